@@ -1,0 +1,180 @@
+//! Backends: what turns batches into recorded chunks, and submits them (M 10.3, "Submitting a RenderCommand to the API").
+
+mod null;
+#[cfg(feature = "wgpu")]
+mod wgpu;
+use std::ops::Range;
+
+use crate::process::{FramePlan, Pass};
+use crate::queue::DrawList;
+use crate::scene::SceneRef;
+use crate::task::Worker;
+use crate::view::{ObjectRecord, Rejections, RenderView};
+
+#[cfg(feature = "wgpu")]
+pub use self::wgpu::{Picture, WgpuBackend, WgpuSubmission};
+pub use null::{NullBackend, NullPass, NullSubmission};
+
+/// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
+/// several workers at once; each of those takes the worker as proof that it runs in a job (M 10.3 asserts it).
+///
+/// The order within a frame: `begin`; then `upload_objects` for every block of objects, and for every pass `prepare`,
+/// `record` for each run of its bundles, and `finish`; then, later and on the device thread, `submit`.
+pub trait Backend: Send + Sync + 'static {
+    /// What one frame holds from `begin` until it was submitted.
+    type Frame: Send + Sync;
+    /// A recorded bundle.
+    type Bundle: Send;
+    /// A finished pass, ready to be submitted.
+    type Commands: Send;
+    /// What is known of a frame that was submitted.
+    type Submission;
+
+    /// What draws, as reports print it.
+    fn adapter(&self) -> String;
+
+    /// Starts a frame: uploads what changed of meshes, materials and textures, and makes targets and pipelines.
+    ///
+    /// # Errors
+    /// If the device cannot hold or make what the frame needs.
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
+
+    /// Uploads objects, from the object `first` on.
+    ///
+    /// # Errors
+    /// If the device refuses.
+    fn upload_objects(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        first: usize,
+        records: &[ObjectRecord],
+    ) -> Result<(), BackendError>;
+
+    /// Makes a pass of commands ready to be recorded: uploads which objects it draws, and makes the pipelines it needs.
+    ///
+    /// # Errors
+    /// If the device refuses; a shader of the process that does not compile is found here at the latest.
+    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: Pass, list: &DrawList) -> Result<(), BackendError>;
+
+    /// Records bundles of a pass.
+    ///
+    /// # Errors
+    /// If the device refuses what was recorded.
+    fn record(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        pass: Pass,
+        list: &DrawList,
+        bundles: Range<usize>,
+    ) -> Result<Vec<Self::Bundle>, BackendError>;
+
+    /// Finishes a pass: its bundles in order, or what it draws without any.
+    ///
+    /// # Errors
+    /// If the device refuses the pass.
+    fn finish(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        plan: &FramePlan,
+        pass: Pass,
+        bundles: Vec<Self::Bundle>,
+    ) -> Result<Self::Commands, BackendError>;
+
+    /// Submits a frame's passes in this order. Called on the device thread alone.
+    ///
+    /// # Errors
+    /// If the device refuses, or is lost.
+    fn submit(&self, frame: Self::Frame, passes: Vec<(Pass, Self::Commands)>)
+    -> Result<Self::Submission, BackendError>;
+}
+
+/// What a frame is to be.
+#[derive(Clone, Copy)]
+pub struct FrameRequest<'a> {
+    /// The processes and their targets.
+    pub plan: &'a FramePlan,
+    /// The views.
+    pub views: &'a [RenderView],
+    /// Each process in each of its views, in the order they are submitted.
+    pub passes: &'a [Pass],
+    /// The scene.
+    pub scene: &'a SceneRef<'a>,
+    /// Where the backend counts what it leaves out.
+    pub rejections: &'a Rejections,
+}
+
+/// What a device could not do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BackendError {
+    /// The device lacks a feature; see the backend's constants for all it needs.
+    #[error("the device lacks {missing}, which Drawloom needs")]
+    MissingFeature {
+        /// The features.
+        missing: String,
+    },
+    /// The device's limits are too low; see the backend's constants for all it needs.
+    #[error("the device's {limit} is {allowed}, and {needed} are needed")]
+    Limit {
+        /// Which limit.
+        limit: &'static str,
+        /// What the device allows.
+        allowed: u64,
+        /// What is needed.
+        needed: u64,
+    },
+    /// The device refused what a pass recorded: an error in a process's shader, targets or parameters.
+    #[error("the device refused {label}: {message}")]
+    Validation {
+        /// What it was.
+        label: String,
+        /// What the device says.
+        message: String,
+    },
+    /// The device is out of memory.
+    #[error("the device is out of memory for {label}")]
+    OutOfMemory {
+        /// What there was no room for.
+        label: String,
+    },
+    /// The device was lost.
+    #[error("the device was lost: {message}")]
+    DeviceLost {
+        /// What the device says.
+        message: String,
+    },
+    /// A process needs what this backend does not have.
+    #[error("process {process:?} cannot be drawn by this backend: {reason}")]
+    Unsupported {
+        /// The process.
+        process: String,
+        /// Why.
+        reason: &'static str,
+    },
+    /// The view's camera is too far from the world's origin, or its numbers are not finite.
+    #[error("view {view:?} is out of reach: its camera is more than 2^33 m from the origin")]
+    ViewOutOfReach {
+        /// The view.
+        view: String,
+    },
+    /// A raw pass reported an error.
+    #[error("the raw pass failed: {0}")]
+    RawPass(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// A target that no view has was asked for.
+    #[error("view {view} has no target {target:?}")]
+    UnknownTarget {
+        /// The view's index.
+        view: usize,
+        /// The name asked for.
+        target: String,
+    },
+    /// What was handed over breaks a rule of the frame: an error of Drawloom's own.
+    #[error("broken rule: {rule}")]
+    BrokenRule {
+        /// The rule.
+        rule: String,
+    },
+}

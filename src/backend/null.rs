@@ -1,0 +1,186 @@
+//! A backend without a device: it counts what it is given, and checks it.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use parking_lot::Mutex;
+
+use super::{Backend, BackendError, FrameRequest};
+use crate::process::{Draws, FramePlan, Pass};
+use crate::queue::{Batch, DrawList};
+use crate::scene::Mesh;
+use crate::task::Worker;
+use crate::view::{LightRecord, ObjectRecord, ViewRecord};
+
+/// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
+/// that draw what is no mesh or that lie beyond a bundle, passes recorded twice or submitted out of order.
+#[derive(Debug, Default)]
+pub struct NullBackend;
+
+/// What was submitted.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NullSubmission {
+    /// In the order they were submitted.
+    pub passes: Vec<NullPass>,
+}
+
+/// One process in one view, as it was submitted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NullPass {
+    /// The process.
+    pub process: String,
+    /// The view's index.
+    pub view: usize,
+    /// How many bundles.
+    pub bundles: usize,
+    /// How many batches in all of them.
+    pub batches: usize,
+    /// How many objects.
+    pub objects: usize,
+    /// How many triangles.
+    pub triangles: usize,
+}
+
+/// A frame on its way.
+#[derive(Debug)]
+pub struct NullFrame {
+    passes: Vec<Pass>,
+    /// Triangles of the mesh in each slot; `None` where there is none.
+    triangles: Vec<Option<usize>>,
+    object_count: usize,
+    uploaded: Mutex<BTreeSet<usize>>,
+    finished: Mutex<BTreeSet<Pass>>,
+}
+
+/// A bundle on its way.
+#[derive(Debug)]
+pub struct NullBundle {
+    batches: usize,
+    objects: Range<usize>,
+    triangles: usize,
+}
+
+impl Backend for NullBackend {
+    type Frame = NullFrame;
+    type Bundle = NullBundle;
+    type Commands = NullPass;
+    type Submission = NullSubmission;
+
+    fn adapter(&self) -> String {
+        String::from("none (null backend)")
+    }
+
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
+        let light_count = request.scene.lights.len();
+        for view in request.views {
+            if ViewRecord::new(view, request.scene, light_count).is_none() {
+                return Err(BackendError::ViewOutOfReach { view: view.name().to_owned() });
+            }
+            let records = request.scene.lights.iter().map(|light| LightRecord::new(light, view.camera.position));
+            ensure(records.count() == light_count, || "a light was lost".to_owned())?;
+        }
+        let mut triangles = vec![None; request.scene.assets.meshes.slot_count()];
+        for (handle, mesh) in request.scene.assets.iter::<Mesh>() {
+            triangles[handle.index() as usize] = Some(mesh.triangle_count());
+        }
+        Ok(NullFrame {
+            passes: request.passes.to_vec(),
+            triangles,
+            object_count: request.scene.object_count(),
+            uploaded: Mutex::default(),
+            finished: Mutex::default(),
+        })
+    }
+
+    fn upload_objects(
+        &self,
+        _worker: &Worker,
+        frame: &NullFrame,
+        first: usize,
+        records: &[ObjectRecord],
+    ) -> Result<(), BackendError> {
+        let mut uploaded = frame.uploaded.lock();
+        for object in first..first + records.len() {
+            ensure(object < frame.object_count, || format!("object {object} is not in the scene"))?;
+            ensure(uploaded.insert(object), || format!("object {object} was uploaded twice"))?;
+        }
+        Ok(())
+    }
+
+    fn prepare(&self, _worker: &Worker, frame: &NullFrame, pass: Pass, list: &DrawList) -> Result<(), BackendError> {
+        ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
+        ensure(list.objects.len() == list.commands.len(), || "objects and commands differ in number".to_owned())?;
+        let ordered = list.commands.is_sorted_by_key(|command| (command.key, command.object));
+        ensure(ordered, || "commands are not sorted".to_owned())?;
+        let beyond = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
+        ensure(beyond.is_none(), || format!("object {beyond:?} is not in the scene"))
+    }
+
+    fn record(
+        &self,
+        _worker: &Worker,
+        frame: &NullFrame,
+        _pass: Pass,
+        list: &DrawList,
+        bundles: Range<usize>,
+    ) -> Result<Vec<NullBundle>, BackendError> {
+        bundles.map(|bundle| record_bundle(frame, list.bundle(bundle))).collect()
+    }
+
+    fn finish(
+        &self,
+        _worker: &Worker,
+        frame: &NullFrame,
+        plan: &FramePlan,
+        pass: Pass,
+        bundles: Vec<NullBundle>,
+    ) -> Result<NullPass, BackendError> {
+        ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
+        let process = &plan.processes()[pass.process].process;
+        if !matches!(process.draws(), Draws::Commands(_)) {
+            ensure(bundles.is_empty(), || format!("{:?} draws no commands but has bundles", process.name()))?;
+        }
+        let mut end = 0;
+        for bundle in &bundles {
+            ensure(bundle.objects.start == end, || "bundles are not in order".to_owned())?;
+            end = bundle.objects.end;
+        }
+        Ok(NullPass {
+            process: process.name().to_owned(),
+            view: pass.view,
+            bundles: bundles.len(),
+            batches: bundles.iter().map(|bundle| bundle.batches).sum(),
+            objects: end,
+            triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
+        })
+    }
+
+    fn submit(&self, frame: NullFrame, passes: Vec<(Pass, NullPass)>) -> Result<NullSubmission, BackendError> {
+        let uploaded = frame.uploaded.lock().len();
+        ensure(uploaded == frame.object_count, || format!("{uploaded} of {} objects uploaded", frame.object_count))?;
+        let in_order = passes.iter().map(|(pass, _)| pass).eq(&frame.passes);
+        ensure(in_order, || "passes were submitted in another order than planned".to_owned())?;
+        Ok(NullSubmission { passes: passes.into_iter().map(|(_, pass)| pass).collect() })
+    }
+}
+
+fn record_bundle(frame: &NullFrame, batches: &[Batch]) -> Result<NullBundle, BackendError> {
+    let within = (1..=DrawList::BATCHES_PER_BUNDLE).contains(&batches.len());
+    ensure(within, || format!("a bundle of {} batches", batches.len()))?;
+    let start = batches[0].first;
+    let (mut end, mut triangles) = (start, 0);
+    for batch in batches {
+        ensure(batch.first == end && batch.count > 0, || format!("a gap or an overlap at object {end}"))?;
+        let mesh = frame.triangles.get(batch.mesh as usize).copied().flatten();
+        let Some(of_mesh) = mesh else {
+            return Err(BackendError::BrokenRule { rule: format!("slot {} holds no mesh", batch.mesh) });
+        };
+        triangles += of_mesh * batch.count as usize;
+        end += batch.count;
+    }
+    Ok(NullBundle { batches: batches.len(), objects: start as usize..end as usize, triangles })
+}
+
+fn ensure(holds: bool, rule: impl FnOnce() -> String) -> Result<(), BackendError> {
+    if holds { Ok(()) } else { Err(BackendError::BrokenRule { rule: rule() }) }
+}

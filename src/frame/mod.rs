@@ -1,0 +1,17 @@
+//! The façade: a scene goes in, recorded queues come out, and the device thread submits them.
+
+mod builder;
+mod error;
+mod granularity;
+mod jobs;
+mod phase;
+mod recorded;
+mod renderer;
+mod statistics;
+
+pub use builder::RendererBuilder;
+pub use error::{BuildError, FrameError, SubmitError};
+pub use granularity::Granularity;
+pub use recorded::{Recorded, Submitted, Submitter, ViewQueue};
+pub use renderer::Renderer;
+pub use statistics::{FrameStatistics, StageTimes, ViewStatistics};

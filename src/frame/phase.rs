@@ -1,0 +1,239 @@
+//! The phases of a frame: what each job does.
+
+use std::ops::Range;
+
+use parking_lot::{Mutex, RwLock};
+
+use super::Granularity;
+use super::statistics::{Stage, StageClock};
+use crate::backend::{Backend, BackendError};
+use crate::blocks::Blocks;
+use crate::command::RenderCommand;
+use crate::graph::{Node, NodeError};
+use crate::process::{FramePlan, Pass};
+use crate::queue::{DrawList, Fill, Selection, instance, sort};
+use crate::scene::SceneRef;
+use crate::task::Worker;
+use crate::view::{ObjectRecord, ObjectTable, RenderView, VisibleSet};
+
+/// A node of the frame's job graph: one phase, of the frame, of a view, or of a pass (by index).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// Checks every object and works out what all views need to know of it.
+    Objects,
+    /// Uploads what an object is.
+    Upload,
+    /// Finds what a view sees.
+    Visibility { view: usize },
+    /// Counts it.
+    Compact { view: usize },
+    /// Makes commands of it.
+    Fill { pass: usize },
+    /// Brings them into order.
+    Sort { pass: usize },
+    /// Merges equal runs.
+    Instance { pass: usize },
+    /// Uploads which objects are drawn, and makes pipelines.
+    Prepare { pass: usize },
+    /// Records bundles.
+    Record { pass: usize },
+    /// Finishes the pass.
+    Finish { pass: usize },
+}
+
+/// What a frame's jobs share.
+pub(super) struct FrameContext<'a, B: Backend> {
+    pub(super) scene: &'a SceneRef<'a>,
+    pub(super) plan: &'a FramePlan,
+    pub(super) views: &'a [RenderView],
+    pub(super) passes: &'a [Pass],
+    pub(super) tables: &'a FrameTables,
+    pub(super) granularity: Granularity,
+    pub(super) backend: &'a B,
+    pub(super) frame: &'a B::Frame,
+    pub(super) recordings: &'a [Recording<B>],
+    pub(super) clock: &'a StageClock,
+}
+
+/// What phases leave for each other; kept from frame to frame so that its memory is reused.
+#[derive(Debug, Default)]
+pub(super) struct FrameTables {
+    pub(super) objects: ObjectTable,
+    /// One for each view.
+    pub(super) visible: Vec<VisibleSet>,
+    /// One for each pass.
+    pub(super) passes: Vec<PassTable>,
+}
+
+/// What one pass draws, on its way from slots to batches.
+#[derive(Debug, Default)]
+pub(super) struct PassTable {
+    /// Which objects it draws; `None` for a pass without commands.
+    pub(super) selection: Option<Selection>,
+    pub(super) commands: Blocks<RenderCommand>,
+    pub(super) list: RwLock<DrawList>,
+}
+
+impl FrameTables {
+    /// Makes room for a frame of `objects` objects.
+    pub(super) fn reset(&mut self, objects: usize) {
+        self.objects.reset(objects);
+        for visible in &mut self.visible {
+            visible.reset(objects);
+        }
+        for pass in &mut self.passes {
+            if pass.selection.is_some() {
+                pass.commands.reserve(objects, RenderCommand::NOTHING);
+            }
+        }
+    }
+}
+
+/// What one pass records: its bundles as they come, and itself when it is finished.
+pub(super) struct Recording<B: Backend> {
+    bundles: Mutex<Vec<Option<B::Bundle>>>,
+    finished: Mutex<Option<B::Commands>>,
+}
+
+impl<B: Backend> Recording<B> {
+    pub(super) fn new() -> Self {
+        Self { bundles: Mutex::new(Vec::new()), finished: Mutex::new(None) }
+    }
+
+    pub(super) fn into_finished(self) -> Option<B::Commands> {
+        self.finished.into_inner()
+    }
+}
+
+/// Objects in a job of [`Phase::Objects`], and blocks of them in a job of [`Phase::Upload`]: neither belongs to a view, so
+/// granularity does not apply.
+const OBJECTS_PER_JOB: usize = BLOCKS_PER_JOB * Blocks::<ObjectRecord>::SIZE;
+const BLOCKS_PER_JOB: usize = 4;
+
+impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        let tables = frame.tables;
+        match *self {
+            Self::Objects | Self::Visibility { .. } => tables.objects.len(),
+            Self::Upload => tables.objects.len().div_ceil(Blocks::<ObjectRecord>::SIZE),
+            Self::Fill { pass } => tables.visible[frame.passes[pass].view].count(),
+            Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
+            Self::Compact { .. }
+            | Self::Sort { .. }
+            | Self::Instance { .. }
+            | Self::Prepare { .. }
+            | Self::Finish { .. } => 1,
+        }
+    }
+
+    fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
+        match self {
+            Self::Objects => OBJECTS_PER_JOB,
+            Self::Upload => BLOCKS_PER_JOB,
+            Self::Visibility { .. } | Self::Fill { .. } => frame.granularity.items(),
+            Self::Record { .. } => frame.granularity.bundles(),
+            _ => 1,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
+        Ok(frame.clock.measure(self.stage(), || self.work(frame, range, worker))?)
+    }
+}
+
+impl Phase {
+    fn stage(self) -> Stage {
+        match self {
+            Self::Objects | Self::Visibility { .. } | Self::Compact { .. } => Stage::Visibility,
+            Self::Fill { .. } => Stage::Fill,
+            Self::Sort { .. } => Stage::Sort,
+            Self::Instance { .. } => Stage::Instance,
+            Self::Upload | Self::Prepare { .. } | Self::Record { .. } | Self::Finish { .. } => Stage::Record,
+        }
+    }
+
+    fn work<B: Backend>(
+        self,
+        frame: &FrameContext<'_, B>,
+        range: Range<usize>,
+        worker: &Worker,
+    ) -> Result<(), BackendError> {
+        let tables = frame.tables;
+        match self {
+            Self::Objects => tables.objects.fill(frame.scene, range),
+            Self::Upload => return upload(frame, range, worker),
+            Self::Visibility { view } => see(frame, view, range),
+            Self::Compact { view } => tables.visible[view].compact(),
+            Self::Fill { pass } => fill(frame, pass, range),
+            Self::Sort { pass } => {
+                let count = tables.visible[frame.passes[pass].view].count();
+                sort(&tables.passes[pass].commands, count, &mut tables.passes[pass].list.write().commands);
+            }
+            Self::Instance { pass } => instance(&mut tables.passes[pass].list.write()),
+            Self::Prepare { pass } => {
+                let list = tables.passes[pass].list.read();
+                frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
+                return frame.backend.prepare(worker, frame.frame, frame.passes[pass], &list);
+            }
+            Self::Record { pass } => return record(frame, pass, range, worker),
+            Self::Finish { pass } => return finish(frame, pass, worker),
+        }
+        Ok(())
+    }
+}
+
+fn upload<B: Backend>(frame: &FrameContext<'_, B>, blocks: Range<usize>, worker: &Worker) -> Result<(), BackendError> {
+    let objects = &frame.tables.objects;
+    for block in blocks {
+        let first = block * Blocks::<ObjectRecord>::SIZE;
+        let count = (objects.len() - first).min(Blocks::<ObjectRecord>::SIZE);
+        frame.backend.upload_objects(worker, frame.frame, first, &objects.records().read(block)[..count])?;
+    }
+    Ok(())
+}
+
+fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
+    let frustum = &frame.views[view].frustum;
+    for (block, part) in Blocks::<ObjectRecord>::parts(range) {
+        let bounds = frame.tables.objects.bounds().read(block);
+        frame.tables.visible[view].test(part, |object| {
+            let bounds = bounds[object % Blocks::<ObjectRecord>::SIZE];
+            frustum.may_see(bounds.center, bounds.radius)
+        });
+    }
+}
+
+fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
+    let table = &frame.tables.passes[pass];
+    let view = frame.passes[pass].view;
+    let fill = Fill {
+        table: &frame.tables.objects,
+        view: &frame.views[view],
+        visible: &frame.tables.visible[view],
+        selection: table.selection.unwrap_or_default(),
+    };
+    fill.run(ranks, &table.commands);
+}
+
+fn record<B: Backend>(
+    frame: &FrameContext<'_, B>,
+    pass: usize,
+    bundles: Range<usize>,
+    worker: &Worker,
+) -> Result<(), BackendError> {
+    let list = frame.tables.passes[pass].list.read();
+    let recorded = frame.backend.record(worker, frame.frame, frame.passes[pass], &list, bundles.clone())?;
+    let mut slots = frame.recordings[pass].bundles.lock();
+    for (slot, bundle) in slots[bundles].iter_mut().zip(recorded) {
+        *slot = Some(bundle);
+    }
+    Ok(())
+}
+
+fn finish<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, worker: &Worker) -> Result<(), BackendError> {
+    let recording = &frame.recordings[pass];
+    let bundles: Vec<_> = std::mem::take(&mut *recording.bundles.lock()).into_iter().flatten().collect();
+    let finished = frame.backend.finish(worker, frame.frame, frame.plan, frame.passes[pass], bundles)?;
+    *recording.finished.lock() = Some(finished);
+    Ok(())
+}

@@ -1,0 +1,93 @@
+//! Submission: from queues to the device, on the device thread alone.
+
+use std::marker::PhantomData;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{FrameStatistics, SubmitError};
+use crate::backend::Backend;
+use crate::process::Pass;
+
+/// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. Dropped
+/// without being submitted, it leaves no trace.
+#[must_use = "a frame is not drawn until it is submitted"]
+pub struct Recorded<B: Backend> {
+    pub(super) queues: Vec<ViewQueue<B::Commands>>,
+    pub(super) frame: B::Frame,
+    pub(super) statistics: FrameStatistics,
+    pub(super) backend: Arc<B>,
+}
+
+impl<B: Backend> Recorded<B> {
+    /// What the frame is, in numbers.
+    pub fn statistics(&self) -> &FrameStatistics {
+        &self.statistics
+    }
+
+    /// One queue for each view.
+    pub fn queues(&self) -> &[ViewQueue<B::Commands>] {
+        &self.queues
+    }
+}
+
+/// One view's queue: its finished passes in order.
+#[derive(Debug)]
+pub struct ViewQueue<T> {
+    /// The view's index.
+    pub view: usize,
+    /// Its passes, each finished and ready to submit.
+    pub passes: Vec<(Pass, T)>,
+}
+
+/// Submits frames. It cannot leave the thread that built it, which is the device thread (M 10.3's assert, moved into the
+/// type):
+///
+/// ```compile_fail
+/// fn leave<B: drawloom::backend::Backend>(submitter: drawloom::Submitter<B>) {
+///     std::thread::spawn(move || submitter);
+/// }
+/// ```
+pub struct Submitter<B> {
+    backend: Arc<B>,
+    stays_on_its_thread: PhantomData<*const ()>,
+}
+
+impl<B: Backend> Submitter<B> {
+    pub(super) fn new(backend: Arc<B>) -> Self {
+        Self { backend, stays_on_its_thread: PhantomData }
+    }
+
+    /// Submits a frame: the views' queues, merged into the order of the graph. Frames are to be submitted in the order they
+    /// were recorded.
+    ///
+    /// # Errors
+    /// If the frame is another renderer's, or the device refuses it.
+    pub fn submit(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
+        let span = tracing::debug_span!(target: "drawloom", "submit");
+        let _entered = span.enter();
+        if !Arc::ptr_eq(&self.backend, &recorded.backend) {
+            return Err(SubmitError::ForeignFrame);
+        }
+        let start = Instant::now();
+        let Recorded { queues, frame, mut statistics, .. } = recorded;
+        let mut passes: Vec<_> = queues.into_iter().flat_map(|queue| queue.passes).collect();
+        // Passes are ordered by process first, and processes are in an order that keeps every dependency.
+        passes.sort_by_key(|(pass, _)| *pass);
+        let submission = self.backend.submit(frame, passes)?;
+        statistics.stages.submit = start.elapsed();
+        Ok(Submitted { submission, statistics })
+    }
+
+    /// What draws.
+    pub fn backend(&self) -> &B {
+        &self.backend
+    }
+}
+
+/// A frame that was submitted.
+pub struct Submitted<B: Backend> {
+    /// What the backend knows of it.
+    pub submission: B::Submission,
+    /// What it was, in numbers.
+    pub statistics: FrameStatistics,
+}

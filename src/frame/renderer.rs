@@ -1,0 +1,229 @@
+//! Recording: from a scene to queues that are ready to submit.
+
+use std::sync::Arc;
+
+use parking_lot::RwLockReadGuard;
+
+use super::jobs::FrameJobs;
+use super::phase::{FrameContext, FrameTables, Recording};
+use super::recorded::{Recorded, ViewQueue};
+use super::statistics::{Stage, StageClock};
+use super::{FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
+use crate::backend::{Backend, FrameRequest};
+use crate::graph::RunError;
+use crate::process::FramePlan;
+use crate::queue::DrawList;
+use crate::scene::{SceneError, SceneRef};
+use crate::task::Scheduler;
+use crate::view::{RejectionReason, RenderView, VisibleSet};
+
+/// Produces frames: records a scene on all workers, and gives it back when that is done.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use drawloom::backend::NullBackend;
+/// use drawloom::scene::sample;
+/// use drawloom::task::Scheduler;
+/// use drawloom::Renderer;
+///
+/// let scheduler = Arc::new(Scheduler::new(2)?);
+/// let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred().build(scheduler)?;
+///
+/// let scene = sample::colonnade()?;
+/// let recorded = renderer.record(scene.as_scene_ref())?;
+/// // From here on the scene may change again.
+/// let submitted = submitter.submit(recorded)?;
+/// assert!(submitted.statistics.views[0].visible > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Renderer<B: Backend> {
+    backend: Arc<B>,
+    plan: FramePlan,
+    granularity: Granularity,
+    scheduler: Arc<Scheduler>,
+    jobs: Option<FrameJobs>,
+    tables: FrameTables,
+}
+
+impl<B: Backend> Renderer<B> {
+    /// Starts to put a renderer together.
+    pub fn builder(backend: B) -> RendererBuilder<B> {
+        RendererBuilder::new(backend)
+    }
+
+    pub(super) fn new(backend: Arc<B>, plan: FramePlan, granularity: Granularity, scheduler: Arc<Scheduler>) -> Self {
+        Self { backend, plan, granularity, scheduler, jobs: None, tables: FrameTables::default() }
+    }
+
+    /// Records a frame: everything up to submission. The calling thread works too.
+    ///
+    /// Objects, lights and textures that cannot be drawn are left out, counted in the statistics, and warned of through
+    /// `tracing`.
+    ///
+    /// # Errors
+    /// If the scene has no camera, a camera that cannot be, or slices of different lengths; if the device refuses
+    /// something; if a process fails or panics. The next frame is not affected.
+    pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
+        let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
+        let _entered = span.enter();
+        check(&scene)?;
+        let views: Vec<RenderView> = scene.cameras.iter().map(RenderView::new).collect();
+        self.draw_up_jobs(&views)?;
+        self.tables.reset(scene.object_count());
+        let lights = self.valid_lights(&scene);
+        let scene = SceneRef { lights: &lights, ..scene };
+
+        let clock = StageClock::default();
+        let recorded = self.run_jobs(&scene, &views, &clock)?;
+        let statistics = self.statistics(&scene, &views, &clock);
+        Ok(Recorded { queues: recorded.1, frame: recorded.0, statistics, backend: Arc::clone(&self.backend) })
+    }
+
+    /// What the last recorded frame drew in one view by one process; `None` where that process draws no commands there.
+    pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
+        let passes = &self.jobs.as_ref()?.passes;
+        let index = passes
+            .iter()
+            .position(|pass| pass.view == view && self.plan.processes()[pass.process].process.name() == process)?;
+        let table = &self.tables.passes[index];
+        table.selection.map(|_| table.list.read())
+    }
+
+    /// The processes and their targets.
+    pub fn plan(&self) -> &FramePlan {
+        &self.plan
+    }
+
+    /// The last frame's jobs as a graph in the DOT language; `None` before the first frame.
+    pub fn jobs_to_dot(&self) -> Option<String> {
+        self.jobs.as_ref().map(|jobs| jobs.schedule.to_dot())
+    }
+
+    /// What draws.
+    pub fn backend(&self) -> &B {
+        &self.backend
+    }
+
+    fn draw_up_jobs(&mut self, views: &[RenderView]) -> Result<(), FrameError> {
+        if !self.jobs.as_ref().is_some_and(|jobs| jobs.fit(views)) {
+            let jobs = FrameJobs::new(&self.plan, views)?;
+            self.tables.visible.resize_with(views.len(), VisibleSet::default);
+            self.tables.passes = jobs.pass_tables(&self.plan);
+            self.jobs = Some(jobs);
+        }
+        Ok(())
+    }
+
+    /// The lights that can be; the others are counted.
+    fn valid_lights(&self, scene: &SceneRef<'_>) -> Vec<crate::scene::Light> {
+        let valid = scene.lights.iter().enumerate().filter(|(index, light)| {
+            let checked = light.check(*index);
+            if let Err(error) = &checked {
+                tracing::warn!(target: "drawloom", %error, "light left out");
+                self.tables.objects.rejections().count(RejectionReason::InvalidLight, *index);
+            }
+            checked.is_ok()
+        });
+        valid.map(|(_, light)| *light).collect()
+    }
+
+    fn run_jobs(
+        &mut self,
+        scene: &SceneRef<'_>,
+        views: &[RenderView],
+        clock: &StageClock,
+    ) -> Result<(B::Frame, Vec<ViewQueue<B::Commands>>), FrameError> {
+        let Some(jobs) = &mut self.jobs else { return Err(FrameError::NoView) };
+        let request = FrameRequest {
+            plan: &self.plan,
+            views,
+            passes: &jobs.passes,
+            scene,
+            rejections: self.tables.objects.rejections(),
+        };
+        let frame = clock.measure(Stage::Record, || self.backend.begin(&request))?;
+        let recordings: Vec<Recording<B>> = jobs.passes.iter().map(|_| Recording::new()).collect();
+        let context = FrameContext {
+            scene,
+            plan: &self.plan,
+            views,
+            passes: &jobs.passes,
+            tables: &self.tables,
+            granularity: self.granularity,
+            backend: &*self.backend,
+            frame: &frame,
+            recordings: &recordings,
+            clock,
+        };
+        jobs.schedule.run(&self.scheduler, &context).map_err(|error| match error {
+            RunError::Failed { process, source } => FrameError::Failed { phase: process, source },
+            RunError::Panicked { process, message } => FrameError::Panicked { phase: process, message },
+            RunError::Scheduler(panic) => FrameError::Job(panic),
+        })?;
+
+        let mut queues: Vec<_> = (0..views.len()).map(|view| ViewQueue { view, passes: Vec::new() }).collect();
+        for (&pass, recording) in jobs.passes.iter().zip(recordings) {
+            queues[pass.view].passes.extend(recording.into_finished().map(|finished| (pass, finished)));
+        }
+        Ok((frame, queues))
+    }
+
+    fn statistics(&self, scene: &SceneRef<'_>, views: &[RenderView], clock: &StageClock) -> FrameStatistics {
+        let passes = self.jobs.as_ref().map_or(&[][..], |jobs| &jobs.passes);
+        let of_view = |(index, view): (usize, &RenderView)| {
+            let mut statistics = ViewStatistics {
+                name: view.name().to_owned(),
+                kind: view.kind(),
+                visible: self.tables.visible[index].count(),
+                commands: 0,
+                batches: 0,
+                bundles: 0,
+            };
+            for (table, _) in self.tables.passes.iter().zip(passes).filter(|(_, pass)| pass.view == index) {
+                let list = table.list.read();
+                statistics.commands += list.commands.len();
+                statistics.batches += list.batches.len();
+                statistics.bundles += list.bundle_count();
+            }
+            statistics
+        };
+        let rejections = self.tables.objects.rejections().list();
+        for rejection in &rejections {
+            let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
+            tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
+        }
+        FrameStatistics {
+            objects: scene.object_count(),
+            lights: scene.lights.len(),
+            views: views.iter().enumerate().map(of_view).collect(),
+            stages: clock.times(),
+            rejections,
+        }
+    }
+}
+
+/// What must hold of a scene as a whole. Single objects and lights are left out instead.
+fn check(scene: &SceneRef<'_>) -> Result<(), FrameError> {
+    scene.check_lengths()?;
+    let objects = scene.object_count();
+    if u32::try_from(objects).is_err() {
+        return Err(FrameError::TooManyObjects { objects });
+    }
+    if scene.cameras.is_empty() {
+        return Err(FrameError::NoView);
+    }
+    for camera in scene.cameras {
+        let [width, height] = camera.size;
+        if width == 0 || height == 0 {
+            return Err(FrameError::EmptyTarget { view: camera.name.clone(), width, height });
+        }
+        camera.check()?;
+    }
+    for (name, color) in [("ambient", scene.ambient), ("background", scene.background)] {
+        if !color.is_finite() || color.min_element() < 0.0 {
+            return Err(SceneError::InvalidColor { name }.into());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,293 @@
+//! From a graph to its schedule: order it, see what is needed, check that, and lay it out flat.
+
+use std::{
+    cmp::Reverse,
+    collections::{BinaryHeap, HashMap, HashSet},
+};
+
+use crossbeam_utils::CachePadded;
+use petgraph::{
+    Direction,
+    graph::{DiGraph, NodeIndex},
+    visit::EdgeRef,
+};
+
+use super::{
+    builder::FrameGraph,
+    edges::{self, Edges, Relation, Roles, Walk},
+    error::{CompileError, GraphProblem},
+    progress::Progress,
+    schedule::{Adjacency, Schedule},
+};
+
+impl<P> FrameGraph<P> {
+    /// Orders the processes, drops those that lead to no output, and checks the rest.
+    ///
+    /// # Errors
+    ///
+    /// [`CompileError`], with the graph and the first [`GraphProblem`] in the order its variants are declared in. Names and
+    /// cycles are looked at in the whole graph; a missing producer and writers without an order only matter where
+    /// the processes they belong to are kept.
+    pub fn compile(mut self) -> Result<Schedule<P>, CompileError<P>> {
+        match plan(&mut self) {
+            Ok(plan) => Ok(lay_out(self, &plan)),
+            Err(problem) => Err(CompileError { graph: Box::new(self), problem }),
+        }
+    }
+}
+
+/// What a graph compiles to, before it is laid out: all by positions in the graph.
+struct Plan {
+    needed: Vec<bool>,
+    /// The needed processes in the order they run in.
+    order: Vec<usize>,
+    /// Per process, the needed processes it waits for.
+    dependencies: Vec<Vec<usize>>,
+}
+
+fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
+    if let Some(misuse) = graph.misuses.pop_front() {
+        return Err(misuse);
+    }
+    let graph = &*graph;
+    check_names(graph)?;
+    let roles = Roles::of_all(graph);
+    let mut edges = edges::derive(graph, &roles);
+    let order = in_order(&edges);
+    if order.len() < graph.processes.len() {
+        let processes = circle(&edges, &order).into_iter().map(|node| name(graph, node)).collect();
+        return Err(GraphProblem::Cycle { processes });
+    }
+    edges::add_versions(&mut edges, &roles);
+    let needed = edges::needed(graph, &roles, &edges);
+    let mut place = vec![0; order.len()];
+    for (at, node) in order.iter().enumerate() {
+        place[node.index()] = at;
+    }
+    let facts = Facts { graph, roles: &roles, edges: &edges, needed: &needed, place: &place };
+    facts.check_producers()?;
+    facts.check_writers()?;
+    let dependencies = facts.dependencies();
+
+    // Ordered anew, so that what was dropped has no say in how ties are broken.
+    let mut remaining = DiGraph::<(), ()>::with_capacity(needed.len(), 0);
+    for _ in &needed {
+        remaining.add_node(());
+    }
+    for (process, dependencies) in dependencies.iter().enumerate() {
+        for &dependency in dependencies {
+            remaining.add_edge(NodeIndex::new(dependency), NodeIndex::new(process), ());
+        }
+    }
+    let order = in_order(&remaining).into_iter().map(NodeIndex::index).filter(|&process| needed[process]).collect();
+    Ok(Plan { needed, order, dependencies })
+}
+
+fn name<P>(graph: &FrameGraph<P>, node: NodeIndex) -> String {
+    graph.processes[node.index()].name.clone()
+}
+
+fn check_names<P>(graph: &FrameGraph<P>) -> Result<(), GraphProblem> {
+    let mut names = HashSet::new();
+    match graph.processes.iter().find(|process| !names.insert(process.name.as_str())) {
+        Some(process) => Err(GraphProblem::DuplicateProcess { name: process.name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// The nodes, each after all before it, the lowest first where several could be next. Nodes on a circle, and those
+/// behind one, are left out.
+fn in_order<E>(graph: &DiGraph<(), E>) -> Vec<NodeIndex> {
+    let mut waits_for: Vec<usize> =
+        graph.node_indices().map(|node| graph.edges_directed(node, Direction::Incoming).count()).collect();
+    let mut ready: BinaryHeap<Reverse<NodeIndex>> =
+        graph.node_indices().filter(|node| waits_for[node.index()] == 0).map(Reverse).collect();
+    let mut order = Vec::with_capacity(waits_for.len());
+    while let Some(Reverse(node)) = ready.pop() {
+        order.push(node);
+        for after in graph.neighbors(node) {
+            waits_for[after.index()] -= 1;
+            if waits_for[after.index()] == 0 {
+                ready.push(Reverse(after));
+            }
+        }
+    }
+    order
+}
+
+/// The nodes of one circle, the lowest first, of a graph that has one; `ordered` is what [`in_order`] made of it.
+fn circle(edges: &Edges, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
+    let mut stuck = vec![true; edges.node_count()];
+    for node in ordered {
+        stuck[node.index()] = false;
+    }
+    // Whoever is stuck waits for somebody who is stuck, so the way back comes by a node twice.
+    let mut path: Vec<NodeIndex> = Vec::new();
+    let mut place = vec![None; stuck.len()];
+    let mut next = edges.node_indices().find(|node| stuck[node.index()]);
+    while let Some(node) = next {
+        if let Some(start) = place[node.index()].replace(path.len()) {
+            path.drain(..start);
+            break;
+        }
+        path.push(node);
+        next = edges.neighbors_directed(node, Direction::Incoming).filter(|before| stuck[before.index()]).min();
+    }
+    path.reverse();
+    let lowest = (0..path.len()).min_by_key(|&at| path[at]).unwrap_or(0);
+    path.rotate_left(lowest);
+    path
+}
+
+/// What is known of a graph that can be put in order.
+struct Facts<'a, P> {
+    graph: &'a FrameGraph<P>,
+    roles: &'a [Roles],
+    edges: &'a Edges,
+    needed: &'a [bool],
+    /// Per process, its place in the order of all, dropped ones included.
+    place: &'a [usize],
+}
+
+impl<P> Facts<'_, P> {
+    fn is_needed(&self, node: NodeIndex) -> bool {
+        self.needed[node.index()]
+    }
+
+    fn place(&self, node: NodeIndex) -> usize {
+        self.place[node.index()]
+    }
+
+    fn check_producers(&self) -> Result<(), GraphProblem> {
+        for (index, (resource, roles)) in self.graph.resources.iter().zip(self.roles).enumerate() {
+            if resource.imported {
+                continue;
+            }
+            let has_producer = |node: NodeIndex| {
+                let mut incoming = self.edges.edges_directed(node, Direction::Incoming);
+                incoming.any(|edge| *edge.weight() == Relation::Data(index))
+            };
+            let readers = roles.modifiers.iter().chain(&roles.readers);
+            let mut readers: Vec<NodeIndex> =
+                readers.copied().filter(|&reader| self.is_needed(reader) && !has_producer(reader)).collect();
+            let output = resource.output && roles.makers().next().is_none();
+            if output || !readers.is_empty() {
+                readers.sort_unstable();
+                return Err(GraphProblem::MissingProducer {
+                    resource: resource.name.clone(),
+                    output,
+                    readers: readers.into_iter().map(|reader| name(self.graph, reader)).collect(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// All makers of a resource have an order if each, in the order of all processes, leads to the next.
+    fn check_writers(&self) -> Result<(), GraphProblem> {
+        let mut walk = Walk::new(self.edges);
+        for (resource, roles) in self.graph.resources.iter().zip(self.roles) {
+            let mut makers: Vec<NodeIndex> = roles.makers().filter(|&maker| self.is_needed(maker)).collect();
+            makers.sort_unstable_by_key(|&maker| self.place(maker));
+            for pair in makers.windows(2) {
+                let end = self.place(pair[1]);
+                walk.from(self.edges, pair[0], Direction::Outgoing, |node, _| self.place(node) <= end);
+                if !walk.has_met(pair[1]) {
+                    return Err(GraphProblem::UnorderedWriters {
+                        resource: resource.name.clone(),
+                        first: name(self.graph, pair[0]),
+                        second: name(self.graph, pair[1]),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Per process, the needed ones it waits for, if it is needed itself.
+    fn dependencies(&self) -> Vec<Vec<usize>> {
+        let mut passed = vec![usize::MAX; self.needed.len()];
+        let mut dependencies = vec![Vec::new(); self.needed.len()];
+        for node in self.edges.node_indices().filter(|&node| self.is_needed(node)) {
+            let dependencies = &mut dependencies[node.index()];
+            self.add_last_makers(node, dependencies);
+            // An order that leads through dropped processes ends at the needed ones before them.
+            let mut open = vec![node];
+            while let Some(after) = open.pop() {
+                for edge in self.edges.edges_directed(after, Direction::Incoming) {
+                    let before = edge.source();
+                    if after == node && *edge.weight() != Relation::Order {
+                        continue;
+                    }
+                    if self.is_needed(before) {
+                        dependencies.push(before.index());
+                    } else if passed[before.index()] != node.index() {
+                        passed[before.index()] = node.index();
+                        open.push(before);
+                    }
+                }
+            }
+            dependencies.sort_unstable();
+            dependencies.dedup();
+        }
+        dependencies
+    }
+
+    /// Of all makers of a resource that a process needs, it has to wait for the last one only, since they have an order.
+    fn add_last_makers(&self, node: NodeIndex, dependencies: &mut Vec<usize>) {
+        let mut last: HashMap<usize, NodeIndex> = HashMap::new();
+        for edge in self.edges.edges_directed(node, Direction::Incoming) {
+            if let Relation::Data(resource) = *edge.weight() {
+                let maker = last.entry(resource).or_insert(edge.source());
+                if self.place(edge.source()) > self.place(*maker) {
+                    *maker = edge.source();
+                }
+            }
+        }
+        dependencies.extend(last.into_values().map(NodeIndex::index));
+    }
+}
+
+fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
+    let mut index_of = vec![0; plan.needed.len()];
+    for (index, &process) in plan.order.iter().enumerate() {
+        index_of[process] = index;
+    }
+    let mut dependencies = vec![Vec::new(); plan.order.len()];
+    let mut dependents = vec![Vec::new(); plan.order.len()];
+    for (index, &process) in plan.order.iter().enumerate() {
+        dependencies[index] = plan.dependencies[process].iter().map(|&dependency| index_of[dependency]).collect();
+        dependencies[index].sort_unstable();
+        for &dependency in &dependencies[index] {
+            dependents[dependency].push(index);
+        }
+    }
+    let mut dropped = Vec::new();
+    let mut kept = Vec::with_capacity(plan.order.len());
+    for (position, process) in graph.processes.into_iter().enumerate() {
+        if plan.needed[position] {
+            kept.push((index_of[position], process));
+        } else {
+            dropped.push(process.name);
+        }
+    }
+    kept.sort_unstable_by_key(|(index, _)| *index);
+    let mut schedule = Schedule {
+        names: Vec::with_capacity(kept.len()),
+        processes: Vec::with_capacity(kept.len()),
+        indices: HashMap::with_capacity(kept.len()),
+        roots: (0..kept.len()).filter(|&index| dependencies[index].is_empty()).collect(),
+        progress: dependencies.iter().map(|list| CachePadded::new(Progress::new(list.len()))).collect(),
+        dependencies: Adjacency::new(dependencies),
+        dependents: Adjacency::new(dependents),
+        dropped,
+        inside: Vec::new(),
+        armed: true,
+    };
+    for (index, process) in kept {
+        schedule.names.push(process.name);
+        schedule.processes.push(process.payload);
+        schedule.indices.insert(process.id, index);
+    }
+    schedule
+}

@@ -1,0 +1,189 @@
+//! Who waits for whom, and why: the rules of [`FrameGraph`] turned into edges.
+
+use petgraph::{
+    Direction,
+    graph::{DiGraph, NodeIndex},
+    visit::EdgeRef,
+};
+
+use super::builder::{Access, FrameGraph};
+
+/// An edge per reason to wait, from the process waited for. The node of a process is its position in the graph.
+pub(super) type Edges = DiGraph<(), Relation>;
+
+/// Why one process waits for another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Relation {
+    /// It was told to.
+    Order,
+    /// It needs what the other makes of this resource.
+    Data(usize),
+}
+
+/// The processes that touch one resource, by what they do with it, each in the order they were added.
+#[derive(Default)]
+pub(super) struct Roles {
+    pub(super) writers: Vec<NodeIndex>,
+    pub(super) modifiers: Vec<NodeIndex>,
+    pub(super) readers: Vec<NodeIndex>,
+}
+
+impl Roles {
+    /// Every resource's.
+    pub(super) fn of_all<P>(graph: &FrameGraph<P>) -> Vec<Self> {
+        let mut accesses = graph.accesses.clone();
+        accesses.sort_unstable_by_key(|access| (access.resource, access.process, access.writes));
+        let mut roles: Vec<Self> = graph.resources.iter().map(|_| Self::default()).collect();
+        for of_one in accesses.chunk_by(|one, next| (one.resource, one.process) == (next.resource, next.process)) {
+            let reads = of_one.iter().any(|access| !access.writes);
+            let writes = of_one.iter().any(|access| access.writes);
+            let Access { resource, process, .. } = of_one[0];
+            let roles = &mut roles[resource];
+            let role = match (reads, writes) {
+                (_, false) => &mut roles.readers,
+                (false, true) => &mut roles.writers,
+                (true, true) => &mut roles.modifiers,
+            };
+            role.push(NodeIndex::new(process));
+        }
+        roles
+    }
+
+    /// All that make something of the resource: writers and modifiers.
+    pub(super) fn makers(&self) -> impl Iterator<Item = NodeIndex> {
+        self.writers.iter().chain(&self.modifiers).copied()
+    }
+}
+
+/// The edges that were told, and those that follow from what each process does with each resource alone.
+pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
+    let mut edges = Edges::default();
+    for _ in &graph.processes {
+        edges.add_node(());
+    }
+    for (before, after) in &graph.orders {
+        edges.add_edge(NodeIndex::new(*before), NodeIndex::new(*after), Relation::Order);
+    }
+    let mut walk = Walk::new(&edges);
+    for (resource, roles) in roles.iter().enumerate() {
+        link(&mut edges, &mut walk, resource, &roles.writers, &roles.modifiers);
+        // A reader that goes before a writer finds that writer's modifiers behind it, through the edges just made.
+        let makers: Vec<NodeIndex> = roles.makers().collect();
+        link(&mut edges, &mut walk, resource, &makers, &roles.readers);
+    }
+    edges
+}
+
+/// Lets every sink wait for every source, but for the pairs in which the sink has been put before the source.
+fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
+    let told = |_: NodeIndex, relation| relation == Relation::Order || relation == Relation::Data(resource);
+    let mut pairs = Vec::new();
+    // One walk finds all that is before a source, or behind a sink: the fewer of the two are walked from.
+    if sources.len() <= sinks.len() {
+        for &source in sources {
+            walk.from(edges, source, Direction::Incoming, told);
+            pairs.extend(sinks.iter().filter(|sink| !walk.has_met(**sink)).map(|&sink| (source, sink)));
+        }
+    } else {
+        for &sink in sinks {
+            walk.from(edges, sink, Direction::Outgoing, told);
+            pairs.extend(sources.iter().filter(|source| !walk.has_met(**source)).map(|&source| (source, sink)));
+        }
+    }
+    for (source, sink) in pairs {
+        edges.add_edge(source, sink, Relation::Data(resource));
+    }
+}
+
+/// Lets modifiers wait for the version they are to modify.
+///
+/// Modifiers have no order of their own, so only once all edges are known is it known which of them come before which. That
+/// one needs what the other left of the resource is no new order, but it is a reason to keep the other.
+pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles]) {
+    let mut walk = Walk::new(edges);
+    let mut made = vec![usize::MAX; edges.node_count()];
+    for (resource, roles) in roles.iter().enumerate() {
+        if roles.modifiers.len() < 2 {
+            continue;
+        }
+        roles.makers().for_each(|maker| made[maker.index()] = resource);
+        for &modifier in &roles.modifiers {
+            // What stands behind another maker is that maker's affair: the walk goes no further there.
+            let mut sources = Vec::new();
+            walk.from(edges, modifier, Direction::Incoming, |before, _| {
+                let is_maker = made[before.index()] == resource;
+                sources.extend(is_maker.then_some(before));
+                !is_maker
+            });
+            sources.sort_unstable();
+            sources.dedup();
+            for source in sources {
+                edges.add_edge(source, modifier, Relation::Data(resource));
+            }
+        }
+    }
+}
+
+/// Which processes are needed: kept ones, those that make an output, and all that these need.
+pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -> Vec<bool> {
+    let mut needed: Vec<bool> = graph.processes.iter().map(|process| process.kept).collect();
+    for (resource, roles) in graph.resources.iter().zip(roles) {
+        if resource.output {
+            roles.makers().for_each(|maker| needed[maker.index()] = true);
+        }
+    }
+    let mut open: Vec<NodeIndex> = edges.node_indices().filter(|node| needed[node.index()]).collect();
+    while let Some(node) = open.pop() {
+        for edge in edges.edges_directed(node, Direction::Incoming) {
+            let source = edge.source();
+            if *edge.weight() != Relation::Order && !needed[source.index()] {
+                needed[source.index()] = true;
+                open.push(source);
+            }
+        }
+    }
+    needed
+}
+
+/// A walk along edges, from node to node, that remembers whom it met. It is used again and again, as to forget is free.
+pub(super) struct Walk {
+    /// Per node, the last walk that met it.
+    met: Vec<usize>,
+    walks: usize,
+    open: Vec<NodeIndex>,
+}
+
+impl Walk {
+    pub(super) fn new(edges: &Edges) -> Self {
+        Self { met: vec![0; edges.node_count()], walks: 0, open: Vec::new() }
+    }
+
+    /// Forgets all, and walks from `start` against or along the edges, to every node that `enter` lets it enter.
+    pub(super) fn from(
+        &mut self,
+        edges: &Edges,
+        start: NodeIndex,
+        direction: Direction,
+        mut enter: impl FnMut(NodeIndex, Relation) -> bool,
+    ) {
+        self.walks += 1;
+        self.met[start.index()] = self.walks;
+        self.open.push(start);
+        while let Some(node) = self.open.pop() {
+            for edge in edges.edges_directed(node, direction) {
+                let next = match direction {
+                    Direction::Incoming => edge.source(),
+                    Direction::Outgoing => edge.target(),
+                };
+                if !self.has_met(next) && enter(next, *edge.weight()) {
+                    self.met[next.index()] = self.walks;
+                    self.open.push(next);
+                }
+            }
+        }
+    }
+
+    pub(super) fn has_met(&self, node: NodeIndex) -> bool {
+        self.met[node.index()] == self.walks
+    }
+}

@@ -1,0 +1,128 @@
+//! What can be wrong with a graph, and what can go wrong in a run.
+
+use std::{error::Error, fmt};
+
+use thiserror::Error;
+
+use crate::task::JobPanic;
+
+use super::builder::FrameGraph;
+
+/// What a [`Node`](super::Node) reports when it fails.
+pub type NodeError = Box<dyn Error + Send + Sync>;
+
+/// A graph that does not compile, and why.
+#[derive(Error)]
+#[error("{problem}")]
+pub struct CompileError<P> {
+    /// The graph as it was, so that it can be put right and compiled again.
+    pub graph: Box<FrameGraph<P>>,
+    /// The first thing that is wrong with it, in the order of [`GraphProblem`]'s variants.
+    pub problem: GraphProblem,
+}
+
+impl<P> fmt::Debug for CompileError<P> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("CompileError").field("problem", &self.problem).field("graph", &self.graph).finish()
+    }
+}
+
+/// What is wrong with a graph.
+///
+/// The variants stand in the order in which they are looked for. Calls that meant nothing come first, since what follows may
+/// only follow from them; then names, which all other problems speak in; then cycles, since nothing has an order before
+/// they are gone; then what the kept processes lack.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum GraphProblem {
+    /// A call was given a process of another graph, or one that had been removed. The call did nothing and, once reported
+    /// here, is forgotten.
+    #[error("the process that stands as `?` in `{call}` does not belong to this graph")]
+    UnknownProcess {
+        /// The call, with the names of what it was given, and `?` for what is unknown.
+        call: String,
+    },
+    /// A call was given a resource of another graph. The call did nothing and, once reported here, is forgotten.
+    #[error("the resource that stands as `?` in `{call}` does not belong to this graph")]
+    UnknownResource {
+        /// The call, with the names of what it was given, and `?` for what is unknown.
+        call: String,
+    },
+    /// Two processes have one name.
+    #[error("two processes are named {name:?}")]
+    DuplicateProcess {
+        /// The name.
+        name: String,
+    },
+    /// Processes wait for each other, dropped ones among them or not.
+    #[error("processes wait for each other in a circle: {}", circle(processes))]
+    Cycle {
+        /// The processes of one circle: each must run before the next, and the last before the first. The one that was
+        /// added first stands first.
+        processes: Vec<String>,
+    },
+    /// Nothing makes a resource before it is needed, and it is not imported.
+    #[error("{}", missing(resource, *output, readers))]
+    MissingProducer {
+        /// The resource.
+        resource: String,
+        /// Whether it is missed because it is an output of the graph.
+        output: bool,
+        /// The processes that read it before anything has written it, in the order they were added.
+        readers: Vec<String>,
+    },
+    /// Two processes write a resource, or modify it, and it is open which is first.
+    #[error("{first:?} and {second:?} both write {resource:?}, and nothing says which is first: put them in order")]
+    UnorderedWriters {
+        /// The resource.
+        resource: String,
+        /// One of the two.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
+fn circle(processes: &[String]) -> String {
+    let names: Vec<String> = processes.iter().chain(processes.first()).map(|name| format!("{name:?}")).collect();
+    names.join(" before ")
+}
+
+fn missing(resource: &str, output: bool, readers: &[String]) -> String {
+    let names: Vec<String> = readers.iter().map(|name| format!("{name:?}")).collect();
+    match (output, names.as_slice()) {
+        (true, []) => format!("nothing writes {resource:?}, which is an output of the graph"),
+        (true, _) => {
+            format!("nothing writes {resource:?}, which is an output of the graph and is read by {}", names.join(", "))
+        }
+        (false, _) => format!("nothing writes {resource:?} before it is read by {}", names.join(", ")),
+    }
+}
+
+/// A run that did not come to its end.
+///
+/// Of several failures the one is reported whose process stands first in the schedule, and of one process' chunks the one
+/// that starts first. Which failures there are besides the first can depend on timing, since the first one stops the rest.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// A process reported an error.
+    #[error("the process {process:?} failed: {source}")]
+    Failed {
+        /// The process' name.
+        process: String,
+        /// What it reported.
+        source: NodeError,
+    },
+    /// A process panicked.
+    #[error("the process {process:?} panicked: {message}")]
+    Panicked {
+        /// The process' name.
+        process: String,
+        /// What the panic said.
+        message: String,
+    },
+    /// A job of the run panicked outside of every process.
+    #[error("the run failed outside of its processes: {0}")]
+    Scheduler(JobPanic),
+}

@@ -1,0 +1,135 @@
+//! The frame graph: says which process waits for which, and runs them so.
+//!
+//! An engine adds processes, says of each which resources it reads and writes, and which resources the frame is for. The
+//! graph is compiled once, which orders and checks it and drops what nobody needs; the [`Schedule`] that comes out is run
+//! every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
+//!
+//! ```text
+//!   FrameGraph                                  Schedule              a run, whoever is free takes a chunk
+//!
+//!   geometry ──► (g-buffer) ──┐                 0 geometry ──┐        worker 0   geometry ▪▪▪▪  light ▪▪▪▪▪  post ▪
+//!                             ▼     compile                  ▼        worker 1   shadow ▪▪▪▪▪▪  light ▪▪▪▪
+//!   shadow ──► (shadow map) ► light  ────────►  1 shadow ─► 2 light
+//!                             │                              │
+//!   (image) ◄── post ◄── (lit)◄                              ▼
+//!                                                          3 post
+//!   debug lines ──► (overlay)                   dropped: debug lines
+//! ```
+//!
+//! The graph knows nothing of what a process does. It may carry anything, and be ordered only; or carry [`Node`]s, and be
+//! run. A node is a number of items that are worked off in chunks, and how many is asked only when all it depends on is
+//! done.
+//!
+//! That all work of a frame is *render processes*, which a manager hands to whatever thread is free, is from L 3.3 (Lorenzon &
+//! Clua). In M 10.4 (McAnlis) a fixed list of kinds says which view comes before which; here it follows from what
+//! each process reads and writes, so that a mirror in a mirror is no special case.
+//!
+//! # A graph of closures
+//!
+//! What the processes work on is borrowed for the length of a run, through the context:
+//!
+//! ```
+//! use std::sync::atomic::{AtomicUsize, Ordering};
+//!
+//! use drawloom::{
+//!     graph::{Closure, FrameGraph},
+//!     task::Scheduler,
+//! };
+//!
+//! struct World {
+//!     heights: Vec<f32>,
+//!     above_ground: AtomicUsize,
+//! }
+//!
+//! let mut graph = FrameGraph::new();
+//! let visible = graph.resource("visible");
+//! let image = graph.resource("image");
+//! graph.output(image);
+//!
+//! let cull = Closure::new(|world: &World, range, _worker| {
+//!     let found = world.heights[range].iter().filter(|height| **height > 0.0).count();
+//!     world.above_ground.fetch_add(found, Ordering::Relaxed);
+//!     Ok(())
+//! });
+//! let cull = graph.add("cull", cull.with_width(|world| world.heights.len()).with_chunk(64));
+//! graph.write(cull, visible);
+//!
+//! let draw = Closure::new(|world: &World, _range, _worker| {
+//!     println!("drawing {} objects", world.above_ground.load(Ordering::Relaxed));
+//!     Ok(())
+//! });
+//! let draw = graph.add("draw", draw.on_calling_thread());
+//! graph.read(draw, visible);
+//! graph.write(draw, image);
+//!
+//! let mut schedule = graph.compile()?;
+//! let scheduler = Scheduler::new(2)?;
+//! for frame in 1..=3 {
+//!     let heights = (0..1000).map(|index| (index % (frame + 1)) as f32).collect();
+//!     let world = World { heights, above_ground: AtomicUsize::new(0) };
+//!     schedule.run(&scheduler, &world)?;
+//!     assert!(world.above_ground.into_inner() > 0);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A context that itself borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, differs in type from frame to
+//! frame. A schedule that is compiled once for all of them holds processes that are a node for each:
+//!
+//! ```
+//! use std::ops::Range;
+//!
+//! use drawloom::{
+//!     graph::{FrameGraph, Node, NodeError},
+//!     task::{Scheduler, Worker},
+//! };
+//!
+//! struct World<'frame> {
+//!     heights: &'frame [f32],
+//! }
+//!
+//! struct CheckHeights;
+//!
+//! impl Node<World<'_>> for CheckHeights {
+//!     fn width(&self, world: &World<'_>) -> usize {
+//!         world.heights.len()
+//!     }
+//!
+//!     fn run(&self, world: &World<'_>, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+//!         let broken = world.heights[range].iter().find(|height| !height.is_finite());
+//!         broken.map_or(Ok(()), |height| Err(format!("a height is {height}").into()))
+//!     }
+//! }
+//!
+//! type Process = Box<dyn for<'frame> Node<World<'frame>>>;
+//!
+//! let mut graph = FrameGraph::<Process>::new();
+//! let check = graph.add("check heights", Box::new(CheckHeights));
+//! graph.keep(check);
+//! let mut schedule = graph.compile()?;
+//! let scheduler = Scheduler::new(2)?;
+//! let heights = vec![1.0, 2.0];
+//! schedule.run(&scheduler, &World { heights: &heights })?;
+//!
+//! let heights = vec![1.0, f32::NAN];
+//! let error = schedule.run(&scheduler, &World { heights: &heights }).unwrap_err();
+//! assert_eq!(error.to_string(), "the process \"check heights\" failed: a height is NaN");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod builder;
+mod compile;
+mod dot;
+mod edges;
+mod error;
+mod execute;
+mod node;
+mod progress;
+mod schedule;
+
+pub use self::{
+    builder::{FrameGraph, ProcessId, ResourceId},
+    error::{CompileError, GraphProblem, NodeError, RunError},
+    node::{Closure, Node},
+    schedule::Schedule,
+};

@@ -1,0 +1,124 @@
+//! The graph as it is run.
+
+use std::{collections::HashMap, fmt};
+
+use crossbeam_utils::CachePadded;
+
+use crate::sync::AtomicBool;
+
+use super::{builder::ProcessId, progress::Progress};
+
+/// A graph in the order it runs in, checked, and flat: compiled once and [run](Self::run) every frame.
+///
+/// Processes are known by their index, from 0 up to [`len`](Self::len): their place in an order in which each comes after
+/// all it depends on. Of the processes that could be next, the one that was added first is. So the same graph always gives
+/// the same schedule.
+pub struct Schedule<P> {
+    pub(super) names: Vec<String>,
+    pub(super) processes: Vec<P>,
+    pub(super) indices: HashMap<ProcessId, usize>,
+    pub(super) dependencies: Adjacency,
+    pub(super) dependents: Adjacency,
+    /// The processes that depend on none.
+    pub(super) roots: Vec<usize>,
+    pub(super) dropped: Vec<String>,
+    pub(super) progress: Vec<CachePadded<Progress>>,
+    /// Per worker, whether it is inside a chunk of this schedule.
+    pub(super) inside: Vec<CachePadded<AtomicBool>>,
+    /// Whether every process waits for all its dependencies again: so it is after a run that came to its end.
+    pub(super) armed: bool,
+}
+
+impl<P> Schedule<P> {
+    /// How many processes are run.
+    pub fn len(&self) -> usize {
+        self.processes.len()
+    }
+
+    /// Whether there is nothing to run.
+    pub fn is_empty(&self) -> bool {
+        self.processes.is_empty()
+    }
+
+    /// The processes and their names, in order.
+    pub fn processes(&self) -> impl ExactSizeIterator<Item = (&str, &P)> {
+        self.names.iter().map(String::as_str).zip(&self.processes)
+    }
+
+    /// The processes and their names, in order, to be changed between two runs.
+    pub fn processes_mut(&mut self) -> impl ExactSizeIterator<Item = (&str, &mut P)> {
+        self.names.iter().map(String::as_str).zip(&mut self.processes)
+    }
+
+    /// The index of a process: `None` if it was dropped, or is of another graph.
+    pub fn index(&self, process: ProcessId) -> Option<usize> {
+        self.indices.get(&process).copied()
+    }
+
+    /// The process with that id: `None` if it was dropped, or is of another graph.
+    pub fn process(&self, process: ProcessId) -> Option<&P> {
+        self.index(process).map(|index| &self.processes[index])
+    }
+
+    /// The process with that id, to be changed between two runs: `None` if it was dropped, or is of another graph.
+    pub fn process_mut(&mut self, process: ProcessId) -> Option<&mut P> {
+        self.index(process).map(|index| &mut self.processes[index])
+    }
+
+    /// The processes, taken out, in execution order.
+    pub fn into_processes(self) -> impl ExactSizeIterator<Item = (String, P)> {
+        self.names.into_iter().zip(self.processes)
+    }
+
+    /// The indices of what the process of that index waits for, ascending; none if there is no such process.
+    ///
+    /// What it waits for only through others may be left out.
+    pub fn dependencies(&self, index: usize) -> &[usize] {
+        self.dependencies.of(index)
+    }
+
+    /// The indices of what waits for the process of that index, ascending; none if there is no such process.
+    pub fn dependents(&self, index: usize) -> &[usize] {
+        self.dependents.of(index)
+    }
+
+    /// The names of the processes that no output needs, in the order they were added.
+    pub fn dropped(&self) -> &[String] {
+        &self.dropped
+    }
+}
+
+impl<P> fmt::Debug for Schedule<P> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Schedule")
+            .field("processes", &self.names)
+            .field("dropped", &self.dropped)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Lists of indices, one after another in one array (compressed sparse rows).
+pub(super) struct Adjacency {
+    /// Where each list starts, and where the last one ends.
+    starts: Vec<usize>,
+    targets: Vec<usize>,
+}
+
+impl Adjacency {
+    pub(super) fn new<List: IntoIterator<Item = usize>>(lists: impl IntoIterator<Item = List>) -> Self {
+        let mut adjacency = Self { starts: vec![0], targets: Vec::new() };
+        for list in lists {
+            adjacency.targets.extend(list);
+            adjacency.starts.push(adjacency.targets.len());
+        }
+        adjacency
+    }
+
+    pub(super) fn of(&self, index: usize) -> &[usize] {
+        match self.starts.get(index..).unwrap_or_default() {
+            [start, end, ..] => &self.targets[*start..*end],
+            _ => &[],
+        }
+    }
+}

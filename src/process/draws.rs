@@ -1,0 +1,60 @@
+//! What a process draws.
+
+use std::borrow::Cow;
+
+#[cfg(feature = "wgpu")]
+use super::RawPass;
+use crate::queue::Selection;
+use crate::scene::Blend;
+
+/// What a process draws in each of its views.
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum Draws<'a> {
+    /// The objects that the view sees, with one shader.
+    Commands(CommandDraws<'a>),
+    /// Every pixel once.
+    FullScreen(FullScreen<'a>),
+    /// Whatever the process encodes itself: compute, copies, passes of its own.
+    #[cfg(feature = "wgpu")]
+    Raw(&'a dyn RawPass),
+}
+
+/// The objects that a view sees: culled, sorted, merged into instanced batches and recorded into bundles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommandDraws<'a> {
+    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `vertex`.
+    pub shader: &'a str,
+    /// The fragment entry point; `None` draws depth alone.
+    pub fragment: Option<&'a str>,
+    /// Which objects.
+    pub selection: Selection,
+    /// Whether what is drawn hides what comes behind it.
+    pub writes_depth: bool,
+    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    pub parameters: Cow<'a, [u8]>,
+}
+
+impl Default for CommandDraws<'_> {
+    fn default() -> Self {
+        Self {
+            shader: "",
+            fragment: Some("fragment"),
+            selection: Selection::Opaque,
+            writes_depth: true,
+            parameters: Cow::Borrowed(&[]),
+        }
+    }
+}
+
+/// Every pixel of the view once, by one triangle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FullScreen<'a> {
+    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
+    /// the prelude's `FullScreenPixel`.
+    pub shader: &'a str,
+    /// How it mixes with what is in the targets.
+    pub blend: Blend,
+    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    pub parameters: Cow<'a, [u8]>,
+}

@@ -1,0 +1,34 @@
+//! What a target's pixels are.
+
+/// The format of a target. All of them can be drawn to and read on every adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// Four bytes, linear, 0 to 1.
+    Rgba8Unorm,
+    /// Four bytes, the colours sRGB encoded.
+    Rgba8Srgb,
+    /// Four half floats.
+    Rgba16Float,
+    /// Two half floats.
+    Rg16Float,
+    /// A float.
+    R32Float,
+    /// Depth as a float.
+    Depth32Float,
+}
+
+impl Format {
+    /// Whether it holds depth rather than colour.
+    pub fn is_depth(self) -> bool {
+        self == Self::Depth32Float
+    }
+
+    /// Bytes a pixel.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rg16Float | Self::R32Float | Self::Depth32Float => 4,
+            Self::Rgba16Float => 8,
+        }
+    }
+}

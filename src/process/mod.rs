@@ -1,0 +1,75 @@
+//! Render processes: what an engine adds to the graph, and the ones that come with the crate (L 3.3).
+//!
+//! A process says which views it is for, which targets it reads and writes, and what it draws. Everything it says is data;
+//! a backend turns it into pipelines, bundles and passes.
+
+mod declare;
+mod draws;
+mod format;
+mod geometry_buffer;
+mod lighting;
+mod plan;
+#[cfg(feature = "wgpu")]
+mod raw_pass;
+mod tone_mapping;
+
+pub use declare::{Access, ClearColor, Declaration, Declare};
+pub use draws::{CommandDraws, Draws, FullScreen};
+pub use format::Format;
+pub use geometry_buffer::GeometryBuffer;
+pub use lighting::Lighting;
+pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget};
+#[cfg(feature = "wgpu")]
+pub use raw_pass::{RawPass, Resolved};
+pub use tone_mapping::ToneMapping;
+
+/// A step of the frame: it owns its trip from the objects a view sees to a recorded pass.
+///
+/// A process draws once in each view of its kind. It is shared by all workers while a frame is recorded, so what changes
+/// from frame to frame is behind a lock or an atomic of its own.
+///
+/// ```
+/// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+///
+/// /// Draws the depth of everything, with the engine's own shader.
+/// struct DepthOnly;
+///
+/// impl RenderProcess for DepthOnly {
+///     fn name(&self) -> &str {
+///         "depth only"
+///     }
+///
+///     fn declare(&self, declare: &mut Declare) {
+///         declare.clears_depth("depth", Format::Depth32Float);
+///     }
+///
+///     fn draws(&self) -> Draws<'_> {
+///         Draws::Commands(CommandDraws {
+///             shader: "
+///                 @vertex
+///                 fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
+///                     let object = drawn_object(in.instance);
+///                     return clip_position(relative_position(object, in.position));
+///                 }
+///             ",
+///             fragment: None,
+///             ..CommandDraws::default()
+///         })
+///     }
+/// }
+/// ```
+pub trait RenderProcess: Send + Sync {
+    /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
+    fn name(&self) -> &str;
+
+    /// Says which views it is for, and what it reads and writes. Asked once, when the graph is built.
+    fn declare(&self, declare: &mut Declare);
+
+    /// Says what it draws. Asked once a frame; the shader must stay the same, the parameters may change.
+    fn draws(&self) -> Draws<'_>;
+}
+
+/// What every shader begins with: the bindings, the structures and the functions that Drawloom provides.
+///
+/// A process's own WGSL is appended to it. See the file `drawloom.wgsl` for what it may use.
+pub const SHADER_PRELUDE: &str = include_str!("drawloom.wgsl");

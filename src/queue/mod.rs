@@ -1,0 +1,11 @@
+//! From the objects a view sees to the batches it draws: fill, sort, instance.
+
+mod draw_list;
+mod fill;
+mod instance;
+mod sort;
+
+pub use draw_list::{Batch, DrawList};
+pub use fill::{Fill, Selection};
+pub use instance::instance;
+pub use sort::sort;

@@ -1,0 +1,86 @@
+//! Meshes, materials and textures: what objects refer to.
+
+use super::{Material, Mesh, SceneError, Texture};
+use crate::handle::{Handle, Slots, StaleHandle};
+
+/// Owns meshes, materials and textures. An engine that keeps its own objects still keeps these here, so that a frame
+/// uploads each once and again only when it changes.
+///
+/// ```
+/// use drawloom::glam::Vec3;
+/// use drawloom::scene::{Assets, Material};
+///
+/// let mut assets = Assets::default();
+/// let brick = assets.add(Material { name: "brick".into(), ..Material::default() })?;
+/// assets.replace(brick, Material { diffuse: Vec3::new(0.6, 0.2, 0.1), ..Material::default() })?;
+/// assets.remove(brick)?;
+/// assert!(assets.get(brick).is_err());
+/// # Ok::<(), drawloom::scene::SceneError>(())
+/// ```
+#[derive(Debug, Default)]
+pub struct Assets {
+    pub(crate) meshes: Slots<Mesh>,
+    pub(crate) materials: Slots<Material>,
+    pub(crate) textures: Slots<Texture>,
+}
+
+impl Assets {
+    /// Adds one.
+    ///
+    /// # Errors
+    /// If it is invalid, or refers to what is not here.
+    pub fn add<T: Asset>(&mut self, asset: T) -> Result<Handle<T>, SceneError> {
+        asset.check(self)?;
+        Ok(T::slots_mut(self).insert(asset))
+    }
+
+    /// Puts another in its place; every object that refers to it changes with it.
+    ///
+    /// # Errors
+    /// If the handle is stale or the new one is invalid; nothing changes then.
+    pub fn replace<T: Asset>(&mut self, handle: Handle<T>, asset: T) -> Result<(), SceneError> {
+        asset.check(self)?;
+        *T::slots_mut(self).get_mut(handle)? = asset;
+        Ok(())
+    }
+
+    /// Takes one out. Objects that still refer to it are rejected, and reported, by the next frame.
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn remove<T: Asset>(&mut self, handle: Handle<T>) -> Result<T, StaleHandle> {
+        T::slots_mut(self).remove(handle)
+    }
+
+    /// Reads one.
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn get<T: Asset>(&self, handle: Handle<T>) -> Result<&T, StaleHandle> {
+        T::slots(self).get(handle)
+    }
+
+    /// All of one type, in slot order.
+    pub fn iter<T: Asset>(&self) -> impl Iterator<Item = (Handle<T>, &T)> {
+        T::slots(self).iter()
+    }
+}
+
+/// What [`Assets`] keeps: [`Mesh`], [`Material`] and [`Texture`].
+pub trait Asset: Sized + sealed::Sealed + 'static {
+    #[doc(hidden)]
+    fn slots(assets: &Assets) -> &Slots<Self>;
+    #[doc(hidden)]
+    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
+    #[doc(hidden)]
+    fn check(&self, _assets: &Assets) -> Result<(), SceneError> {
+        Ok(())
+    }
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for super::Mesh {}
+    impl Sealed for super::Material {}
+    impl Sealed for super::Texture {}
+}

@@ -1,0 +1,111 @@
+//! Lights.
+
+use std::f32::consts::FRAC_PI_2;
+
+use glam::{DVec3, Vec3};
+
+use super::SceneError;
+
+/// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
+///
+/// Lights with a position fall off with the square of the distance, and are brought smoothly to 0 at their `range` by
+/// the factor (1 − (d/range)⁴)².
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Light {
+    /// So far away that its rays are parallel.
+    Directional {
+        /// The way it travels.
+        direction: Vec3,
+        /// On a surface that faces it, per channel.
+        illuminance: Vec3,
+    },
+    /// The same in every direction.
+    Point {
+        /// In the world, in metres.
+        position: DVec3,
+        /// At 1 m, per channel.
+        intensity: Vec3,
+        /// Where it ends, in metres.
+        range: f32,
+    },
+    /// A cone.
+    Spot {
+        /// In the world, in metres.
+        position: DVec3,
+        /// The cone's axis.
+        direction: Vec3,
+        /// On the axis at 1 m, per channel.
+        intensity: Vec3,
+        /// Where it ends, in metres.
+        range: f32,
+        /// Between the axis and where it begins to fade, in radians.
+        inner_angle: f32,
+        /// Between the axis and where it is gone, in radians, up to π/2.
+        outer_angle: f32,
+    },
+    /// A small lit surface that faces `direction`: it falls off with the cosine from its axis, and nothing goes backwards
+    /// (the light of L 4.2.2).
+    Hemispherical {
+        /// In the world, in metres.
+        position: DVec3,
+        /// The axis.
+        direction: Vec3,
+        /// On the axis at 1 m, per channel.
+        intensity: Vec3,
+        /// Where it ends, in metres.
+        range: f32,
+    },
+}
+
+impl Light {
+    /// The range at which the brightest channel of `intensity` has fallen to 1/255: 16·√I.
+    pub fn range_for(intensity: Vec3) -> f32 {
+        16.0 * intensity.max_element().max(0.0).sqrt()
+    }
+
+    /// Says what is wrong with it, if anything.
+    pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
+        let problem = match *self {
+            Self::Directional { direction, illuminance } => {
+                direction_problem(direction).or_else(|| color_problem(illuminance))
+            }
+            Self::Point { position, intensity, range } => {
+                place_problem(position, range).or_else(|| color_problem(intensity))
+            }
+            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle } => {
+                place_problem(position, range)
+                    .or_else(|| color_problem(intensity))
+                    .or_else(|| direction_problem(direction))
+                    .or_else(|| cone_problem(inner_angle, outer_angle))
+            }
+            Self::Hemispherical { position, direction, intensity, range } => place_problem(position, range)
+                .or_else(|| color_problem(intensity))
+                .or_else(|| direction_problem(direction)),
+        };
+        problem.map_or(Ok(()), |reason| Err(SceneError::InvalidLight { light: index, reason }))
+    }
+}
+
+fn direction_problem(direction: Vec3) -> Option<&'static str> {
+    (!direction.is_finite() || !direction.is_normalized()).then_some("its direction is not of unit length")
+}
+
+fn color_problem(color: Vec3) -> Option<&'static str> {
+    (!color.is_finite() || color.min_element() < 0.0).then_some("its intensity is negative or not finite")
+}
+
+fn place_problem(position: DVec3, range: f32) -> Option<&'static str> {
+    if !position.is_finite() {
+        Some("its position is not finite")
+    } else if !(range > 0.0 && range.is_finite()) {
+        Some("its range is not a positive distance")
+    } else {
+        None
+    }
+}
+
+fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
+    let ordered = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
+    (!ordered).then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees")
+}

@@ -1,0 +1,182 @@
+//! Triangle meshes.
+
+use glam::Vec3;
+
+use super::{Asset, Assets, SceneError};
+use crate::handle::Slots;
+
+/// A mesh: vertices, indices into them, and how indices make triangles. Right-handed, counter-clockwise triangles face
+/// the viewer, lengths in metres in the object's own space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    name: String,
+    topology: Topology,
+    vertices: Vec<Vertex>,
+    indices: Vec<u32>,
+    bounds: Bounds,
+}
+
+impl Mesh {
+    /// A mesh, with its bounds.
+    ///
+    /// # Errors
+    /// If it has no triangle, if an index points past the vertices, if a triangle list is not made of whole triangles,
+    /// or if a vertex is not finite.
+    pub fn new(
+        name: impl Into<String>,
+        topology: Topology,
+        vertices: Vec<Vertex>,
+        indices: Vec<u32>,
+    ) -> Result<Self, SceneError> {
+        let name = name.into();
+        if indices.len() < 3 {
+            return Err(SceneError::EmptyMesh { mesh: name });
+        }
+        if topology == Topology::TriangleList && !indices.len().is_multiple_of(3) {
+            return Err(SceneError::PartialTriangle { mesh: name, indices: indices.len() });
+        }
+        if let Some(&index) = indices.iter().find(|&&index| index as usize >= vertices.len()) {
+            return Err(SceneError::IndexOutOfRange { mesh: name, index, vertices: vertices.len() });
+        }
+        if let Some(vertex) = vertices.iter().position(|vertex| !vertex.is_finite()) {
+            return Err(SceneError::NonFiniteVertex { mesh: name, vertex });
+        }
+        let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
+        Ok(Self { name, topology, vertices, indices, bounds })
+    }
+
+    /// What it is called in reports.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How indices make triangles.
+    pub fn topology(&self) -> Topology {
+        self.topology
+    }
+
+    /// The vertices.
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
+    }
+
+    /// The indices, each below the number of vertices.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// The sphere that holds every vertex.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// The number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        match self.topology {
+            Topology::TriangleList => self.indices.len() / 3,
+            Topology::TriangleStrip => self.indices.len() - 2,
+        }
+    }
+}
+
+impl Asset for Mesh {
+    fn slots(assets: &Assets) -> &Slots<Self> {
+        &assets.meshes
+    }
+
+    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
+        &mut assets.meshes
+    }
+}
+
+/// A vertex, as it lies in memory and in the vertex buffer.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Vertex {
+    /// In object space, in metres.
+    pub position: [f32; 3],
+    /// In object space, of unit length.
+    pub normal: [f32; 3],
+    /// Texture coordinates: (0, 0) is the picture's top left, (1, 1) its bottom right, and they repeat.
+    pub uv: [f32; 2],
+}
+
+impl Vertex {
+    fn is_finite(&self) -> bool {
+        self.position.iter().chain(&self.normal).chain(&self.uv).all(|value| value.is_finite())
+    }
+}
+
+/// How indices make triangles (M listing 10.1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Topology {
+    /// Every three indices are a triangle.
+    #[default]
+    TriangleList = 0,
+    /// Every index from the third on makes a triangle with the two before it; every second one is wound the other way.
+    TriangleStrip = 1,
+}
+
+/// A bounding sphere in object space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Its centre, in metres.
+    pub center: Vec3,
+    /// Its radius, in metres; never negative.
+    pub radius: f32,
+}
+
+impl Bounds {
+    /// A sphere that holds all points: centred on their box, and grown by what rounding may have lost.
+    pub fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
+        let Some((low, high)) = points.clone().fold(None, |range: Option<(Vec3, Vec3)>, point| {
+            let (low, high) = range.unwrap_or((point, point));
+            Some((low.min(point), high.max(point)))
+        }) else {
+            return Self::default();
+        };
+        let center = low * 0.5 + high * 0.5;
+        let distance = points.map(|point| point.as_dvec3().distance(center.as_dvec3())).fold(0.0, f64::max);
+        Self { center, radius: (distance as f32).next_up() }
+    }
+
+    /// Whether centre and radius are finite, and the radius is not negative.
+    pub fn is_valid(&self) -> bool {
+        self.center.is_finite() && self.radius.is_finite() && self.radius >= 0.0
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    fn corner(x: f32, y: f32, z: f32) -> Vertex {
+        Vertex { position: [x, y, z], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] }
+    }
+
+    #[test]
+    fn bad_meshes_are_refused_by_name() {
+        let corners = vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0)];
+        let make = |vertices, indices| Mesh::new("leaf", Topology::TriangleList, vertices, indices);
+        assert!(matches!(make(corners.clone(), vec![]), Err(SceneError::EmptyMesh { mesh }) if mesh == "leaf"));
+        assert!(matches!(make(corners.clone(), vec![0, 1, 2, 0]), Err(SceneError::PartialTriangle { indices: 4, .. })));
+        let outside = make(corners.clone(), vec![0, 1, 3]);
+        assert!(matches!(outside, Err(SceneError::IndexOutOfRange { index: 3, vertices: 3, .. })));
+        let broken = vec![corners[0], corners[1], corner(f32::NAN, 0.0, 0.0)];
+        assert!(matches!(make(broken, vec![0, 1, 2]), Err(SceneError::NonFiniteVertex { vertex: 2, .. })));
+        assert!(make(corners, vec![0, 1, 2]).is_ok());
+    }
+
+    #[test]
+    fn bounds_hold_every_point_at_every_magnitude() {
+        for scale in [1e-20_f32, 1e-3, 1.0, 1e6, 1e30] {
+            let points = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(-4.0, 0.1, 7.3), Vec3::new(0.3, -9.0, 2.0)];
+            let scaled = points.map(|point| point * scale);
+            let bounds = Bounds::around(scaled.into_iter());
+            for point in scaled {
+                assert!(point.as_dvec3().distance(bounds.center.as_dvec3()) <= f64::from(bounds.radius), "{scale}");
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! What is drawn: objects, meshes, materials, lights and cameras.
+//!
+//! [`SceneRef`] is what a frame reads; [`Scene`] owns one, and an engine with storage of its own lends its slices instead.
+
+mod assets;
+mod camera;
+mod collection;
+mod error;
+mod light;
+mod material;
+mod mesh;
+#[cfg(feature = "obj")]
+pub mod obj;
+pub mod sample;
+mod scene_ref;
+
+pub use assets::{Asset, Assets};
+pub use camera::{Camera, ViewKind};
+pub use collection::{ObjectHandle, RenderObject, Scene};
+pub use error::SceneError;
+pub use light::Light;
+pub use material::{Blend, Material, Texture};
+pub use mesh::{Bounds, Mesh, Topology, Vertex};
+pub use scene_ref::SceneRef;

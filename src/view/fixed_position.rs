@@ -1,0 +1,76 @@
+//! Positions that subtract exactly on any device.
+
+use glam::DVec3;
+
+/// A position in 64-bit fixed point, in steps of 2⁻³⁰ m (just below a nanometre).
+///
+/// Devices have no f64, and f32 is off by metres far from the origin. The difference of two fixed-point positions is exact
+/// with 32-bit integers and a borrow; only that difference, which is small where it matters, is rounded to f32. So one
+/// table of positions serves every view, wherever in the world its camera is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FixedPosition([i64; 3]);
+
+impl FixedPosition {
+    /// The farthest coordinate in metres: 2³³, about 8.6 million kilometres.
+    pub const REACH: f64 = 8_589_934_592.0;
+
+    const STEPS_PER_METRE: f64 = 1_073_741_824.0;
+
+    /// The nearest fixed-point position; `None` where a coordinate is not finite or beyond [`FixedPosition::REACH`].
+    pub fn new(position: DVec3) -> Option<Self> {
+        let within = position.is_finite() && position.abs().max_element() < Self::REACH;
+        within.then(|| Self((position * Self::STEPS_PER_METRE).round().to_array().map(|steps| steps as i64)))
+    }
+
+    /// Lower and upper 32 bits of each coordinate.
+    pub fn halves(self) -> ([u32; 3], [i32; 3]) {
+        (self.0.map(|steps| steps as u32), self.0.map(|steps| (steps >> 32) as i32))
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// What the shader does, in the same 32-bit steps.
+    fn difference(object: FixedPosition, camera: FixedPosition) -> [f32; 3] {
+        let ((low, high), (camera_low, camera_high)) = (object.halves(), camera.halves());
+        std::array::from_fn(|axis| {
+            let borrow = i32::from(low[axis] < camera_low[axis]);
+            let low = low[axis].wrapping_sub(camera_low[axis]);
+            let high = high[axis].wrapping_sub(camera_high[axis]).wrapping_sub(borrow);
+            let negative = high < 0;
+            // The magnitude first: the two halves of a small negative number are both large.
+            let carry = u32::from(low == 0);
+            let magnitude_low = if negative { (!low).wrapping_add(1) } else { low };
+            let magnitude_high = if negative { (!high as u32).wrapping_add(carry) } else { high as u32 };
+            let magnitude = magnitude_high as f32 * 4.0 + magnitude_low as f32 * 2_f32.powi(-30);
+            if negative { -magnitude } else { magnitude }
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn differences_are_as_exact_as_f32_can_say(
+            place in -8.5e9..8.5e9_f64, sign in prop::bool::ANY, exponent in -9.0..9.0_f64,
+        ) {
+            let offset = if sign { 10_f64.powf(exponent) } else { -10_f64.powf(exponent) };
+            let other = (place + offset).clamp(-8.58e9, 8.58e9);
+            let (camera, object) = (DVec3::splat(place), DVec3::splat(other));
+            let found = difference(FixedPosition::new(object).unwrap(), FixedPosition::new(camera).unwrap());
+            let exact = other - place;
+            let bound = 2_f64.powi(-30) + exact.abs() * 2_f64.powi(-22);
+            prop_assert!((f64::from(found[0]) - exact).abs() <= bound, "{} for {exact}", found[0]);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_held_is_refused() {
+        for bad in [f64::NAN, f64::INFINITY, FixedPosition::REACH, -1e300] {
+            assert_eq!(FixedPosition::new(DVec3::new(0.0, bad, 0.0)), None);
+        }
+        assert!(FixedPosition::new(DVec3::splat(-8.5e9)).is_some());
+    }
+}

@@ -1,0 +1,17 @@
+//! Views: "everything is a camera" (M 10.4). What there is, worked out once a frame, and what of it each view sees.
+
+mod fixed_position;
+mod frustum;
+mod object_table;
+mod rejection;
+mod render_view;
+mod view_record;
+mod visible_set;
+
+pub use fixed_position::FixedPosition;
+pub use frustum::Frustum;
+pub use object_table::{ObjectDraw, ObjectRecord, ObjectTable, WorldBounds};
+pub use rejection::{Rejection, RejectionReason, Rejections};
+pub use render_view::RenderView;
+pub use view_record::{LightRecord, ViewRecord};
+pub use visible_set::VisibleSet;

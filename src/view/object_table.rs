@@ -1,0 +1,181 @@
+//! What every view needs to know of every object, worked out once a frame.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::{FixedPosition, RejectionReason, Rejections};
+use crate::blocks::Blocks;
+use crate::command::{Cull, DrawState};
+use crate::scene::{Material, Mesh, SceneRef};
+
+/// The frame's objects: what is uploaded, where each is, and how each is drawn. Objects that cannot be drawn are counted
+/// and left out.
+#[derive(Debug, Default)]
+pub struct ObjectTable {
+    records: Blocks<ObjectRecord>,
+    bounds: Blocks<WorldBounds>,
+    draws: Blocks<ObjectDraw>,
+    rejections: Rejections,
+    length: usize,
+}
+
+impl ObjectTable {
+    /// Makes room for `objects` objects.
+    pub fn reset(&mut self, objects: usize) {
+        self.length = objects;
+        self.records.reserve(objects, bytemuck::Zeroable::zeroed());
+        self.bounds.reserve(objects, WorldBounds::NOTHING);
+        self.draws.reserve(objects, ObjectDraw::default());
+        self.rejections = Rejections::default();
+    }
+
+    /// Fills in the objects of `range`.
+    pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
+        for (block, part) in Blocks::<ObjectRecord>::parts(range) {
+            let mut records = self.records.write(block);
+            let mut bounds = self.bounds.write(block);
+            let mut draws = self.draws.write(block);
+            for object in part {
+                let entry = object % Blocks::<ObjectRecord>::SIZE;
+                match describe(scene, object) {
+                    Ok(described) => (records[entry], bounds[entry], draws[entry]) = described,
+                    Err(reason) => {
+                        bounds[entry] = WorldBounds::NOTHING;
+                        self.rejections.count(reason, object);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The number of objects.
+    pub fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+
+    /// What is uploaded, 64 bytes an object.
+    pub fn records(&self) -> &Blocks<ObjectRecord> {
+        &self.records
+    }
+
+    /// Where each object is.
+    pub fn bounds(&self) -> &Blocks<WorldBounds> {
+        &self.bounds
+    }
+
+    /// How each object is drawn.
+    pub fn draws(&self) -> &Blocks<ObjectDraw> {
+        &self.draws
+    }
+
+    /// What was left out, and why.
+    pub fn rejections(&self) -> &Rejections {
+        &self.rejections
+    }
+}
+
+/// An object as shaders read it. Its position is in fixed point, so that it can be taken relative to any view's camera
+/// exactly: one table serves all views, wherever they are.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct ObjectRecord {
+    /// The lower halves of the position's three coordinates.
+    pub position_low: [u32; 3],
+    /// Its material's slot.
+    pub material: u32,
+    /// The upper halves of the position's three coordinates.
+    pub position_high: [i32; 3],
+    /// Keeps what follows at a multiple of 16 bytes, as WGSL wants it.
+    pub padding: u32,
+    /// From object space to the world's axes: x, y, z, w.
+    pub orientation: [f32; 4],
+    /// Along the object's own axes.
+    pub scale: [f32; 3],
+    /// Its index.
+    pub object: u32,
+}
+
+/// Where an object is in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldBounds {
+    /// The centre of a sphere around it, in metres.
+    pub center: DVec3,
+    /// The sphere's radius in metres.
+    pub radius: f32,
+}
+
+impl WorldBounds {
+    /// Seen by nobody.
+    pub const NOTHING: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
+}
+
+/// How an object is drawn, as slots and state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectDraw {
+    /// Its mesh's slot.
+    pub mesh: u32,
+    /// Its material's slot.
+    pub material: u32,
+    /// Its fixed-function state.
+    pub state: DrawState,
+}
+
+impl Default for ObjectDraw {
+    fn default() -> Self {
+        Self { mesh: 0, material: 0, state: DrawState::PLAIN }
+    }
+}
+
+fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldBounds, ObjectDraw), RejectionReason> {
+    if !scene.transform_is_valid(object) {
+        return Err(RejectionReason::InvalidTransform);
+    }
+    let (position, scale) = (scene.positions[object], scene.scales[object]);
+    let orientation = scene.orientations[object].normalize();
+    let mesh = scene.assets.get(scene.meshes[object]).map_err(|_| RejectionReason::StaleMesh)?;
+    let material = scene.assets.get(scene.materials[object]).map_err(|_| RejectionReason::StaleMaterial)?;
+    let fixed = FixedPosition::new(position).ok_or(RejectionReason::OutOfReach)?;
+
+    let bounds = scene.bounds[object];
+    if !bounds.is_valid() {
+        return Err(RejectionReason::InvalidBounds);
+    }
+    let offset = orientation.as_dquat() * (scale.as_dvec3() * bounds.center.as_dvec3());
+    // Rounded up, and by what rounding the orientation to f32 can turn the centre.
+    let reach = f64::from(bounds.radius) * f64::from(scale.abs().max_element());
+    let radius = ((reach + offset.length() * 1e-6) as f32).next_up();
+    let center = position + offset;
+    if !center.is_finite() || !radius.is_finite() {
+        return Err(RejectionReason::InvalidBounds);
+    }
+
+    let slots = (scene.meshes[object].index(), scene.materials[object].index());
+    let (position_low, position_high) = fixed.halves();
+    let record = ObjectRecord {
+        position_low,
+        material: slots.1,
+        position_high,
+        padding: 0,
+        orientation: orientation.to_array(),
+        scale: scale.to_array(),
+        object: object as u32,
+    };
+    let draw = ObjectDraw { mesh: slots.0, material: slots.1, state: state_of(mesh, material, scale) };
+    Ok((record, WorldBounds { center, radius }, draw))
+}
+
+fn state_of(mesh: &Mesh, material: &Material, scale: glam::Vec3) -> DrawState {
+    let mirrored = scale.is_negative_bitmask().count_ones() % 2 == 1;
+    let cull = match (material.double_sided, mirrored) {
+        (true, _) => Cull::Nothing,
+        (false, false) => Cull::Back,
+        (false, true) => Cull::Front,
+    };
+    DrawState::new(mesh.topology(), cull, material.blend)
+}

@@ -1,0 +1,107 @@
+//! What a frame left out, counted and told.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Counts what a frame leaves out. Any number of jobs may count at once.
+#[derive(Debug, Default)]
+pub struct Rejections {
+    by_reason: [Rejected; RejectionReason::ALL.len()],
+}
+
+impl Rejections {
+    /// Counts one object, light or material.
+    pub fn count(&self, reason: RejectionReason, index: usize) {
+        self.by_reason[reason as usize].count(index);
+    }
+
+    /// What was counted, one entry a reason.
+    pub fn list(&self) -> Vec<Rejection> {
+        let counted = RejectionReason::ALL.into_iter().zip(&self.by_reason).map(|(reason, rejected)| Rejection {
+            reason,
+            count: rejected.count.load(Ordering::Relaxed) as usize,
+            first: rejected.first.load(Ordering::Relaxed) as usize,
+        });
+        counted.filter(|rejection| rejection.count > 0).collect()
+    }
+}
+
+/// Objects or lights that a frame left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rejection {
+    /// Why.
+    pub reason: RejectionReason,
+    /// How many.
+    pub count: usize,
+    /// The lowest index among them.
+    pub first: usize,
+}
+
+/// Why something was left out of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum RejectionReason {
+    /// An object's position, orientation or scale is not finite, or its orientation is no rotation.
+    InvalidTransform,
+    /// An object's bounds are not finite or negative, or too large once scaled.
+    InvalidBounds,
+    /// An object is farther from the world's origin than [`FixedPosition::REACH`].
+    OutOfReach,
+    /// An object's mesh was removed.
+    StaleMesh,
+    /// An object's material was removed.
+    StaleMaterial,
+    /// A light has an intensity, a place, a direction, a range or angles that cannot be.
+    InvalidLight,
+    /// A material's texture was removed; the plain colour stands in.
+    StaleTexture,
+    /// The device has no room for a texture; the plain colour stands in.
+    TextureLimit,
+}
+
+impl RejectionReason {
+    const ALL: [Self; 8] = [
+        Self::InvalidTransform,
+        Self::InvalidBounds,
+        Self::OutOfReach,
+        Self::StaleMesh,
+        Self::StaleMaterial,
+        Self::InvalidLight,
+        Self::StaleTexture,
+        Self::TextureLimit,
+    ];
+
+    /// As reports print it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InvalidTransform => "object with an invalid transform",
+            Self::InvalidBounds => "object with invalid bounds",
+            Self::OutOfReach => "object too far from the origin",
+            Self::StaleMesh => "object with a removed mesh",
+            Self::StaleMaterial => "object with a removed material",
+            Self::InvalidLight => "invalid light",
+            Self::StaleTexture => "material with a removed texture",
+            Self::TextureLimit => "texture beyond the device's limits",
+        }
+    }
+}
+
+/// A count, and the lowest index counted: the same whichever worker came first.
+#[derive(Debug)]
+struct Rejected {
+    count: AtomicU32,
+    first: AtomicU32,
+}
+
+impl Default for Rejected {
+    fn default() -> Self {
+        Self { count: AtomicU32::new(0), first: AtomicU32::new(u32::MAX) }
+    }
+}
+
+impl Rejected {
+    fn count(&self, index: usize) {
+        // Read only when the frame's jobs have ended, which orders everything.
+        self.count.fetch_add(1, Ordering::Relaxed);
+        self.first.fetch_min(u32::try_from(index).unwrap_or(u32::MAX), Ordering::Relaxed);
+    }
+}
