@@ -30,10 +30,33 @@ use super::error::GraphProblem;
 /// # What is kept
 ///
 /// The frame is for its outputs: a process is kept if an output, or a process that is [kept](Self::keep) whatever it
-/// writes, needs what it writes, directly or through others. Without an output and without a kept process all are dropped;
-/// [`Schedule::dropped`](super::Schedule::dropped) names those that were. What [`order`](Self::order) says puts processes
-/// in order but keeps none. A dropped process still hands on the order: if `a` comes before it, and it before `b`, then
-/// `a` comes before `b`.
+/// writes, needs what it writes, directly or through others. All that must be waited for is needed, and so is, for a
+/// modifier, what the last modifiers before it left. Without an output and without a kept process all are dropped;
+/// [`Schedule::dropped`](super::Schedule::dropped) names those that were.
+///
+/// What [`order`](Self::order) says puts processes in order but keeps none. A dropped process still hands on the order: if
+/// `a` comes before it, and it before `b`, then `a` comes before `b`.
+///
+/// ```
+/// use drawloom::graph::FrameGraph;
+///
+/// let mut graph = FrameGraph::new();
+/// let [depth, image] = ["depth", "image"].map(|name| graph.resource(name));
+/// graph.output(image);
+///
+/// let light = graph.add("light", "what a process carries");
+/// graph.read(light, depth);
+/// graph.write(light, image);
+/// let geometry = graph.add("geometry", "can be anything");
+/// graph.write(geometry, depth);
+/// graph.add("overlay", "and this one leads to no output");
+///
+/// let schedule = graph.compile()?;
+/// let order: Vec<&str> = schedule.processes().map(|(name, _)| name).collect();
+/// assert_eq!(order, ["geometry", "light"]);
+/// assert_eq!(schedule.dropped(), ["overlay"]);
+/// # Ok::<(), drawloom::graph::CompileError<&str>>(())
+/// ```
 pub struct FrameGraph<P> {
     /// Tells this graph's ids from those of all others.
     identity: usize,
@@ -52,7 +75,7 @@ pub struct FrameGraph<P> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ProcessId {
     pub(super) graph: usize,
-    /// The how-manieth process of the graph it was, removed ones included.
+    /// How many processes had been added to the graph before it.
     pub(super) serial: usize,
 }
 

@@ -1,9 +1,6 @@
 //! From a graph to its schedule: order it, see what is needed, check that, and lay it out flat.
 
-use std::{
-    cmp::Reverse,
-    collections::{BinaryHeap, HashMap, HashSet},
-};
+use std::collections::{HashMap, HashSet};
 
 use crossbeam_utils::CachePadded;
 use petgraph::{
@@ -14,8 +11,9 @@ use petgraph::{
 
 use super::{
     builder::FrameGraph,
-    edges::{self, Edges, Relation, Roles, Walk},
+    edges::{self, Edges, Relation, Roles},
     error::{CompileError, GraphProblem},
+    order::{Walk, circle, in_order, places},
     progress::Progress,
     schedule::{Adjacency, Schedule},
 };
@@ -58,12 +56,9 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
         let processes = circle(&edges, &order).into_iter().map(|node| name(graph, node)).collect();
         return Err(GraphProblem::Cycle { processes });
     }
-    edges::add_versions(&mut edges, &roles);
+    let place = places(order.len(), &order);
+    edges::add_versions(&mut edges, &roles, &place);
     let needed = edges::needed(graph, &roles, &edges);
-    let mut place = vec![0; order.len()];
-    for (at, node) in order.iter().enumerate() {
-        place[node.index()] = at;
-    }
     let facts = Facts { graph, roles: &roles, edges: &edges, needed: &needed, place: &place };
     facts.check_producers()?;
     facts.check_writers()?;
@@ -93,50 +88,6 @@ fn check_names<P>(graph: &FrameGraph<P>) -> Result<(), GraphProblem> {
         Some(process) => Err(GraphProblem::DuplicateProcess { name: process.name.clone() }),
         None => Ok(()),
     }
-}
-
-/// The nodes, each after all before it, the lowest first where several could be next. Nodes on a circle, and those
-/// behind one, are left out.
-fn in_order<E>(graph: &DiGraph<(), E>) -> Vec<NodeIndex> {
-    let mut waits_for: Vec<usize> =
-        graph.node_indices().map(|node| graph.edges_directed(node, Direction::Incoming).count()).collect();
-    let mut ready: BinaryHeap<Reverse<NodeIndex>> =
-        graph.node_indices().filter(|node| waits_for[node.index()] == 0).map(Reverse).collect();
-    let mut order = Vec::with_capacity(waits_for.len());
-    while let Some(Reverse(node)) = ready.pop() {
-        order.push(node);
-        for after in graph.neighbors(node) {
-            waits_for[after.index()] -= 1;
-            if waits_for[after.index()] == 0 {
-                ready.push(Reverse(after));
-            }
-        }
-    }
-    order
-}
-
-/// The nodes of one circle, the lowest first, of a graph that has one; `ordered` is what [`in_order`] made of it.
-fn circle(edges: &Edges, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
-    let mut stuck = vec![true; edges.node_count()];
-    for node in ordered {
-        stuck[node.index()] = false;
-    }
-    // Whoever is stuck waits for somebody who is stuck, so the way back comes by a node twice.
-    let mut path: Vec<NodeIndex> = Vec::new();
-    let mut place = vec![None; stuck.len()];
-    let mut next = edges.node_indices().find(|node| stuck[node.index()]);
-    while let Some(node) = next {
-        if let Some(start) = place[node.index()].replace(path.len()) {
-            path.drain(..start);
-            break;
-        }
-        path.push(node);
-        next = edges.neighbors_directed(node, Direction::Incoming).filter(|before| stuck[before.index()]).min();
-    }
-    path.reverse();
-    let lowest = (0..path.len()).min_by_key(|&at| path[at]).unwrap_or(0);
-    path.rotate_left(lowest);
-    path
 }
 
 /// What is known of a graph that can be put in order.

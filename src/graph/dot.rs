@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{
     builder::FrameGraph,
     edges::{self, Roles},
+    order::{in_order, places},
     schedule::Schedule,
 };
 
@@ -17,7 +18,8 @@ impl<P> FrameGraph<P> {
     pub fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
-        edges::add_versions(&mut edges, &roles);
+        let place = places(self.processes.len(), &in_order(&edges));
+        edges::add_versions(&mut edges, &roles, &place);
         let needed = edges::needed(self, &roles, &edges);
 
         let mut dot = Dot::new();

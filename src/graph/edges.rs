@@ -6,7 +6,10 @@ use petgraph::{
     visit::EdgeRef,
 };
 
-use super::builder::{Access, FrameGraph};
+use super::{
+    builder::{Access, FrameGraph},
+    order::Walk,
+};
 
 /// An edge per reason to wait, from the process waited for. The node of a process is its position in the graph.
 pub(super) type Edges = DiGraph<(), Relation>;
@@ -95,11 +98,11 @@ fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeInde
     }
 }
 
-/// Lets modifiers wait for the version they are to modify.
+/// Lets modifiers wait for the version they are to modify: what the last makers before them left.
 ///
-/// Modifiers have no order of their own, so only once all edges are known is it known which of them come before which. That
-/// one needs what the other left of the resource is no new order, but it is a reason to keep the other.
-pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles]) {
+/// Modifiers have no order of their own, so only once all edges are known is it known which of them come before which, and
+/// `place` is where. That one needs what the other left is no new order, but it is a reason to keep the other.
+pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) {
     let mut walk = Walk::new(edges);
     let mut made = vec![usize::MAX; edges.node_count()];
     for (resource, roles) in roles.iter().enumerate() {
@@ -109,16 +112,28 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles]) {
         roles.makers().for_each(|maker| made[maker.index()] = resource);
         for &modifier in &roles.modifiers {
             // What stands behind another maker is that maker's affair: the walk goes no further there.
-            let mut sources = Vec::new();
+            let mut last = Vec::new();
             walk.from(edges, modifier, Direction::Incoming, |before, _| {
                 let is_maker = made[before.index()] == resource;
-                sources.extend(is_maker.then_some(before));
+                last.extend(is_maker.then_some(before));
                 !is_maker
             });
-            sources.sort_unstable();
-            sources.dedup();
-            for source in sources {
-                edges.add_edge(source, modifier, Relation::Data(resource));
+            last.sort_unstable_by_key(|maker| place[maker.index()]);
+            last.dedup();
+            for (at, &maker) in last.iter().enumerate() {
+                // Writers have their edge already. All lists of roles are ascending.
+                if roles.modifiers.binary_search(&maker).is_err() {
+                    continue;
+                }
+                // A maker can have been met although it stands behind another one as well, by a way past that one.
+                let later = &last[at + 1..];
+                if let Some(end) = later.last() {
+                    let is_between = |node: NodeIndex, _| place[node.index()] <= place[end.index()];
+                    walk.from(edges, maker, Direction::Outgoing, is_between);
+                }
+                if !later.iter().any(|&other| walk.has_met(other)) {
+                    edges.add_edge(maker, modifier, Relation::Data(resource));
+                }
             }
         }
     }
@@ -143,47 +158,4 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
         }
     }
     needed
-}
-
-/// A walk along edges, from node to node, that remembers whom it met. It is used again and again, as to forget is free.
-pub(super) struct Walk {
-    /// Per node, the last walk that met it.
-    met: Vec<usize>,
-    walks: usize,
-    open: Vec<NodeIndex>,
-}
-
-impl Walk {
-    pub(super) fn new(edges: &Edges) -> Self {
-        Self { met: vec![0; edges.node_count()], walks: 0, open: Vec::new() }
-    }
-
-    /// Forgets all, and walks from `start` against or along the edges, to every node that `enter` lets it enter.
-    pub(super) fn from(
-        &mut self,
-        edges: &Edges,
-        start: NodeIndex,
-        direction: Direction,
-        mut enter: impl FnMut(NodeIndex, Relation) -> bool,
-    ) {
-        self.walks += 1;
-        self.met[start.index()] = self.walks;
-        self.open.push(start);
-        while let Some(node) = self.open.pop() {
-            for edge in edges.edges_directed(node, direction) {
-                let next = match direction {
-                    Direction::Incoming => edge.source(),
-                    Direction::Outgoing => edge.target(),
-                };
-                if !self.has_met(next) && enter(next, *edge.weight()) {
-                    self.met[next.index()] = self.walks;
-                    self.open.push(next);
-                }
-            }
-        }
-    }
-
-    pub(super) fn has_met(&self, node: NodeIndex) -> bool {
-        self.met[node.index()] == self.walks
-    }
 }

@@ -124,6 +124,7 @@ mod edges;
 mod error;
 mod execute;
 mod node;
+mod order;
 mod progress;
 mod schedule;
 

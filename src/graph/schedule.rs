@@ -65,7 +65,7 @@ impl<P> Schedule<P> {
         self.index(process).map(|index| &mut self.processes[index])
     }
 
-    /// The processes, taken out, in execution order.
+    /// The processes, taken out, with their names, in execution order.
     pub fn into_processes(self) -> impl ExactSizeIterator<Item = (String, P)> {
         self.names.into_iter().zip(self.processes)
     }

@@ -1,0 +1,261 @@
+//! The buffers of one frame on its way.
+
+use std::mem;
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+
+use super::arena::new_buffer;
+use super::layouts::Layouts;
+use crate::backend::{BackendError, FrameRequest};
+use crate::process::{Draws, Pass};
+use crate::view::{LightRecord, ObjectRecord, ViewRecord};
+
+/// Buffers that no frame uses at present.
+///
+/// A frame has its buffers for itself from `begin` until it was submitted, or dropped. After that the next frame may write
+/// them at once: wgpu puts those writes behind what was submitted before.
+#[derive(Default)]
+pub(super) struct BufferPool {
+    free: Mutex<Vec<Buffers>>,
+}
+
+impl BufferPool {
+    pub(super) fn take(self: &Arc<Self>) -> FrameBuffers {
+        let buffers = self.free.lock().pop().unwrap_or_default();
+        FrameBuffers { buffers, pool: Arc::clone(self) }
+    }
+}
+
+/// A frame's buffers, which return to the pool when they are dropped.
+pub(super) struct FrameBuffers {
+    buffers: Buffers,
+    pool: Arc<BufferPool>,
+}
+
+impl Drop for FrameBuffers {
+    fn drop(&mut self) {
+        self.pool.free.lock().push(mem::take(&mut self.buffers));
+    }
+}
+
+impl FrameBuffers {
+    /// Makes room for a frame, and uploads its views, lights and parameters.
+    ///
+    /// # Errors
+    /// If the device has no room, or a camera is out of reach.
+    pub(super) fn begin(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        layouts: &Layouts,
+        request: &FrameRequest<'_>,
+        draws: &[Draws<'_>],
+    ) -> Result<(), BackendError> {
+        let views = view_bytes(request)?;
+        let (lights, light_stride) = light_bytes(request);
+        let (parameters, parameter_ranges) = parameter_bytes(request.passes, draws);
+        let objects = request.scene.object_count().max(1);
+        let drawn_stride = aligned(objects * 4);
+
+        let buffers = &mut self.buffers;
+        let sizes = [
+            objects * size_of::<ObjectRecord>(),
+            views.len(),
+            lights.len(),
+            request.passes.len() * drawn_stride,
+            parameters.len(),
+        ];
+        let mut renewed = false;
+        for (buffer, size) in buffers.all().into_iter().zip(sizes) {
+            renewed |= buffer.reserve(device, size)?;
+        }
+        buffers.views.write(queue, 0, &views);
+        buffers.lights.write(queue, 0, &lights);
+        buffers.parameters.write(queue, 0, &parameters);
+
+        let key = GroupsKey { passes: request.passes.to_vec(), objects, light_stride, drawn_stride };
+        if renewed || buffers.groups_key.as_ref() != Some(&key) {
+            buffers.groups = (0..request.passes.len()).map(|pass| buffers.group(device, layouts, &key, pass)).collect();
+            buffers.groups_key = Some(key);
+        }
+        buffers.drawn_stride = drawn_stride;
+        buffers.parameter_ranges = parameter_ranges;
+        Ok(())
+    }
+
+    /// `@group(0)` of a pass.
+    pub(super) fn group(&self, pass: usize) -> &wgpu::BindGroup {
+        &self.buffers.groups[pass]
+    }
+
+    /// A pass's parameters; `None` where it has none.
+    pub(super) fn parameters(&self, pass: usize) -> Option<wgpu::BufferBinding<'_>> {
+        let (offset, length) = self.buffers.parameter_ranges[pass]?;
+        self.buffers.parameters.binding(offset, length)
+    }
+
+    pub(super) fn write_objects(&self, queue: &wgpu::Queue, first: usize, records: &[ObjectRecord]) {
+        self.buffers.objects.write(queue, first * size_of::<ObjectRecord>(), bytemuck::cast_slice(records));
+    }
+
+    pub(super) fn write_drawn(&self, queue: &wgpu::Queue, pass: usize, objects: &[u32]) {
+        self.buffers.drawn.write(queue, pass * self.buffers.drawn_stride, bytemuck::cast_slice(objects));
+    }
+}
+
+struct Buffers {
+    objects: GrowingBuffer,
+    /// A [`ViewRecord`] a view.
+    views: GrowingBuffer,
+    /// Each view's lights, relative to its camera.
+    lights: GrowingBuffer,
+    /// For each pass, which objects it draws; `drawn_stride` bytes apart.
+    drawn: GrowingBuffer,
+    drawn_stride: usize,
+    /// Each pass's parameters, and where in the buffer they are.
+    parameters: GrowingBuffer,
+    parameter_ranges: Vec<Option<(usize, usize)>>,
+    /// `@group(0)` of each pass, and what it was made for.
+    groups: Vec<wgpu::BindGroup>,
+    groups_key: Option<GroupsKey>,
+}
+
+/// What bind groups depend on, beside the buffers themselves.
+#[derive(PartialEq)]
+struct GroupsKey {
+    passes: Vec<Pass>,
+    objects: usize,
+    light_stride: usize,
+    drawn_stride: usize,
+}
+
+impl Default for Buffers {
+    fn default() -> Self {
+        let storage = |label| GrowingBuffer::new(label, wgpu::BufferUsages::STORAGE);
+        let uniform = |label| GrowingBuffer::new(label, wgpu::BufferUsages::UNIFORM);
+        Self {
+            objects: storage("objects"),
+            views: uniform("views"),
+            lights: storage("lights"),
+            drawn: storage("drawn objects"),
+            drawn_stride: 0,
+            parameters: uniform("parameters"),
+            parameter_ranges: Vec::new(),
+            groups: Vec::new(),
+            groups_key: None,
+        }
+    }
+}
+
+impl Buffers {
+    fn all(&mut self) -> [&mut GrowingBuffer; 5] {
+        [&mut self.objects, &mut self.views, &mut self.lights, &mut self.drawn, &mut self.parameters]
+    }
+
+    fn group(&self, device: &wgpu::Device, layouts: &Layouts, key: &GroupsKey, pass: usize) -> wgpu::BindGroup {
+        let view = key.passes[pass].view;
+        let bindings = [
+            self.views.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
+            self.objects.binding(0, key.objects * size_of::<ObjectRecord>()),
+            self.drawn.binding(pass * key.drawn_stride, key.drawn_stride),
+            self.lights.binding(view * key.light_stride, key.light_stride),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(bindings.into_iter().flatten())
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Buffer(buffer) })
+            .collect();
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &layouts.frame,
+            entries: &entries,
+        })
+    }
+}
+
+/// A buffer that is replaced by a larger one when it is too small.
+struct GrowingBuffer {
+    label: &'static str,
+    usage: wgpu::BufferUsages,
+    buffer: Option<wgpu::Buffer>,
+}
+
+impl GrowingBuffer {
+    fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
+        Self { label, usage: usage | wgpu::BufferUsages::COPY_DST, buffer: None }
+    }
+
+    /// Makes room for `bytes`, and says whether that took another buffer.
+    fn reserve(&mut self, device: &wgpu::Device, bytes: usize) -> Result<bool, BackendError> {
+        let needed = (bytes as u64).max(ALIGNMENT as u64);
+        if self.buffer.as_ref().is_some_and(|buffer| buffer.size() >= needed) {
+            return Ok(false);
+        }
+        // Half as much again, so that a scene that grows by one object a frame does not move every frame.
+        let size = (needed + needed / 2).min(device.limits().max_buffer_size & !3).max(needed);
+        self.buffer = Some(new_buffer(device, self.label, size, self.usage)?);
+        Ok(true)
+    }
+
+    fn write(&self, queue: &wgpu::Queue, offset: usize, bytes: &[u8]) {
+        if let Some(buffer) = self.buffer.as_ref().filter(|_| !bytes.is_empty()) {
+            queue.write_buffer(buffer, offset as u64, bytes);
+        }
+    }
+
+    /// A part of the buffer; `None` before [`GrowingBuffer::reserve`].
+    fn binding(&self, offset: usize, bytes: usize) -> Option<wgpu::BufferBinding<'_>> {
+        let size = std::num::NonZeroU64::new(bytes as u64);
+        self.buffer.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset: offset as u64, size })
+    }
+}
+
+/// Every device takes multiples of this as offsets into uniform and storage buffers.
+const ALIGNMENT: usize = 256;
+
+fn aligned(bytes: usize) -> usize {
+    bytes.max(1).next_multiple_of(ALIGNMENT)
+}
+
+fn view_bytes(request: &FrameRequest<'_>) -> Result<Vec<u8>, BackendError> {
+    let mut bytes = Vec::with_capacity(request.views.len() * ALIGNMENT);
+    for view in request.views {
+        let record = ViewRecord::new(view, request.scene, request.scene.lights.len())
+            .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
+        append_aligned(&mut bytes, bytemuck::bytes_of(&record));
+    }
+    Ok(bytes)
+}
+
+fn light_bytes(request: &FrameRequest<'_>) -> (Vec<u8>, usize) {
+    let stride = aligned(request.scene.lights.len() * size_of::<LightRecord>());
+    let mut bytes = Vec::with_capacity(request.views.len() * stride);
+    for (count, view) in (1..).zip(request.views) {
+        for light in request.scene.lights {
+            bytes.extend_from_slice(bytemuck::bytes_of(&LightRecord::new(light, view.camera.position)));
+        }
+        bytes.resize(count * stride, 0);
+    }
+    (bytes, stride)
+}
+
+fn parameter_bytes(passes: &[Pass], draws: &[Draws<'_>]) -> (Vec<u8>, Vec<Option<(usize, usize)>>) {
+    let mut bytes = Vec::new();
+    let mut append = |pass: &Pass| {
+        let parameters = match &draws[pass.process] {
+            Draws::Commands(commands) => &commands.parameters,
+            Draws::FullScreen(full_screen) => &full_screen.parameters,
+            Draws::Raw(_) => return None,
+        };
+        let offset = bytes.len();
+        append_aligned(&mut bytes, parameters);
+        (!parameters.is_empty()).then_some((offset, parameters.len()))
+    };
+    let ranges = passes.iter().map(&mut append).collect();
+    (bytes, ranges)
+}
+
+fn append_aligned(bytes: &mut Vec<u8>, more: &[u8]) {
+    bytes.extend_from_slice(more);
+    bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+}

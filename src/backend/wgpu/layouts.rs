@@ -1,0 +1,99 @@
+//! The bindings that every shader has: `@group(0)` and `@group(1)` of `drawloom.wgsl`.
+
+use wgpu::ShaderStages;
+
+use crate::process::Format;
+use crate::view::ViewRecord;
+
+/// The bind group layouts that all processes share.
+pub(super) struct Layouts {
+    /// View, objects, which of them are drawn, lights.
+    pub(super) frame: wgpu::BindGroupLayout,
+    /// Materials and textures.
+    pub(super) assets: wgpu::BindGroupLayout,
+}
+
+impl Layouts {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let frame = [
+            entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(size_of::<ViewRecord>() as u64)),
+            entry(1, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(2, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(3, ShaderStages::VERTEX_FRAGMENT, storage()),
+        ];
+        let array = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2Array,
+            multisampled: false,
+        };
+        let assets = [
+            entry(0, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(1, ShaderStages::FRAGMENT, array),
+            entry(2, ShaderStages::FRAGMENT, array),
+            entry(3, ShaderStages::FRAGMENT, array),
+            entry(4, ShaderStages::FRAGMENT, array),
+            entry(5, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        ];
+        Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
+    }
+}
+
+/// The layout of a process's own `@group(2)`: its parameters where it has some, then the targets it samples. `None` where
+/// it has neither.
+pub(super) fn process_layout(
+    device: &wgpu::Device,
+    has_parameters: bool,
+    samples: impl Iterator<Item = Format>,
+) -> Option<wgpu::BindGroupLayout> {
+    let mut entries = Vec::new();
+    if has_parameters {
+        entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(0)));
+    }
+    for (binding, format) in (1..).zip(samples) {
+        let sample_type = if format.is_depth() {
+            wgpu::TextureSampleType::Depth
+        } else {
+            wgpu::TextureSampleType::Float { filterable: false }
+        };
+        let view_dimension = wgpu::TextureViewDimension::D2;
+        let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        entries.push(entry(binding, ShaderStages::FRAGMENT, texture));
+    }
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("process"), entries: &entries };
+    (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+}
+
+/// A target's format in wgpu's words.
+pub(super) fn texture_format(format: Format) -> wgpu::TextureFormat {
+    match format {
+        Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
+        Format::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+        Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
+        Format::R32Float => wgpu::TextureFormat::R32Float,
+        Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
+    }
+}
+
+fn entry(binding: u32, visibility: ShaderStages, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+fn uniform(size: u64) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: std::num::NonZeroU64::new(size),
+    }
+}
+
+fn storage() -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}

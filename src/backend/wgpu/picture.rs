@@ -1,0 +1,100 @@
+//! What is known of a submitted frame, and its pictures brought back.
+
+use std::sync::Arc;
+
+use super::error_scope::checked;
+use super::targets::ViewTargets;
+use crate::backend::BackendError;
+use crate::process::Format;
+
+/// A frame that was submitted to wgpu.
+pub struct WgpuSubmission {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    index: wgpu::SubmissionIndex,
+    targets: Vec<Arc<ViewTargets>>,
+}
+
+/// A target's pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// What a pixel is.
+    pub format: Format,
+    /// Rows from top to bottom, without padding.
+    pub bytes: Vec<u8>,
+}
+
+impl WgpuSubmission {
+    pub(super) fn new(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        index: wgpu::SubmissionIndex,
+        targets: Vec<Arc<ViewTargets>>,
+    ) -> Self {
+        Self { device, queue, index, targets }
+    }
+
+    /// One of a view's targets, to show or to copy. The next frame draws into the same texture.
+    pub fn texture(&self, view: usize, target: &str) -> Option<&wgpu::Texture> {
+        self.targets.get(view)?.find(target).map(|target| &target.texture)
+    }
+
+    /// Waits until the device has drawn the frame.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn wait(&self) -> Result<(), BackendError> {
+        let poll = wgpu::PollType::Wait { submission_index: Some(self.index.clone()), timeout: None };
+        self.device.poll(poll).map(|_| ()).map_err(|error| BackendError::DeviceLost { message: error.to_string() })
+    }
+
+    /// Waits for the device, and copies one of a view's targets.
+    ///
+    /// # Errors
+    /// If there is no such target, or the device refuses or is lost.
+    pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
+        let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
+        let found = self.targets.get(view).and_then(|targets| targets.find(target)).ok_or_else(unknown)?;
+        let (size, format) = (found.texture.size(), found.format);
+        let row = size.width as usize * format.bytes();
+        let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
+        let buffer = checked(&self.device, target, || self.copy(&found.texture, padded_row))?;
+
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver waits below, so it is there.
+            let _ = sender.send(result);
+        });
+        let lost = |message: String| BackendError::DeviceLost { message };
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+        let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;
+        mapped.map_err(|error| lost(error.to_string()))?;
+        let padded = buffer.get_mapped_range(..).map_err(|error| lost(error.to_string()))?;
+        let bytes = padded.chunks_exact(padded_row).flat_map(|padded| &padded[..row]).copied().collect();
+        Ok(Picture { width: size.width, height: size.height, format, bytes })
+    }
+
+    fn copy(&self, texture: &wgpu::Texture, padded_row: usize) -> wgpu::Buffer {
+        let size = texture.size();
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("picture"),
+            size: padded_row as u64 * u64::from(size.height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row as u32), rows_per_image: None };
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            size,
+        );
+        self.queue.submit([encoder.finish()]);
+        buffer
+    }
+}

@@ -1,0 +1,224 @@
+//! Pipelines: what a process and a draw's state become on the device.
+
+use std::collections::HashMap;
+
+use parking_lot::{RwLock, RwLockReadGuard};
+
+use super::layouts::{Layouts, process_layout, texture_format};
+use super::targets::ViewTargets;
+use crate::command::{Cull, DrawState};
+use crate::process::{Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
+use crate::queue::Batch;
+use crate::scene::{Blend, Topology, Vertex};
+
+/// The pipelines of one process: one for each state that a scene has needed so far.
+pub(super) struct ProcessPipelines {
+    /// `@group(2)`; `None` for a process that has nothing there.
+    process_layout: Option<wgpu::BindGroupLayout>,
+    /// `None` for a raw pass.
+    shader: Option<Shader>,
+    colors: Vec<wgpu::TextureFormat>,
+    depth: Option<Depth>,
+    by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
+}
+
+struct Shader {
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+    vertex: &'static str,
+    fragment: Option<String>,
+}
+
+#[derive(Clone, Copy)]
+struct Depth {
+    format: wgpu::TextureFormat,
+    writes: bool,
+}
+
+impl ProcessPipelines {
+    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts, plan: &FramePlan, planned: &PlannedProcess) -> Self {
+        let declaration = &planned.declaration;
+        let format_of = |target: &str| {
+            let mut targets = plan.targets().iter().filter(|planned| planned.views == declaration.views);
+            targets.find(|planned| planned.name == target).map_or(Format::Rgba8Unorm, |planned| planned.format)
+        };
+        let draws = planned.process.draws();
+        let (source, vertex, fragment, has_parameters, writes_depth) = match &draws {
+            Draws::Commands(commands) => {
+                let fragment = commands.fragment.map(str::to_owned);
+                (commands.shader, "vertex", fragment, !commands.parameters.is_empty(), commands.writes_depth)
+            }
+            Draws::FullScreen(full_screen) => {
+                let has_parameters = !full_screen.parameters.is_empty();
+                (full_screen.shader, "full_screen", Some("fragment".to_owned()), has_parameters, false)
+            }
+            Draws::Raw(_) => ("", "", None, false, false),
+        };
+        let process_layout = process_layout(device, has_parameters, declaration.samples().map(format_of));
+        let shader = (!vertex.is_empty()).then(|| {
+            let name = planned.process.name();
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(format!("{SHADER_PRELUDE}\n{source}").into()),
+            });
+            let shared = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
+            let used = if process_layout.is_some() { 3 } else { 2 };
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(name),
+                bind_group_layouts: &shared[..used],
+                immediate_size: 0,
+            });
+            Shader { module, layout, vertex, fragment }
+        });
+        let depth = declaration.depth().map(|(target, cleared)| Depth {
+            format: texture_format(format_of(target)),
+            writes: cleared && writes_depth,
+        });
+        let colors = declaration.colors().map(|(target, _)| texture_format(format_of(target))).collect();
+        let pipelines = Self { process_layout, shader, colors, depth, by_state: RwLock::default() };
+        if let Draws::FullScreen(full_screen) = &draws {
+            pipelines.make(device, full_screen_state(full_screen.blend));
+        }
+        pipelines
+    }
+
+    /// Makes the pipelines that these batches need and that are not there yet.
+    pub(super) fn prepare(&self, device: &wgpu::Device, batches: &[Batch]) {
+        let mut previous = None;
+        for batch in batches {
+            if previous.replace(batch.state) != Some(batch.state) && !self.prepared().contains_key(&batch.state) {
+                self.make(device, batch.state);
+            }
+        }
+    }
+
+    /// The pipelines there are, by state.
+    pub(super) fn prepared(&self) -> RwLockReadGuard<'_, HashMap<DrawState, wgpu::RenderPipeline>> {
+        self.by_state.read()
+    }
+
+    /// What the process has at `@group(2)` in one pass.
+    pub(super) fn process_group(
+        &self,
+        device: &wgpu::Device,
+        parameters: Option<wgpu::BufferBinding<'_>>,
+        targets: &ViewTargets,
+        declaration: &Declaration,
+    ) -> Option<wgpu::BindGroup> {
+        let layout = self.process_layout.as_ref()?;
+        let parameters = parameters.map(|buffer| (0, wgpu::BindingResource::Buffer(buffer)));
+        let sampled = (1..).zip(declaration.samples()).filter_map(|(binding, name)| {
+            targets.find(name).map(|target| (binding, wgpu::BindingResource::TextureView(&target.view)))
+        });
+        let entries: Vec<_> = parameters
+            .into_iter()
+            .chain(sampled)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let descriptor = wgpu::BindGroupDescriptor { label: Some("process"), layout, entries: &entries };
+        Some(device.create_bind_group(&descriptor))
+    }
+
+    /// What a bundle must know of the pass that it is for.
+    pub(super) fn bundle_descriptor<'a>(
+        &self,
+        label: &'a str,
+        color_formats: &'a [Option<wgpu::TextureFormat>],
+    ) -> wgpu::RenderBundleEncoderDescriptor<'a> {
+        wgpu::RenderBundleEncoderDescriptor {
+            label: Some(label),
+            color_formats,
+            depth_stencil: self.depth.map(|depth| wgpu::RenderBundleDepthStencil {
+                format: depth.format,
+                depth_read_only: !depth.writes,
+                stencil_read_only: true,
+            }),
+            sample_count: 1,
+            multiview: None,
+        }
+    }
+
+    /// The formats of the colour targets.
+    pub(super) fn color_formats(&self) -> Vec<Option<wgpu::TextureFormat>> {
+        self.colors.iter().copied().map(Some).collect()
+    }
+
+    fn make(&self, device: &wgpu::Device, state: DrawState) {
+        let Some(shader) = &self.shader else { return };
+        let target = |format: &wgpu::TextureFormat| {
+            Some(wgpu::ColorTargetState {
+                format: *format,
+                blend: blend_state(state.blend()),
+                write_mask: wgpu::ColorWrites::ALL,
+            })
+        };
+        let targets: Vec<_> = self.colors.iter().map(target).collect();
+        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
+        let vertices = [Some(wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &attributes,
+        })];
+        let has_vertices = shader.vertex == "vertex";
+        let (topology, strip_index_format) = match state.topology() {
+            Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
+            Topology::TriangleStrip => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
+        };
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&shader.layout),
+            vertex: wgpu::VertexState {
+                module: &shader.module,
+                entry_point: Some(shader.vertex),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: if has_vertices { &vertices } else { &[] },
+            },
+            primitive: wgpu::PrimitiveState {
+                topology,
+                strip_index_format,
+                front_face: wgpu::FrontFace::Ccw,
+                cull_mode: match state.cull() {
+                    Cull::Back => Some(wgpu::Face::Back),
+                    Cull::Front => Some(wgpu::Face::Front),
+                    Cull::Nothing => None,
+                },
+                ..wgpu::PrimitiveState::default()
+            },
+            depth_stencil: self.depth.map(|depth| wgpu::DepthStencilState {
+                format: depth.format,
+                // What mixes with what is behind it must not hide what is drawn after it.
+                depth_write_enabled: Some(depth.writes && state.blend() == Blend::None),
+                depth_compare: Some(wgpu::CompareFunction::Greater),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: shader.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
+                module: &shader.module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        self.by_state.write().insert(state, pipeline);
+    }
+}
+
+/// The state that a full-screen triangle is drawn with.
+pub(super) fn full_screen_state(blend: Blend) -> DrawState {
+    DrawState::new(Topology::TriangleList, Cull::Nothing, blend)
+}
+
+fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
+    use wgpu::{BlendComponent, BlendFactor, BlendOperation};
+    let both = |component: BlendComponent| wgpu::BlendState { color: component, alpha: component };
+    let add = |operation| BlendComponent { src_factor: BlendFactor::One, dst_factor: BlendFactor::One, operation };
+    match blend {
+        Blend::None => None,
+        Blend::Alpha => Some(wgpu::BlendState::ALPHA_BLENDING),
+        Blend::Additive => Some(both(add(BlendOperation::Add))),
+        Blend::Subtractive => Some(both(add(BlendOperation::ReverseSubtract))),
+    }
+}

@@ -1,0 +1,127 @@
+//! Textures scaled to the size of their array's layers, with mip levels. Averages are taken of light, not of sRGB bytes.
+
+use std::sync::LazyLock;
+
+use crate::scene::Texture;
+
+/// All mip levels of a texture scaled to a square, from `side` pixels down to one; RGBA bytes, sRGB encoded.
+pub(super) fn mip_chain(texture: &Texture, side: u32) -> Vec<Vec<u8>> {
+    let mut level = scaled(texture, side);
+    let mut side = side as usize;
+    let mut chain = vec![encoded(&level)];
+    while side > 1 {
+        level = halved(&level, side);
+        side /= 2;
+        chain.push(encoded(&level));
+    }
+    chain
+}
+
+type Texel = [f32; 4];
+
+/// Bilinear where it grows. Where it shrinks, the mean of the pixels that each new one covers.
+fn scaled(texture: &Texture, side: u32) -> Vec<Texel> {
+    let (width, height) = (texture.width() as usize, texture.height() as usize);
+    let texels: Vec<Texel> =
+        texture.pixels().chunks_exact(4).map(|pixel| decoded([pixel[0], pixel[1], pixel[2], pixel[3]])).collect();
+    let columns = weights(width, side as usize);
+    let rows = weights(height, side as usize);
+    let mut result = Vec::with_capacity(rows.len() * columns.len());
+    for row in &rows {
+        for column in &columns {
+            let mut sum = [0.0; 4];
+            for &(y, row_weight) in row {
+                for &(x, column_weight) in column {
+                    let texel = texels[y * width + x];
+                    for channel in 0..4 {
+                        sum[channel] += texel[channel] * row_weight * column_weight;
+                    }
+                }
+            }
+            result.push(sum);
+        }
+    }
+    result
+}
+
+/// For each of `to` new places, which of `from` old ones make it up and by what share: a tent as wide as the coarser of
+/// the two grids. Places wrap around, as texture coordinates do.
+fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+    let step = from as f64 / to as f64;
+    let reach = step.max(1.0);
+    let of_place = |place: usize| {
+        let center = (place as f64 + 0.5) * step - 0.5;
+        let first = (center - reach).floor() as i64;
+        let last = (center + reach).ceil() as i64;
+        let tent = |old: i64| (1.0 - (old as f64 - center).abs() / reach).max(0.0);
+        let total: f64 = (first..=last).map(tent).sum();
+        let wrapped = |old: i64| old.rem_euclid(from as i64) as usize;
+        let weighted = (first..=last).map(|old| (wrapped(old), (tent(old) / total) as f32));
+        weighted.filter(|(_, weight)| *weight > 0.0).collect()
+    };
+    (0..to).map(of_place).collect()
+}
+
+fn halved(level: &[Texel], side: usize) -> Vec<Texel> {
+    let half = side / 2;
+    let texel = |index: usize| {
+        let (x, y) = (index % half * 2, index / half * 2);
+        let corners = [y * side + x, y * side + x + 1, (y + 1) * side + x, (y + 1) * side + x + 1];
+        std::array::from_fn(|channel| corners.iter().map(|&corner| level[corner][channel]).sum::<f32>() * 0.25)
+    };
+    (0..half * half).map(texel).collect()
+}
+
+fn decoded(pixel: [u8; 4]) -> Texel {
+    static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| linear(byte as f32 / 255.0)));
+    let [red, green, blue, alpha] = pixel;
+    let light = |byte: u8| LINEAR[usize::from(byte)];
+    [light(red), light(green), light(blue), f32::from(alpha) / 255.0]
+}
+
+fn encoded(level: &[Texel]) -> Vec<u8> {
+    let byte = |value: f32| (value * 255.0 + 0.5) as u8;
+    let encode =
+        |&[red, green, blue, alpha]: &Texel| [byte(srgb(red)), byte(srgb(green)), byte(srgb(blue)), byte(alpha)];
+    level.iter().flat_map(encode).collect()
+}
+
+fn linear(value: f32) -> f32 {
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+fn srgb(value: f32) -> f32 {
+    if value <= 0.003_130_8 { value * 12.92 } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_texture_of_its_layers_size_is_kept_to_the_byte() {
+        let pixels: Vec<u8> = (0..=255).cycle().take(8 * 8 * 4).collect();
+        let texture = Texture::new("all bytes", 8, 8, pixels.clone()).unwrap();
+        let chain = mip_chain(&texture, 8);
+        assert_eq!(chain.iter().map(Vec::len).collect::<Vec<_>>(), [256, 64, 16, 4]);
+        assert_eq!(chain[0], pixels);
+    }
+
+    #[test]
+    fn black_and_white_average_to_half_the_light() {
+        let pixels = [[0, 0, 0, 255], [255, 255, 255, 255], [255, 255, 255, 255], [0, 0, 0, 255]].concat();
+        let texture = Texture::new("checker", 2, 2, pixels).unwrap();
+        assert_eq!(mip_chain(&texture, 2)[1], [188, 188, 188, 255]);
+    }
+
+    #[test]
+    fn one_colour_stays_that_colour_at_every_size() {
+        for (width, height, side) in [(1, 1, 256), (3, 5, 256), (300, 7, 256), (700, 300, 512)] {
+            let pixels = [10, 100, 200, 50].repeat(width as usize * height as usize);
+            let texture = Texture::new("plain", width, height, pixels).unwrap();
+            for level in mip_chain(&texture, side) {
+                assert!(level.chunks(4).all(|pixel| pixel == [10, 100, 200, 50]));
+            }
+        }
+    }
+}

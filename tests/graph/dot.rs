@@ -1,0 +1,187 @@
+//! The drawings: what they show, and that any name gives a drawing that can be read.
+
+use drawloom::graph::FrameGraph;
+use proptest::prelude::*;
+
+use crate::oracle::{any_sketch, sound_sketch};
+
+/// The identifiers of a node or an edge, and its attributes.
+type Statement<'a> = (Vec<&'a str>, Vec<(&'a str, String)>);
+
+/// Reads what the drawings use of Graphviz' language: a statement a line, each a node or an edge with attributes. Gives the
+/// attributes of each node or edge, by its identifiers.
+fn parse(dot: &str) -> Result<Vec<Statement<'_>>, String> {
+    let body = dot.strip_prefix("digraph {\n").and_then(|rest| rest.strip_suffix("}\n")).ok_or("no digraph")?;
+    body.lines().map(|line| statement(line).ok_or_else(|| format!("cannot read {line:?}"))).collect()
+}
+
+fn statement(line: &str) -> Option<Statement<'_>> {
+    let line = line.trim_start().strip_suffix(';')?;
+    let (subject, mut rest) = match line.split_once(" [") {
+        Some((subject, attributes)) => (subject, attributes.strip_suffix(']')?),
+        None => (line, ""),
+    };
+    let identifiers: Vec<&str> = subject.split(" -> ").collect();
+    if identifiers.iter().any(|identifier| !identifier.chars().all(char::is_alphanumeric)) {
+        return None;
+    }
+    let mut attributes = Vec::new();
+    while !rest.is_empty() {
+        let (key, tail) = rest.split_once('=')?;
+        let value;
+        (value, rest) = if let Some(quoted) = tail.strip_prefix('"') { string(quoted)? } else { word(tail) };
+        attributes.push((key, value));
+        rest = match rest.strip_prefix(", ") {
+            Some(next) if !next.is_empty() => next,
+            None if rest.is_empty() => rest,
+            _ => return None,
+        };
+    }
+    Some((identifiers, attributes))
+}
+
+fn word(text: &str) -> (String, &str) {
+    let end = text.find(|character: char| !character.is_alphanumeric()).unwrap_or(text.len());
+    (text[..end].to_owned(), &text[end..])
+}
+
+/// A string behind its opening quote, as it is drawn, and what follows.
+fn string(text: &str) -> Option<(String, &str)> {
+    let mut drawn = String::new();
+    let mut characters = text.char_indices();
+    loop {
+        match characters.next()? {
+            (at, '"') => return Some((drawn.replace("&amp;", "&"), &text[at + 1..])),
+            (_, '\\') => match characters.next()?.1 {
+                escaped @ ('"' | '\\') => drawn.push(escaped),
+                _ => return None,
+            },
+            (_, control) if control.is_control() => return None,
+            (_, other) => drawn.push(other),
+        }
+    }
+}
+
+/// The attributes of the node that is drawn with that label.
+fn node<'a>(statements: &'a [Statement<'a>], label: &str) -> (String, Vec<(&'a str, &'a str)>) {
+    let is_it =
+        |(_, attributes): &&Statement<'_>| attributes.iter().any(|(key, value)| *key == "label" && value == label);
+    let (identifiers, attributes) = statements.iter().find(is_it).unwrap_or_else(|| panic!("no {label:?}"));
+    let attributes = attributes.iter().filter(|(key, _)| *key != "label");
+    (identifiers[0].to_owned(), attributes.map(|(key, value)| (*key, value.as_str())).collect())
+}
+
+fn small_graph() -> FrameGraph<()> {
+    let mut graph = FrameGraph::new();
+    let [map, image, overlay, noise] = ["map", "image", "overlay", "noise"].map(|name| graph.resource(name));
+    let [shadow, light, lines] = ["shadow", "light", "lines"].map(|name| graph.add(name, ()));
+    graph.write(shadow, map);
+    graph.read(light, map);
+    graph.read(light, image);
+    graph.write(light, image);
+    graph.write(lines, overlay);
+    graph.order(lines, light);
+    graph.import(image);
+    graph.import(noise);
+    graph.output(image);
+    graph
+}
+
+#[test]
+fn a_graph_shows_processes_resources_and_what_is_not_needed() {
+    let dot = small_graph().to_dot();
+    let statements = parse(&dot).expect("the drawing can be read");
+    let (shadow, attributes) = node(&statements, "shadow");
+    assert_eq!(attributes, [("shape", "box")]);
+    let (light, _) = node(&statements, "light");
+    let (lines, attributes) = node(&statements, "lines");
+    assert_eq!(attributes, [("shape", "box"), ("style", "dashed")]);
+    let (map, attributes) = node(&statements, "map");
+    assert_eq!(attributes, [("shape", "ellipse")]);
+    let (image, attributes) = node(&statements, "image");
+    assert_eq!(attributes, [("shape", "ellipse"), ("style", "filled"), ("peripheries", "2")]);
+    let (overlay, attributes) = node(&statements, "overlay");
+    assert_eq!(attributes, [("shape", "ellipse"), ("style", "dashed")]);
+    let (_, attributes) = node(&statements, "noise");
+    assert_eq!(attributes, [("shape", "ellipse"), ("style", "filled,dashed")]);
+
+    let mut edges: Vec<_> = statements.iter().filter(|(ends, _)| ends.len() == 2).cloned().collect();
+    edges.sort();
+    let dotted = vec![("style", "dotted".to_owned())];
+    let mut expected = vec![
+        (vec![shadow.as_str(), &map], vec![]),
+        (vec![map.as_str(), &light], vec![]),
+        (vec![image.as_str(), &light], vec![]),
+        (vec![light.as_str(), &image], vec![]),
+        (vec![lines.as_str(), &overlay], vec![]),
+        (vec![lines.as_str(), &light], dotted),
+    ];
+    expected.sort();
+    assert_eq!(edges, expected);
+}
+
+#[test]
+fn a_schedule_shows_the_order_and_what_was_dropped() {
+    let dot = small_graph().compile().expect("nothing is wrong").to_dot();
+    let statements = parse(&dot).expect("the drawing can be read");
+    let (shadow, attributes) = node(&statements, "shadow");
+    assert_eq!(attributes, [("shape", "box")]);
+    let (light, _) = node(&statements, "light");
+    let (_, attributes) = node(&statements, "lines");
+    assert_eq!(attributes, [("shape", "box"), ("style", "dashed")]);
+    let edges: Vec<_> = statements.iter().map(|(ends, _)| ends.clone()).filter(|ends| ends.len() == 2).collect();
+    assert_eq!(edges, [[shadow.as_str(), &light]]);
+}
+
+#[test]
+fn entities_and_control_characters_are_drawn_as_they_are_written() {
+    let mut graph = FrameGraph::new();
+    graph.add("a &lt; b", ());
+    assert!(graph.to_dot().contains(r#"label="a &amp;lt; b""#), "{}", graph.to_dot());
+    graph.add("a\nb\r\u{0}\t", ());
+    assert!(graph.to_dot().contains(r#"label="a\\nb\\r\\u{0}\\t""#), "{}", graph.to_dot());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
+
+    #[test]
+    fn any_name_is_drawn_as_it_is(name in "\\PC*|[\"\\\\&;a>\\[\\]{}=, -]{0,12}") {
+        let mut graph = FrameGraph::new();
+        let process = graph.add(name.clone(), ());
+        graph.keep(process);
+        let other = format!("other {name}");
+        graph.resource(other.clone());
+        graph.add("dropped".to_owned() + &name, ());
+        let dot = graph.to_dot();
+        let statements = parse(&dot).map_err(TestCaseError::fail)?;
+        prop_assert_eq!(statements.len(), 3);
+        prop_assert_eq!(node(&statements, &name).1, [("shape", "box")]);
+        prop_assert_eq!(node(&statements, &other).1[0], ("shape", "ellipse"));
+        let dot = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?.to_dot();
+        prop_assert_eq!(parse(&dot).map_err(TestCaseError::fail)?.len(), 2);
+    }
+
+    #[test]
+    fn any_graph_can_be_drawn_also_one_that_does_not_compile(sketch in any_sketch()) {
+        let graph = sketch.graph(|process| process);
+        let dot = graph.to_dot();
+        let statements = parse(&dot).map_err(TestCaseError::fail)?;
+        let dashed = |attributes: &[(&str, String)]| attributes.contains(&("style", "dashed".to_owned()));
+        let dropped = statements.iter().filter(|(ends, attributes)| ends[0].starts_with("process") && dashed(attributes));
+        let drawn = dropped.count();
+        if let Ok(schedule) = graph.compile() {
+            prop_assert_eq!(drawn, schedule.dropped().len());
+        }
+    }
+
+    #[test]
+    fn a_schedule_draws_every_dependency(sketch in sound_sketch()) {
+        let schedule = sketch.graph(|process| process).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let dot = schedule.to_dot();
+        let statements = parse(&dot).map_err(TestCaseError::fail)?;
+        let edges = statements.iter().filter(|(ends, _)| ends.len() == 2).count();
+        let dependencies: usize = (0..schedule.len()).map(|index| schedule.dependencies(index).len()).sum();
+        prop_assert_eq!(edges, dependencies);
+    }
+}

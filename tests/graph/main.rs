@@ -1,0 +1,17 @@
+//! The frame graph against a naive oracle of its rules, and its runs against plain bookkeeping.
+
+mod compile;
+mod dot;
+mod extremes;
+mod oracle;
+mod problems;
+mod run;
+mod stops;
+
+use std::sync::LazyLock;
+
+use drawloom::task::Scheduler;
+
+/// Schedulers of one, two and four workers, which all tests use.
+static SCHEDULERS: LazyLock<[Scheduler; 3]> =
+    LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));

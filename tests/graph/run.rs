@@ -1,0 +1,263 @@
+//! What a run does: every item once, after all it depends on, on whoever is free.
+
+use std::{
+    ops::Range,
+    sync::{
+        Barrier, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+};
+
+use drawloom::{
+    graph::{Closure, FrameGraph, Node, NodeError, Schedule},
+    task::{Scheduler, Worker},
+};
+use proptest::{collection::vec, prelude::*};
+
+use crate::{
+    SCHEDULERS,
+    oracle::{Oracle, sound_sketch},
+};
+
+/// How often each item of each process was done.
+type Tally = Vec<Vec<AtomicUsize>>;
+
+fn tally(widths: &[usize]) -> Tally {
+    widths.iter().map(|width| (0..*width).map(|_| AtomicUsize::new(0)).collect()).collect()
+}
+
+/// A process that counts its items, and fails if something that comes before it is not done.
+struct Counting {
+    process: usize,
+    chunk: usize,
+    pinned: bool,
+    before: Vec<usize>,
+}
+
+impl Counting {
+    fn check(&self, tally: &Tally) -> Result<(), NodeError> {
+        // Relaxed: that the counts are seen at all is what the schedule is to see to.
+        let is_done = |process: &usize| tally[*process].iter().all(|count| count.load(Ordering::Relaxed) == 1);
+        match self.before.iter().find(|process| !is_done(process)) {
+            Some(process) => Err(format!("p{process} is not done").into()),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Node<Tally> for Counting {
+    fn width(&self, tally: &Tally) -> usize {
+        if let Err(error) = self.check(tally) {
+            panic!("{error}");
+        }
+        tally[self.process].len()
+    }
+
+    fn chunk(&self, _tally: &Tally) -> usize {
+        self.chunk
+    }
+
+    fn pinned(&self) -> bool {
+        self.pinned
+    }
+
+    fn run(&self, tally: &Tally, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+        let chunk = self.chunk.max(1);
+        if range.is_empty()
+            || !range.start.is_multiple_of(chunk)
+            || range.end != (range.start + chunk).min(tally[self.process].len())
+        {
+            return Err(format!("{range:?} is no chunk").into());
+        }
+        for count in &tally[self.process][range] {
+            count.fetch_add(1, Ordering::Relaxed);
+        }
+        self.check(tally)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
+
+    #[test]
+    fn every_item_is_done_once_and_after_all_before_it(
+        sketch in sound_sketch(),
+        shapes in vec((prop_oneof![0..4usize, 0..100usize], 0..12usize, prop::bool::weighted(0.1)), 24),
+    ) {
+        let oracle = Oracle::new(&sketch);
+        let graph = sketch.graph(|process| Counting {
+            process,
+            chunk: shapes[process].1,
+            pinned: shapes[process].2,
+            before: (0..oracle.needed.len()).filter(|&before| oracle.needed[before] && oracle.before[before][process]).collect(),
+        });
+        let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        for scheduler in SCHEDULERS.iter() {
+            for _ in 0..3 {
+                let widths: Vec<usize> = (0..oracle.needed.len()).map(|process| shapes[process].0).collect();
+                let tally = tally(&widths);
+                schedule.run(scheduler, &tally).map_err(|error| TestCaseError::fail(error.to_string()))?;
+                for (process, counts) in tally.into_iter().enumerate() {
+                    for count in counts {
+                        prop_assert_eq!(count.into_inner(), usize::from(oracle.needed[process]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A schedule of one kept process.
+pub fn alone<'a, C>(process: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
+    let mut graph = FrameGraph::new();
+    let process = graph.add("alone", process);
+    graph.keep(process);
+    graph.compile().expect("nothing is wrong")
+}
+
+pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Scheduler, context: &C) {
+    schedule.run(scheduler, context).expect("nothing fails");
+}
+
+#[test]
+fn all_workers_join_a_wide_process() {
+    // Each item waits for the others, so the run only ends if as many workers work on it at once.
+    let mut schedule = alone(Closure::new(|barrier: &Barrier, _, _| {
+        barrier.wait();
+        Ok(())
+    }));
+    let [_, two, four] = &*SCHEDULERS;
+    for (scheduler, width) in [(two, 2), (four, 4)] {
+        let (_, process) = schedule.processes_mut().next().expect("there is one");
+        *process = Closure::new(|barrier: &Barrier, _, _| {
+            barrier.wait();
+            Ok(())
+        })
+        .with_width(move |_| width);
+        for _ in 0..20 {
+            run(&mut schedule, scheduler, &Barrier::new(width));
+        }
+    }
+}
+
+#[test]
+fn independent_processes_run_at_once() {
+    let mut graph = FrameGraph::new();
+    let source = graph.add("source", Closure::new(|_: &Barrier, _, _| Ok(())));
+    for name in ["a", "b", "c", "d"] {
+        let process = graph.add(
+            name,
+            Closure::new(|barrier: &Barrier, _, _| {
+                barrier.wait();
+                Ok(())
+            }),
+        );
+        graph.order(source, process);
+        graph.keep(process);
+    }
+    graph.keep(source);
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for _ in 0..20 {
+        run(&mut schedule, &SCHEDULERS[2], &Barrier::new(4));
+    }
+}
+
+#[test]
+fn the_width_may_depend_on_what_came_before() {
+    let mut graph = FrameGraph::new();
+    let list = graph.resource("list");
+    let read = graph.add(
+        "read",
+        Closure::new(|counts: &[AtomicUsize; 2], range: Range<usize>, _| {
+            counts[1].fetch_add(range.len(), Ordering::Relaxed);
+            Ok(())
+        })
+        .with_width(|counts| counts[0].load(Ordering::Relaxed)),
+    );
+    let write = graph.add(
+        "write",
+        Closure::new(|counts: &[AtomicUsize; 2], range: Range<usize>, _| {
+            counts[0].fetch_add(range.len(), Ordering::Relaxed);
+            Ok(())
+        })
+        .with_width(|_| 300)
+        .with_chunk(3),
+    );
+    graph.read(read, list);
+    graph.write(write, list);
+    graph.keep(read);
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for scheduler in SCHEDULERS.iter() {
+        let counts = [AtomicUsize::new(0), AtomicUsize::new(0)];
+        run(&mut schedule, scheduler, &counts);
+        assert_eq!(counts.map(AtomicUsize::into_inner), [300, 300]);
+    }
+}
+
+#[test]
+fn pinned_processes_run_in_order_on_the_thread_that_called() {
+    let log = |log: &Mutex<Vec<(thread::ThreadId, usize)>>, range: Range<usize>, _: &Worker| {
+        log.lock().map_err(|_| "poisoned")?.push((thread::current().id(), range.start));
+        Ok(())
+    };
+    let mut graph = FrameGraph::new();
+    let first = graph.add("first", Closure::new(log).with_width(|_| 50).on_calling_thread());
+    let between = graph.add("between", Closure::new(|_: &Mutex<_>, _, _| Ok(())).with_width(|_| 50));
+    let last = graph.add("last", Closure::new(log).with_width(|_| 50).with_chunk(10).on_calling_thread());
+    graph.order(first, between);
+    graph.order(between, last);
+    [first, between, last].into_iter().for_each(|process| graph.keep(process));
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    let here = thread::current().id();
+    let expected: Vec<_> = (0..50).chain((0..50).step_by(10)).map(|start| (here, start)).collect();
+    for scheduler in SCHEDULERS.iter() {
+        for _ in 0..20 {
+            let log = Mutex::new(Vec::new());
+            run(&mut schedule, scheduler, &log);
+            assert_eq!(log.into_inner().expect("nobody panics"), expected);
+        }
+    }
+}
+
+#[test]
+fn the_context_may_be_of_unknown_size() {
+    let mut graph = FrameGraph::<Box<dyn Node<[AtomicUsize]>>>::new();
+    let process = Closure::new(|items: &[AtomicUsize], range: Range<usize>, _| {
+        items[range].iter().for_each(|item| item.store(1, Ordering::Relaxed));
+        Ok(())
+    });
+    let process = graph.add("fill", Box::new(process.with_width(<[AtomicUsize]>::len).with_chunk(4)));
+    graph.keep(process);
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    let items: Vec<AtomicUsize> = (0..10).map(|_| AtomicUsize::new(0)).collect();
+    schedule.run(&SCHEDULERS[1], items.as_slice()).expect("nothing fails");
+    assert!(items.into_iter().all(|item| item.into_inner() == 1));
+}
+
+#[test]
+fn pinned_roots_run_on_the_thread_that_called() {
+    // The first keeps the caller until another worker has come by, which would take the last if it could.
+    let meeting = |(barrier, _): &(Barrier, thread::ThreadId), _: Range<usize>, _: &Worker| {
+        barrier.wait();
+        Ok(())
+    };
+    let checked = |(_, caller): &(Barrier, thread::ThreadId), _: Range<usize>, _: &Worker| {
+        if thread::current().id() == *caller { Ok(()) } else { Err("this is not the caller".into()) }
+    };
+    let mut graph = FrameGraph::new();
+    for (name, process) in [
+        ("meeting pinned", Closure::new(meeting).on_calling_thread()),
+        ("meeting free", Closure::new(meeting)),
+        ("checked", Closure::new(checked).on_calling_thread()),
+    ] {
+        let process = graph.add(name, process);
+        graph.keep(process);
+    }
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for scheduler in &SCHEDULERS[1..] {
+        for _ in 0..50 {
+            run(&mut schedule, scheduler, &(Barrier::new(2), thread::current().id()));
+        }
+    }
+}

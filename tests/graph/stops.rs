@@ -1,0 +1,234 @@
+//! Runs that fail: what is stopped, what is reported, and that the next run is as good as new.
+
+use std::{
+    ops::Range,
+    sync::{
+        Barrier, Mutex,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+};
+
+use drawloom::{
+    graph::{Closure, FrameGraph, Node, NodeError, RunError, Schedule},
+    task::Worker,
+};
+
+use crate::SCHEDULERS;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Trouble {
+    Error,
+    PanicInRun,
+    PanicInWidth,
+    PanicInChunk,
+    PanicInPinned,
+}
+
+/// Ten items; something goes wrong with the fourth or before the first.
+struct Troubled<'a> {
+    trouble: Trouble,
+    is_on: &'a AtomicBool,
+}
+
+impl Troubled<'_> {
+    fn has(&self, trouble: Trouble) -> bool {
+        self.trouble == trouble && self.is_on.load(Ordering::Relaxed)
+    }
+}
+
+type Log = Mutex<Vec<String>>;
+
+impl Node<Log> for Troubled<'_> {
+    fn width(&self, _log: &Log) -> usize {
+        assert!(!self.has(Trouble::PanicInWidth), "as planned");
+        10
+    }
+
+    fn chunk(&self, _log: &Log) -> usize {
+        assert!(!self.has(Trouble::PanicInChunk), "as planned");
+        1
+    }
+
+    fn pinned(&self) -> bool {
+        assert!(!self.has(Trouble::PanicInPinned), "as planned");
+        false
+    }
+
+    fn run(&self, _log: &Log, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+        if range.contains(&3) {
+            assert!(!self.has(Trouble::PanicInRun), "as planned");
+            if self.has(Trouble::Error) {
+                return Err("as planned".into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `first`, then `troubled`, then `last`, of which the first and the last write down their names.
+fn chain(trouble: Trouble, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '_>> {
+    let noting = |name: &'static str| {
+        Closure::new(move |log: &Log, _, _| {
+            log.lock().map_err(|_| "poisoned")?.push(name.to_owned());
+            Ok(())
+        })
+    };
+    let mut graph = FrameGraph::<Box<dyn Node<Log> + '_>>::new();
+    let processes = [
+        graph.add("first", Box::new(noting("first"))),
+        graph.add("troubled", Box::new(Troubled { trouble, is_on })),
+        graph.add("last", Box::new(noting("last"))),
+    ];
+    for pair in processes.windows(2) {
+        graph.order(pair[0], pair[1]);
+    }
+    for process in processes {
+        graph.keep(process);
+    }
+    graph.compile().expect("nothing is wrong")
+}
+
+#[test]
+fn a_failure_stops_the_run_and_names_the_process() {
+    let all =
+        [Trouble::Error, Trouble::PanicInRun, Trouble::PanicInWidth, Trouble::PanicInChunk, Trouble::PanicInPinned];
+    for trouble in all {
+        for scheduler in SCHEDULERS.iter() {
+            let is_on = AtomicBool::new(false);
+            let mut schedule = chain(trouble, &is_on);
+            for fails in [true, false, true, true, false] {
+                is_on.store(fails, Ordering::Relaxed);
+                let log = Log::default();
+                let result = schedule.run(scheduler, &log);
+                let log = log.into_inner().expect("nobody panics holding the log");
+                match result {
+                    Ok(()) => assert!(!fails && log == ["first", "last"], "{log:?}"),
+                    Err(RunError::Failed { process, source }) => {
+                        assert!(fails && trouble == Trouble::Error);
+                        assert_eq!((process.as_str(), source.to_string().as_str()), ("troubled", "as planned"));
+                        assert_eq!(log, ["first"]);
+                    }
+                    Err(RunError::Panicked { process, message }) => {
+                        assert!(fails && trouble != Trouble::Error);
+                        assert_eq!((process.as_str(), message.as_str()), ("troubled", "as planned"));
+                        assert_eq!(log, ["first"]);
+                    }
+                    Err(other) => panic!("{other}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_root_whose_first_question_panics_is_named() {
+    let is_on = AtomicBool::new(true);
+    let mut graph = FrameGraph::new();
+    let root = graph.add("root", Troubled { trouble: Trouble::PanicInPinned, is_on: &is_on });
+    graph.keep(root);
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    let error = schedule.run(&SCHEDULERS[1], &Log::default()).expect_err("it panics");
+    assert_eq!(error.to_string(), r#"the process "root" panicked: as planned"#);
+    is_on.store(false, Ordering::Relaxed);
+    schedule.run(&SCHEDULERS[1], &Log::default()).expect("it does not panic");
+}
+
+#[test]
+fn no_further_chunk_starts_after_a_failure() {
+    for pinned in [false, true] {
+        let started = AtomicUsize::new(0);
+        let process = Closure::new(|(): &(), range: Range<usize>, _| {
+            started.fetch_add(1, Ordering::Relaxed);
+            if range.len() < 2 {
+                return Err("so many chunks cannot be counted".into());
+            }
+            if range.contains(&5) { Err("enough".into()) } else { Ok(()) }
+        });
+        // So wide that the run would not end if the failure did not stop it.
+        let process = process.with_width(|()| usize::MAX);
+        let mut graph = FrameGraph::new();
+        let process = graph.add("endless", if pinned { process.on_calling_thread() } else { process });
+        let after = graph.add("after", Closure::new(|(): &(), _, _| panic!("it must not run")));
+        graph.order(process, after);
+        graph.keep(process);
+        graph.keep(after);
+        let mut schedule = graph.compile().expect("nothing is wrong");
+        for scheduler in SCHEDULERS.iter() {
+            started.store(0, Ordering::Relaxed);
+            let error = schedule.run(scheduler, &()).expect_err("it fails");
+            assert_eq!(error.to_string(), r#"the process "endless" failed: enough"#);
+            if pinned || scheduler.workers() == 1 {
+                // One chunk after another, up to the one that fails.
+                assert!(started.load(Ordering::Relaxed) <= 6);
+            }
+        }
+    }
+}
+
+#[test]
+fn of_two_failures_the_one_that_stands_first_is_reported() {
+    // Each waits until the other runs too, so both fail in every run.
+    let failing = |message: &'static str| {
+        Closure::new(move |barrier: &Barrier, _, _| {
+            barrier.wait();
+            Err(message.into())
+        })
+    };
+    let mut graph = FrameGraph::new();
+    for name in ["one", "two"] {
+        let process = graph.add(name, failing(name));
+        graph.keep(process);
+    }
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for _ in 0..200 {
+        let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
+        assert_eq!(error.to_string(), r#"the process "one" failed: one"#);
+    }
+}
+
+#[test]
+fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
+    let failing = Closure::new(|barrier: &Barrier, range: Range<usize>, _| {
+        barrier.wait();
+        Err(format!("chunk {}", range.start).into())
+    });
+    let mut graph = FrameGraph::new();
+    let process = graph.add("wide", failing.with_width(|_| 2));
+    graph.keep(process);
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for _ in 0..200 {
+        let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
+        assert_eq!(error.to_string(), r#"the process "wide" failed: chunk 0"#);
+    }
+}
+
+#[test]
+fn an_error_that_panics_when_dropped_does_not_reach_the_caller() {
+    #[derive(Debug, thiserror::Error)]
+    #[error("bad")]
+    struct Bad;
+    impl Drop for Bad {
+        fn drop(&mut self) {
+            panic!("dropped");
+        }
+    }
+    let failing = |both: &Barrier, _: Range<usize>, _: &Worker| -> Result<(), NodeError> {
+        both.wait();
+        Err(Box::new(Bad))
+    };
+    let mut graph = FrameGraph::new();
+    for name in ["one", "two"] {
+        let process = graph.add(name, Closure::new(failing));
+        graph.keep(process);
+    }
+    let mut schedule = graph.compile().expect("nothing is wrong");
+    for _ in 0..50 {
+        match schedule.run(&SCHEDULERS[1], &Barrier::new(2)) {
+            Err(RunError::Failed { process, source }) => {
+                std::mem::forget(source);
+                assert_eq!(process, "one");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
