@@ -5,6 +5,7 @@
 mod assets;
 mod camera;
 mod collection;
+pub mod defaults;
 mod error;
 mod light;
 mod material;

@@ -1,0 +1,152 @@
+//! Renders a scene through the whole frame, and says what that took.
+//!
+//!     cargo run --release --example frame
+//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --frames 100
+
+#[path = "frame/adapter.rs"]
+mod adapter;
+#[path = "frame/arguments.rs"]
+mod arguments;
+#[path = "frame/report.rs"]
+mod report;
+
+use std::error::Error;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::{Backend, NullBackend, WgpuBackend, WgpuSubmission};
+use drawloom::scene::{Scene, obj, sample};
+use drawloom::task::Scheduler;
+use drawloom::{FrameStatistics, Renderer, Submitted};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use arguments::{Arguments, BackendName};
+use report::Report;
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
+    match run(&Arguments::checked()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", with_causes(error.as_ref()));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let scene = load_scene(arguments)?;
+    match arguments.backend {
+        BackendName::Null => draw(arguments, &scene, NullBackend, |_| Ok(())),
+        BackendName::Noop => {
+            let (device, queue) = adapter::noop_device()?;
+            draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)
+        }
+        BackendName::Wgpu => {
+            let (device, queue) = adapter::device()?;
+            let submission = draw_and_keep(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?;
+            save(arguments, &submission.submission)
+        }
+    }
+}
+
+fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
+    let mut scene = match &arguments.scene {
+        None => sample::colonnade()?,
+        Some(path) => {
+            let imported = obj::load(path)?;
+            for warning in &imported.warnings {
+                eprintln!("warning: {warning}");
+            }
+            println!(
+                "{}: {} triangles, and {} degenerate ones left out",
+                path.display(),
+                imported.triangles,
+                imported.degenerate_triangles
+            );
+            imported.scene
+        }
+    };
+    for camera in &mut scene.cameras {
+        if let Some(placed) = &arguments.camera {
+            placed.apply(camera);
+        }
+        camera.size = arguments.size.0;
+    }
+    scene.duplicate_objects(arguments.copies.get());
+    Ok(scene)
+}
+
+fn draw<B: Backend>(
+    arguments: &Arguments,
+    scene: &Scene,
+    backend: B,
+    wait: impl Fn(&B::Submission) -> Result<(), drawloom::backend::BackendError>,
+) -> Result<(), Box<dyn Error>> {
+    draw_and_keep(arguments, scene, backend, wait).map(|_| ())
+}
+
+/// Draws all frames, reports on them, and returns the last.
+fn draw_and_keep<B: Backend>(
+    arguments: &Arguments,
+    scene: &Scene,
+    backend: B,
+    wait: impl Fn(&B::Submission) -> Result<(), drawloom::backend::BackendError>,
+) -> Result<Submitted<B>, Box<dyn Error>> {
+    let scheduler = Arc::new(match arguments.workers {
+        Some(workers) => Scheduler::new(workers.get())?,
+        None => Scheduler::with_available_parallelism()?,
+    });
+    let workers = scheduler.workers();
+    let (mut renderer, submitter) =
+        Renderer::builder(backend).deferred().granularity(arguments.granularity.0).build(scheduler)?;
+
+    let frames = arguments.frames.get();
+    let progress = ProgressBar::new(frames as u64);
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left")?);
+    let mut measured: Vec<(Duration, FrameStatistics)> = Vec::with_capacity(frames);
+    let mut last = None;
+    for _ in 0..frames {
+        let start = Instant::now();
+        let recorded = renderer.record(scene.as_scene_ref())?;
+        let submitted = submitter.submit(recorded)?;
+        let cpu = start.elapsed();
+        // The next frame is not to be measured against a device that is still busy with this one.
+        wait(&submitted.submission)?;
+        measured.push((cpu, submitted.statistics.clone()));
+        last = Some(submitted);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+
+    let report = Report::new(renderer.backend().adapter(), arguments, workers, &measured);
+    report.print();
+    if let Some(path) = &arguments.report {
+        report.write(path)?;
+    }
+    last.ok_or_else(|| "no frame was drawn".into())
+}
+
+fn save(arguments: &Arguments, submission: &WgpuSubmission) -> Result<(), Box<dyn Error>> {
+    let path = arguments.out.clone().unwrap_or_else(|| "frame.png".into());
+    let picture = submission.read(0, "picture")?;
+    image::save_buffer(&path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
+        .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+    println!("{} written", path.display());
+    Ok(())
+}
+
+fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let inner_text = inner.to_string();
+        // Some errors end with what caused them already.
+        if !text.ends_with(&inner_text) {
+            text = format!("{text}: {inner_text}");
+        }
+        cause = inner.source();
+    }
+    text
+}

@@ -1,0 +1,172 @@
+//! The command line.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Parser, ValueEnum, error::ErrorKind};
+use drawloom::Granularity;
+use drawloom::glam::DVec3;
+use drawloom::scene::Camera;
+
+/// Renders a scene through the whole frame: graph, jobs, views, commands, sorting and instancing, bundles, queues and
+/// submission.
+#[derive(Parser)]
+#[command(name = "frame")]
+pub struct Arguments {
+    /// An OBJ file; without it, the scene that comes with the project.
+    pub scene: Option<PathBuf>,
+
+    /// Where the camera is and what it looks at, in metres.
+    #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
+    pub camera: Option<PlacedCamera>,
+
+    /// What draws: `wgpu` an adapter, `noop` wgpu without one, `null` nothing, with every rule checked.
+    #[arg(long, value_enum, default_value = "wgpu")]
+    pub backend: BackendName,
+
+    /// Threads that run jobs, this one included; as many as the machine has cores if not given.
+    #[arg(long, value_name = "N")]
+    pub workers: Option<NonZeroUsize>,
+
+    /// The size of a job: per-camera, per-draw or chunk:N.
+    #[arg(long, value_name = "SIZE", default_value = "chunk:512")]
+    pub granularity: JobSize,
+
+    /// The scene's objects N times over, at the same place.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub copies: NonZeroUsize,
+
+    /// How many frames to draw.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub frames: NonZeroUsize,
+
+    /// The picture's size in pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x540")]
+    pub size: PictureSize,
+
+    /// Where the last picture goes; frame.png if not given.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+
+    /// Writes the figures as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// The command line's arguments, or clap's error.
+    pub fn checked() -> Self {
+        let arguments = Self::parse();
+        if arguments.out.is_some() && arguments.backend != BackendName::Wgpu {
+            let message = "--out needs a picture, and this backend draws none";
+            <Self as clap::CommandFactory>::command().error(ErrorKind::ArgumentConflict, message).exit();
+        }
+        arguments
+    }
+}
+
+/// What draws.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BackendName {
+    /// wgpu on the machine's adapter.
+    Wgpu,
+    /// wgpu's own backend that does nothing: the price of recording alone.
+    Noop,
+    /// Drawloom's backend that counts and checks.
+    Null,
+}
+
+impl BackendName {
+    /// As it is written on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wgpu => "wgpu",
+            Self::Noop => "noop",
+            Self::Null => "null",
+        }
+    }
+}
+
+/// `x,y,z,tx,ty,tz`.
+#[derive(Clone)]
+pub struct PlacedCamera {
+    position: DVec3,
+    target: DVec3,
+}
+
+impl PlacedCamera {
+    /// Puts a camera there.
+    pub fn apply(&self, camera: &mut Camera) {
+        let placed = Camera::looking_at(camera.name.clone(), self.position, self.target);
+        camera.position = placed.position;
+        camera.orientation = placed.orientation;
+    }
+}
+
+impl FromStr for PlacedCamera {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers =
+            text.split(',').map(|part| part.trim().parse::<f64>().map_err(|error| format!("{part:?}: {error}")));
+        let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+        let &[x, y, z, target_x, target_y, target_z] = numbers.as_slice() else {
+            return Err(format!("six numbers are wanted, not {}", numbers.len()));
+        };
+        let (position, target) = (DVec3::new(x, y, z), DVec3::new(target_x, target_y, target_z));
+        if !position.is_finite() || !target.is_finite() {
+            return Err("the numbers must be finite".to_owned());
+        }
+        if position == target {
+            return Err("a camera cannot look at where it is".to_owned());
+        }
+        Ok(Self { position, target })
+    }
+}
+
+/// `per-camera`, `per-draw` or `chunk:N`.
+#[derive(Clone)]
+pub struct JobSize(pub Granularity);
+
+impl JobSize {
+    /// As it is written on the command line.
+    pub fn name(&self) -> String {
+        match self.0 {
+            Granularity::PerCamera => "per-camera".to_owned(),
+            Granularity::PerDraw => "per-draw".to_owned(),
+            Granularity::Chunk(size) => format!("chunk:{size}"),
+        }
+    }
+}
+
+impl FromStr for JobSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("chunk:")) {
+            ("per-camera", _) => Ok(Self(Granularity::PerCamera)),
+            ("per-draw", _) => Ok(Self(Granularity::PerDraw)),
+            (_, Some(size)) => {
+                let size = size.parse::<NonZeroUsize>().map_err(|error| format!("chunk size {size:?}: {error}"))?;
+                Ok(Self(Granularity::Chunk(size.get())))
+            }
+            _ => Err("it is per-camera, per-draw or chunk:N".to_owned()),
+        }
+    }
+}
+
+/// `WxH`.
+#[derive(Clone)]
+pub struct PictureSize(pub [u32; 2]);
+
+impl FromStr for PictureSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (width, height) = text.split_once('x').ok_or("it is WIDTHxHEIGHT, as in 960x540")?;
+        let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text:?}: {error}"));
+        let size = [side(width)?, side(height)?];
+        if size.contains(&0) { Err("a picture without pixels".to_owned()) } else { Ok(Self(size)) }
+    }
+}

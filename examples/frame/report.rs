@@ -1,0 +1,145 @@
+//! What the frames took, as a table and as JSON.
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Duration;
+
+use drawloom::FrameStatistics;
+use serde::Serialize;
+
+use crate::arguments::Arguments;
+
+/// What is told of the frames.
+#[derive(Serialize)]
+pub struct Report {
+    adapter: String,
+    backend: &'static str,
+    workers: usize,
+    granularity: String,
+    objects: usize,
+    frames: usize,
+    views: Vec<View>,
+    stages_ms: Stages,
+    cpu_ms: Cpu,
+    /// What was left out; only printed.
+    #[serde(skip)]
+    rejections: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct View {
+    name: String,
+    kind: &'static str,
+    visible: usize,
+    commands: usize,
+    batches: usize,
+    bundles: usize,
+}
+
+/// Thread time, summed over workers, of the median frame.
+#[derive(Serialize)]
+struct Stages {
+    visibility: f64,
+    fill: f64,
+    sort: f64,
+    instance: f64,
+    record: f64,
+    submit: f64,
+}
+
+/// Wall time from the scene's hand-over to the return of submit.
+#[derive(Serialize)]
+struct Cpu {
+    median: f64,
+    p95: f64,
+}
+
+impl Report {
+    /// From what each frame measured; there is at least one.
+    pub fn new(
+        adapter: String,
+        arguments: &Arguments,
+        workers: usize,
+        measured: &[(Duration, FrameStatistics)],
+    ) -> Self {
+        let mut by_time: Vec<_> = measured.iter().collect();
+        by_time.sort_by_key(|(cpu, _)| *cpu);
+        let at_share = |share: f64| by_time[((by_time.len() - 1) as f64 * share).round() as usize];
+        let (median, frame) = at_share(0.5);
+        let view = |view: &drawloom::ViewStatistics| View {
+            name: view.name.clone(),
+            kind: view.kind.name(),
+            visible: view.visible,
+            commands: view.commands,
+            batches: view.batches,
+            bundles: view.bundles,
+        };
+        let rejections = frame.rejections.iter();
+        Self {
+            adapter,
+            backend: arguments.backend.name(),
+            workers,
+            granularity: arguments.granularity.name(),
+            objects: frame.objects,
+            frames: measured.len(),
+            views: frame.views.iter().map(view).collect(),
+            stages_ms: Stages {
+                visibility: milliseconds(frame.stages.visibility),
+                fill: milliseconds(frame.stages.fill),
+                sort: milliseconds(frame.stages.sort),
+                instance: milliseconds(frame.stages.instance),
+                record: milliseconds(frame.stages.record),
+                submit: milliseconds(frame.stages.submit),
+            },
+            cpu_ms: Cpu { median: milliseconds(*median), p95: milliseconds(at_share(0.95).0) },
+            rejections: rejections
+                .map(|rejection| format!("{} × {}", rejection.count, rejection.reason.name()))
+                .collect(),
+        }
+    }
+
+    /// As a table.
+    pub fn print(&self) {
+        let Self { adapter, backend, workers, granularity, objects, frames, .. } = self;
+        println!("adapter  {adapter}");
+        println!("frames   {frames} on {backend}, {workers} workers, {granularity}");
+        println!("objects  {objects}");
+        for rejection in &self.rejections {
+            println!("left out {rejection}");
+        }
+        println!();
+        println!("{:<16} {:<10} {:>9} {:>9} {:>9} {:>9}", "view", "kind", "visible", "commands", "batches", "bundles");
+        for view in &self.views {
+            let View { name, kind, visible, commands, batches, bundles } = view;
+            println!("{name:<16} {kind:<10} {visible:>9} {commands:>9} {batches:>9} {bundles:>9}");
+        }
+        println!();
+        let stages = &self.stages_ms;
+        for (stage, time) in [
+            ("visibility", stages.visibility),
+            ("fill", stages.fill),
+            ("sort", stages.sort),
+            ("instance", stages.instance),
+            ("record", stages.record),
+            ("submit", stages.submit),
+        ] {
+            println!("{stage:<10} {time:>9.3} ms thread time");
+        }
+        println!("{:<10} {:>9.3} ms, 95% within {:.3} ms", "cpu", self.cpu_ms.median, self.cpu_ms.p95);
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Box<dyn Error>> {
+        let text = serde_json::to_string_pretty(self)?;
+        std::fs::write(path, text + "\n")
+            .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+        Ok(())
+    }
+}
+
+fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}

@@ -1,0 +1,203 @@
+//! The triangles of a scene, and what a ray meets first.
+
+use glam::{DVec3, Vec3};
+
+use crate::scene::{Mesh, SceneRef, Topology};
+
+/// All triangles in a unit of their own: the centre of their box is the origin, and its corners are at distance 1. So
+/// scenes of every size and anywhere are alike, and 32 bits are enough.
+pub(super) struct Surfaces {
+    /// In the world, in metres.
+    pub center: DVec3,
+    /// Half the box's diagonal, in metres.
+    pub radius: f64,
+    /// Half the box's size, in units.
+    pub half_size: Vec3,
+    triangles: Vec<Triangle>,
+    /// A tree of boxes over `triangles`, the root first.
+    nodes: Vec<Node>,
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hit {
+    /// In units.
+    pub distance: f32,
+    /// Whether the surface faces where the ray comes from, by its normals.
+    pub faces: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Triangle {
+    corner: Vec3,
+    edges: [Vec3; 2],
+    normal: Vec3,
+}
+
+struct Node {
+    low: Vec3,
+    high: Vec3,
+    /// The triangles below it.
+    first: usize,
+    count: usize,
+    /// Its second child; the first one follows it. None for a leaf.
+    second: Option<usize>,
+}
+
+const LEAF: usize = 6;
+
+/// Beyond this many, every second, third ... is looked at, which is enough to see a room from an object.
+const MOST_TRIANGLES: usize = 2_000_000;
+
+impl Surfaces {
+    /// None if no triangle can be drawn.
+    pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
+        let drawable = |object: usize| {
+            let mesh = scene.assets.get(*scene.meshes.get(object)?).ok()?;
+            scene.transform_is_valid(object).then_some((object, mesh))
+        };
+        let objects = || (0..scene.object_count()).filter_map(drawable);
+        let total: usize = objects().map(|(_, mesh)| mesh.triangle_count()).sum();
+        let step = total.div_ceil(MOST_TRIANGLES).max(1);
+        let world: Vec<_> = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step).collect();
+        let points = world.iter().flat_map(|(corners, _)| corners);
+        let (low, high) = points
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)));
+        let (center, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
+        if !(radius > 0.0 && radius.is_finite()) {
+            return None;
+        }
+        let triangles = world.into_iter().map(|(corners, normal)| {
+            let [a, b, c] = corners.map(|corner| ((corner - center) / radius).as_vec3());
+            Triangle { corner: a, edges: [b - a, c - a], normal }
+        });
+        let half_size = ((high - low) / (2.0 * radius)).as_vec3();
+        let mut surfaces = Self { center, radius, half_size, triangles: triangles.collect(), nodes: Vec::new() };
+        surfaces.build(0, surfaces.triangles.len());
+        Some(surfaces)
+    }
+
+    /// What a ray meets first. `direction` is of unit length.
+    pub(super) fn cast(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
+        let inverse = direction.recip();
+        let mut nearest = None;
+        let mut limit = f32::INFINITY;
+        let mut pending = vec![0];
+        while let Some(index) = pending.pop() {
+            let node = &self.nodes[index];
+            if !node.is_met(origin, inverse, limit) {
+                continue;
+            }
+            if let Some(second) = node.second {
+                pending.extend([second, index + 1]);
+                continue;
+            }
+            for triangle in &self.triangles[node.first..node.first + node.count] {
+                if let Some(distance) = triangle.distance(origin, direction).filter(|&distance| distance < limit) {
+                    limit = distance;
+                    nearest = Some(Hit { distance, faces: triangle.normal.dot(direction) < 0.0 });
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Adds the node over `count` triangles from `first` on, and those below it: halves along the longest side.
+    fn build(&mut self, first: usize, count: usize) {
+        let triangles = &mut self.triangles[first..first + count];
+        let corners = triangles.iter().flat_map(Triangle::corners);
+        let (low, high) =
+            corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
+        let index = self.nodes.len();
+        self.nodes.push(Node { low, high, first, count, second: None });
+        if count <= LEAF {
+            return;
+        }
+        let axis = (high - low).max_position();
+        let half = count / 2;
+        triangles.select_nth_unstable_by(half, |one, other| one.middle()[axis].total_cmp(&other.middle()[axis]));
+        self.build(first, half);
+        self.nodes[index].second = Some(self.nodes.len());
+        self.build(first + half, count - half);
+    }
+}
+
+impl Node {
+    fn is_met(&self, origin: Vec3, inverse: Vec3, limit: f32) -> bool {
+        let (one, other) = ((self.low - origin) * inverse, (self.high - origin) * inverse);
+        let enter = one.min(other).max_element().max(0.0);
+        let leave = one.max(other).min_element();
+        // A ray within the plane of a side gives NaN, which counts as met: a box too many costs time only.
+        !(enter > leave * 1.00001 || enter > limit)
+    }
+}
+
+impl Triangle {
+    fn corners(&self) -> [Vec3; 3] {
+        [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
+    }
+
+    fn middle(&self) -> Vec3 {
+        self.corner + (self.edges[0] + self.edges[1]) / 3.0
+    }
+
+    /// Möller and Trumbore's intersection, from both sides.
+    fn distance(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        let across = direction.cross(self.edges[1]);
+        let inverse = self.edges[0].dot(across).recip();
+        let offset = origin - self.corner;
+        let u = offset.dot(across) * inverse;
+        let turned = offset.cross(self.edges[0]);
+        let v = direction.dot(turned) * inverse;
+        let distance = self.edges[1].dot(turned) * inverse;
+        // A ray along the triangle's plane divides by 0, and no comparison holds then.
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 1e-6).then_some(distance)
+    }
+}
+
+/// The triangles of an object that have an area, with the way their vertices' normals point.
+fn in_world<'a>(
+    scene: SceneRef<'a>,
+    object: usize,
+    mesh: &'a Mesh,
+) -> impl Iterator<Item = ([DVec3; 3], Vec3)> + use<'a> {
+    let (position, orientation, scale) = (scene.positions[object], scene.orientations[object], scene.scales[object]);
+    let stride = match mesh.topology() {
+        Topology::TriangleList => 3,
+        Topology::TriangleStrip => 1,
+    };
+    mesh.indices().windows(3).step_by(stride).filter_map(move |corners| {
+        let vertices = [corners[0], corners[1], corners[2]].map(|index| mesh.vertices()[index as usize]);
+        let points = vertices.map(|vertex| {
+            let local = Vec3::from(vertex.position).as_dvec3() * scale.as_dvec3();
+            position + orientation.as_dquat() * local
+        });
+        let normal = orientation * (vertices.map(|vertex| Vec3::from(vertex.normal)).iter().sum::<Vec3>() / scale);
+        let area = (points[1] - points[0]).cross(points[2] - points[0]);
+        let is_finite = points.iter().all(|point| point.is_finite()) && normal.is_finite();
+        (is_finite && area.length_squared() > 0.0).then_some((points, normal))
+    })
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::scene::sample;
+
+    #[test]
+    fn the_tree_finds_what_a_look_at_every_triangle_finds() {
+        let scene = sample::colonnade().unwrap();
+        let surfaces = Surfaces::new(scene.as_scene_ref()).unwrap();
+        let mut hits = 0;
+        for number in 0..200 {
+            let turn = number as f32;
+            let origin = Vec3::new((turn * 0.7).sin() * 0.5, (turn * 0.3).cos() * 0.1, (turn * 1.3).sin() * 0.5);
+            let direction = Vec3::new((turn * 2.1).sin(), (turn * 0.9).sin(), (turn * 1.7).cos()).normalize();
+            let distances = surfaces.triangles.iter().filter_map(|triangle| triangle.distance(origin, direction));
+            let expected = distances.min_by(f32::total_cmp);
+            assert_eq!(surfaces.cast(origin, direction).map(|hit| hit.distance), expected, "{number}");
+            hits += usize::from(expected.is_some());
+        }
+        assert!((50..200).contains(&hits), "{hits}");
+    }
+}

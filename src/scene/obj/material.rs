@@ -1,0 +1,157 @@
+//! From a library's definitions to the scene's materials and textures.
+
+use std::collections::HashMap;
+use std::io::{self, Cursor};
+
+use glam::Vec3;
+use image::{ImageFormat, ImageReader, imageops};
+
+use super::ObjWarning;
+use super::library::{self, Definition};
+use super::tidy::Tidy;
+use crate::handle::Handle;
+use crate::scene::{Blend, Material, Scene, SceneError, Texture};
+
+/// This share of materials with opacity 0 is an exporter's mistake: 3ds Max writes transparency where opacity belongs.
+const INVERTED_SHARE: f64 = 0.8;
+
+/// The materials an OBJ file uses, in the order of [`Tidy::materials`], and last the default one.
+pub(super) fn add_materials(
+    scene: &mut Scene,
+    tidy: &Tidy,
+    fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
+    warnings: &mut Vec<ObjWarning>,
+) -> Result<Vec<Handle<Material>>, SceneError> {
+    let mut definitions = Vec::new();
+    for library in &tidy.libraries {
+        add_library(library, fetch, &mut definitions, warnings);
+    }
+    correct_opacity(&mut definitions, warnings);
+    // A later definition of the same name takes the earlier one's place.
+    let defined: HashMap<_, _> = definitions.iter().map(|definition| (definition.name.as_str(), definition)).collect();
+    let mut textures = Textures { fetch, known: HashMap::new() };
+    let default = || Material { double_sided: true, ..Material::default() };
+    let mut handles = Vec::new();
+    for name in &tidy.materials {
+        let material = match defined.get(name.as_str()) {
+            Some(definition) => textures.material(scene, definition, warnings)?,
+            None => {
+                warnings.push(ObjWarning::UndefinedMaterial { material: name.clone() });
+                default()
+            }
+        };
+        handles.push(scene.add(material)?);
+    }
+    handles.push(scene.add(default())?);
+    Ok(handles)
+}
+
+/// Reads a library. A name with spaces is one name, or, if there is no such file, several.
+fn add_library(
+    library: &str,
+    fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
+    definitions: &mut Vec<Definition>,
+    warnings: &mut Vec<ObjWarning>,
+) {
+    match fetch(&library.replace('\\', "/")) {
+        // Only names can hold what is not UTF-8, and those will be named as undefined.
+        Ok(bytes) => definitions.extend(library::definitions(library, &String::from_utf8_lossy(&bytes), warnings)),
+        Err(_) if library.contains(char::is_whitespace) => {
+            for part in library.split_whitespace() {
+                add_library(part, fetch, definitions, warnings);
+            }
+        }
+        Err(error) => {
+            warnings.push(ObjWarning::MissingLibrary { library: library.to_owned(), reason: error.to_string() });
+        }
+    }
+}
+
+fn correct_opacity(definitions: &mut [Definition], warnings: &mut Vec<ObjWarning>) {
+    let materials = definitions.iter().filter(|definition| definition.opacity.is_some()).count();
+    let invisible = definitions.iter().filter(|definition| definition.opacity == Some(0.0)).count();
+    if invisible > 0 && invisible as f64 >= INVERTED_SHARE * materials as f64 {
+        warnings.push(ObjWarning::InvertedOpacity { invisible, materials });
+        definitions.iter_mut().for_each(|definition| definition.opacity = None);
+    }
+}
+
+/// Textures by path, so that materials share them.
+struct Textures<'a> {
+    fetch: &'a dyn Fn(&str) -> io::Result<Vec<u8>>,
+    known: HashMap<String, Result<Handle<Texture>, String>>,
+}
+
+impl Textures<'_> {
+    fn material(
+        &mut self,
+        scene: &mut Scene,
+        definition: &Definition,
+        warnings: &mut Vec<ObjWarning>,
+    ) -> Result<Material, SceneError> {
+        let texture = match &definition.texture {
+            Some(path) => self.texture(scene, path, &definition.name, warnings)?,
+            None => None,
+        };
+        let diffuse = match definition.diffuse {
+            // Exporters write black where a texture takes the colour's place.
+            Some(Vec3::ZERO) if texture.is_some() => Vec3::ONE,
+            Some(diffuse) => diffuse,
+            None if texture.is_some() => Vec3::ONE,
+            None => Material::default().diffuse,
+        };
+        let opacity = definition.opacity.unwrap_or(1.0);
+        Ok(Material {
+            name: definition.name.clone(),
+            diffuse,
+            texture,
+            emission: definition.emission,
+            opacity,
+            blend: if opacity < 1.0 { Blend::Alpha } else { Blend::None },
+            double_sided: true,
+        })
+    }
+
+    fn texture(
+        &mut self,
+        scene: &mut Scene,
+        path: &str,
+        material: &str,
+        warnings: &mut Vec<ObjWarning>,
+    ) -> Result<Option<Handle<Texture>>, SceneError> {
+        if !self.known.contains_key(path) {
+            let handle = match self.decode(path, warnings) {
+                Ok(texture) => Ok(scene.add(texture)?),
+                Err(reason) => Err(reason),
+            };
+            self.known.insert(path.to_owned(), handle);
+        }
+        match &self.known[path] {
+            Ok(handle) => Ok(Some(*handle)),
+            Err(reason) => {
+                let (texture, material) = (path.to_owned(), material.to_owned());
+                warnings.push(ObjWarning::UnusableTexture { texture, material, reason: reason.clone() });
+                Ok(None)
+            }
+        }
+    }
+
+    fn decode(&self, path: &str, warnings: &mut Vec<ObjWarning>) -> Result<Texture, String> {
+        let bytes = (self.fetch)(path).map_err(|error| error.to_string())?;
+        let mut reader = ImageReader::new(Cursor::new(bytes));
+        // Contents over name, but a TGA has nothing to know it by.
+        if let Ok(format) = ImageFormat::from_path(path) {
+            reader.set_format(format);
+        }
+        let reader = reader.with_guessed_format().map_err(|error| error.to_string())?;
+        let mut picture = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
+        let (width, height) = picture.dimensions();
+        if width.max(height) > Texture::LARGEST {
+            let [wide, high] = [width, height].map(|side| side.min(Texture::LARGEST));
+            picture = imageops::resize(&picture, wide, high, imageops::FilterType::Triangle);
+            warnings.push(ObjWarning::ScaledTexture { texture: path.to_owned(), width, height });
+        }
+        let (width, height) = picture.dimensions();
+        Texture::new(path, width, height, picture.into_raw()).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,135 @@
+//! The triangles of one model.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::polygon::triangulate;
+use crate::scene::Vertex;
+
+/// What can be drawn of a model: triangles with an area, around their own centre, each vertex with a normal.
+#[derive(Debug, Default)]
+pub(super) struct Shape {
+    /// The centre of its box. Vertices are relative to it.
+    pub center: DVec3,
+    pub vertices: Vec<Vertex>,
+    pub indices: Vec<u32>,
+    pub degenerate_triangles: usize,
+    pub fanned_polygons: usize,
+    pub replaced_normals: usize,
+    pub replaced_coordinates: usize,
+    /// Attributes that only some faces have.
+    pub partial_attributes: Vec<&'static str>,
+}
+
+/// A triangle thinner than this share of its longest edge has no area: 32-bit coordinates cannot place it so thin, so it
+/// is nothing but rounding.
+const THINNEST: f64 = 1e-10;
+
+impl Shape {
+    pub(super) fn new(mesh: &tobj::Mesh) -> Self {
+        let mut shape = Self::default();
+        let source = Source::new(mesh, &mut shape.partial_attributes);
+        let triangles = shape.triangles(mesh, &source.positions);
+        let points = triangles.iter().flat_map(|triangle| triangle.corners.map(|corner| source.positions[corner]));
+        let (low, high) =
+            points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
+        if !triangles.is_empty() {
+            shape.center = (low + high) / 2.0;
+        }
+        // Vertices are shared where the file gives them a normal; where a face lends its own, they are not.
+        let mut shared = HashMap::new();
+        for Triangle { corners, normal } in triangles {
+            for corner in corners {
+                let given = source.normals.get(corner).and_then(|normal| normal.try_normalize());
+                shape.replaced_normals += usize::from(given.is_none() && !source.normals.is_empty());
+                let index = match given {
+                    Some(given) => *shared.entry(corner).or_insert_with(|| shape.add_vertex(&source, corner, given)),
+                    None => shape.add_vertex(&source, corner, normal),
+                };
+                shape.indices.push(index);
+            }
+        }
+        shape
+    }
+
+    /// Every triangle with an area; the others are counted.
+    fn triangles(&mut self, mesh: &tobj::Mesh, positions: &[DVec3]) -> Vec<Triangle> {
+        let mut kept = Vec::new();
+        let mut cut = Vec::new();
+        let mut corners: &[u32] = &mesh.indices;
+        // Without arities every face is a triangle.
+        let count = if mesh.face_arities.is_empty() { corners.len() / 3 } else { mesh.face_arities.len() };
+        for face in 0..count {
+            let arity = mesh.face_arities.get(face).map_or(3, |&arity| arity as usize);
+            let (polygon, rest) = corners.split_at(arity);
+            corners = rest;
+            let points: Vec<_> = polygon.iter().map(|&corner| positions[corner as usize]).collect();
+            cut.clear();
+            self.fanned_polygons += usize::from(!triangulate(&points, &mut cut));
+            for triangle in &cut {
+                match normal(triangle.map(|corner| points[corner])) {
+                    Some(normal) => {
+                        kept.push(Triangle { corners: triangle.map(|corner| polygon[corner] as usize), normal });
+                    }
+                    None => self.degenerate_triangles += 1,
+                }
+            }
+        }
+        kept
+    }
+
+    fn add_vertex(&mut self, source: &Source, corner: usize, normal: DVec3) -> u32 {
+        let [u, v] = source.coordinates.get(corner).copied().unwrap_or_default();
+        let is_finite = u.is_finite() && v.is_finite();
+        self.replaced_coordinates += usize::from(!is_finite);
+        self.vertices.push(Vertex {
+            position: (source.positions[corner] - self.center).as_vec3().into(),
+            normal: normal.as_vec3().into(),
+            // An OBJ file's second axis points up.
+            uv: if is_finite { [u, 1.0 - v] } else { [0.0; 2] },
+        });
+        (self.vertices.len() - 1) as u32
+    }
+}
+
+struct Triangle {
+    corners: [usize; 3],
+    normal: DVec3,
+}
+
+/// A mesh as tobj gives it, one entry a vertex. Normals and coordinates are empty where there are none.
+struct Source {
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    coordinates: Vec<[f32; 2]>,
+}
+
+impl Source {
+    fn new(mesh: &tobj::Mesh, partial: &mut Vec<&'static str>) -> Self {
+        // 64-bit here whichever tobj was built with, and so that products do not overflow.
+        let triple = |values: &[_; 3]| DVec3::from(values.map(f64::from));
+        let positions: Vec<_> = mesh.positions.as_chunks().0.iter().map(triple).collect();
+        let mut normals: Vec<_> = mesh.normals.as_chunks().0.iter().map(triple).collect();
+        let pair = |values: &[_; 2]| values.map(|value| f64::from(value) as f32);
+        let mut coordinates: Vec<_> = mesh.texcoords.as_chunks().0.iter().map(pair).collect();
+        // tobj leaves out what a corner lacks, so entries no longer belong to their vertices.
+        if !normals.is_empty() && normals.len() != positions.len() {
+            partial.push("normals");
+            normals.clear();
+        }
+        if !coordinates.is_empty() && coordinates.len() != positions.len() {
+            partial.push("texture coordinates");
+            coordinates.clear();
+        }
+        Self { positions, normals, coordinates }
+    }
+}
+
+/// The direction a triangle faces, if it has an area.
+fn normal([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+    let product = (b - a).cross(c - a);
+    let longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
+    // Comparisons with NaN are false.
+    if product.length() > THINNEST * longest { product.try_normalize() } else { None }
+}

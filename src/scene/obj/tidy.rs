@@ -1,0 +1,227 @@
+//! The text of an OBJ file, made ready for tobj.
+//!
+//! tobj 4.0.5 makes triangles of lines, tells neither which material is missing nor which line is wrong, reads neither
+//! continued lines nor comments behind a face, mixes up vertices of which only some have colours, and overflows on some
+//! indices. So every line it gets was checked here first.
+
+use std::fmt::Write;
+
+use glam::DVec3;
+
+/// What tobj is given, and what it is not told.
+#[derive(Debug, Default)]
+pub(super) struct Tidy {
+    /// What tobj reads. Materials are called by their index in `materials`.
+    pub text: String,
+    /// What `mtllib` names, in order.
+    pub libraries: Vec<String>,
+    /// What `usemtl` names, each once.
+    pub materials: Vec<String>,
+    /// Positions in `text` are relative to it.
+    pub origin: DVec3,
+    /// Points that were left out.
+    pub points: usize,
+    /// Lines that were left out.
+    pub lines: usize,
+    /// Free-form curves and surfaces that were left out.
+    pub surfaces: usize,
+    counts: Counts,
+    origin_is_set: bool,
+}
+
+/// A line that cannot be understood: its number from 1, and why.
+#[derive(Debug)]
+pub(super) struct BadLine {
+    pub line: usize,
+    pub reason: String,
+}
+
+/// How many there are so far: what relative indices count back from.
+#[derive(Debug, Default)]
+struct Counts {
+    positions: usize,
+    texture_coordinates: usize,
+    normals: usize,
+}
+
+/// Scenes nearer to the world's origin than this are read as they are; others relative to a multiple of it, since tobj
+/// reads `f32`, which is 0.5 m coarse in a survey's coordinates.
+const ORIGIN_STEP: f64 = 4096.0;
+
+impl Tidy {
+    pub(super) fn new(source: &str) -> Result<Self, BadLine> {
+        let mut tidy = Self::default();
+        for (line, statement) in statements(source) {
+            tidy.statement(&statement).map_err(|reason| BadLine { line, reason })?;
+        }
+        Ok(tidy)
+    }
+
+    fn statement(&mut self, statement: &str) -> Result<(), String> {
+        let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
+        let rest = rest.trim();
+        // Names may hold a `#`, numbers may not.
+        let values = rest.split_once('#').map_or(rest, |(values, _)| values);
+        match keyword {
+            "v" => self.position(values),
+            "vt" => self.texture_coordinates(values),
+            "vn" => self.normal(values),
+            "f" => self.face(values),
+            "p" => {
+                self.points += values.split_whitespace().count();
+                Ok(())
+            }
+            "l" => {
+                self.lines += 1;
+                Ok(())
+            }
+            "curv" | "curv2" | "surf" => {
+                self.surfaces += 1;
+                Ok(())
+            }
+            "o" | "g" => {
+                self.emit(format_args!("{keyword} {rest}"));
+                Ok(())
+            }
+            "usemtl" => {
+                let known = self.materials.iter().position(|name| name == rest);
+                let index = known.unwrap_or_else(|| {
+                    self.materials.push(rest.to_owned());
+                    self.materials.len() - 1
+                });
+                self.emit(format_args!("usemtl {index}"));
+                Ok(())
+            }
+            "mtllib" => {
+                self.libraries.push(rest.to_owned());
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Three coordinates; a fourth divides them, and any further ones are a colour.
+    fn position(&mut self, values: &str) -> Result<(), String> {
+        let numbers = numbers(values)?;
+        let [x, y, z, ..] = numbers[..] else {
+            return Err(format!("a vertex needs 3 coordinates and has {}", numbers.len()));
+        };
+        let position = match numbers[..] {
+            [_, _, _, 0.0] => return Err(String::from("a vertex has the weight 0")),
+            [_, _, _, weight] => DVec3::new(x, y, z) / weight,
+            _ => DVec3::new(x, y, z),
+        };
+        if !self.origin_is_set && position.is_finite() {
+            self.origin = (position / ORIGIN_STEP).trunc() * ORIGIN_STEP;
+            self.origin_is_set = true;
+        }
+        let DVec3 { x, y, z } = position - self.origin;
+        self.counts.positions += 1;
+        self.emit(format_args!("v {x:e} {y:e} {z:e}"));
+        Ok(())
+    }
+
+    fn texture_coordinates(&mut self, values: &str) -> Result<(), String> {
+        let numbers = numbers(values)?;
+        let [u, ..] = numbers[..] else {
+            return Err(String::from("texture coordinates without a number"));
+        };
+        let v = numbers.get(1).copied().unwrap_or(0.0);
+        self.counts.texture_coordinates += 1;
+        self.emit(format_args!("vt {u:e} {v:e}"));
+        Ok(())
+    }
+
+    fn normal(&mut self, values: &str) -> Result<(), String> {
+        let numbers = numbers(values)?;
+        let [x, y, z, ..] = numbers[..] else {
+            return Err(format!("a normal needs 3 numbers and has {}", numbers.len()));
+        };
+        self.counts.normals += 1;
+        self.emit(format_args!("vn {x:e} {y:e} {z:e}"));
+        Ok(())
+    }
+
+    fn face(&mut self, values: &str) -> Result<(), String> {
+        for corner in values.split_whitespace() {
+            self.check_corner(corner)?;
+        }
+        match values.split_whitespace().count() {
+            0 => return Err(String::from("a face without a corner")),
+            1 => self.points += 1,
+            2 => self.lines += 1,
+            _ => self.emit(format_args!("f {values}")),
+        }
+        Ok(())
+    }
+
+    /// A corner is `position`, `position/texture`, `position//normal` or `position/texture/normal`.
+    fn check_corner(&self, corner: &str) -> Result<(), String> {
+        let counts = [
+            ("vertex", self.counts.positions),
+            ("texture coordinate", self.counts.texture_coordinates),
+            ("normal", self.counts.normals),
+        ];
+        let indices: Vec<_> = corner.split('/').collect();
+        if indices.len() > counts.len() || indices[0].is_empty() {
+            return Err(format!("`{corner}` is no corner of a face"));
+        }
+        for (index, (what, count)) in indices.into_iter().zip(counts) {
+            if index.is_empty() {
+                continue;
+            }
+            let number: i64 = index.parse().map_err(|_| format!("`{corner}` is no corner of a face"))?;
+            if number == 0 || number.unsigned_abs() > count as u64 {
+                return Err(format!("a face refers to {what} {number}, and there are {count} so far"));
+            }
+        }
+        Ok(())
+    }
+
+    fn emit(&mut self, line: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.text, "{line}");
+    }
+}
+
+/// The statements of an OBJ or MTL file, each with the number of its last line: a backslash continues a line on the next.
+pub(super) fn statements(source: &str) -> impl Iterator<Item = (usize, String)> {
+    let mut begun = String::new();
+    let lines = source.strip_prefix('\u{feff}').unwrap_or(source).lines().chain([""]);
+    lines.enumerate().filter_map(move |(index, line)| {
+        if let Some(part) = line.strip_suffix('\\') {
+            begun.push_str(part);
+            begun.push(' ');
+            return None;
+        }
+        begun.push_str(line);
+        let statement = begun.trim().to_owned();
+        begun.clear();
+        (!statement.is_empty() && !statement.starts_with('#')).then_some((index + 1, statement))
+    })
+}
+
+fn numbers(values: &str) -> Result<Vec<f64>, String> {
+    let number = |word: &str| word.parse().map_err(|_| format!("`{word}` is no number"));
+    values.split_whitespace().map(number).collect()
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_far_away_keeps_its_millimetres() {
+        let tidy = Tidy::new("v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\n").unwrap();
+        assert_eq!(tidy.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
+        let second: Vec<f32> =
+            tidy.text.lines().nth(1).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
+        assert!((f64::from(second[1]) + tidy.origin.y - 4_500_000.002).abs() < 5e-4);
+    }
+
+    #[test]
+    fn a_line_goes_on_after_a_backslash_and_keeps_its_number() {
+        let found: Vec<_> = statements("# head\r\nf 1 2 \\\r\n 3\r\n\nv 1\\").collect();
+        assert_eq!(found, [(3, String::from("f 1 2   3")), (6, String::from("v 1"))]);
+    }
+}
