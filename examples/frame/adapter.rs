@@ -15,7 +15,8 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(
         |_| "no graphics adapter found; on Debian, `apt install mesa-vulkan-drivers` provides one in software",
     )?;
-    open(&adapter)
+    // Whatever the adapter has beyond what Drawloom needs allows larger pictures and more objects.
+    open(&adapter, adapter.limits())
 }
 
 /// wgpu's backend that does nothing.
@@ -24,14 +25,15 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     descriptor.backends = wgpu::Backends::NOOP;
     descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
     let instance = wgpu::Instance::new(descriptor);
-    open(&pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?)
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
+    // It claims limits that wgpu itself does not keep.
+    open(&adapter, wgpu::Limits::default())
 }
 
-fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+fn open(adapter: &wgpu::Adapter, required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let descriptor = wgpu::DeviceDescriptor {
         required_features: WgpuBackend::REQUIRED_FEATURES,
-        // Whatever the adapter has beyond what Drawloom needs allows larger pictures and more objects.
-        required_limits: adapter.limits(),
+        required_limits,
         ..wgpu::DeviceDescriptor::default()
     };
     Ok(pollster::block_on(adapter.request_device(&descriptor))?)

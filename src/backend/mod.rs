@@ -5,7 +5,7 @@ mod null;
 mod wgpu;
 use std::ops::Range;
 
-use crate::process::{FramePlan, Pass};
+use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::SceneRef;
 use crate::task::Worker;
@@ -78,7 +78,7 @@ pub trait Backend: Send + Sync + 'static {
         &self,
         worker: &Worker,
         frame: &Self::Frame,
-        plan: &FramePlan,
+        request: &FrameRequest<'_>,
         pass: Pass,
         bundles: Vec<Self::Bundle>,
     ) -> Result<Self::Commands, BackendError>;
@@ -96,6 +96,8 @@ pub trait Backend: Send + Sync + 'static {
 pub struct FrameRequest<'a> {
     /// The processes and their targets.
     pub plan: &'a FramePlan,
+    /// What each process draws, in the plan's order.
+    pub draws: &'a [Draws<'a>],
     /// The views.
     pub views: &'a [RenderView],
     /// Each process in each of its views, in the order they are submitted.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use parking_lot::Mutex;
 
 use super::{Backend, BackendError, FrameRequest};
-use crate::process::{Draws, FramePlan, Pass};
+use crate::process::{Draws, Pass};
 use crate::queue::{Batch, DrawList};
 use crate::scene::Mesh;
 use crate::task::Worker;
@@ -131,13 +131,13 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        plan: &FramePlan,
+        request: &FrameRequest<'_>,
         pass: Pass,
         bundles: Vec<NullBundle>,
     ) -> Result<NullPass, BackendError> {
         ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
-        let process = &plan.processes()[pass.process].process;
-        if !matches!(process.draws(), Draws::Commands(_)) {
+        let process = &request.plan.processes()[pass.process].process;
+        if !matches!(request.draws[pass.process], Draws::Commands(_)) {
             ensure(bundles.is_empty(), || format!("{:?} draws no commands but has bundles", process.name()))?;
         }
         let mut end = 0;

@@ -1,8 +1,8 @@
 //! What can go wrong with a frame.
 
 use crate::backend::BackendError;
-use crate::graph::{GraphProblem, NodeError};
-use crate::process::PlanError;
+use crate::graph::{GraphProblem, NodeError, RunError};
+use crate::process::{PlanError, ProcessPanic};
 use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
 
@@ -72,12 +72,25 @@ pub enum FrameError {
         /// What the panic said.
         message: String,
     },
+    /// A process panicked when it was asked what it draws.
+    #[error(transparent)]
+    Process(#[from] ProcessPanic),
     /// A job outside of every process panicked.
     #[error(transparent)]
     Job(#[from] JobPanic),
     /// The frame's own jobs have no order: an error of Drawloom's own.
     #[error("the frame's jobs have no order: {0}")]
     Jobs(GraphProblem),
+}
+
+impl From<RunError> for FrameError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Failed { process, source } => Self::Failed { phase: process, source },
+            RunError::Panicked { process, message } => Self::Panicked { phase: process, message },
+            RunError::Scheduler(panic) => Self::Job(panic),
+        }
+    }
 }
 
 /// Why a recorded frame was not submitted.

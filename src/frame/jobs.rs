@@ -21,7 +21,7 @@ impl FrameJobs {
     ///
     /// # Errors
     /// If a view is drawn by no process.
-    pub(super) fn new(plan: &FramePlan, views: &[RenderView]) -> Result<Self, FrameError> {
+    pub(super) fn new(plan: &FramePlan, draws: &[Draws<'_>], views: &[RenderView]) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
             if !passes.iter().any(|pass| pass.view == index) {
@@ -50,7 +50,7 @@ impl FrameJobs {
                 id
             };
             let mut previous = None;
-            if matches!(process.draws(), Draws::Commands(_)) {
+            if matches!(draws[pass.process], Draws::Commands(_)) {
                 let seen = *compacted[view].get_or_insert_with(|| {
                     let seen = add(format!("visibility, {view_name}"), Phase::Visibility { view }, Some(objects));
                     add(format!("compact, {view_name}"), Phase::Compact { view }, Some(seen))
@@ -79,9 +79,9 @@ impl FrameJobs {
     }
 
     /// Empty tables for the passes.
-    pub(super) fn pass_tables(&self, plan: &FramePlan) -> Vec<PassTable> {
+    pub(super) fn pass_tables(&self, draws: &[Draws<'_>]) -> Vec<PassTable> {
         let table = |pass: &Pass| {
-            let selection = match plan.processes()[pass.process].process.draws() {
+            let selection = match &draws[pass.process] {
                 Draws::Commands(commands) => Some(commands.selection),
                 _ => None,
             };

@@ -6,15 +6,13 @@ use parking_lot::{Mutex, RwLock};
 
 use super::Granularity;
 use super::statistics::{Stage, StageClock};
-use crate::backend::{Backend, BackendError};
+use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::blocks::Blocks;
 use crate::command::RenderCommand;
 use crate::graph::{Node, NodeError};
-use crate::process::{FramePlan, Pass};
 use crate::queue::{DrawList, Fill, Selection, instance, sort};
-use crate::scene::SceneRef;
 use crate::task::Worker;
-use crate::view::{ObjectRecord, ObjectTable, RenderView, VisibleSet};
+use crate::view::{ObjectRecord, ObjectTable, VisibleSet};
 
 /// A node of the frame's job graph: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +41,7 @@ pub(super) enum Phase {
 
 /// What a frame's jobs share.
 pub(super) struct FrameContext<'a, B: Backend> {
-    pub(super) scene: &'a SceneRef<'a>,
-    pub(super) plan: &'a FramePlan,
-    pub(super) views: &'a [RenderView],
-    pub(super) passes: &'a [Pass],
+    pub(super) request: &'a FrameRequest<'a>,
     pub(super) tables: &'a FrameTables,
     pub(super) granularity: Granularity,
     pub(super) backend: &'a B,
@@ -116,7 +111,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
         match *self {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.len().div_ceil(Blocks::<ObjectRecord>::SIZE),
-            Self::Fill { pass } => tables.visible[frame.passes[pass].view].count(),
+            Self::Fill { pass } => tables.visible[frame.request.passes[pass].view].count(),
             Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
             Self::Compact { .. }
             | Self::Sort { .. }
@@ -160,20 +155,20 @@ impl Phase {
     ) -> Result<(), BackendError> {
         let tables = frame.tables;
         match self {
-            Self::Objects => tables.objects.fill(frame.scene, range),
+            Self::Objects => tables.objects.fill(frame.request.scene, range),
             Self::Upload => return upload(frame, range, worker),
             Self::Visibility { view } => see(frame, view, range),
             Self::Compact { view } => tables.visible[view].compact(),
             Self::Fill { pass } => fill(frame, pass, range),
             Self::Sort { pass } => {
-                let count = tables.visible[frame.passes[pass].view].count();
+                let count = tables.visible[frame.request.passes[pass].view].count();
                 sort(&tables.passes[pass].commands, count, &mut tables.passes[pass].list.write().commands);
             }
             Self::Instance { pass } => instance(&mut tables.passes[pass].list.write()),
             Self::Prepare { pass } => {
                 let list = tables.passes[pass].list.read();
                 frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
-                return frame.backend.prepare(worker, frame.frame, frame.passes[pass], &list);
+                return frame.backend.prepare(worker, frame.frame, frame.request.passes[pass], &list);
             }
             Self::Record { pass } => return record(frame, pass, range, worker),
             Self::Finish { pass } => return finish(frame, pass, worker),
@@ -193,7 +188,7 @@ fn upload<B: Backend>(frame: &FrameContext<'_, B>, blocks: Range<usize>, worker:
 }
 
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
-    let frustum = &frame.views[view].frustum;
+    let frustum = &frame.request.views[view].frustum;
     for (block, part) in Blocks::<ObjectRecord>::parts(range) {
         let bounds = frame.tables.objects.bounds().read(block);
         frame.tables.visible[view].test(part, |object| {
@@ -205,10 +200,10 @@ fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>
 
 fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
     let table = &frame.tables.passes[pass];
-    let view = frame.passes[pass].view;
+    let view = frame.request.passes[pass].view;
     let fill = Fill {
         table: &frame.tables.objects,
-        view: &frame.views[view],
+        view: &frame.request.views[view],
         visible: &frame.tables.visible[view],
         selection: table.selection.unwrap_or_default(),
     };
@@ -222,7 +217,7 @@ fn record<B: Backend>(
     worker: &Worker,
 ) -> Result<(), BackendError> {
     let list = frame.tables.passes[pass].list.read();
-    let recorded = frame.backend.record(worker, frame.frame, frame.passes[pass], &list, bundles.clone())?;
+    let recorded = frame.backend.record(worker, frame.frame, frame.request.passes[pass], &list, bundles.clone())?;
     let mut slots = frame.recordings[pass].bundles.lock();
     for (slot, bundle) in slots[bundles].iter_mut().zip(recorded) {
         *slot = Some(bundle);
@@ -233,7 +228,7 @@ fn record<B: Backend>(
 fn finish<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, worker: &Worker) -> Result<(), BackendError> {
     let recording = &frame.recordings[pass];
     let bundles: Vec<_> = std::mem::take(&mut *recording.bundles.lock()).into_iter().flatten().collect();
-    let finished = frame.backend.finish(worker, frame.frame, frame.plan, frame.passes[pass], bundles)?;
+    let finished = frame.backend.finish(worker, frame.frame, frame.request, frame.request.passes[pass], bundles)?;
     *recording.finished.lock() = Some(finished);
     Ok(())
 }

@@ -10,12 +10,11 @@ use super::recorded::{Recorded, ViewQueue};
 use super::statistics::{Stage, StageClock};
 use super::{FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, FrameRequest};
-use crate::graph::RunError;
-use crate::process::FramePlan;
+use crate::process::{Draws, FramePlan};
 use crate::queue::DrawList;
-use crate::scene::{SceneError, SceneRef};
+use crate::scene::{Light, SceneError, SceneRef};
 use crate::task::Scheduler;
-use crate::view::{RejectionReason, RenderView, VisibleSet};
+use crate::view::{RejectionReason, Rejections, RenderView, VisibleSet};
 
 /// Produces frames: records a scene on all workers, and gives it back when that is done.
 ///
@@ -69,15 +68,37 @@ impl<B: Backend> Renderer<B> {
         let _entered = span.enter();
         check(&scene)?;
         let views: Vec<RenderView> = scene.cameras.iter().map(RenderView::new).collect();
-        self.draw_up_jobs(&views)?;
+        let draws = self.plan.draws()?;
+        draw_up_jobs(&mut self.jobs, &mut self.tables, &self.plan, &draws, &views)?;
+        let Some(jobs) = &mut self.jobs else { return Err(FrameError::NoView) };
         self.tables.reset(scene.object_count());
-        let lights = self.valid_lights(&scene);
-        let scene = SceneRef { lights: &lights, ..scene };
+        let lights = valid_lights(&scene, self.tables.objects.rejections());
+        let request = FrameRequest {
+            plan: &self.plan,
+            draws: &draws,
+            views: &views,
+            passes: &jobs.passes,
+            scene: &SceneRef { lights: &lights, ..scene },
+            rejections: self.tables.objects.rejections(),
+        };
 
         let clock = StageClock::default();
-        let recorded = self.run_jobs(&scene, &views, &clock)?;
-        let statistics = self.statistics(&scene, &views, &clock);
-        Ok(Recorded { queues: recorded.1, frame: recorded.0, statistics, backend: Arc::clone(&self.backend) })
+        let frame = clock.measure(Stage::Record, || self.backend.begin(&request))?;
+        let recordings: Vec<Recording<B>> = request.passes.iter().map(|_| Recording::new()).collect();
+        let context = FrameContext {
+            request: &request,
+            tables: &self.tables,
+            granularity: self.granularity,
+            backend: &*self.backend,
+            frame: &frame,
+            recordings: &recordings,
+            clock: &clock,
+        };
+        jobs.schedule.run(&self.scheduler, &context)?;
+
+        let queues = queues_of(&request, recordings);
+        let statistics = statistics_of(&request, &self.tables, &clock);
+        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) })
     }
 
     /// What the last recorded frame drew in one view by one process; `None` where that process draws no commands there.
@@ -104,102 +125,76 @@ impl<B: Backend> Renderer<B> {
     pub fn backend(&self) -> &B {
         &self.backend
     }
+}
 
-    fn draw_up_jobs(&mut self, views: &[RenderView]) -> Result<(), FrameError> {
-        if !self.jobs.as_ref().is_some_and(|jobs| jobs.fit(views)) {
-            let jobs = FrameJobs::new(&self.plan, views)?;
-            self.tables.visible.resize_with(views.len(), VisibleSet::default);
-            self.tables.passes = jobs.pass_tables(&self.plan);
-            self.jobs = Some(jobs);
-        }
-        Ok(())
+/// Sees to it that the jobs are those that these views need.
+fn draw_up_jobs(
+    jobs: &mut Option<FrameJobs>,
+    tables: &mut FrameTables,
+    plan: &FramePlan,
+    draws: &[Draws<'_>],
+    views: &[RenderView],
+) -> Result<(), FrameError> {
+    if !jobs.as_ref().is_some_and(|jobs| jobs.fit(views)) {
+        let new = FrameJobs::new(plan, draws, views)?;
+        tables.visible.resize_with(views.len(), VisibleSet::default);
+        tables.passes = new.pass_tables(draws);
+        *jobs = Some(new);
     }
+    Ok(())
+}
 
-    /// The lights that can be; the others are counted.
-    fn valid_lights(&self, scene: &SceneRef<'_>) -> Vec<crate::scene::Light> {
-        let valid = scene.lights.iter().enumerate().filter(|(index, light)| {
-            let checked = light.check(*index);
-            if let Err(error) = &checked {
-                tracing::warn!(target: "drawloom", %error, "light left out");
-                self.tables.objects.rejections().count(RejectionReason::InvalidLight, *index);
-            }
-            checked.is_ok()
-        });
-        valid.map(|(_, light)| *light).collect()
+/// The lights that can be; the others are counted.
+fn valid_lights(scene: &SceneRef<'_>, rejections: &Rejections) -> Vec<Light> {
+    let valid = scene.lights.iter().enumerate().filter(|(index, light)| {
+        let checked = light.check(*index);
+        if let Err(error) = &checked {
+            tracing::warn!(target: "drawloom", %error, "light left out");
+            rejections.count(RejectionReason::InvalidLight, *index);
+        }
+        checked.is_ok()
+    });
+    valid.map(|(_, light)| *light).collect()
+}
+
+/// One queue for each view, its passes in the order of the plan.
+fn queues_of<B: Backend>(request: &FrameRequest<'_>, recordings: Vec<Recording<B>>) -> Vec<ViewQueue<B::Commands>> {
+    let mut queues: Vec<_> = (0..request.views.len()).map(|view| ViewQueue { view, passes: Vec::new() }).collect();
+    for (&pass, recording) in request.passes.iter().zip(recordings) {
+        queues[pass.view].passes.extend(recording.into_finished().map(|finished| (pass, finished)));
     }
+    queues
+}
 
-    fn run_jobs(
-        &mut self,
-        scene: &SceneRef<'_>,
-        views: &[RenderView],
-        clock: &StageClock,
-    ) -> Result<(B::Frame, Vec<ViewQueue<B::Commands>>), FrameError> {
-        let Some(jobs) = &mut self.jobs else { return Err(FrameError::NoView) };
-        let request = FrameRequest {
-            plan: &self.plan,
-            views,
-            passes: &jobs.passes,
-            scene,
-            rejections: self.tables.objects.rejections(),
+fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &StageClock) -> FrameStatistics {
+    let of_view = |(index, view): (usize, &RenderView)| {
+        let mut statistics = ViewStatistics {
+            name: view.name().to_owned(),
+            kind: view.kind(),
+            visible: tables.visible[index].count(),
+            commands: 0,
+            batches: 0,
+            bundles: 0,
         };
-        let frame = clock.measure(Stage::Record, || self.backend.begin(&request))?;
-        let recordings: Vec<Recording<B>> = jobs.passes.iter().map(|_| Recording::new()).collect();
-        let context = FrameContext {
-            scene,
-            plan: &self.plan,
-            views,
-            passes: &jobs.passes,
-            tables: &self.tables,
-            granularity: self.granularity,
-            backend: &*self.backend,
-            frame: &frame,
-            recordings: &recordings,
-            clock,
-        };
-        jobs.schedule.run(&self.scheduler, &context).map_err(|error| match error {
-            RunError::Failed { process, source } => FrameError::Failed { phase: process, source },
-            RunError::Panicked { process, message } => FrameError::Panicked { phase: process, message },
-            RunError::Scheduler(panic) => FrameError::Job(panic),
-        })?;
-
-        let mut queues: Vec<_> = (0..views.len()).map(|view| ViewQueue { view, passes: Vec::new() }).collect();
-        for (&pass, recording) in jobs.passes.iter().zip(recordings) {
-            queues[pass.view].passes.extend(recording.into_finished().map(|finished| (pass, finished)));
+        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
+            let list = table.list.read();
+            statistics.commands += list.commands.len();
+            statistics.batches += list.batches.len();
+            statistics.bundles += list.bundle_count();
         }
-        Ok((frame, queues))
+        statistics
+    };
+    let rejections = request.rejections.list();
+    for rejection in &rejections {
+        let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
+        tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
     }
-
-    fn statistics(&self, scene: &SceneRef<'_>, views: &[RenderView], clock: &StageClock) -> FrameStatistics {
-        let passes = self.jobs.as_ref().map_or(&[][..], |jobs| &jobs.passes);
-        let of_view = |(index, view): (usize, &RenderView)| {
-            let mut statistics = ViewStatistics {
-                name: view.name().to_owned(),
-                kind: view.kind(),
-                visible: self.tables.visible[index].count(),
-                commands: 0,
-                batches: 0,
-                bundles: 0,
-            };
-            for (table, _) in self.tables.passes.iter().zip(passes).filter(|(_, pass)| pass.view == index) {
-                let list = table.list.read();
-                statistics.commands += list.commands.len();
-                statistics.batches += list.batches.len();
-                statistics.bundles += list.bundle_count();
-            }
-            statistics
-        };
-        let rejections = self.tables.objects.rejections().list();
-        for rejection in &rejections {
-            let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-            tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
-        }
-        FrameStatistics {
-            objects: scene.object_count(),
-            lights: scene.lights.len(),
-            views: views.iter().enumerate().map(of_view).collect(),
-            stages: clock.times(),
-            rejections,
-        }
+    FrameStatistics {
+        objects: request.scene.object_count(),
+        lights: request.scene.lights.len(),
+        views: request.views.iter().enumerate().map(of_view).collect(),
+        stages: clock.times(),
+        rejections,
     }
 }
 

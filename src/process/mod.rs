@@ -18,7 +18,7 @@ pub use draws::{CommandDraws, Draws, FullScreen};
 pub use format::Format;
 pub use geometry_buffer::GeometryBuffer;
 pub use lighting::Lighting;
-pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget};
+pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessPanic};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, Resolved};
 pub use tone_mapping::ToneMapping;

@@ -1,8 +1,9 @@
 //! From a list of processes to what a frame does, in order.
 
-use super::{Access, Declaration, Declare, Format, RenderProcess};
+use super::{Access, Declaration, Declare, Draws, Format, RenderProcess};
 use crate::graph::{FrameGraph, GraphProblem};
 use crate::scene::ViewKind;
+use crate::task::{JobPanic, catch};
 
 /// What every frame does: processes in the order they are submitted, and the targets they use.
 pub struct FramePlan {
@@ -75,6 +76,19 @@ impl FramePlan {
     /// The processes in the order they are submitted.
     pub fn processes(&self) -> &[PlannedProcess] {
         &self.processes
+    }
+
+    /// Asks every process what it draws in this frame, in order.
+    ///
+    /// # Errors
+    /// If one panics, naming it.
+    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessPanic> {
+        let ask = |planned: &'a PlannedProcess| {
+            let named =
+                |panic: JobPanic| ProcessPanic { process: planned.process.name().to_owned(), message: panic.message };
+            catch(|| planned.process.draws()).map_err(named)
+        };
+        self.processes.iter().map(ask).collect()
     }
 
     /// The targets that views of each kind have.
@@ -161,6 +175,16 @@ pub enum PlanError {
     /// No process is left, because none leads to an output.
     #[error("no process leads to an output")]
     Empty,
+}
+
+/// A process panicked when it was asked what it draws.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("process {process:?} panicked when it was asked what it draws: {message}")]
+pub struct ProcessPanic {
+    /// The process.
+    pub process: String,
+    /// What the panic said.
+    pub message: String,
 }
 
 fn declaration_of(process: &dyn RenderProcess) -> Declaration {

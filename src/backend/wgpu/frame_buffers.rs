@@ -50,11 +50,10 @@ impl FrameBuffers {
         queue: &wgpu::Queue,
         layouts: &Layouts,
         request: &FrameRequest<'_>,
-        draws: &[Draws<'_>],
     ) -> Result<(), BackendError> {
         let views = view_bytes(request)?;
         let (lights, light_stride) = light_bytes(request);
-        let (parameters, parameter_ranges) = parameter_bytes(request.passes, draws);
+        let (parameters, parameter_ranges) = parameter_bytes(request.passes, request.draws);
         let objects = request.scene.object_count().max(1);
         let drawn_stride = aligned(objects * 4);
 

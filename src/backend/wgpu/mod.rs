@@ -99,13 +99,13 @@ impl WgpuBackend {
         &self.queue
     }
 
-    fn pipelines(&self, plan: &FramePlan) -> Result<&[ProcessPipelines], BackendError> {
+    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<&[ProcessPipelines], BackendError> {
         if let Some(pipelines) = self.pipelines.get() {
             return Ok(pipelines);
         }
-        let made = plan.processes().iter().map(|planned| {
+        let made = plan.processes().iter().zip(draws).map(|(planned, draws)| {
             let label = format!("the shader of {:?}", planned.process.name());
-            checked(&self.device, &label, || ProcessPipelines::new(&self.device, &self.layouts, plan, planned))
+            checked(&self.device, &label, || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws))
         });
         let made = made.collect::<Result<Vec<_>, _>>()?;
         Ok(self.pipelines.get_or_init(|| made))
@@ -145,16 +145,15 @@ impl Backend for WgpuBackend {
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, views, passes, scene, rejections } = *request;
-        let pipelines = self.pipelines(plan)?;
+        let FrameRequest { plan, draws, views, passes, scene, rejections } = *request;
+        let pipelines = self.pipelines(plan, draws)?;
         let assets = checked(&self.device, "meshes, materials and textures", || {
             self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
         })??;
         let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
-        let draws: Vec<Draws<'_>> = plan.processes().iter().map(|planned| planned.process.draws()).collect();
         let (buffers, process_groups) = checked(&self.device, "the frame's buffers", || {
             let mut buffers = self.buffers.take();
-            buffers.begin(&self.device, &self.queue, &self.layouts, request, &draws)?;
+            buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
             let groups = passes.iter().enumerate().map(|(index, pass)| {
                 let parameters = buffers.parameters(index);
                 let declaration = &plan.processes()[pass.process].declaration;
@@ -219,7 +218,7 @@ impl Backend for WgpuBackend {
         &self,
         _worker: &Worker,
         frame: &WgpuFrame,
-        plan: &FramePlan,
+        request: &FrameRequest<'_>,
         pass: Pass,
         bundles: Vec<wgpu::RenderBundle>,
     ) -> Result<wgpu::CommandBuffer, BackendError> {
@@ -231,12 +230,12 @@ impl Backend for WgpuBackend {
             let mut encoder = self
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(&frame.labels[index]) });
-            let planned = &plan.processes()[pass.process];
-            match planned.process.draws() {
-                Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, pass, raw)?,
+            match &request.draws[pass.process] {
+                Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, pass, *raw)?,
                 draws => {
-                    let (pipelines, declaration) = (&pipelines[pass.process], &planned.declaration);
-                    record::pass(&mut encoder, frame, index, pipelines, declaration, &draws, &bundles);
+                    let declaration = &request.plan.processes()[pass.process].declaration;
+                    let pipelines = &pipelines[pass.process];
+                    record::pass(&mut encoder, frame, index, pipelines, declaration, draws, &bundles);
                 }
             }
             Ok(encoder.finish())

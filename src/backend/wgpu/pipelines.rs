@@ -36,14 +36,19 @@ struct Depth {
 }
 
 impl ProcessPipelines {
-    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts, plan: &FramePlan, planned: &PlannedProcess) -> Self {
+    pub(super) fn new(
+        device: &wgpu::Device,
+        layouts: &Layouts,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+    ) -> Self {
         let declaration = &planned.declaration;
         let format_of = |target: &str| {
             let mut targets = plan.targets().iter().filter(|planned| planned.views == declaration.views);
             targets.find(|planned| planned.name == target).map_or(Format::Rgba8Unorm, |planned| planned.format)
         };
-        let draws = planned.process.draws();
-        let (source, vertex, fragment, has_parameters, writes_depth) = match &draws {
+        let (source, vertex, fragment, has_parameters, writes_depth) = match draws {
             Draws::Commands(commands) => {
                 let fragment = commands.fragment.map(str::to_owned);
                 (commands.shader, "vertex", fragment, !commands.parameters.is_empty(), commands.writes_depth)
@@ -76,7 +81,7 @@ impl ProcessPipelines {
         });
         let colors = declaration.colors().map(|(target, _)| texture_format(format_of(target))).collect();
         let pipelines = Self { process_layout, shader, colors, depth, by_state: RwLock::default() };
-        if let Draws::FullScreen(full_screen) = &draws {
+        if let Draws::FullScreen(full_screen) = draws {
             pipelines.make(device, full_screen_state(full_screen.blend));
         }
         pipelines

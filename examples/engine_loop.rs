@@ -1,0 +1,291 @@
+//! An engine that owns its device, its world and its loop, and has Drawloom produce its frames.
+//!
+//!     cargo run --release --example engine_loop
+//!
+//! Each turn of the loop: hand the world over, get it back as soon as the frame is recorded, submit the frame on this
+//! thread, the device thread, while the next update runs on another. Without a window: the picture goes into a texture
+//! that stands for the surface's, and at the end to `engine_loop.png`.
+
+#[path = "frame/adapter.rs"]
+#[expect(dead_code, reason = "the other half is for the frame example")]
+mod adapter;
+
+use std::error::Error;
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::WgpuBackend;
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::handle::Handle;
+use drawloom::process::{
+    CommandDraws, Declare, Draws, GeometryBuffer, Lighting, RawPass, RenderProcess, Resolved, ToneMapping,
+};
+use drawloom::queue::Selection;
+use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, wgpu};
+use parking_lot::Mutex;
+
+const FRAMES: usize = 120;
+const STEP: Duration = Duration::from_millis(16);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // The engine's own device. What Drawloom needs of it is in WgpuBackend's constants.
+    let (device, queue) = adapter::device()?;
+    let surface = Arc::new(Surface::new(&device, [960, 540]));
+
+    // One scheduler for the engine's own jobs and for Drawloom's.
+    let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+    let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue)?)
+        .process(GeometryBuffer)
+        .process(Lighting)
+        .process(Glow)
+        .process(ToneMapping { exposure: 1.2 })
+        .process(Present { surface: Arc::clone(&surface) })
+        .output("picture")
+        .build(Arc::clone(&scheduler))?;
+
+    let mut world = World::new()?;
+    let mut held = Vec::with_capacity(FRAMES);
+    let mut last = None;
+    for frame in 0..FRAMES {
+        if frame == FRAMES / 2 {
+            world.camera.size = [640, 480];
+            surface.resize(&device, world.camera.size);
+        }
+        let handed_over = Instant::now();
+        let recorded = renderer.record(world.as_scene_ref())?;
+        held.push(handed_over.elapsed());
+
+        let submitted = thread::scope(|scope| {
+            let update = scope.spawn(|| world.update(&scheduler));
+            let submitted = submitter.submit(recorded);
+            update.join().map_err(|_| "the update panicked")??;
+            Ok::<_, Box<dyn Error>>(submitted?)
+        })?;
+        last = Some(submitted.submission);
+    }
+
+    held.sort();
+    println!("{} objects, {FRAMES} frames on {}", world.positions.len(), adapter_name(&device));
+    println!("the world was held {:?} a frame (median), {:?} at most", held[FRAMES / 2], held[FRAMES - 1]);
+    let submission = last.ok_or("no frame was drawn")?;
+    let picture = submission.read(0, "picture")?;
+    let path = "engine_loop.png";
+    image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
+    println!("{path} written, {}x{} after the resize", picture.width, picture.height);
+    Ok(())
+}
+
+/// The engine's own storage: one array a property, which Drawloom reads in place.
+struct World {
+    time: f64,
+    camera: Camera,
+    lights: Vec<Light>,
+    assets: Assets,
+    positions: Vec<DVec3>,
+    orientations: Vec<Quat>,
+    scales: Vec<Vec3>,
+    bounds: Vec<Bounds>,
+    meshes: Vec<Handle<Mesh>>,
+    materials: Vec<Handle<Material>>,
+}
+
+impl World {
+    fn new() -> Result<Self, SceneError> {
+        let mut assets = Assets::default();
+        let cube = cube()?;
+        let bounds = cube.bounds();
+        let cube = assets.add(cube)?;
+        let stone = assets.add(Material { name: "stone".into(), diffuse: Vec3::splat(0.6), ..Material::default() })?;
+        let ember = assets.add(Material {
+            name: "ember".into(),
+            diffuse: Vec3::new(1.0, 0.35, 0.1),
+            blend: Blend::Additive,
+            ..Material::default()
+        })?;
+        let count = 40 * 40;
+        let material = |index: usize| if index.is_multiple_of(7) { ember } else { stone };
+        Ok(Self {
+            time: 0.0,
+            camera: Camera::looking_at("main", DVec3::new(0.0, 9.0, 22.0), DVec3::ZERO),
+            lights: vec![
+                Light::Directional {
+                    direction: Vec3::new(-0.5, -0.7, -0.5).normalize(),
+                    illuminance: Vec3::splat(2.5),
+                },
+                Light::Point { position: DVec3::Y * 4.0, intensity: Vec3::new(20.0, 30.0, 60.0), range: 30.0 },
+            ],
+            assets,
+            positions: vec![DVec3::ZERO; count],
+            orientations: vec![Quat::IDENTITY; count],
+            scales: vec![Vec3::splat(0.35); count],
+            bounds: vec![bounds; count],
+            meshes: vec![cube; count],
+            materials: (0..count).map(material).collect(),
+        })
+    }
+
+    /// What Drawloom may read until the frame is recorded.
+    fn as_scene_ref(&self) -> SceneRef<'_> {
+        SceneRef {
+            positions: &self.positions,
+            orientations: &self.orientations,
+            scales: &self.scales,
+            bounds: &self.bounds,
+            meshes: &self.meshes,
+            materials: &self.materials,
+            assets: &self.assets,
+            lights: &self.lights,
+            cameras: std::slice::from_ref(&self.camera),
+            ambient: Vec3::splat(0.05),
+            background: Vec3::new(0.01, 0.012, 0.02),
+        }
+    }
+
+    /// The engine's simulation: waves through a field of cubes, as jobs on the shared scheduler.
+    fn update(&mut self, scheduler: &Scheduler) -> Result<(), drawloom::task::JobPanic> {
+        self.time += STEP.as_secs_f64();
+        let time = self.time;
+        let rows = self.positions.chunks_mut(40).zip(self.orientations.chunks_mut(40)).enumerate();
+        scheduler.scope(|scope| {
+            for (row, (positions, orientations)) in rows {
+                scope.spawn(move |_, _| {
+                    for (column, (position, orientation)) in positions.iter_mut().zip(orientations).enumerate() {
+                        let (x, z) = (column as f64 - 19.5, row as f64 - 19.5);
+                        let height = (x.hypot(z) * 0.6 - time * 3.0).sin();
+                        *position = DVec3::new(x * 0.8, height, z * 0.8);
+                        *orientation = Quat::from_rotation_y((time + height) as f32);
+                    }
+                });
+            }
+        })
+    }
+}
+
+/// A pipeline of the engine's own over Drawloom's commands: objects of additive materials glow, brightest at their rims.
+struct Glow;
+
+impl RenderProcess for Glow {
+    fn name(&self) -> &str {
+        "glow"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.draws_over("radiance");
+        declare.tests_depth("depth");
+        // Lighting changes the radiance too, so the order has to be said.
+        declare.after("lighting");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            selection: Selection::Blended,
+            shader: "
+                struct Rim {
+                    @builtin(position) clip: vec4<f32>,
+                    @location(0) relative: vec3<f32>,
+                    @location(1) normal: vec3<f32>,
+                    @location(2) @interpolate(flat) material: u32,
+                }
+
+                @vertex
+                fn vertex(in: VertexInput) -> Rim {
+                    let object = drawn_object(in.instance);
+                    let relative = relative_position(object, in.position);
+                    return Rim(clip_position(relative), relative, world_normal(object, in.normal), object.material);
+                }
+
+                @fragment
+                fn fragment(in: Rim) -> @location(0) vec4<f32> {
+                    let facing = abs(dot(normalize(in.normal), normalize(in.relative)));
+                    return vec4<f32>(materials[in.material].diffuse * (1.5 - facing), 1.0);
+                }
+            ",
+            ..CommandDraws::default()
+        })
+    }
+}
+
+/// A process of the engine's own that encodes itself: it copies the finished picture to where the engine shows it.
+struct Present {
+    surface: Arc<Surface>,
+}
+
+impl RenderProcess for Present {
+    fn name(&self) -> &str {
+        "present"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.reads("picture");
+        // Nothing in the graph reads what it writes.
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Raw(self)
+    }
+}
+
+impl RawPass for Present {
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &Resolved<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        let picture = resources.target("picture").ok_or("there is no picture to present")?;
+        let shown = self.surface.texture.lock();
+        encoder.copy_texture_to_texture(picture.as_image_copy(), shown.as_image_copy(), picture.size());
+        Ok(())
+    }
+}
+
+/// Stands for a window's surface.
+struct Surface {
+    texture: Mutex<wgpu::Texture>,
+}
+
+impl Surface {
+    fn new(device: &wgpu::Device, size: [u32; 2]) -> Self {
+        Self { texture: Mutex::new(surface_texture(device, size)) }
+    }
+
+    fn resize(&self, device: &wgpu::Device, size: [u32; 2]) {
+        *self.texture.lock() = surface_texture(device, size);
+    }
+}
+
+fn surface_texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("surface"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    })
+}
+
+fn adapter_name(device: &wgpu::Device) -> String {
+    device.adapter_info().name
+}
+
+/// A cube of 2 m, each side with normals of its own.
+fn cube() -> Result<Mesh, SceneError> {
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
+        let right = normal.any_orthonormal_vector();
+        let up = normal.cross(right);
+        let first = vertices.len() as u32;
+        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+            let position = (normal + right * x + up * y).to_array();
+            vertices.push(Vertex { position, normal: normal.to_array(), uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] });
+        }
+        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+    }
+    Mesh::new("cube", Topology::TriangleList, vertices, indices)
+}

@@ -1,0 +1,239 @@
+//! What cannot be drawn is named, or counted and left out. Nothing panics, and the next frame is whole.
+
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::process::{GeometryBuffer, Lighting, PlanError, ToneMapping};
+use drawloom::scene::{Bounds, Camera, Light, Mesh, Scene, SceneError, SceneRef, ViewKind};
+use drawloom::task::Scheduler;
+use drawloom::view::RejectionReason;
+use drawloom::{BuildError, FrameError, Granularity, Renderer, SubmitError};
+
+use crate::renderer;
+use crate::scenes::{cube, field};
+
+fn error_of(scene: SceneRef<'_>) -> FrameError {
+    let (mut renderer, submitter) = renderer(2, Granularity::default());
+    let error = renderer.record(scene).err().expect("the scene cannot be drawn");
+    let good = field(50);
+    let recorded = renderer.record(good.as_scene_ref()).expect("the next frame is whole");
+    submitter.submit(recorded).unwrap();
+    error
+}
+
+fn rejected(scene: SceneRef<'_>) -> Vec<(RejectionReason, usize, usize)> {
+    let (mut renderer, submitter) = renderer(2, Granularity::Chunk(5));
+    let recorded = renderer.record(scene).unwrap();
+    let statistics = submitter.submit(recorded).unwrap().statistics;
+    let told = statistics.rejections.iter();
+    told.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect()
+}
+
+#[test]
+fn an_empty_scene_is_a_frame_of_background() {
+    let mut scene = Scene::new();
+    scene.cameras = field(0).cameras.clone();
+    let (mut renderer, submitter) = renderer(2, Granularity::default());
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let submitted = submitter.submit(recorded).unwrap();
+    assert_eq!(submitted.statistics.objects, 0);
+    assert_eq!(submitted.submission.passes.len(), 6);
+}
+
+#[test]
+fn a_scene_without_a_camera_is_refused() {
+    let mut scene = field(10);
+    scene.cameras.clear();
+    assert!(matches!(error_of(scene.as_scene_ref()), FrameError::NoView));
+}
+
+#[test]
+fn a_picture_without_pixels_is_refused_by_its_views_name() {
+    for size in [[0, 0], [0, 100], [100, 0]] {
+        let mut scene = field(10);
+        scene.cameras[1].size = size;
+        let error = error_of(scene.as_scene_ref());
+        assert!(matches!(&error, FrameError::EmptyTarget { view, .. } if view == "side"), "{error}");
+    }
+}
+
+#[test]
+fn a_camera_that_cannot_be_is_refused_by_name() {
+    let bad: [fn(&mut Camera); 10] = [
+        |camera| camera.position.y = f64::NAN,
+        |camera| camera.position.y = f64::INFINITY,
+        |camera| camera.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+        |camera| camera.orientation.x = f32::NAN,
+        |camera| camera.field_of_view = 0.0,
+        |camera| camera.field_of_view = PI,
+        |camera| camera.field_of_view = f32::NAN,
+        |camera| camera.near = 0.0,
+        |camera| camera.near = f32::INFINITY,
+        |camera| camera.near = f32::NAN,
+    ];
+    for spoil in bad {
+        let mut scene = field(10);
+        spoil(&mut scene.cameras[1]);
+        let error = error_of(scene.as_scene_ref());
+        let named = matches!(&error, FrameError::Scene(SceneError::InvalidCamera { camera, .. }) if camera == "side");
+        assert!(named, "{error}");
+    }
+    let mut scene = field(10);
+    scene.cameras[0].position.x = 1e10;
+    assert!(matches!(error_of(scene.as_scene_ref()), FrameError::Backend(_)));
+}
+
+#[test]
+fn a_view_that_no_process_draws_is_refused_by_name() {
+    let mut scene = field(10);
+    scene.cameras[1].kind = ViewKind::Reflection;
+    let error = error_of(scene.as_scene_ref());
+    assert!(matches!(&error, FrameError::NoProcess { view, .. } if view == "side"), "{error}");
+}
+
+#[test]
+fn slices_of_different_lengths_are_refused_by_name() {
+    let scene = field(10);
+    let whole = scene.as_scene_ref();
+    let short = [
+        ("orientations", SceneRef { orientations: &whole.orientations[1..], ..whole }),
+        ("scales", SceneRef { scales: &whole.scales[1..], ..whole }),
+        ("bounds", SceneRef { bounds: &whole.bounds[1..], ..whole }),
+        ("meshes", SceneRef { meshes: &whole.meshes[1..], ..whole }),
+        ("materials", SceneRef { materials: &whole.materials[1..], ..whole }),
+    ];
+    for (name, scene) in short {
+        let error = error_of(scene);
+        let named = matches!(
+            &error,
+            FrameError::Scene(SceneError::UnequalSlices { slice, count: 9, positions: 10 }) if *slice == name
+        );
+        assert!(named, "{error}");
+    }
+}
+
+#[test]
+fn colours_that_cannot_be_are_refused() {
+    for bad in [Vec3::splat(f32::NAN), Vec3::splat(f32::INFINITY), Vec3::splat(-1.0)] {
+        let mut scene = field(10);
+        scene.background = bad;
+        assert!(error_of(scene.as_scene_ref()).to_string().contains("background"));
+        let mut scene = field(10);
+        scene.ambient = bad;
+        assert!(error_of(scene.as_scene_ref()).to_string().contains("ambient"));
+    }
+}
+
+#[test]
+fn objects_that_cannot_be_are_counted_and_left_out() {
+    let scene = field(40);
+    let whole = scene.as_scene_ref();
+    let mut positions = whole.positions.to_vec();
+    let mut orientations = whole.orientations.to_vec();
+    let mut scales = whole.scales.to_vec();
+    let mut bounds = whole.bounds.to_vec();
+    positions[3].x = f64::NAN;
+    positions[4].y = f64::NEG_INFINITY;
+    positions[5].z = 1e12;
+    orientations[6] = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+    scales[7].z = f32::NAN;
+    bounds[8] = Bounds { center: Vec3::ZERO, radius: f32::NAN };
+    bounds[9] = Bounds { center: Vec3::ZERO, radius: -1.0 };
+    (bounds[10].radius, scales[10]) = (1e30, Vec3::splat(1e20));
+    let spoiled =
+        SceneRef { positions: &positions, orientations: &orientations, scales: &scales, bounds: &bounds, ..whole };
+    let expected = [
+        (RejectionReason::InvalidTransform, 4, 3),
+        (RejectionReason::InvalidBounds, 3, 8),
+        (RejectionReason::OutOfReach, 1, 5),
+    ];
+    assert_eq!(rejected(spoiled), expected);
+    assert_eq!(rejected(whole), []);
+}
+
+#[test]
+fn extreme_scales_are_drawn() {
+    for scale in [0.0, -1.0, 1e-20, 1e20, f32::MIN_POSITIVE / 4.0] {
+        let mut scene = field(20);
+        for handle in scene.objects().collect::<Vec<_>>() {
+            let mut object = scene.object(handle).unwrap();
+            object.scale.y = scale;
+            scene.replace_object(handle, object).unwrap();
+        }
+        assert_eq!(rejected(scene.as_scene_ref()), [], "{scale}");
+    }
+}
+
+#[test]
+fn objects_whose_mesh_or_material_was_removed_are_counted_and_left_out() {
+    let mut scene = field(30);
+    let reference = scene.as_scene_ref();
+    let (mesh, material) = (reference.meshes[1], reference.materials[0]);
+    scene.remove(mesh).unwrap();
+    scene.remove(material).unwrap();
+    // Every third object has that mesh, and every fifth of the others that material.
+    let expected = [(RejectionReason::StaleMesh, 10, 1), (RejectionReason::StaleMaterial, 4, 0)];
+    assert_eq!(rejected(scene.as_scene_ref()), expected);
+
+    // The slot is used again, and the stale handles still mean nothing.
+    let new: drawloom::handle::Handle<Mesh> = scene.add(cube()).unwrap();
+    assert_eq!(new.index(), mesh.index());
+    assert_eq!(rejected(scene.as_scene_ref()), expected);
+}
+
+#[test]
+fn lights_that_cannot_be_are_counted_and_left_out() {
+    let mut scene = field(10);
+    let point =
+        |intensity: f32, range| Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range };
+    let spot = |inner_angle, outer_angle| Light::Spot {
+        position: DVec3::ZERO,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::ONE,
+        range: 1.0,
+        inner_angle,
+        outer_angle,
+    };
+    scene.lights.extend([
+        point(f32::NAN, 1.0),
+        point(f32::INFINITY, 1.0),
+        point(-1.0, 1.0),
+        point(1.0, 0.0),
+        point(1.0, f32::INFINITY),
+        Light::Directional { direction: Vec3::ZERO, illuminance: Vec3::ONE },
+        Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 },
+        spot(0.0, 0.0),
+        spot(0.5, 0.4),
+        spot(0.0, PI),
+        Light::Hemispherical { position: DVec3::ZERO, direction: Vec3::ONE, intensity: Vec3::ONE, range: 1.0 },
+    ]);
+    assert_eq!(rejected(scene.as_scene_ref()), [(RejectionReason::InvalidLight, 11, 2)]);
+    scene.lights.truncate(2);
+    scene.lights.extend([point(0.0, 1.0), spot(0.0, 0.5)]);
+    assert_eq!(rejected(scene.as_scene_ref()), []);
+}
+
+#[test]
+fn a_renderer_that_cannot_be_is_refused() {
+    let scheduler = || Arc::new(Scheduler::new(1).unwrap());
+    let empty = Renderer::builder(NullBackend).deferred().granularity(Granularity::Chunk(0)).build(scheduler());
+    assert!(matches!(empty.err(), Some(BuildError::EmptyChunk)));
+    let nothing = Renderer::builder(NullBackend).build(scheduler());
+    assert!(matches!(nothing.err(), Some(BuildError::Plan(PlanError::Empty))));
+    let unlit = Renderer::builder(NullBackend).process(Lighting).process(ToneMapping::default()).output("picture");
+    let error = unlit.build(scheduler()).err().unwrap().to_string();
+    assert!(error.contains("lighting"), "{error}");
+    let twice = Renderer::builder(NullBackend).deferred().process(GeometryBuffer).build(scheduler());
+    assert!(twice.err().unwrap().to_string().contains("geometry buffer"));
+}
+
+#[test]
+fn a_frame_of_another_renderer_is_refused() {
+    let scene = field(10);
+    let (mut one, _) = renderer(1, Granularity::default());
+    let (_, other) = renderer(1, Granularity::default());
+    let recorded = one.record(scene.as_scene_ref()).unwrap();
+    assert!(matches!(other.submit(recorded), Err(SubmitError::ForeignFrame)));
+}

@@ -1,0 +1,57 @@
+//! A process that panics fails the frame by name, and the next frame is whole.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use drawloom::backend::NullBackend;
+use drawloom::process::{Declare, Draws, FullScreen, RenderProcess};
+use drawloom::task::Scheduler;
+use drawloom::{FrameError, Renderer};
+
+use crate::scenes::field;
+
+/// Panics for as long as the switch is on.
+struct Fragile {
+    breaks: Arc<AtomicBool>,
+}
+
+impl RenderProcess for Fragile {
+    fn name(&self) -> &str {
+        "fragile"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.draws_over("radiance");
+        declare.after("lighting");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        assert!(!self.breaks.load(Ordering::Relaxed), "the glass is broken");
+        Draws::FullScreen(FullScreen::default())
+    }
+}
+
+#[test]
+fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_runs() {
+    let breaks = Arc::new(AtomicBool::new(false));
+    let scheduler = Arc::new(Scheduler::new(3).unwrap());
+    let fragile = Fragile { breaks: Arc::clone(&breaks) };
+    let (mut renderer, submitter) =
+        Renderer::builder(NullBackend).deferred().process(fragile).build(scheduler).unwrap();
+    let scene = field(500);
+    for frame in 0..20 {
+        let broken = frame % 2 == 1;
+        breaks.store(broken, Ordering::Relaxed);
+        match renderer.record(scene.as_scene_ref()) {
+            Ok(recorded) => {
+                assert!(!broken);
+                assert_eq!(submitter.submit(recorded).unwrap().submission.passes.len(), 8);
+            }
+            Err(FrameError::Process(panic)) => {
+                assert!(broken);
+                assert_eq!((panic.process.as_str(), panic.message.as_str()), ("fragile", "the glass is broken"));
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+}

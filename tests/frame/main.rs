@@ -1,0 +1,19 @@
+//! Frames down to the queue, on the backend that draws nothing and checks everything.
+
+mod bad_input;
+mod failing_process;
+mod same_result;
+#[path = "../scenes/mod.rs"]
+mod scenes;
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::task::Scheduler;
+use drawloom::{Granularity, Renderer, Submitter};
+
+/// The shipped processes on the null backend.
+fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let scheduler = Arc::new(Scheduler::new(workers).unwrap());
+    Renderer::builder(NullBackend).deferred().granularity(granularity).build(scheduler).unwrap()
+}

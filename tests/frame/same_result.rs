@@ -1,0 +1,117 @@
+//! Whoever does the work, and however it is cut: the queues are the same.
+
+use drawloom::backend::NullPass;
+use drawloom::glam::DVec3;
+use drawloom::queue::DrawList;
+use drawloom::scene::{Scene, sample};
+use drawloom::{FrameStatistics, Granularity};
+
+use crate::renderer;
+use crate::scenes::field;
+
+const GRANULARITIES: [Granularity; 6] = [
+    Granularity::PerCamera,
+    Granularity::PerDraw,
+    Granularity::Chunk(7),
+    Granularity::Chunk(64),
+    Granularity::Chunk(300),
+    Granularity::Chunk(usize::MAX),
+];
+
+fn drawn(scene: &Scene, workers: usize, granularity: Granularity) -> (Vec<DrawList>, Vec<NullPass>, FrameStatistics) {
+    let (mut renderer, submitter) = renderer(workers, granularity);
+    // The second frame finds what the first one left behind.
+    let mut result = None;
+    for _ in 0..2 {
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let lists = (0..scene.cameras.len()).map(|view| renderer.draw_list("geometry buffer", view).unwrap().clone());
+        let lists = lists.collect();
+        let submitted = submitter.submit(recorded).unwrap();
+        result = Some((lists, submitted.submission.passes, submitted.statistics));
+    }
+    result.unwrap()
+}
+
+fn assert_same_for_all(scene: &Scene) {
+    let (lists, passes, statistics) = drawn(scene, 1, Granularity::PerCamera);
+    assert!(lists.iter().all(|list| !list.commands.is_empty()));
+    for workers in [1, 2, 4] {
+        for granularity in GRANULARITIES {
+            let (other_lists, other_passes, other_statistics) = drawn(scene, workers, granularity);
+            assert!(other_lists == lists, "commands or batches differ with {workers} workers, {granularity:?}");
+            assert_eq!(other_passes, passes, "{workers} workers, {granularity:?}");
+            assert_eq!(other_statistics.views, statistics.views, "{workers} workers, {granularity:?}");
+        }
+    }
+}
+
+#[test]
+fn a_field_of_boxes() {
+    assert_same_for_all(&field(3000));
+}
+
+#[test]
+fn the_projects_own_scene() {
+    assert_same_for_all(&sample::colonnade().unwrap());
+}
+
+#[test]
+fn coincident_copies() {
+    let mut scene = field(100);
+    scene.duplicate_objects(5);
+    let (lists, ..) = drawn(&scene, 2, Granularity::Chunk(64));
+    for list in lists {
+        for pair in list.commands.windows(2) {
+            assert!((pair[0].key, pair[0].object) < (pair[1].key, pair[1].object));
+        }
+    }
+    assert_same_for_all(&scene);
+}
+
+#[test]
+fn a_view_draws_what_a_plain_loop_finds_visible() {
+    let scene = field(2000);
+    let (lists, _, statistics) = drawn(&scene, 2, Granularity::default());
+    for (camera, (list, view)) in scene.cameras.iter().zip(lists.iter().zip(&statistics.views)) {
+        let reference = scene.as_scene_ref();
+        let inside = |object: usize| {
+            let bounds = reference.bounds[object];
+            let offset =
+                reference.orientations[object].as_dquat() * (reference.scales[object] * bounds.center).as_dvec3();
+            let place =
+                camera.orientation.as_dquat().inverse() * (reference.positions[object] + offset - camera.position);
+            let radius = f64::from(bounds.radius * reference.scales[object].abs().max_element());
+            let half = f64::from(camera.field_of_view) * 0.5;
+            let half_x = (half.tan() * f64::from(camera.aspect())).atan();
+            let beside = |coordinate: f64, angle: f64| coordinate.abs() * angle.cos() + place.z * angle.sin() <= radius;
+            -place.z + radius >= f64::from(camera.near) && beside(place.x, half_x) && beside(place.y, half)
+        };
+        let expected = (0..reference.object_count()).filter(|&object| inside(object)).count();
+        // Spheres that touch a plane to within rounding may be on either side of it.
+        assert!(view.visible.abs_diff(expected) <= 1, "{} against {expected}", view.visible);
+        assert!(view.visible > 100 && view.visible < 2000, "the camera {} tests something", camera.name);
+        assert!(list.commands.len() < view.visible, "blended objects are not in the geometry buffer");
+    }
+}
+
+#[test]
+fn moving_the_world_and_the_camera_together_changes_nothing() {
+    let near = field(500);
+    for distance in [1e3, 1e6, 1e9] {
+        let mut far = field(500);
+        let shift = DVec3::new(distance, -distance * 0.5, distance * 0.25);
+        for camera in &mut far.cameras {
+            camera.position += shift;
+        }
+        let handles: Vec<_> = far.objects().collect();
+        for handle in handles {
+            let mut object = far.object(handle).unwrap();
+            object.position += shift;
+            far.replace_object(handle, object).unwrap();
+        }
+        let (near, far) = (drawn(&near, 1, Granularity::default()), drawn(&far, 1, Granularity::default()));
+        for (near, far) in near.2.views.iter().zip(&far.2.views) {
+            assert!(near.visible.abs_diff(far.visible) <= 1, "{distance}: {near:?} {far:?}");
+        }
+    }
+}
