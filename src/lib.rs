@@ -1,18 +1,60 @@
-//! Drawloom.
-#![warn(missing_docs)]
+//! Drawloom produces an engine's frames on every core.
+//!
+//! An engine hands over its scene; Drawloom splits the frame into jobs, records wgpu bundles on all workers, and hands the
+//! device thread one ordered queue per camera to submit. What matters here, in this order: it does what the engine's
+//! author expects; it is right at the extremes; it is fast; it is pleasant to read; it is small.
+//!
+//! ```text
+//!  Scene (read-only while a frame is produced)                                        scene
+//!    │  views        one a camera: "everything is a camera"                           view
+//!    ▼
+//!  visibility        per view: which objects it sees          parallel over objects   view
+//!    ▼
+//!  fill              per view: a command for each of them     parallel over chunks    command, queue
+//!    ▼
+//!  sort → instance   by key; equal runs become one draw       parallel over views     queue
+//!    ▼
+//!  record            batches into bundles, bundles into a pass  parallel over chunks  backend
+//!    ▼
+//!  per-camera queue  finished passes in order, one queue a view
+//!    ▼
+//!  submit            the device thread alone
+//! ```
+//!
+//! Where to begin:
+//!
+//! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
+//! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
+//! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
+//! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
+//!
+//! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded Rendering"),
+//! **L** (Lorenzon and Clua, "A Novel Multithreaded Rendering System based on a Deferred Approach", SBGames 2009) and
+//! **S** (Schertenleib, "A Multithreaded 3D Renderer").
+//!
+//! # Features
+//!
+//! - `wgpu` (default): the wgpu backend, and [`wgpu`] itself. Without it everything down to the queue is there, with a
+//!   backend that counts and checks.
+//! - `obj` (default): OBJ files and their textures.
+//!
+//! # Spans
+//!
+//! Spans and warnings go through `tracing` under the target `drawloom`. The crate installs no subscriber.
 
-pub mod backend;
-pub mod blocks;
-pub mod command;
-mod frame;
-pub mod graph;
-pub mod handle;
-pub mod process;
-pub mod queue;
-pub mod scene;
+// The rooms, each using only those above it; `tests/architecture.rs` sees to that.
 mod sync;
 pub mod task;
+pub mod blocks;
+pub mod graph;
+pub mod handle;
+pub mod scene;
+pub mod command;
 pub mod view;
+pub mod queue;
+pub mod process;
+pub mod backend;
+mod frame;
 
 pub use frame::{
     BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
@@ -21,3 +63,8 @@ pub use frame::{
 pub use glam;
 #[cfg(feature = "wgpu")]
 pub use wgpu;
+
+/// The README's Rust is compiled with the documentation's tests.
+#[cfg(all(doctest, feature = "wgpu", feature = "obj"))]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

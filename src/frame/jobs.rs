@@ -4,6 +4,7 @@ use super::FrameError;
 use super::phase::{PassTable, Phase};
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
+use crate::queue::Selection;
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -12,7 +13,9 @@ pub(super) struct FrameJobs {
     pub(super) schedule: Schedule<Phase>,
     /// In the order they are submitted: by process, then by view.
     pub(super) passes: Vec<Pass>,
+    /// What the jobs were drawn up for.
     views: Vec<(String, ViewKind)>,
+    selections: Vec<Option<Selection>>,
 }
 
 impl FrameJobs {
@@ -50,7 +53,7 @@ impl FrameJobs {
                 id
             };
             let mut previous = None;
-            if matches!(draws[pass.process], Draws::Commands(_)) {
+            if selection_of(&draws[pass.process]).is_some() {
                 let seen = *compacted[view].get_or_insert_with(|| {
                     let seen = add(format!("visibility, {view_name}"), Phase::Visibility { view }, Some(objects));
                     add(format!("compact, {view_name}"), Phase::Compact { view }, Some(seen))
@@ -69,25 +72,29 @@ impl FrameJobs {
             add(format!("{}, {view_name}, finish", process.name()), Phase::Finish { pass: index }, previous);
         }
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
-        Ok(Self { schedule, passes, views: signature(views) })
+        let views = views.iter().map(|view| (view.name().to_owned(), view.kind())).collect();
+        Ok(Self { schedule, passes, views, selections: draws.iter().map(selection_of).collect() })
     }
 
-    /// Whether they still are what these views need.
-    pub(super) fn fit(&self, views: &[RenderView]) -> bool {
+    /// Whether they still are what these draws and views need.
+    pub(super) fn fit(&self, draws: &[Draws<'_>], views: &[RenderView]) -> bool {
         let names = self.views.iter().map(|(name, kind)| (name.as_str(), *kind));
         names.eq(views.iter().map(|view| (view.name(), view.kind())))
+            && self.selections.iter().copied().eq(draws.iter().map(selection_of))
     }
 
     /// Empty tables for the passes.
-    pub(super) fn pass_tables(&self, draws: &[Draws<'_>]) -> Vec<PassTable> {
-        let table = |pass: &Pass| {
-            let selection = match &draws[pass.process] {
-                Draws::Commands(commands) => Some(commands.selection),
-                _ => None,
-            };
-            PassTable { selection, ..PassTable::default() }
-        };
+    pub(super) fn pass_tables(&self) -> Vec<PassTable> {
+        let table = |pass: &Pass| PassTable { selection: self.selections[pass.process], ..PassTable::default() };
         self.passes.iter().map(table).collect()
+    }
+}
+
+/// Which objects a process draws; `None` for one that draws no objects.
+fn selection_of(draws: &Draws<'_>) -> Option<Selection> {
+    match draws {
+        Draws::Commands(commands) => Some(commands.selection),
+        _ => None,
     }
 }
 
@@ -99,8 +106,4 @@ fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
         }
     }
     passes
-}
-
-fn signature(views: &[RenderView]) -> Vec<(String, ViewKind)> {
-    views.iter().map(|view| (view.name().to_owned(), view.kind())).collect()
 }

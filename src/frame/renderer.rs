@@ -135,10 +135,10 @@ fn draw_up_jobs(
     draws: &[Draws<'_>],
     views: &[RenderView],
 ) -> Result<(), FrameError> {
-    if !jobs.as_ref().is_some_and(|jobs| jobs.fit(views)) {
+    if !jobs.as_ref().is_some_and(|jobs| jobs.fit(draws, views)) {
         let new = FrameJobs::new(plan, draws, views)?;
         tables.visible.resize_with(views.len(), VisibleSet::default);
-        tables.passes = new.pass_tables(draws);
+        tables.passes = new.pass_tables();
         *jobs = Some(new);
     }
     Ok(())

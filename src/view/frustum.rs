@@ -82,7 +82,7 @@ mod tests {
             place in prop::array::uniform3(-1.0..1.0_f64),
             exponent in 0.0..9.0_f64,
             axis in prop::array::uniform3(-1.0..1.0_f32),
-            angle in 0.0..6.28_f32,
+            angle in 0.0..std::f32::consts::TAU,
             degrees in 0.1..179.0_f32,
             width in 1_u32..4000,
             height in 1_u32..4000,

@@ -146,11 +146,11 @@ fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldB
     if !bounds.is_valid() {
         return Err(RejectionReason::InvalidBounds);
     }
-    let offset = orientation.as_dquat() * (scale.as_dvec3() * bounds.center.as_dvec3());
-    // Rounded up, and by what rounding the orientation to f32 can turn the centre.
-    let reach = f64::from(bounds.radius) * f64::from(scale.abs().max_element());
-    let radius = ((reach + offset.length() * 1e-6) as f32).next_up();
-    let center = position + offset;
+    let offset = orientation * (scale * bounds.center);
+    // Grown by what rounding can have turned and moved the centre, and shortened the radius: some ten roundings of 2⁻²⁴,
+    // which is less than 1e-6, in the terms of the rotation; and one each in the product and in the sum.
+    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + offset.length() * 1e-6;
+    let center = position + offset.as_dvec3();
     if !center.is_finite() || !radius.is_finite() {
         return Err(RejectionReason::InvalidBounds);
     }

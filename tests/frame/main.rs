@@ -3,6 +3,7 @@
 mod bad_input;
 mod failing_process;
 mod same_result;
+mod views;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 

@@ -76,7 +76,7 @@ fn make_field(count: usize) -> Result<Scene, SceneError> {
             materials[index % materials.len()],
             DVec3::new(within(-20.0, 20.0), within(-8.0, 8.0), within(-40.0, 20.0)),
         );
-        object.orientation = Quat::from_rotation_y(within(0.0, 6.28) as f32);
+        object.orientation = Quat::from_rotation_y(within(0.0, std::f64::consts::TAU) as f32);
         object.scale = Vec3::splat(within(0.2, 1.0) as f32);
         if index % 11 == 0 {
             object.scale.x = -object.scale.x;

@@ -16,12 +16,13 @@ pub const BACKGROUND: Vec3 = Vec3::new(0.015, 0.02, 0.035);
 
 /// A camera called `main` that shows the scene, from 1 µm to 10,000 km in size and wherever it is.
 ///
-/// Rays from points inside say what the scene is. Surfaces that face the point all around are a room, and the camera
-/// stands in it at eye height, looking along its longest free line of sight; if the room lacks a wall, the camera looks in
-/// from there. Otherwise the scene is an object, shown from the outside, from a little above. The scene is upright along
-/// +Y. The near plane is at a thousandth of the scene's radius.
+/// Rays say what the scene is. If its surfaces face points inside and not those outside, it is a room: the camera stands in
+/// it at eye height, looking along the longest free line of sight, or looks in from where a wall is missing. Otherwise it
+/// is an object, shown from outside and a little above. The scene is upright along +Y. The near plane is at a thousandth of
+/// the scene's radius.
 ///
-/// An empty scene, or one of which nothing can be drawn, gets a camera that looks at the world's origin.
+/// An empty scene, or one of which nothing can be drawn, gets a camera that looks at the world's origin. So does one whose
+/// slices differ in length.
 ///
 /// ```
 /// use drawloom::scene::{defaults, sample};
@@ -70,7 +71,7 @@ pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
 /// The centre and radius of a sphere around every object that can be drawn; a radius of 1 if there is none.
 pub(super) fn extent(scene: SceneRef<'_>) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for object in (0..scene.object_count()).filter(|&object| scene.transform_is_valid(object)) {
+    for object in drawable_objects(scene) {
         let scale = scene.scales[object];
         let bounds = scene.bounds[object];
         let center = scene.positions[object] + (scene.orientations[object] * (bounds.center * scale)).as_dvec3();
@@ -82,4 +83,10 @@ pub(super) fn extent(scene: SceneRef<'_>) -> (DVec3, f64) {
     }
     let radius = (high - low).length() / 2.0;
     if radius > 0.0 && radius.is_finite() { ((low + high) / 2.0, radius) } else { (DVec3::ZERO, 1.0) }
+}
+
+/// The objects whose transforms can be drawn; none if the scene's slices differ in length.
+fn drawable_objects(scene: SceneRef<'_>) -> impl Iterator<Item = usize> {
+    let count = if scene.check_lengths().is_ok() { scene.object_count() } else { 0 };
+    (0..count).filter(move |&object| scene.transform_is_valid(object))
 }

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::drawable_objects;
 use crate::scene::{Mesh, SceneRef, Topology};
 
 /// All triangles in a unit of their own: the centre of their box is the origin, and its corners are at distance 1. So
@@ -52,11 +53,8 @@ const MOST_TRIANGLES: usize = 2_000_000;
 impl Surfaces {
     /// None if no triangle can be drawn.
     pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
-        let drawable = |object: usize| {
-            let mesh = scene.assets.get(*scene.meshes.get(object)?).ok()?;
-            scene.transform_is_valid(object).then_some((object, mesh))
-        };
-        let objects = || (0..scene.object_count()).filter_map(drawable);
+        let with_mesh = |object: usize| scene.assets.get(scene.meshes[object]).ok().map(|mesh| (object, mesh));
+        let objects = || drawable_objects(scene).filter_map(with_mesh);
         let total: usize = objects().map(|(_, mesh)| mesh.triangle_count()).sum();
         let step = total.div_ceil(MOST_TRIANGLES).max(1);
         let world: Vec<_> = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step).collect();

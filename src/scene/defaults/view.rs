@@ -14,8 +14,14 @@ pub(super) struct View {
     pub field_of_view: f32,
 }
 
-/// The share of rays that must meet surfaces facing them for a point to be in a room.
+/// The share of rays that must meet surfaces facing them, from some point inside, in a room.
 const ROOM: f32 = 0.6;
+
+/// The share of rays from outside that must meet surfaces facing them on an object, be it hollow.
+const OBJECT: f32 = 0.5;
+
+/// Rays that look around a point.
+const RAYS: usize = 256;
 
 /// From outside. Inside, where walls are near, it is wider.
 const NARROW: f32 = 45.0;
@@ -25,56 +31,68 @@ const WIDE: f32 = 65.0;
 const ASPECT: f32 = 16.0 / 9.0;
 
 pub(super) fn best(surfaces: &Surfaces) -> View {
-    let surroundings = [Vec3::ZERO, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y, Vec3::NEG_Y]
-        .map(|side| Surroundings::at(surfaces, side * surfaces.half_size * 0.3));
-    let most_closed = surroundings.into_iter().max_by(|one, other| one.facing.total_cmp(&other.facing));
-    match most_closed {
-        Some(room) if room.facing >= ROOM => match room.open_side() {
-            Some(side) if side.y.abs() < 0.5 => looking_in(surfaces, side),
-            // Open to the top it is a dish, or a landscape.
-            Some(side) if side.y >= 0.5 => object(surfaces),
-            _ => inside(surfaces).unwrap_or_else(|| object(surfaces)),
-        },
-        _ => object(surfaces),
+    if faced_from_outside(surfaces) >= OBJECT {
+        return object(surfaces);
     }
+    let points = [Vec3::ZERO, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y, Vec3::NEG_Y];
+    let around = points.map(|side| Surroundings::at(surfaces, side * surfaces.half_size * 0.3));
+    // A point within something, or outside, knows nothing of the room.
+    let around: Vec<_> = around.into_iter().filter(|around| around.faced >= ROOM).collect();
+    match open_side(&around) {
+        _ if around.is_empty() => object(surfaces),
+        Some(side) => looking_in(surfaces, side),
+        None => inside(surfaces).unwrap_or_else(|| object(surfaces)),
+    }
+}
+
+/// The share of rays from all around that meet surfaces facing them, of those that meet any.
+fn faced_from_outside(surfaces: &Surfaces) -> f32 {
+    let targets = || (0..8).map(|target| evenly_around(target, 8) * surfaces.half_size * 0.7);
+    let eyes = (0..RAYS).map(|eye| evenly_around(eye, RAYS) * 2.0);
+    let rays = eyes.flat_map(|eye| targets().map(move |target| (eye, (target - eye).normalize())));
+    let hits: Vec<_> = rays.filter_map(|(eye, direction)| surfaces.cast(eye, direction)).collect();
+    hits.iter().filter(|hit| hit.faces).count() as f32 / hits.len().max(1) as f32
 }
 
 /// What is around a point.
 struct Surroundings {
     /// The share of rays that meet surfaces facing the point.
-    facing: f32,
+    faced: f32,
+    /// The share that meets nothing, times their mean direction.
+    open: Vec3,
     /// The share that meets nothing.
-    open: f32,
-    /// The mean direction of those that meet nothing; shorter than 1 as they differ.
-    open_direction: Vec3,
+    missing: f32,
 }
 
 impl Surroundings {
     fn at(surfaces: &Surfaces, point: Vec3) -> Self {
-        const RAYS: usize = 256;
-        let (mut facing, mut missing, mut sum) = (0, 0, Vec3::ZERO);
+        const SHARE: f32 = 1.0 / RAYS as f32;
+        let mut around = Self { faced: 0.0, open: Vec3::ZERO, missing: 0.0 };
         for direction in (0..RAYS).map(|ray| evenly_around(ray, RAYS)) {
             match surfaces.cast(point, direction) {
-                Some(hit) => facing += usize::from(hit.faces),
+                Some(hit) if hit.faces => around.faced += SHARE,
+                Some(_) => {}
                 None => {
-                    missing += 1;
-                    sum += direction;
+                    around.missing += SHARE;
+                    around.open += direction * SHARE;
                 }
             }
         }
-        let share = |count: usize| count as f32 / RAYS as f32;
-        Self { facing: share(facing), open: share(missing), open_direction: sum / missing.max(1) as f32 }
+        around
     }
+}
 
-    /// The side without a wall, if there is one: rays that meet nothing go one way. A slightly slanted side is an axis.
-    fn open_side(&self) -> Option<Vec3> {
-        if self.open < 0.05 || self.open_direction.length() < 0.7 {
-            return None;
-        }
-        let side = self.open_direction.normalize();
-        let axis = Vec3::AXES.map(|axis| axis * side.dot(axis).signum());
-        Some(axis.into_iter().find(|axis| side.dot(*axis) > 0.9).unwrap_or(side))
+/// The side without a wall, if there is one: rays that meet nothing go one way, and not up, where a court is open too. A
+/// slightly slanted side is an axis.
+fn open_side(around: &[Surroundings]) -> Option<Vec3> {
+    let missing: f32 = around.iter().map(|around| around.missing).sum();
+    let open: Vec3 = around.iter().map(|around| around.open).sum();
+    let side = open.try_normalize()?;
+    if missing < 0.05 * around.len() as f32 || open.length() < 0.7 * missing || side.y.abs() > 0.5 {
+        return None;
     }
+    let axes = Vec3::AXES.map(|axis| axis * side.dot(axis).signum());
+    Some(axes.into_iter().find(|axis| side.dot(*axis) > 0.9).unwrap_or(side))
 }
 
 /// From outside through the open side, the box filling the picture.
@@ -120,7 +138,8 @@ fn inside(surfaces: &Surfaces) -> Option<View> {
     let mut best: Option<(f32, View)> = None;
     for x in -STEPS..=STEPS {
         for z in -STEPS..=STEPS {
-            let share = Vec3::new(x as f32, 0.0, z as f32) / (STEPS as f32 + 0.5);
+            // From a quarter of the height, so that it is the ground floor that is found.
+            let share = Vec3::new(x as f32, -0.5 * (STEPS as f32 + 0.5), z as f32) / (STEPS as f32 + 0.5);
             let Some(eye) = standing_at(surfaces, share * surfaces.half_size) else {
                 continue;
             };
@@ -144,8 +163,8 @@ fn standing_at(surfaces: &Surfaces, point: Vec3) -> Option<Vec3> {
         Some(hit) => Some(hit.distance),
         None => Some(otherwise),
     };
-    let below = reach(Vec3::NEG_Y, surfaces.half_size.y)?;
-    let above = reach(Vec3::Y, surfaces.half_size.y)?;
+    let below = reach(Vec3::NEG_Y, surfaces.half_size.y + point.y)?;
+    let above = reach(Vec3::Y, surfaces.half_size.y - point.y)?;
     let eye = point + Vec3::Y * (0.22 * (below + above) - below);
     // Room to stand: nothing close by.
     let clearance = 0.04;

@@ -141,29 +141,23 @@ pub enum ObjWarning {
         /// Curves and surfaces.
         surfaces: usize,
     },
-    /// Normals that are zero or not finite. The face's own takes their place.
-    #[error("model `{model}` has {normals} normals that are zero or not finite, and the faces' own take their place")]
+    /// Normals that are zero or not finite. The faces' own take their place.
+    #[error("{normals} normals are zero or not finite, and the faces' own take their place")]
     ReplacedNormals {
-        /// Its name.
-        model: String,
         /// How many.
         normals: usize,
     },
     /// Texture coordinates that are not finite. Zero takes their place.
-    #[error("model `{model}` has {coordinates} texture coordinates that are not finite, and 0 takes their place")]
+    #[error("{coordinates} texture coordinates are not finite, and 0 takes their place")]
     ReplacedTextureCoordinates {
-        /// Its name.
-        model: String,
         /// How many.
         coordinates: usize,
     },
-    /// Faces with and without normals, or texture coordinates, in one model. None of them are used.
-    #[error("only some faces of model `{model}` have {attribute}, so none are used")]
-    PartialAttribute {
-        /// Its name.
-        model: String,
-        /// `normals` or `texture coordinates`.
-        attribute: &'static str,
+    /// Corners of faces that refer to a normal or texture coordinate that the file does not have. They have none then.
+    #[error("{corners} corners of faces refer to a normal or texture coordinate that is not there")]
+    DanglingCorners {
+        /// How many.
+        corners: usize,
     },
     /// Polygons that cross themselves, or are not convex and have more than 256 corners. They were cut into a fan.
     #[error("model `{model}` has {polygons} polygons that cross themselves or are too large, and may look wrong")]

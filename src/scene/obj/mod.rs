@@ -123,6 +123,19 @@ fn parse(tidy: &Tidy) -> Result<Vec<tobj::Model>, tobj::LoadError> {
     Ok(models)
 }
 
+/// What tidying up replaced or left out.
+fn losses(tidy: &Tidy) -> impl Iterator<Item = ObjWarning> {
+    let Tidy { points, lines, surfaces, bad_normals, bad_texture_coordinates, dangling_corners, .. } = *tidy;
+    [
+        (points + lines + surfaces, ObjWarning::NotDrawn { points, lines, surfaces }),
+        (bad_normals, ObjWarning::ReplacedNormals { normals: bad_normals }),
+        (bad_texture_coordinates, ObjWarning::ReplacedTextureCoordinates { coordinates: bad_texture_coordinates }),
+        (dangling_corners, ObjWarning::DanglingCorners { corners: dangling_corners }),
+    ]
+    .into_iter()
+    .filter_map(|(count, warning)| (count > 0).then_some(warning))
+}
+
 impl Imported {
     fn fill(
         &mut self,
@@ -130,10 +143,7 @@ impl Imported {
         tidy: &Tidy,
         fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
     ) -> Result<(), SceneError> {
-        if tidy.points + tidy.lines + tidy.surfaces > 0 {
-            let Tidy { points, lines, surfaces, .. } = *tidy;
-            self.warnings.push(ObjWarning::NotDrawn { points, lines, surfaces });
-        }
+        self.warnings.extend(losses(tidy));
         let materials = material::add_materials(&mut self.scene, tidy, fetch, &mut self.warnings)?;
         let mut glowing = Vec::new();
         for model in models {
@@ -189,18 +199,8 @@ impl Imported {
         if shape.indices.is_empty() {
             self.warnings.push(ObjWarning::EmptyModel { model: model.clone(), degenerate_triangles });
         }
-        for &attribute in &shape.partial_attributes {
-            self.warnings.push(ObjWarning::PartialAttribute { model: model.clone(), attribute });
-        }
         if shape.fanned_polygons > 0 {
-            self.warnings.push(ObjWarning::FannedPolygons { model: model.clone(), polygons: shape.fanned_polygons });
-        }
-        if shape.replaced_coordinates > 0 {
-            let coordinates = shape.replaced_coordinates;
-            self.warnings.push(ObjWarning::ReplacedTextureCoordinates { model: model.clone(), coordinates });
-        }
-        if shape.replaced_normals > 0 {
-            self.warnings.push(ObjWarning::ReplacedNormals { model, normals: shape.replaced_normals });
+            self.warnings.push(ObjWarning::FannedPolygons { model, polygons: shape.fanned_polygons });
         }
     }
 }

@@ -16,10 +16,6 @@ pub(super) struct Shape {
     pub indices: Vec<u32>,
     pub degenerate_triangles: usize,
     pub fanned_polygons: usize,
-    pub replaced_normals: usize,
-    pub replaced_coordinates: usize,
-    /// Attributes that only some faces have.
-    pub partial_attributes: Vec<&'static str>,
 }
 
 /// A triangle thinner than this share of its longest edge has no area: 32-bit coordinates cannot place it so thin, so it
@@ -29,7 +25,7 @@ const THINNEST: f64 = 1e-10;
 impl Shape {
     pub(super) fn new(mesh: &tobj::Mesh) -> Self {
         let mut shape = Self::default();
-        let source = Source::new(mesh, &mut shape.partial_attributes);
+        let source = Source::new(mesh);
         let triangles = shape.triangles(mesh, &source.positions);
         let points = triangles.iter().flat_map(|triangle| triangle.corners.map(|corner| source.positions[corner]));
         let (low, high) =
@@ -41,9 +37,7 @@ impl Shape {
         let mut shared = HashMap::new();
         for Triangle { corners, normal } in triangles {
             for corner in corners {
-                let given = source.normals.get(corner).and_then(|normal| normal.try_normalize());
-                shape.replaced_normals += usize::from(given.is_none() && !source.normals.is_empty());
-                let index = match given {
+                let index = match source.normals[corner].try_normalize() {
                     Some(given) => *shared.entry(corner).or_insert_with(|| shape.add_vertex(&source, corner, given)),
                     None => shape.add_vertex(&source, corner, normal),
                 };
@@ -80,14 +74,12 @@ impl Shape {
     }
 
     fn add_vertex(&mut self, source: &Source, corner: usize, normal: DVec3) -> u32 {
-        let [u, v] = source.coordinates.get(corner).copied().unwrap_or_default();
-        let is_finite = u.is_finite() && v.is_finite();
-        self.replaced_coordinates += usize::from(!is_finite);
+        let [u, v] = source.coordinates[corner];
         self.vertices.push(Vertex {
             position: (source.positions[corner] - self.center).as_vec3().into(),
             normal: normal.as_vec3().into(),
             // An OBJ file's second axis points up.
-            uv: if is_finite { [u, 1.0 - v] } else { [0.0; 2] },
+            uv: [u, 1.0 - v],
         });
         (self.vertices.len() - 1) as u32
     }
@@ -98,7 +90,7 @@ struct Triangle {
     normal: DVec3,
 }
 
-/// A mesh as tobj gives it, one entry a vertex. Normals and coordinates are empty where there are none.
+/// A mesh as tobj gives it, one entry a vertex; the normal is zero where there is none.
 struct Source {
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
@@ -106,23 +98,15 @@ struct Source {
 }
 
 impl Source {
-    fn new(mesh: &tobj::Mesh, partial: &mut Vec<&'static str>) -> Self {
+    fn new(mesh: &tobj::Mesh) -> Self {
         // 64-bit here whichever tobj was built with, and so that products do not overflow.
         let triple = |values: &[_; 3]| DVec3::from(values.map(f64::from));
-        let positions: Vec<_> = mesh.positions.as_chunks().0.iter().map(triple).collect();
-        let mut normals: Vec<_> = mesh.normals.as_chunks().0.iter().map(triple).collect();
         let pair = |values: &[_; 2]| values.map(|value| f64::from(value) as f32);
-        let mut coordinates: Vec<_> = mesh.texcoords.as_chunks().0.iter().map(pair).collect();
-        // tobj leaves out what a corner lacks, so entries no longer belong to their vertices.
-        if !normals.is_empty() && normals.len() != positions.len() {
-            partial.push("normals");
-            normals.clear();
+        Self {
+            positions: mesh.positions.as_chunks().0.iter().map(triple).collect(),
+            normals: mesh.normals.as_chunks().0.iter().map(triple).collect(),
+            coordinates: mesh.texcoords.as_chunks().0.iter().map(pair).collect(),
         }
-        if !coordinates.is_empty() && coordinates.len() != positions.len() {
-            partial.push("texture coordinates");
-            coordinates.clear();
-        }
-        Self { positions, normals, coordinates }
     }
 }
 

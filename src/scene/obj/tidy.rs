@@ -1,8 +1,8 @@
 //! The text of an OBJ file, made ready for tobj.
 //!
 //! tobj 4.0.5 makes triangles of lines, tells neither which material is missing nor which line is wrong, reads neither
-//! continued lines nor comments behind a face, mixes up vertices of which only some have colours, and overflows on some
-//! indices. So every line it gets was checked here first.
+//! continued lines nor comments behind a face, mixes up vertices of which only some have a colour, a normal or a texture
+//! coordinate, and overflows on some indices. So every line it gets was checked here first.
 
 use std::fmt::Write;
 
@@ -11,7 +11,8 @@ use glam::DVec3;
 /// What tobj is given, and what it is not told.
 #[derive(Debug, Default)]
 pub(super) struct Tidy {
-    /// What tobj reads. Materials are called by their index in `materials`.
+    /// What tobj reads. Materials are called by their index in `materials`. Every corner of a face has all three indices,
+    /// and what it lacked refers to [`NOTHING`].
     pub text: String,
     /// What `mtllib` names, in order.
     pub libraries: Vec<String>,
@@ -25,6 +26,12 @@ pub(super) struct Tidy {
     pub lines: usize,
     /// Free-form curves and surfaces that were left out.
     pub surfaces: usize,
+    /// Normals that are zero or not finite; zero in `text`.
+    pub bad_normals: usize,
+    /// Texture coordinates that are not finite; those of [`NOTHING`] in `text`.
+    pub bad_texture_coordinates: usize,
+    /// Corners that refer to a normal or texture coordinate that is not there.
+    pub dangling_corners: usize,
     counts: Counts,
     origin_is_set: bool,
 }
@@ -37,12 +44,16 @@ pub(super) struct BadLine {
 }
 
 /// How many there are so far: what relative indices count back from.
-#[derive(Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     positions: usize,
     texture_coordinates: usize,
     normals: usize,
 }
+
+/// What a corner without normal or texture coordinate gets: a normal that is none, and, since the second axis points up,
+/// the upper left of the texture.
+const NOTHING: &str = "vt 0 1\nvn 0 0 0\n";
 
 /// Scenes nearer to the world's origin than this are read as they are; others relative to a multiple of it, since tobj
 /// reads `f32`, which is 0.5 m coarse in a survey's coordinates.
@@ -50,7 +61,7 @@ const ORIGIN_STEP: f64 = 4096.0;
 
 impl Tidy {
     pub(super) fn new(source: &str) -> Result<Self, BadLine> {
-        let mut tidy = Self::default();
+        let mut tidy = Self { text: String::from(NOTHING), ..Self::default() };
         for (line, statement) in statements(source) {
             tidy.statement(&statement).map_err(|reason| BadLine { line, reason })?;
         }
@@ -127,7 +138,10 @@ impl Tidy {
             return Err(String::from("texture coordinates without a number"));
         };
         let v = numbers.get(1).copied().unwrap_or(0.0);
+        let is_finite = u.is_finite() && v.is_finite();
+        self.bad_texture_coordinates += usize::from(!is_finite);
         self.counts.texture_coordinates += 1;
+        let [u, v] = if is_finite { [u, v] } else { [0.0, 1.0] };
         self.emit(format_args!("vt {u:e} {v:e}"));
         Ok(())
     }
@@ -137,45 +151,49 @@ impl Tidy {
         let [x, y, z, ..] = numbers[..] else {
             return Err(format!("a normal needs 3 numbers and has {}", numbers.len()));
         };
+        let normal = DVec3::new(x, y, z).try_normalize();
+        self.bad_normals += usize::from(normal.is_none());
         self.counts.normals += 1;
+        let DVec3 { x, y, z } = normal.unwrap_or_default();
         self.emit(format_args!("vn {x:e} {y:e} {z:e}"));
         Ok(())
     }
 
     fn face(&mut self, values: &str) -> Result<(), String> {
+        let mut face = String::from("f");
+        let mut corners = 0;
         for corner in values.split_whitespace() {
-            self.check_corner(corner)?;
+            face.push_str(&self.corner(corner)?);
+            corners += 1;
         }
-        match values.split_whitespace().count() {
+        match corners {
             0 => return Err(String::from("a face without a corner")),
             1 => self.points += 1,
             2 => self.lines += 1,
-            _ => self.emit(format_args!("f {values}")),
+            _ => self.emit(format_args!("{face}")),
         }
         Ok(())
     }
 
     /// A corner is `position`, `position/texture`, `position//normal` or `position/texture/normal`.
-    fn check_corner(&self, corner: &str) -> Result<(), String> {
-        let counts = [
-            ("vertex", self.counts.positions),
-            ("texture coordinate", self.counts.texture_coordinates),
-            ("normal", self.counts.normals),
-        ];
-        let indices: Vec<_> = corner.split('/').collect();
-        if indices.len() > counts.len() || indices[0].is_empty() {
-            return Err(format!("`{corner}` is no corner of a face"));
+    fn corner(&mut self, corner: &str) -> Result<String, String> {
+        let no_corner = || format!("`{corner}` is no corner of a face");
+        let mut indices = [None; 3];
+        for (place, index) in corner.split('/').enumerate().filter(|(_, index)| !index.is_empty()) {
+            *indices.get_mut(place).ok_or_else(no_corner)? = Some(index.parse::<i64>().map_err(|_| no_corner())?);
         }
-        for (index, (what, count)) in indices.into_iter().zip(counts) {
-            if index.is_empty() {
-                continue;
-            }
-            let number: i64 = index.parse().map_err(|_| format!("`{corner}` is no corner of a face"))?;
-            if number == 0 || number.unsigned_abs() > count as u64 {
-                return Err(format!("a face refers to {what} {number}, and there are {count} so far"));
-            }
-        }
-        Ok(())
+        let [Some(position), texture, normal] = indices else {
+            return Err(no_corner());
+        };
+        let Counts { positions, texture_coordinates, normals } = self.counts;
+        let position = absolute(position, positions)
+            .ok_or_else(|| format!("a face refers to vertex {position}, and there are {positions} so far"))?;
+        let found = [(texture, texture_coordinates), (normal, normals)]
+            .map(|(index, count)| index.map(|index| absolute(index, count)));
+        self.dangling_corners += usize::from(found.contains(&Some(None)));
+        // The first of either is that of `NOTHING`.
+        let [texture, normal] = found.map(|index| index.flatten().map_or(1, |index| index + 1));
+        Ok(format!(" {position}/{texture}/{normal}"))
     }
 
     fn emit(&mut self, line: std::fmt::Arguments<'_>) {
@@ -201,6 +219,13 @@ pub(super) fn statements(source: &str) -> impl Iterator<Item = (usize, String)> 
     })
 }
 
+/// An index counted from 1, if there is such an entry; a negative one counts back from the last.
+fn absolute(index: i64, count: usize) -> Option<u64> {
+    let count = count as u64;
+    let distance = index.unsigned_abs();
+    (1..=count).contains(&distance).then(|| if index > 0 { distance } else { count + 1 - distance })
+}
+
 fn numbers(values: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| word.parse().map_err(|_| format!("`{word}` is no number"));
     values.split_whitespace().map(number).collect()
@@ -215,7 +240,7 @@ mod tests {
         let tidy = Tidy::new("v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\n").unwrap();
         assert_eq!(tidy.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
         let second: Vec<f32> =
-            tidy.text.lines().nth(1).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
+            tidy.text.lines().last().unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
         assert!((f64::from(second[1]) + tidy.origin.y - 4_500_000.002).abs() < 5e-4);
     }
 

@@ -1,0 +1,147 @@
+//! Scenes, sizes and assets that change between frames.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Texture, Topology};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::judge::assert_different;
+use crate::scenes::{cube, field, square};
+use crate::studio::{Studio, draw};
+
+pub const CASES: &[Case] = &[
+    ("a_resized_view_draws_what_a_new_one_draws", resized),
+    ("objects_come_and_go", objects_come_and_go),
+    ("assets_are_added_changed_and_removed", assets_change),
+    ("a_frame_on_its_way_is_not_touched_by_the_next", frames_on_their_way),
+    ("a_frame_that_is_dropped_leaves_no_trace", dropped),
+    ("another_scene_takes_the_place_of_the_first", another_scene),
+    ("views_come_and_go", views_come_and_go),
+];
+
+fn resized() -> Result<(), Failed> {
+    let mut scene = field(200);
+    let mut studio = Studio::new()?;
+    let first = studio.draw(&scene)?;
+    for size in [[100, 300], [333, 77], [1, 1]] {
+        scene.cameras[0].size = size;
+        if studio.draw(&scene)? != draw(&scene)? {
+            return Err(format!("{size:?}").into());
+        }
+    }
+    scene.cameras[0].size = field(0).cameras[0].size;
+    if studio.draw(&scene)? == first { Ok(()) } else { Err("back at the first size it differs".into()) }
+}
+
+fn objects_come_and_go() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    for count in [10, 3000, 0, 257, 256] {
+        if studio.draw(&field(count))? != draw(&field(count))? {
+            return Err(format!("{count} objects").into());
+        }
+    }
+    Ok(())
+}
+
+fn assets_change() -> Result<(), Failed> {
+    let mut scene = field(100);
+    let mut studio = Studio::new()?;
+    let mut previous = studio.draw(&scene)?;
+    let (mesh, material) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
+
+    let checker = [[255, 0, 0, 255], [0, 0, 255, 255]].concat().repeat(8);
+    let texture = scene.add(Texture::new("stripes", 4, 4, checker)?)?;
+    type Change<'a> = &'a dyn Fn(&mut Scene) -> Result<(), Failed>;
+    let changes: [(&str, Change<'_>); 6] = [
+        ("material", &|scene| {
+            Ok(scene.replace(material, Material { diffuse: Vec3::new(1.0, 0.1, 0.1), ..Material::default() })?)
+        }),
+        ("texture", &|scene| Ok(scene.replace(material, Material { texture: Some(texture), ..Material::default() })?)),
+        ("pixels", &|scene| Ok(scene.replace(texture, Texture::new("green", 1, 1, vec![0, 255, 0, 255])?)?)),
+        ("mesh", &|scene| Ok(scene.replace(mesh, square(Topology::TriangleList))?)),
+        ("blending", &|scene| Ok(scene.replace(material, Material { blend: Blend::Alpha, ..Material::default() })?)),
+        ("removed mesh", &|scene| {
+            let other = scene.as_scene_ref().meshes[1];
+            scene.remove(other)?;
+            Ok(())
+        }),
+    ];
+    for (name, change) in changes {
+        change(&mut scene)?;
+        let picture = studio.draw(&scene)?;
+        assert_different(&picture, &previous).map_err(|_| format!("{name}: nothing changed"))?;
+        if picture != draw(&scene)? {
+            return Err(format!("{name}: a new renderer draws something else").into());
+        }
+        previous = picture;
+    }
+    // More meshes than the first arenas hold, so that everything moves.
+    for _ in 0..400 {
+        let new = scene.add(cube())?;
+        let material = scene.add(Material::default())?;
+        scene.add_object(RenderObject::new(new, material, DVec3::new(0.0, 0.0, -500.0)))?;
+    }
+    if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("after the move it differs".into()) }
+}
+
+fn frames_on_their_way() -> Result<(), Failed> {
+    let mut scene = field(300);
+    let before = draw(&scene)?;
+    let mut studio = Studio::new()?;
+    let first = studio.record(&scene)?;
+    let (mesh, material) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
+    scene.replace(mesh, square(Topology::TriangleList))?;
+    scene.replace(material, Material { diffuse: Vec3::X, ..Material::default() })?;
+    let removed: drawloom::handle::Handle<Mesh> = scene.as_scene_ref().meshes[2];
+    scene.remove(removed)?;
+    scene.lights.clear();
+    for handle in scene.objects().collect::<Vec<_>>() {
+        let object = scene.object(handle)?;
+        let moved = RenderObject { position: -object.position, ..object };
+        if moved.mesh != removed {
+            scene.replace_object(handle, moved)?;
+        }
+    }
+    scene.cameras[0].position.y += 3.0;
+    let second = studio.record(&scene)?;
+    let after = draw(&scene)?;
+    if studio.submit(first)?.read(0, "picture")? != before {
+        return Err("the first frame shows what came after it".into());
+    }
+    if studio.submit(second)?.read(0, "picture")? != after { Err("the second frame differs".into()) } else { Ok(()) }
+}
+
+fn dropped() -> Result<(), Failed> {
+    let (one, other) = (field(300), field(50));
+    let mut studio = Studio::new()?;
+    for _ in 0..3 {
+        drop(studio.record(&one)?);
+    }
+    let recorded = studio.record(&other)?;
+    drop(studio.record(&one)?);
+    let picture = studio.submit(recorded)?.read(0, "picture")?;
+    if picture == draw(&other)? { Ok(()) } else { Err("a dropped frame shows".into()) }
+}
+
+fn another_scene() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    studio.draw(&field(100))?;
+    // The same handles, with other things behind them.
+    let mut scene = field(100);
+    let mesh = scene.as_scene_ref().meshes[0];
+    scene.replace(mesh, square(Topology::TriangleList))?;
+    if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("it is mixed with the first".into()) }
+}
+
+fn views_come_and_go() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let scene = field(100);
+    for cameras in [&scene.cameras[..1], &scene.cameras[..], &scene.cameras[1..], &scene.cameras[..]] {
+        let mut part = field(100);
+        part.cameras = cameras.to_vec();
+        if studio.draw(&part)? != draw(&part)? {
+            return Err(format!("{} views", cameras.len()).into());
+        }
+    }
+    Ok(())
+}

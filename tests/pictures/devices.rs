@@ -1,0 +1,67 @@
+//! Devices that draw nothing, or too little.
+
+use std::sync::Arc;
+
+use drawloom::backend::{BackendError, WgpuBackend};
+use drawloom::task::Scheduler;
+use drawloom::{Granularity, Renderer, wgpu};
+use libtest_mimic::Failed;
+
+use crate::scenes::field;
+use crate::{Case, adapter};
+
+pub const CASES: &[Case] = &[
+    ("noop_takes_every_frame", noop),
+    ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
+    ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
+];
+
+fn noop() -> Result<(), Failed> {
+    let (device, queue) = adapter::noop_device().map_err(|error| error.to_string())?;
+    for granularity in [Granularity::PerCamera, Granularity::Chunk(100)] {
+        let backend = WgpuBackend::new(device.clone(), queue.clone())?;
+        let scheduler = Arc::new(Scheduler::new(2)?);
+        let (mut renderer, submitter) =
+            Renderer::builder(backend).deferred().granularity(granularity).build(scheduler)?;
+        for count in [0, 10, 2000, 500] {
+            let recorded = renderer.record(field(count).as_scene_ref())?;
+            let submitted = submitter.submit(recorded)?;
+            submitted.submission.wait()?;
+            if submitted.statistics.objects != count {
+                return Err(format!("{} objects of {count}", submitted.statistics.objects).into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn low_limits() -> Result<(), Failed> {
+    let (device, queue) =
+        noop_with(wgpu::Limits { max_storage_buffers_per_shader_stage: 3, ..WgpuBackend::REQUIRED_LIMITS })?;
+    match WgpuBackend::new(device, queue).err() {
+        Some(BackendError::Limit { limit, allowed: 3, needed: 4 }) if limit.contains("storage_buffers") => Ok(()),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn large_picture() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let (mut renderer, _) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let mut scene = field(10);
+    scene.cameras[0].size = [5000, 10];
+    match renderer.record(scene.as_scene_ref()).err() {
+        Some(drawloom::FrameError::Backend(BackendError::Limit { needed: 5000, .. })) => Ok(()),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn noop_with(required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Failed> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::NOOP;
+    descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
+    let descriptor = wgpu::DeviceDescriptor { required_limits, ..wgpu::DeviceDescriptor::default() };
+    Ok(pollster::block_on(adapter.request_device(&descriptor))?)
+}

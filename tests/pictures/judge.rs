@@ -1,0 +1,70 @@
+//! When two pictures are the same.
+
+use drawloom::backend::Picture;
+use image::{RgbImage, RgbaImage};
+use image_compare::Algorithm;
+use libtest_mimic::Failed;
+
+/// How far two pictures are apart.
+#[derive(Clone, Copy, Debug)]
+pub struct Distance {
+    /// Root of the mean square over all pixels and channels, 0 to 1.
+    pub root_mean_square: f64,
+    /// The share of pixels of which a channel is off by more than 10 of 255.
+    pub wrong: f64,
+}
+
+impl Distance {
+    /// The bound for one scene drawn by two adapters. Rounding differs between them, and where it decides which of two
+    /// surfaces a pixel on an edge shows, that pixel is off as a whole: so a few pixels may be wrong, and all of
+    /// them together not by much.
+    pub fn is_within_bound(self) -> bool {
+        self.root_mean_square <= 0.01 && self.wrong <= 0.003
+    }
+
+    pub fn between(one: &RgbImage, other: &RgbImage) -> Result<Self, Failed> {
+        let similarity = image_compare::rgb_similarity_structure(&Algorithm::RootMeanSquared, one, other)?;
+        let is_wrong = |(one, other): (&image::Rgb<u8>, &image::Rgb<u8>)| {
+            one.0.iter().zip(other.0).any(|(one, other)| one.abs_diff(other) > 10)
+        };
+        let wrong = one.pixels().zip(other.pixels()).filter(|&pair| is_wrong(pair)).count();
+        let wrong = wrong as f64 / f64::from(one.width() * one.height());
+        Ok(Self { root_mean_square: 1.0 - similarity.score, wrong })
+    }
+}
+
+/// A picture as `image` has it, without its alpha.
+pub fn as_image(picture: &Picture) -> Result<RgbImage, Failed> {
+    let image = RgbaImage::from_raw(picture.width, picture.height, picture.bytes.clone());
+    Ok(image::DynamicImage::ImageRgba8(image.ok_or("the bytes do not fit the size")?).to_rgb8())
+}
+
+/// Fails where two pictures are further apart than two adapters may be.
+pub fn assert_alike(one: &Picture, other: &Picture) -> Result<(), Failed> {
+    let distance = Distance::between(&as_image(one)?, &as_image(other)?)?;
+    if distance.is_within_bound() { Ok(()) } else { Err(format!("the pictures differ: {distance:?}").into()) }
+}
+
+/// Fails where two pictures are not further apart than two adapters may be.
+pub fn assert_different(one: &Picture, other: &Picture) -> Result<(), Failed> {
+    match assert_alike(one, other) {
+        Ok(()) => Err("the pictures should differ".into()),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Fails where a colour is off by more than 2 of 255 in a channel.
+pub fn assert_color(found: [u8; 3], expected: [u8; 3]) -> Result<(), Failed> {
+    let close = found.iter().zip(expected).all(|(found, expected)| found.abs_diff(expected) <= 2);
+    if close { Ok(()) } else { Err(format!("{found:?} should be {expected:?}").into()) }
+}
+
+/// What the shipped tone mapping makes of a radiance, worked out in f64.
+pub fn tone_mapped(radiance: [f64; 3]) -> [u8; 3] {
+    radiance.map(|radiance| {
+        let mapped = (radiance * (2.51 * radiance + 0.03)) / (radiance * (2.43 * radiance + 0.59) + 0.14);
+        let linear = mapped.clamp(0.0, 1.0);
+        let encoded = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+        (encoded * 255.0).round() as u8
+    })
+}

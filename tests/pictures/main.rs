@@ -1,0 +1,64 @@
+//! Real pictures, drawn by wgpu on the machine's adapter.
+//!
+//! Without an adapter, and without the scenes beside the repository, the cases that need them show as ignored; with
+//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` writes the references anew: look
+//! at each before it is kept.
+
+#[path = "../../examples/frame/adapter.rs"]
+mod adapter;
+mod changes;
+mod devices;
+mod judge;
+mod lighting;
+mod placement;
+mod processes;
+mod references;
+mod same_bytes;
+#[path = "../scenes/mod.rs"]
+mod scenes;
+mod studio;
+
+use std::path::PathBuf;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+type Case = (&'static str, fn() -> Result<(), Failed>);
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let no_adapter = studio::device().is_none();
+    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let mut trials = Vec::new();
+    let cases = [
+        (changes::CASES, Needs::Adapter),
+        (lighting::CASES, Needs::Adapter),
+        (placement::CASES, Needs::Adapter),
+        (processes::CASES, Needs::Adapter),
+        (references::CASES, Needs::Adapter),
+        (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (same_bytes::CASES, Needs::Adapter),
+        (same_bytes::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (devices::CASES, Needs::Nothing),
+    ];
+    for (cases, needs) in cases {
+        let no_scenes = needs == Needs::AdapterAndSharedScenes && !shared_scenes().is_dir();
+        let lacks_adapter = needs != Needs::Nothing && no_adapter;
+        for &(name, case) in cases {
+            let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
+            trials.push(Trial::test(name, case).with_ignored_flag(no_scenes || (lacks_adapter && !required)));
+        }
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Needs {
+    Nothing,
+    Adapter,
+    AdapterAndSharedScenes,
+}
+
+/// Scenes that lie beside the repository, where they are there at all.
+fn shared_scenes() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
+}

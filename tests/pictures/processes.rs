@@ -1,0 +1,311 @@
+//! An engine's own processes: its shaders, its passes, and its mistakes.
+
+use std::error::Error;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use drawloom::backend::BackendError;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, RawPass, RenderProcess, Resolved,
+};
+use drawloom::queue::Selection;
+use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
+use drawloom::{FrameError, wgpu};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::judge::assert_color;
+use crate::scenes::{field, sized, square};
+use crate::studio::{Studio, pixel};
+
+pub const CASES: &[Case] = &[
+    ("a_pipeline_of_the_engines_own", own_pipeline),
+    ("blended_objects_go_back_to_front", back_to_front),
+    ("parameters_change_from_frame_to_frame", parameters),
+    ("a_raw_pass_writes_a_target", raw_pass),
+    ("a_shader_that_does_not_compile_is_named", broken_shader),
+    ("a_pass_that_the_device_refuses_is_named", refused_pass),
+    ("a_raw_pass_that_fails_or_panics_is_named", failing_raw_pass),
+];
+
+/// A process made of closures' worth of data.
+struct Made {
+    name: &'static str,
+    declare: fn(&mut Declare),
+    draws: fn() -> Draws<'static>,
+}
+
+impl RenderProcess for Made {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (self.declare)(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        (self.draws)()
+    }
+}
+
+const PLAIN_COLOR: &str = "
+    struct Plain {
+        @builtin(position) clip: vec4<f32>,
+        @location(0) @interpolate(flat) material: u32,
+    }
+
+    @vertex
+    fn vertex(in: VertexInput) -> Plain {
+        let object = drawn_object(in.instance);
+        return Plain(clip_position(relative_position(object, in.position)), object.material);
+    }
+
+    @fragment
+    fn fragment(in: Plain) -> @location(0) vec4<f32> {
+        let material = materials[in.material];
+        return vec4<f32>(material.diffuse, material.opacity);
+    }
+";
+
+fn plain_color(selection: Selection) -> Draws<'static> {
+    Draws::Commands(CommandDraws { shader: PLAIN_COLOR, selection, ..CommandDraws::default() })
+}
+
+const PLAIN: Made = Made {
+    name: "plain colour",
+    declare: |declare| {
+        declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 1.0, 1.0]));
+        declare.clears_depth("plain depth", Format::Depth32Float);
+    },
+    draws: || plain_color(Selection::All),
+};
+
+fn panes(depths_and_blends: &[(f64, Vec3, Blend)]) -> Result<Scene, Failed> {
+    let mut scene = Scene::new();
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [32, 32])];
+    let mesh = scene.add(square(Topology::TriangleList))?;
+    for &(z, diffuse, blend) in depths_and_blends {
+        let material = scene.add(Material { diffuse, blend, opacity: 0.5, ..Material::default() })?;
+        scene.add_object(RenderObject::new(mesh, material, DVec3::Z * z))?;
+    }
+    Ok(scene)
+}
+
+fn own_pipeline() -> Result<(), Failed> {
+    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain"))?;
+    let scene = panes(&[(0.0, Vec3::new(1.0, 0.5, 0.25), Blend::None)])?;
+    let recorded = studio.record(&scene)?;
+    let picture = studio.submit(recorded)?.read(0, "plain")?;
+    assert_color(pixel(&picture, 16, 16), [255, 128, 64])?;
+    assert_color(pixel(&picture, 0, 0), [0, 0, 255])
+}
+
+fn back_to_front() -> Result<(), Failed> {
+    let glass = [
+        (-1.0, Vec3::X, Blend::Alpha),
+        (0.0, Vec3::Y, Blend::Alpha),
+        (1.0, Vec3::new(0.0, 0.0, 0.5), Blend::Additive),
+        (2.0, Vec3::new(0.0, 0.25, 0.0), Blend::Subtractive),
+    ];
+    // Over blue: red half over it, green half over that, then half a blue added, then a quarter of green taken.
+    let expected = [64, 128 - 64, 64 + 128];
+    for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
+        let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain"))?;
+        let scene = panes(&order.map(|index: usize| glass[index]))?;
+        let recorded = studio.record(&scene)?;
+        let picture = studio.submit(recorded)?.read(0, "plain")?;
+        assert_color(pixel(&picture, 16, 16), expected)
+            .map_err(|failed| format!("{order:?}: {}", failed.message().unwrap_or("")))?;
+    }
+    Ok(())
+}
+
+/// Fills a target with a grey that changes.
+struct Grey {
+    percent: Arc<AtomicU32>,
+}
+
+impl RenderProcess for Grey {
+    fn name(&self) -> &str {
+        "grey"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("grey", Format::Rgba8Unorm, ClearColor::Background);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let value = self.percent.load(Ordering::Relaxed) as f32 / 100.0;
+        Draws::FullScreen(FullScreen {
+            shader: "
+                @group(2) @binding(0) var<uniform> grey: vec4<f32>;
+
+                @fragment
+                fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                    return grey;
+                }
+            ",
+            parameters: [value; 4].map(f32::to_le_bytes).concat().into(),
+            ..FullScreen::default()
+        })
+    }
+}
+
+fn parameters() -> Result<(), Failed> {
+    let percent = Arc::new(AtomicU32::new(0));
+    let grey = Grey { percent: Arc::clone(&percent) };
+    let mut studio = Studio::with(2, |builder| builder.process(grey).output("grey"))?;
+    let scene = panes(&[])?;
+    for value in [0, 20, 100] {
+        percent.store(value, Ordering::Relaxed);
+        let recorded = studio.record(&scene)?;
+        let picture = studio.submit(recorded)?.read(0, "grey")?;
+        assert_color(pixel(&picture, 3, 3), [(value * 255 / 100) as u8; 3])?;
+    }
+    Ok(())
+}
+
+/// What a raw pass does when it is asked to encode.
+#[derive(Clone, Copy)]
+enum Deed {
+    ClearYellow,
+    Fail,
+    Panic,
+    CopyNonsense,
+}
+
+struct RawProcess {
+    deed: Deed,
+}
+
+impl RenderProcess for RawProcess {
+    fn name(&self) -> &str {
+        "raw process"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.writes("raw", Format::Rgba8Unorm);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Raw(self)
+    }
+}
+
+impl RawPass for RawProcess {
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &Resolved<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        let target = resources.target("raw").ok_or("the target is missing")?;
+        match self.deed {
+            Deed::ClearYellow => {
+                let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+                let load = wgpu::LoadOp::Clear(wgpu::Color { r: 1.0, g: 1.0, b: 0.0, a: 1.0 });
+                encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+                    })],
+                    ..wgpu::RenderPassDescriptor::default()
+                });
+            }
+            Deed::Fail => return Err("the well is dry".into()),
+            Deed::Panic => panic!("the well is poisoned"),
+            // From itself into itself.
+            Deed::CopyNonsense => {
+                encoder.copy_texture_to_texture(target.as_image_copy(), target.as_image_copy(), target.size());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn raw_pass() -> Result<(), Failed> {
+    let mut studio = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::ClearYellow }).output("raw"))?;
+    let recorded = studio.record(&panes(&[])?)?;
+    let picture = studio.submit(recorded)?.read(0, "raw")?;
+    assert_color(pixel(&picture, 5, 5), [255, 255, 0])
+}
+
+fn error_of(mut studio: Studio) -> Result<FrameError, Failed> {
+    let mut scene = field(600);
+    scene.cameras.truncate(1);
+    let first = studio.renderer.record(scene.as_scene_ref()).err().ok_or("the first frame should fail")?;
+    // A second attempt fails the same way, rather than hanging or passing.
+    let second = studio.renderer.record(scene.as_scene_ref()).err().ok_or("the second frame should fail")?;
+    if first.to_string() == second.to_string() { Ok(first) } else { Err(format!("{first} / {second}").into()) }
+}
+
+fn expect_named(error: &FrameError, process: &str, detail: &str) -> Result<(), Failed> {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = format!("{text}: {cause}");
+        source = cause.source();
+    }
+    let named = text.contains(process) && text.contains(detail);
+    if named { Ok(()) } else { Err(format!("{text:?} should name {process:?} and {detail:?}").into()) }
+}
+
+fn broken_shader() -> Result<(), Failed> {
+    let broken = Made {
+        name: "broken shader",
+        declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
+        draws: || Draws::FullScreen(FullScreen { shader: "fn fragment( {", ..FullScreen::default() }),
+    };
+    let error = error_of(Studio::with(2, |builder| builder.process(broken).output("picture"))?)?;
+    expect_named(&error, "broken shader", "fragment")
+}
+
+fn refused_pass() -> Result<(), Failed> {
+    // It reads the target that it draws into.
+    let refused = Made {
+        name: "ouroboros",
+        declare: |declare| {
+            declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background);
+            declare.samples("tail");
+        },
+        draws: || {
+            Draws::FullScreen(FullScreen {
+                shader: "
+                    @group(2) @binding(1) var tail: texture_2d<f32>;
+
+                    @fragment
+                    fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                        return textureLoad(tail, vec2<i32>(0, 0), 0);
+                    }
+                ",
+                ..FullScreen::default()
+            })
+        },
+    };
+    let first_writer = Made {
+        name: "head",
+        declare: |declare| declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background),
+        draws: || plain_color(Selection::Opaque),
+    };
+    let studio = Studio::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
+    expect_named(&error_of(studio)?, "ouroboros", "finish")?;
+
+    let nonsense = RawProcess { deed: Deed::CopyNonsense };
+    let studio = Studio::with(2, |builder| builder.process(nonsense).output("raw"))?;
+    expect_named(&error_of(studio)?, "raw process", "refused")
+}
+
+fn failing_raw_pass() -> Result<(), Failed> {
+    let fail = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::Fail }).output("raw"))?;
+    let error = error_of(fail)?;
+    expect_named(&error, "raw process", "the well is dry")?;
+    let FrameError::Failed { source, .. } = &error else { return Err(format!("{error:?}").into()) };
+    if source.downcast_ref::<BackendError>().is_none() {
+        return Err("the backend's error is lost".into());
+    }
+    let panics = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::Panic }).output("raw"))?;
+    expect_named(&error_of(panics)?, "raw process", "the well is poisoned")
+}

@@ -1,0 +1,136 @@
+//! Pictures against stored references; and what would be a mistake is seen to be one.
+
+use std::path::PathBuf;
+
+use drawloom::glam::Vec3;
+use drawloom::scene::{Light, Mesh, Scene, Vertex, obj, sample};
+use libtest_mimic::Failed;
+
+use crate::judge::{Distance, as_image, assert_different};
+use crate::scenes::field;
+use crate::studio::draw;
+use crate::{Case, shared_scenes};
+
+pub const CASES: &[Case] = &[
+    ("reference_of_the_projects_own_scene", || compare("colonnade", &colonnade()?)),
+    ("reference_of_a_field_of_boxes", || compare("field", &field(400))),
+    ("a_wrong_light_is_seen", a_wrong_light_is_seen),
+    ("a_missing_object_is_seen", a_missing_object_is_seen),
+    ("flipped_normals_are_seen", flipped_normals_are_seen),
+];
+
+pub const CASES_OF_SHARED_SCENES: &[Case] = &[
+    ("reference_of_cornell", || compare("cornell", &cornell()?)),
+    ("reference_of_sponza", || compare("sponza", &sponza()?)),
+    ("every_malformed_file_that_loads_gives_a_picture", malformed_files),
+];
+
+pub fn colonnade() -> Result<Scene, Failed> {
+    Ok(small(sample::colonnade()?))
+}
+
+pub fn cornell() -> Result<Scene, Failed> {
+    Ok(small(obj::load(shared_scenes().join("cornell/CornellBox-Original.obj"))?.scene))
+}
+
+pub fn sponza() -> Result<Scene, Failed> {
+    Ok(small(obj::load(shared_scenes().join("sponza/sponza_part.obj"))?.scene))
+}
+
+fn small(mut scene: Scene) -> Scene {
+    for camera in &mut scene.cameras {
+        camera.size = [320, 180];
+    }
+    scene
+}
+
+fn compare(name: &str, scene: &Scene) -> Result<(), Failed> {
+    let drawn = as_image(&draw(scene)?)?;
+    let path = reference_path(name);
+    if std::env::var_os("DRAWLOOM_RENEW_REFERENCES").is_some() {
+        drawn.save(&path)?;
+    }
+    let reference = image::open(&path)?.to_rgb8();
+    let distance = Distance::between(&drawn, &reference)?;
+    if distance.is_within_bound() {
+        return Ok(());
+    }
+    let found = std::env::temp_dir().join(format!("drawloom-{name}.png"));
+    drawn.save(&found)?;
+    Err(format!("{distance:?} between {} and {}", path.display(), found.display()).into())
+}
+
+fn reference_path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/pictures/references").join(format!("{name}.png"))
+}
+
+fn a_wrong_light_is_seen() -> Result<(), Failed> {
+    let wrong = |color: &mut Vec3| *color = Vec3::new(color.z, color.x, color.y);
+    let right = draw(&field(400))?;
+    for index in 0..field(0).lights.len() {
+        let mut scene = field(400);
+        match &mut scene.lights[index] {
+            Light::Directional { illuminance, .. } => *illuminance *= 1.2,
+            Light::Point { intensity, .. } => wrong(intensity),
+            other => return Err(format!("no case for {other:?}").into()),
+        }
+        assert_different(&draw(&scene)?, &right).map_err(|_| format!("light {index} could be wrong"))?;
+    }
+    let right = draw(&colonnade()?)?;
+    let mut scene = colonnade()?;
+    for light in &mut scene.lights {
+        if let Light::Directional { illuminance, .. } = light {
+            wrong(illuminance);
+        }
+    }
+    assert_different(&draw(&scene)?, &right)
+}
+
+fn a_missing_object_is_seen() -> Result<(), Failed> {
+    let right = draw(&field(60))?;
+    let mut seen = 0;
+    for index in 0..20 {
+        let mut scene = field(60);
+        let handle = scene.objects().nth(index).ok_or("the field has 60 objects")?;
+        let object = scene.remove_object(handle)?;
+        let large = object.scale.x.abs() > 0.6 && object.position.z > 0.0 && object.position.x.abs() < 12.0;
+        let opaque = scene.assets().get(object.material)?.blend == drawloom::scene::Blend::None;
+        if large && opaque {
+            assert_different(&draw(&scene)?, &right).map_err(|_| format!("object {index} could be missing"))?;
+            seen += 1;
+        }
+    }
+    if seen == 0 { Err("no object was large enough".into()) } else { Ok(()) }
+}
+
+fn flipped_normals_are_seen() -> Result<(), Failed> {
+    let right = draw(&colonnade()?)?;
+    // What is single-sided has the normals of its mesh; the rest turns them to the camera.
+    let mut scene = colonnade()?;
+    let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
+    for (handle, mesh) in meshes {
+        let flip = |vertex: &Vertex| Vertex { normal: vertex.normal.map(|component| -component), ..*vertex };
+        let vertices = mesh.vertices().iter().map(flip).collect();
+        scene.replace(handle, Mesh::new(mesh.name(), mesh.topology(), vertices, mesh.indices().to_vec())?)?;
+    }
+    assert_different(&draw(&scene)?, &right)
+}
+
+fn malformed_files() -> Result<(), Failed> {
+    let mut drawn = 0;
+    for folder in ["tobj", "trimesh"] {
+        for entry in std::fs::read_dir(shared_scenes().join("malformed").join(folder))? {
+            let path = entry?.path();
+            let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+            let Some(imported) = is_obj.then(|| obj::load(&path).ok()).flatten() else { continue };
+            let picture = draw(&small(imported.scene))?;
+            let first = &picture.bytes[..4];
+            let plain = picture.bytes.chunks_exact(4).all(|pixel| pixel == first);
+            if plain {
+                return Err(format!("{} gives an empty picture", path.display()).into());
+            }
+            drawn += 1;
+        }
+    }
+    if drawn < 10 { Err(format!("only {drawn} files loaded").into()) } else { Ok(()) }
+}

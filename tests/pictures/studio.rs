@@ -1,0 +1,71 @@
+//! Draws scenes.
+
+use std::sync::{Arc, OnceLock};
+
+use drawloom::backend::{Picture, WgpuBackend, WgpuSubmission};
+use drawloom::scene::Scene;
+use drawloom::task::Scheduler;
+use drawloom::{Granularity, Recorded, Renderer, RendererBuilder, Submitter, wgpu};
+use libtest_mimic::Failed;
+
+use crate::adapter;
+
+/// The machine's adapter as a device that all cases share; `None` where there is none.
+pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
+    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+    DEVICE.get_or_init(|| adapter::device().ok()).clone()
+}
+
+/// A renderer and its submitter.
+pub struct Studio {
+    pub renderer: Renderer<WgpuBackend>,
+    pub submitter: Submitter<WgpuBackend>,
+}
+
+impl Studio {
+    /// The shipped processes on two workers.
+    pub fn new() -> Result<Self, Failed> {
+        Self::with(2, RendererBuilder::deferred)
+    }
+
+    /// Other processes, or other settings.
+    pub fn with(
+        workers: usize,
+        build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+    ) -> Result<Self, Failed> {
+        let (device, queue) = device().ok_or("there is no graphics adapter")?;
+        let scheduler = Arc::new(Scheduler::new(workers)?);
+        let (renderer, submitter) = build(Renderer::builder(WgpuBackend::new(device, queue)?)).build(scheduler)?;
+        Ok(Self { renderer, submitter })
+    }
+
+    /// The shipped processes with this many workers and this granularity.
+    pub fn cut(workers: usize, granularity: Granularity) -> Result<Self, Failed> {
+        Self::with(workers, |builder| builder.deferred().granularity(granularity))
+    }
+
+    pub fn record(&mut self, scene: &Scene) -> Result<Recorded<WgpuBackend>, Failed> {
+        Ok(self.renderer.record(scene.as_scene_ref())?)
+    }
+
+    pub fn submit(&self, recorded: Recorded<WgpuBackend>) -> Result<WgpuSubmission, Failed> {
+        Ok(self.submitter.submit(recorded)?.submission)
+    }
+
+    /// The first view's picture.
+    pub fn draw(&mut self, scene: &Scene) -> Result<Picture, Failed> {
+        let recorded = self.record(scene)?;
+        Ok(self.submit(recorded)?.read(0, "picture")?)
+    }
+}
+
+/// The picture that the shipped processes draw of a scene.
+pub fn draw(scene: &Scene) -> Result<Picture, Failed> {
+    Studio::new()?.draw(scene)
+}
+
+/// Red, green and blue of a pixel.
+pub fn pixel(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
+    let start = (y as usize * picture.width as usize + x as usize) * 4;
+    [picture.bytes[start], picture.bytes[start + 1], picture.bytes[start + 2]]
+}
