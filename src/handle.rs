@@ -47,6 +47,7 @@ pub struct Slots<T> {
     revision: u64,
     entries: Vec<Entry<T>>,
     free: Vec<u32>,
+    length: usize,
 }
 
 impl<T> Slots<T> {
@@ -59,6 +60,7 @@ impl<T> Slots<T> {
             revision: 0,
             entries: Vec::new(),
             free: Vec::new(),
+            length: 0,
         }
     }
 
@@ -68,6 +70,7 @@ impl<T> Slots<T> {
     /// Beyond `u32::MAX` entries.
     pub fn insert(&mut self, value: T) -> Handle<T> {
         self.revision += 1;
+        self.length += 1;
         let revision = self.revision;
         let index = self.free.pop().unwrap_or_else(|| {
             let index = u32::try_from(self.entries.len()).expect("more than u32::MAX entries");
@@ -90,6 +93,7 @@ impl<T> Slots<T> {
             return Err(handle.stale());
         };
         self.revision += 1;
+        self.length -= 1;
         entry.revision = self.revision;
         // A slot that ran out of generations is retired, so that no stale handle ever becomes valid again.
         if let Some(next) = entry.generation.checked_add(1) {
@@ -130,7 +134,7 @@ impl<T> Slots<T> {
 
     /// The number of entries.
     pub fn len(&self) -> usize {
-        self.iter().count()
+        self.length
     }
 
     /// Whether there is no entry.

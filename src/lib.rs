@@ -34,7 +34,7 @@
 //!
 //! # Features
 //!
-//! - `wgpu` (default): the wgpu backend, and [`wgpu`] itself. Without it everything down to the queue is there, with a
+//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the queue is there, with a
 //!   backend that counts and checks.
 //! - `obj` (default): OBJ files and their textures.
 //!

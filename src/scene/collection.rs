@@ -14,7 +14,7 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// The lights.
     pub lights: Vec<Light>,
-    /// Light that reaches every surface from everywhere, linear.
+    /// Radiance that reaches every surface from everywhere, linear: a surface of diffuse 1 then looks just as bright.
     pub ambient: Vec3,
     /// Radiance where nothing is, linear.
     pub background: Vec3,

@@ -38,6 +38,12 @@ pub enum SceneError {
         /// Which vertex.
         vertex: usize,
     },
+    /// A mesh that no sphere of a finite radius holds.
+    #[error("mesh `{mesh}` is too large for a bounding sphere")]
+    MeshTooLarge {
+        /// Its name.
+        mesh: String,
+    },
     /// Colours that are negative or not finite, or an opacity outside 0 to 1.
     #[error("material `{material}` has a colour that is negative or not finite, or an opacity outside 0 to 1")]
     InvalidMaterial {

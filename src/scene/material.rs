@@ -10,7 +10,7 @@ use crate::handle::{Handle, Slots};
 pub struct Material {
     /// What it is called in reports.
     pub name: String,
-    /// The share of light reflected diffusely, linear, 0 to 1 each.
+    /// The share of light reflected diffusely, linear; above 1 a surface reflects more light than it gets.
     pub diffuse: Vec3,
     /// Multiplies `diffuse` where there is one.
     pub texture: Option<Handle<Texture>>,
@@ -96,8 +96,8 @@ impl Texture {
     pub fn new(name: impl Into<String>, width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, SceneError> {
         let name = name.into();
         let sides = 1..=Self::LARGEST;
-        let expected = width as usize * height as usize * 4;
-        if !sides.contains(&width) || !sides.contains(&height) || pixels.len() != expected {
+        let fits = |bytes: usize| bytes == width as usize * height as usize * 4;
+        if !sides.contains(&width) || !sides.contains(&height) || !fits(pixels.len()) {
             return Err(SceneError::InvalidTexture { texture: name, width, height, bytes: pixels.len() });
         }
         Ok(Self { name, width, height, pixels })

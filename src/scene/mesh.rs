@@ -21,7 +21,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If it has no triangle, if an index points past the vertices, if a triangle list is not made of whole triangles,
-    /// or if a vertex is not finite.
+    /// if a vertex is not finite, or if no sphere of a finite radius holds them all.
     pub fn new(
         name: impl Into<String>,
         topology: Topology,
@@ -42,6 +42,9 @@ impl Mesh {
             return Err(SceneError::NonFiniteVertex { mesh: name, vertex });
         }
         let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
+        if !bounds.is_valid() {
+            return Err(SceneError::MeshTooLarge { mesh: name });
+        }
         Ok(Self { name, topology, vertices, indices, bounds })
     }
 
@@ -95,7 +98,7 @@ impl Asset for Mesh {
 pub struct Vertex {
     /// In object space, in metres.
     pub position: [f32; 3],
-    /// In object space, of unit length.
+    /// In object space; only its direction counts.
     pub normal: [f32; 3],
     /// Texture coordinates: (0, 0) is the picture's top left, (1, 1) its bottom right, and they repeat.
     pub uv: [f32; 2],
@@ -165,6 +168,8 @@ mod tests {
         assert!(matches!(outside, Err(SceneError::IndexOutOfRange { index: 3, vertices: 3, .. })));
         let broken = vec![corners[0], corners[1], corner(f32::NAN, 0.0, 0.0)];
         assert!(matches!(make(broken, vec![0, 1, 2]), Err(SceneError::NonFiniteVertex { vertex: 2, .. })));
+        let huge = vec![corner(f32::MAX, f32::MAX, 0.0), corner(f32::MIN, f32::MIN, 0.0), corners[2]];
+        assert!(matches!(make(huge, vec![0, 1, 2]), Err(SceneError::MeshTooLarge { .. })));
         assert!(make(corners, vec![0, 1, 2]).is_ok());
     }
 

@@ -30,7 +30,7 @@ pub struct SceneRef<'a> {
     pub lights: &'a [Light],
     /// A main view for each (M 10.4).
     pub cameras: &'a [Camera],
-    /// Light that reaches every surface from everywhere, linear.
+    /// Radiance that reaches every surface from everywhere, linear: a surface of diffuse 1 then looks just as bright.
     pub ambient: Vec3,
     /// Radiance where nothing is, linear.
     pub background: Vec3,

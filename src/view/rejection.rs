@@ -44,7 +44,7 @@ pub enum RejectionReason {
     InvalidTransform,
     /// An object's bounds are not finite or negative, or too large once scaled.
     InvalidBounds,
-    /// An object is farther from the world's origin than [`FixedPosition::REACH`].
+    /// An object is farther from the world's origin than [`FixedPosition::REACH`](super::FixedPosition::REACH).
     OutOfReach,
     /// An object's mesh was removed.
     StaleMesh,

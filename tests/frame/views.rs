@@ -75,7 +75,7 @@ fn graphs_can_be_looked_at() {
 #[test]
 fn bundles_hold_256_batches_whatever_the_granularity() {
     let mut scene = field(3000);
-    // Depth alternates between meshes only where materials do; blended objects are left out. So make every object a batch.
+    // Every object gets a mesh of its own, so that nothing merges.
     let (cube, stone) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
     let cube = scene.assets().get(cube).unwrap().clone();
     for handle in scene.objects().collect::<Vec<_>>() {

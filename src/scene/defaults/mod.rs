@@ -90,3 +90,6 @@ fn drawable_objects(scene: SceneRef<'_>) -> impl Iterator<Item = usize> {
     let count = if scene.check_lengths().is_ok() { scene.object_count() } else { 0 };
     (0..count).filter(move |&object| scene.transform_is_valid(object))
 }
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests;

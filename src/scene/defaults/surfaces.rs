@@ -153,7 +153,7 @@ impl Triangle {
     }
 }
 
-/// The triangles of an object that have an area, with the way their vertices' normals point.
+/// The finite triangles of an object, with the way their vertices' normals point.
 fn in_world<'a>(
     scene: SceneRef<'a>,
     object: usize,
@@ -171,9 +171,8 @@ fn in_world<'a>(
             position + orientation.as_dquat() * local
         });
         let normal = orientation * (vertices.map(|vertex| Vec3::from(vertex.normal)).iter().sum::<Vec3>() / scale);
-        let area = (points[1] - points[0]).cross(points[2] - points[0]);
         let is_finite = points.iter().all(|point| point.is_finite()) && normal.is_finite();
-        (is_finite && area.length_squared() > 0.0).then_some((points, normal))
+        is_finite.then_some((points, normal))
     })
 }
 

@@ -8,33 +8,49 @@ const MOST_CORNERS: usize = 256;
 /// Cuts a polygon into `corners.len() - 2` triangles, given as indices of corners, wound as it is. False if the triangles
 /// may cover more or less than the polygon: it crosses itself, or is not convex and too large.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) -> bool {
+    if corners.len() == 3 {
+        triangles.push([0, 1, 2]);
+        return true;
+    }
     let flat = flatten(corners);
     let mut ring: Vec<usize> = (0..corners.len()).collect();
-    let fits_fan = (1..flat.len() - 1).all(|corner| turn(flat[0], flat[corner], flat[corner + 1]) >= 0.0);
-    let exact = fits_fan || (corners.len() <= MOST_CORNERS && cut_ears(&flat, &mut ring, triangles));
+    let smallest =
+        (1..flat.len() - 1).map(|corner| turn(flat[0], flat[corner], flat[corner + 1])).fold(f64::INFINITY, f64::min);
+    let exact = if corners.len() <= MOST_CORNERS {
+        // A fan with a triangle without area would do, but then something lies on its edge that need not.
+        smallest > 0.0 || cut_ears(&flat, &mut ring, triangles)
+    } else {
+        smallest >= 0.0
+    };
     // Whatever is left, and everything if it is convex, is a fan around its first corner.
     triangles.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));
     exact
 }
 
-/// Cuts off corners whose triangle lies inside, until three are left. False if there are more and none can be cut off.
+/// Cuts off corners whose triangle lies inside, until three are left. False if that cannot be done.
 fn cut_ears(flat: &[DVec2], ring: &mut Vec<usize>, triangles: &mut Vec<[usize; 3]>) -> bool {
     while ring.len() > 3 {
         let count = ring.len();
         let around = |place: usize| [ring[(place + count - 1) % count], ring[place], ring[(place + 1) % count]];
-        let Some(place) = (0..count).find(|&place| is_ear(flat, ring, around(place))) else {
+        // A corner on a straight edge comes last: it gives a triangle without area, unless it is an end of another's base.
+        let places = || (0..count).filter(|&place| is_ear(flat, ring, around(place)));
+        let has_area = |&place: &usize| {
+            let [a, b, c] = around(place).map(|corner| flat[corner]);
+            turn(a, b, c) > 0.0
+        };
+        let Some(place) = places().find(has_area).or_else(|| places().next()) else {
             return false;
         };
         triangles.push(around(place));
         ring.remove(place);
     }
-    true
+    // Of a polygon that crosses itself, a triangle that turns the other way is left.
+    turn(flat[ring[0]], flat[ring[1]], flat[ring[2]]) >= 0.0
 }
 
 fn is_ear(flat: &[DVec2], ring: &[usize], ear: [usize; 3]) -> bool {
     let [a, b, c] = ear.map(|corner| flat[corner]);
-    // A corner on a straight edge is cut off as a triangle without area, which is dropped later. One that coincides with
-    // a corner of the ear does not hinder: that is how a polygon with a hole is written.
+    // What coincides with a corner of the ear does not hinder: that is how a polygon with a hole is written.
     let is_inside = |point: DVec2| {
         turn(a, b, point) >= 0.0 && turn(b, c, point) >= 0.0 && turn(c, a, point) >= 0.0 && ![a, b, c].contains(&point)
     };
@@ -103,6 +119,14 @@ mod tests {
         let bow = [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
         let mut triangles = Vec::new();
         assert!(!triangulate(&bow, &mut triangles));
+        assert_eq!(triangles.len(), 2);
+    }
+
+    #[test]
+    fn a_polygon_without_area_crosses_nothing() {
+        let line = [0.0, 1.0, 2.0, 3.0].map(|x| DVec3::new(x, 0.0, 0.0));
+        let mut triangles = Vec::new();
+        assert!(triangulate(&line, &mut triangles));
         assert_eq!(triangles.len(), 2);
     }
 

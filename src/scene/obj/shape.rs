@@ -20,7 +20,7 @@ pub(super) struct Shape {
 
 /// A triangle thinner than this share of its longest edge has no area: 32-bit coordinates cannot place it so thin, so it
 /// is nothing but rounding.
-const THINNEST: f64 = 1e-10;
+const THINNEST: f64 = 1e-7;
 
 impl Shape {
     pub(super) fn new(mesh: &tobj::Mesh) -> Self {

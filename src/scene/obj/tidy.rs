@@ -59,6 +59,9 @@ const NOTHING: &str = "vt 0 1\nvn 0 0 0\n";
 /// reads `f32`, which is 0.5 m coarse in a survey's coordinates.
 const ORIGIN_STEP: f64 = 4096.0;
 
+/// Farther than a frame draws. A vertex out there is a mistake that the others do not have to follow.
+const FARTHEST_ORIGIN: f64 = 1e10;
+
 impl Tidy {
     pub(super) fn new(source: &str) -> Result<Self, BadLine> {
         let mut tidy = Self { text: String::from(NOTHING), ..Self::default() };
@@ -122,7 +125,7 @@ impl Tidy {
             [_, _, _, weight] => DVec3::new(x, y, z) / weight,
             _ => DVec3::new(x, y, z),
         };
-        if !self.origin_is_set && position.is_finite() {
+        if !self.origin_is_set && position.abs().cmple(DVec3::splat(FARTHEST_ORIGIN)).all() {
             self.origin = (position / ORIGIN_STEP).trunc() * ORIGIN_STEP;
             self.origin_is_set = true;
         }
@@ -138,7 +141,8 @@ impl Tidy {
             return Err(String::from("texture coordinates without a number"));
         };
         let v = numbers.get(1).copied().unwrap_or(0.0);
-        let is_finite = u.is_finite() && v.is_finite();
+        // As 32-bit numbers, which is what they will be.
+        let is_finite = (u as f32).is_finite() && (v as f32).is_finite();
         self.bad_texture_coordinates += usize::from(!is_finite);
         self.counts.texture_coordinates += 1;
         let [u, v] = if is_finite { [u, v] } else { [0.0, 1.0] };

@@ -22,7 +22,7 @@ const FIRST: f32 = 7.6;
 /// The height of the podium that the box stands on.
 const PODIUM: f32 = 0.6;
 
-/// A Cornell box on a podium in a colonnade, some 500 objects of a dozen meshes: slabs of checkered floor, fluted columns
+/// A Cornell box on a podium in a colonnade, some 500 objects of twenty meshes: slabs of checkered floor, fluted columns
 /// with bases, capitals and arches, roof beams, banners, urns, lanterns and cypresses. Lit by a low sun, the sky, the box's
 /// own lamp, lanterns and spotlights. Its camera `main` looks down the nave into the box.
 ///
@@ -254,3 +254,6 @@ fn columns() -> impl Iterator<Item = f32> {
 fn bays() -> impl Iterator<Item = f32> {
     columns().take(COLUMNS - 1).map(|z| z - BAY / 2.0)
 }
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests;

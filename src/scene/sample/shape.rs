@@ -146,7 +146,7 @@ pub(super) fn banner(length: f32) -> Result<Mesh, SceneError> {
         let depth = 0.09 * share * sine;
         let change = 0.09 * (sine + share * TAU * 1.5 * cosine) / length;
         let normal = Vec3::new(0.0, change, 1.0).normalize();
-        [-0.5, 0.5].map(|x| vertex(Vec3::new(x, -length * share, depth), normal, [x + 0.5, share]))
+        [0.5, -0.5].map(|x| vertex(Vec3::new(x, -length * share, depth), normal, [x + 0.5, share]))
     });
     Mesh::new("banner", Topology::TriangleStrip, vertices.collect(), (0..2 * (ROWS + 1)).collect())
 }

@@ -1,0 +1,55 @@
+//! Files that a case writes, and what it looks at.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use drawloom::scene::Mesh;
+use drawloom::scene::obj::{self, Imported, ObjError};
+use image::RgbaImage;
+
+/// A folder of its own, gone when the case ends.
+pub struct Folder(pub PathBuf);
+
+impl Folder {
+    pub fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        // Only uniqueness matters.
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("drawloom-obj-{}-{number}", std::process::id()));
+        fs::create_dir_all(path.join("textures")).unwrap();
+        Self(path)
+    }
+
+    pub fn with(self, name: &str, contents: impl AsRef<[u8]>) -> Self {
+        fs::write(self.0.join(name), contents).unwrap();
+        self
+    }
+
+    pub fn with_picture(self, name: &str, picture: &RgbaImage) -> Self {
+        picture.save(self.0.join(name)).unwrap();
+        self
+    }
+
+    pub fn load(&self) -> Result<Imported, ObjError> {
+        obj::load(self.0.join("a.obj"))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder left behind is no reason to fail.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+pub const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+pub fn load(text: &str) -> Imported {
+    Folder::new().with("a.obj", text).load().unwrap()
+}
+
+pub fn mesh(imported: &Imported, object: usize) -> &Mesh {
+    let scene = imported.scene.as_scene_ref();
+    scene.assets.get(scene.meshes[object]).unwrap()
+}

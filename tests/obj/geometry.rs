@@ -1,0 +1,169 @@
+//! Vertices and faces, and what is no OBJ file, of files written for one purpose each.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::obj::{self, Imported, ObjError, ObjWarning};
+use libtest_mimic::Trial;
+
+use crate::folder::{Folder, TRIANGLE, load, mesh};
+use crate::trial;
+
+pub fn trials() -> Vec<Trial> {
+    vec![
+        trial("geometry::a_polygon_is_cut_along_its_outline", a_polygon_is_cut_along_its_outline),
+        trial("geometry::a_relative_index_counts_back", a_relative_index_counts_back),
+        trial("geometry::lines_and_points_are_left_out", lines_and_points_are_left_out),
+        trial("geometry::triangles_without_area_are_left_out", triangles_without_area_are_left_out),
+        trial("geometry::a_model_without_area_is_named", a_model_without_area_is_named),
+        trial("geometry::bad_normals_and_coordinates_are_replaced", bad_normals_and_coordinates_are_replaced),
+        trial("geometry::faces_with_and_without_normals_mix", faces_with_and_without_normals_mix),
+        trial("geometry::a_flat_face_has_its_own_normal", a_flat_face_has_its_own_normal),
+        trial("geometry::objects_stand_at_their_centre", objects_stand_at_their_centre),
+        trial("geometry::bad_lines_are_named", bad_lines_are_named),
+        trial("geometry::what_is_no_text_is_an_error", what_is_no_text_is_an_error),
+        trial("geometry::what_cannot_be_read_is_an_error", what_cannot_be_read_is_an_error),
+    ]
+}
+
+fn a_polygon_is_cut_along_its_outline() {
+    // An L, whose first corner does not see all others.
+    let text = "v 0 2 0\nv 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nf 4 5 6 1 2 3\n";
+    for text in [text.to_owned(), text.replace("f 4 5 6 1 2 3", "f 6 1 2 \\\n3 4 5 # the same")] {
+        let imported = load(&text);
+        assert_eq!((imported.triangles, imported.warnings.len()), (4, 0));
+        assert!((area(&imported) - 3.0).abs() < 1e-5, "{}", area(&imported));
+    }
+    let crossed = load("v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 2 0\nf 1 2 3 4\n");
+    assert!(matches!(crossed.warnings[..], [ObjWarning::FannedPolygons { polygons: 1, .. }]), "{:?}", crossed.warnings);
+}
+
+fn area(imported: &Imported) -> f32 {
+    let mesh = mesh(imported, 0);
+    let triangles = mesh.indices().chunks(3).map(|corners| {
+        let [a, b, c] = [0, 1, 2].map(|corner| Vec3::from(mesh.vertices()[corners[corner] as usize].position));
+        (b - a).cross(c - a).length() / 2.0
+    });
+    triangles.sum()
+}
+
+fn a_relative_index_counts_back() {
+    let imported = load("v 9 9 9\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf -3 -2 -1\nv 7 7 7\n");
+    assert_eq!(imported.triangles, 1);
+    assert_eq!(imported.scene.as_scene_ref().positions, [DVec3::new(1.0, 1.0, 0.0)]);
+}
+
+fn lines_and_points_are_left_out() {
+    let imported = load(&format!("{TRIANGLE}l 1 2 3\nl 1 2\np 1 2\nf 1 2\nf 3\ncurv 0 1 1 2\n"));
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 0));
+    assert_eq!(imported.warnings, [ObjWarning::NotDrawn { points: 3, lines: 3, surfaces: 1 }]);
+}
+
+fn triangles_without_area_are_left_out() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 2 0 0\nv nan 0 0\nv inf 0 0\nv 1e300 0 0\n";
+    for bad in ["f 1 1 2", "f 1 2 4", "f 1 2 5", "f 1 2 6", "f 1 2 7", "f 1 2 8"] {
+        let imported = load(&format!("{vertices}f 1 2 3\n{bad}\n"));
+        assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1), "{bad}");
+    }
+    // In a line but for rounding.
+    let imported = load(&format!("{TRIANGLE}v 0.1 0.3 0.7\nv 0.2 0.6 1.4\nv 0.3 0.9 2.1\nf 4 5 6\n"));
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1));
+    // Small is not degenerate.
+    let imported = load("v 0 0 0\nv 1e-12 0 0\nv 0 1e-12 0\nf 1 2 3\n");
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 0));
+}
+
+fn a_model_without_area_is_named() {
+    let imported = load(&format!("{TRIANGLE}o thin\nf 1 2 1\n"));
+    let expected = ObjWarning::EmptyModel { model: String::from("thin"), degenerate_triangles: 1 };
+    assert_eq!((imported.warnings, imported.scene.object_count()), (vec![expected], 1));
+    let error = Folder::new().with("a.obj", "v 0 0 0\nf 1 1 1\n").load().unwrap_err();
+    assert!(matches!(error, ObjError::NoTriangles { degenerate_triangles: 1, .. }), "{error}");
+    let error = Folder::new().with("a.obj", "").load().unwrap_err();
+    assert!(error.to_string().contains("a.obj` has no triangle to draw"), "{error}");
+}
+
+fn bad_normals_and_coordinates_are_replaced() {
+    let imported = load(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 0\nvn nan 0 1\nvn 0 3 4\nvt nan 1\nvt 0.5 1e200\nvt 0.5 0.25\n\
+         f 1/1/1 2/2/2 3/3/3\n",
+    );
+    let vertices = mesh(&imported, 0).vertices();
+    let normals: Vec<_> = vertices.iter().map(|vertex| vertex.normal).collect();
+    assert_eq!(normals, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.6, 0.8]]);
+    let uvs: Vec<_> = vertices.iter().map(|vertex| vertex.uv).collect();
+    assert_eq!(uvs, [[0.0, 0.0], [0.0, 0.0], [0.5, 0.75]]);
+    let expected =
+        [ObjWarning::ReplacedNormals { normals: 2 }, ObjWarning::ReplacedTextureCoordinates { coordinates: 2 }];
+    assert_eq!(imported.warnings, expected);
+}
+
+fn faces_with_and_without_normals_mix() {
+    let imported = load("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 1 0\nvt 1 1\nf 1 2 3\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\n");
+    let mesh = mesh(&imported, 0);
+    let corners: Vec<_> = mesh.indices().iter().map(|&index| mesh.vertices()[index as usize]).collect();
+    let of = |face: usize| (corners[face * 3].normal, corners[face * 3].uv);
+    assert_eq!(of(0), ([0.0, 0.0, 1.0], [0.0, 0.0]));
+    assert_eq!(of(1), ([0.0, 0.0, 1.0], [1.0, 0.0]));
+    assert_eq!(of(2), ([0.0, 1.0, 0.0], [0.0, 0.0]));
+    assert_eq!(imported.warnings, []);
+    let dangling = load(&TRIANGLE.replace("f 1 2 3", "f 1/7 2//9 3"));
+    assert_eq!(dangling.warnings, [ObjWarning::DanglingCorners { corners: 2 }]);
+}
+
+fn a_flat_face_has_its_own_normal() {
+    // Two faces share an edge, and no normal.
+    let imported = load(&format!("{TRIANGLE}v 0 0 -1\nf 1 4 2\n"));
+    let mesh = mesh(&imported, 0);
+    let normals: Vec<_> = mesh.indices().iter().map(|&index| mesh.vertices()[index as usize].normal).collect();
+    assert_eq!(normals[..3], [[0.0, 0.0, 1.0]; 3]);
+    assert_eq!(normals[3..], [[0.0, -1.0, 0.0]; 3]);
+}
+
+fn objects_stand_at_their_centre() {
+    let imported = load("v 1000000 5 0\nv 1000000.25 5 0\nv 1000000 5.5 0\nf 1 2 3\n");
+    assert_eq!(imported.scene.as_scene_ref().positions, [DVec3::new(1_000_000.125, 5.25, 0.0)]);
+    assert_eq!(mesh(&imported, 0).vertices()[0].position, [-0.125, -0.25, 0.0]);
+    let bounds = mesh(&imported, 0).bounds();
+    assert!(bounds.center.length() < 1e-6 && bounds.radius < 0.3);
+}
+
+fn bad_lines_are_named() {
+    for (text, part) in [
+        ("v 1 2\n", "line 1: a vertex needs 3 coordinates and has 2"),
+        ("v 1 2 x\n", "line 1: `x` is no number"),
+        ("v 1 2 3 0\n", "line 1: a vertex has the weight 0"),
+        ("\n\nvn 1 2\n", "line 3: a normal needs 3 numbers and has 2"),
+        ("vt\n", "line 1: texture coordinates without a number"),
+        ("f\n", "line 1: a face without a corner"),
+        ("v 0 0 0\nf 1 2 3\n", "line 2: a face refers to vertex 2, and there are 1 so far"),
+        ("v 0 0 0\nf 0 1 1\n", "line 2: a face refers to vertex 0"),
+        ("v 0 0 0\nf -2 1 1\n", "line 2: a face refers to vertex -2"),
+        ("v 0 0 0\nf 1/1/1/1 1 1\n", "line 2: `1/1/1/1` is no corner of a face"),
+        ("v 0 0 0\nf 1/a 1 1\n", "line 2: `1/a` is no corner of a face"),
+        ("v 0 0 0\nf //1 1 1\n", "line 2: `//1` is no corner of a face"),
+        ("v 0 0 0\nf 99999999999999999999 1 1\n", "is no corner of a face"),
+    ] {
+        let error = Folder::new().with("a.obj", text).load().unwrap_err();
+        assert!(matches!(error, ObjError::Malformed { .. }), "{text}");
+        let message = error.to_string();
+        assert!(message.contains(part) && message.contains("a.obj"), "{message}");
+    }
+    let weighted = load("v 0 0 0 2\nv 2 0 0 2\nv 0 2 0 2\nf 1 2 3\n");
+    assert_eq!(mesh(&weighted, 0).vertices()[1].position, [0.5, -0.5, 0.0]);
+}
+
+fn what_is_no_text_is_an_error() {
+    let error = Folder::new().with("a.obj", b"v 0 0 \xff\n").load().unwrap_err();
+    assert!(matches!(error, ObjError::NotText { offset: 6, .. }), "{error}");
+    assert!(error.to_string().contains("a.obj"));
+    // A mark at the start, as some editors write, is text.
+    assert_eq!(load(&format!("\u{feff}{TRIANGLE}")).triangles, 1);
+}
+
+fn what_cannot_be_read_is_an_error() {
+    let folder = Folder::new();
+    for path in [folder.0.join("missing.obj"), folder.0.clone()] {
+        let error = obj::load(&path).unwrap_err();
+        assert!(matches!(error, ObjError::Unreadable { .. }), "{error}");
+        assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+    }
+}

@@ -1,0 +1,191 @@
+//! Materials, textures and lights, of files written for one purpose each.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::obj::{Imported, ObjWarning};
+use drawloom::scene::{Blend, Light, Material, Texture};
+use image::{Rgba, RgbaImage};
+use libtest_mimic::Trial;
+
+use crate::folder::{Folder, TRIANGLE, load, mesh};
+use crate::trial;
+
+pub fn trials() -> Vec<Trial> {
+    vec![
+        trial("materials::a_texture_loads_with_its_top_up", a_texture_loads_with_its_top_up),
+        trial("materials::a_missing_texture_is_named", a_missing_texture_is_named),
+        trial("materials::a_large_texture_is_scaled_down", a_large_texture_is_scaled_down),
+        trial("materials::a_texture_is_shared", a_texture_is_shared),
+        trial("materials::a_missing_library_is_named", a_missing_library_is_named),
+        trial("materials::an_undefined_material_is_named", an_undefined_material_is_named),
+        trial("materials::a_colour_of_one_number_is_gray", a_colour_of_one_number_is_gray),
+        trial("materials::opacity_0_everywhere_is_a_mistake", opacity_0_everywhere_is_a_mistake),
+        trial("materials::opacity_0_on_one_is_meant", opacity_0_on_one_is_meant),
+        trial("materials::a_glowing_panel_shines_from_its_front", a_glowing_panel_shines_from_its_front),
+        trial("materials::a_glowing_body_shines_everywhere", a_glowing_body_shines_everywhere),
+        trial("materials::a_dark_scene_gets_lights", a_dark_scene_gets_lights),
+    ]
+}
+
+/// A triangle of one material, as its library defines it.
+fn load_material(library: &str) -> (Material, Imported) {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
+    let imported = Folder::new().with("a.obj", text).with("a.mtl", library).load().unwrap();
+    (named(&imported, "one"), imported)
+}
+
+fn named(imported: &Imported, name: &str) -> Material {
+    let mut materials = imported.scene.assets().iter::<Material>().map(|(_, material)| material);
+    materials.find(|material| material.name == name).unwrap().clone()
+}
+
+/// Red above, blue below.
+fn picture() -> RgbaImage {
+    RgbaImage::from_fn(2, 2, |_, y| if y == 0 { Rgba([255, 0, 0, 255]) } else { Rgba([0, 0, 255, 255]) })
+}
+
+fn a_texture_loads_with_its_top_up() {
+    let text =
+        format!("mtllib a.mtl\nusemtl one\nvt 0 1\nvt 0 0\nvt 1 0\n{}", TRIANGLE.replace("f 1 2 3", "f 1/1 2/2 3/3"));
+    let library = "newmtl one\nKd 0 0 0\nmap_Kd -clamp on textures\\a picture.png\n";
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", library);
+    let imported = folder.with_picture("textures/a picture.png", &picture()).load().unwrap();
+    let material = named(&imported, "one");
+    // Black with a texture means the texture.
+    assert_eq!(material.diffuse, Vec3::ONE);
+    let texture: &Texture = imported.scene.assets().get(material.texture.unwrap()).unwrap();
+    assert_eq!((texture.width(), texture.height()), (2, 2));
+    assert_eq!(texture.pixels()[..4], [255, 0, 0, 255]);
+    let uvs: Vec<_> = mesh(&imported, 0).vertices().iter().map(|vertex| vertex.uv).collect();
+    assert_eq!(uvs, [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
+    assert_eq!(imported.warnings.len(), 1, "{:?}", imported.warnings);
+    assert!(imported.warnings[0].to_string().contains("-clamp"));
+}
+
+fn a_missing_texture_is_named() {
+    let (material, imported) = load_material("newmtl one\nKd 0.5 0.25 0\nmap_Kd textures/no.png\n");
+    assert_eq!((material.diffuse, material.texture), (Vec3::new(0.5, 0.25, 0.0), None));
+    let [ObjWarning::UnusableTexture { texture, material, .. }] = &imported.warnings[..] else {
+        panic!("{:?}", imported.warnings);
+    };
+    assert_eq!((texture.as_str(), material.as_str()), ("textures/no.png", "one"));
+    // One that is no picture, by a name that none of the formats has.
+    let (material, imported) = load_material("newmtl one\nKd 0 0 0\nmap_Kd a.mtl\n");
+    assert_eq!((material.diffuse, material.texture), (Vec3::ZERO, None));
+    assert_eq!(imported.warnings.len(), 1);
+}
+
+fn a_large_texture_is_scaled_down() {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
+    let wide = RgbaImage::new(Texture::LARGEST + 1, 2);
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", "newmtl one\nmap_Kd wide.png\n");
+    let imported = folder.with_picture("wide.png", &wide).load().unwrap();
+    let texture = imported.scene.assets().get(named(&imported, "one").texture.unwrap()).unwrap();
+    assert_eq!((texture.width(), texture.height()), (Texture::LARGEST, 2));
+    let expected =
+        ObjWarning::ScaledTexture { texture: String::from("wide.png"), width: Texture::LARGEST + 1, height: 2 };
+    assert_eq!(imported.warnings, [expected]);
+}
+
+fn a_texture_is_shared() {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}usemtl two\nf 3 2 1\n");
+    let library = "newmtl one\nmap_Kd a.png\nnewmtl two\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", library).with_picture("a.png", &picture());
+    let imported = folder.load().unwrap();
+    assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
+    assert_eq!(named(&imported, "one").texture, named(&imported, "two").texture);
+    assert_eq!(named(&imported, "two").diffuse, Vec3::splat(0.5));
+}
+
+fn a_missing_library_is_named() {
+    let imported = load(&format!("mtllib no.mtl\n{TRIANGLE}"));
+    let [ObjWarning::MissingLibrary { library, .. }] = &imported.warnings[..] else {
+        panic!("{:?}", imported.warnings);
+    };
+    assert_eq!(library, "no.mtl");
+    let object = imported.scene.objects().next().unwrap();
+    let material = imported.scene.object(object).unwrap().material;
+    let material = imported.scene.assets().get(material).unwrap();
+    assert_eq!(*material, Material { double_sided: true, ..Material::default() });
+}
+
+fn an_undefined_material_is_named() {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}usemtl no such one\nf 3 2 1\n");
+    let imported = Folder::new().with("a.obj", text).with("a.mtl", "newmtl one\nKd 1 0 0\n").load().unwrap();
+    assert_eq!(imported.warnings, [ObjWarning::UndefinedMaterial { material: String::from("no such one") }]);
+    let diffuse = imported.scene.objects().map(|object| {
+        let material = imported.scene.object(object).unwrap().material;
+        imported.scene.assets().get(material).unwrap().diffuse
+    });
+    assert_eq!(diffuse.collect::<Vec<_>>(), [Vec3::X, Material::default().diffuse]);
+}
+
+fn a_colour_of_one_number_is_gray() {
+    let (material, imported) = load_material("newmtl one\nKd 0.25\n");
+    assert_eq!(material.diffuse, Vec3::splat(0.25));
+    assert_eq!(imported.warnings, []);
+}
+
+fn opacity_0_everywhere_is_a_mistake() {
+    let (material, imported) = load_material("newmtl one\nd 0\nnewmtl two\nTr 1\nnewmtl three\n");
+    assert_eq!((material.opacity, material.blend), (1.0, Blend::None));
+    assert_eq!(imported.warnings, [ObjWarning::InvertedOpacity { invisible: 2, materials: 2 }]);
+}
+
+fn opacity_0_on_one_is_meant() {
+    let (material, imported) = load_material("newmtl one\nd 0\nnewmtl two\nd 1\n");
+    assert_eq!((material.opacity, material.blend), (0.0, Blend::Alpha));
+    assert_eq!(imported.warnings, []);
+    let (material, _) = load_material("newmtl one\nTr 0.25\n");
+    assert_eq!((material.opacity, material.blend), (0.75, Blend::Alpha));
+}
+
+const GLOW: &str = "newmtl glow\nKe 2 1 0.5\n";
+
+fn a_glowing_panel_shines_from_its_front() {
+    let text = "mtllib a.mtl\nusemtl glow\nv 0 5 0\nv 3 5 0\nv 3 5 2\nv 0 5 2\n";
+    // Its winding says up. A normal that says down is right.
+    for (face, normal) in [("f 4 3 2 1", Vec3::Y), ("f 4//1 3//1 2//1 1//1\n", Vec3::NEG_Y)] {
+        let text = format!("{text}vn 0 -1 0\n{face}\n");
+        let imported = Folder::new().with("a.obj", text).with("a.mtl", GLOW).load().unwrap();
+        let [Light::Hemispherical { position, direction, intensity, range }] = imported.scene.lights[..] else {
+            panic!("{:?}", imported.scene.lights);
+        };
+        assert!(direction.abs_diff_eq(normal, 1e-6), "{direction}");
+        assert!(intensity.abs_diff_eq(Vec3::new(12.0, 6.0, 3.0), 1e-4), "{intensity}");
+        let off = (position - DVec3::new(1.5, 5.0, 1.0)).dot(normal.as_dvec3());
+        assert!(off > 0.0 && off < 0.01, "{position}");
+        assert!(range > 3.0 && range < 100.0, "{range}");
+    }
+}
+
+fn a_glowing_body_shines_everywhere() {
+    let mut text = String::from("mtllib a.mtl\nusemtl glow\n");
+    for corner in 0..8 {
+        let side = |bit: u32| 10 + 2 * ((corner >> bit) & 1);
+        text += &format!("v {} {} {}\n", side(0), side(1), side(2));
+    }
+    text += "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    let imported = Folder::new().with("a.obj", text).with("a.mtl", GLOW).load().unwrap();
+    let [Light::Point { position, intensity, .. }] = imported.scene.lights[..] else {
+        panic!("{:?}", imported.scene.lights);
+    };
+    assert!(position.distance(DVec3::splat(11.0)) < 1e-6, "{position}");
+    // A quarter of six sides of 4 square metres.
+    assert!(intensity.abs_diff_eq(Vec3::new(12.0, 6.0, 3.0), 1e-4), "{intensity}");
+}
+
+fn a_dark_scene_gets_lights() {
+    let imported = load(TRIANGLE);
+    let [
+        Light::Directional { illuminance: key, .. },
+        Light::Directional { illuminance: fill, .. },
+        Light::Point { .. },
+    ] = imported.scene.lights[..]
+    else {
+        panic!("{:?}", imported.scene.lights);
+    };
+    assert!(key.x > key.z && fill.z > fill.x, "a warm key and a cool fill");
+    assert!(imported.scene.ambient.min_element() > 0.0);
+    assert!(imported.scene.background.z > imported.scene.background.x);
+    assert_eq!(imported.scene.cameras[0].name, "main");
+}
