@@ -122,15 +122,18 @@ fn clip_position(relative: vec3<f32>) -> vec4<f32> {
     return view.clip_from_relative * vec4<f32>(relative, 1.0);
 }
 
-// From object space to the world's axes, of unit length. The cofactors of a scale need no division, so a scale of 0 along
-// one axis leaves a normal too.
+// From object space to the world's axes, of unit length; 0 where there is none to be had. The cofactors of a scale need no
+// division, so a scale of 0 along one axis leaves a normal too.
 fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
-    let scale = object.scale;
+    // Products of the scale as it is could leave the range of f32.
+    let sizes = abs(object.scale);
+    let largest = max(max(sizes.x, sizes.y), sizes.z);
+    let scale = select(vec3<f32>(1.0), object.scale / largest, largest > 0.0);
     let cofactors = scale.yzx * scale.zxy;
     let mirrored = select(1.0, -1.0, scale.x * scale.y * scale.z < 0.0);
     let turned = rotate(object.orientation, mirrored * cofactors * normal);
     let length_squared = dot(turned, turned);
-    return select(normal, turned * inverseSqrt(length_squared), length_squared > 0.0);
+    return select(vec3<f32>(0.0), turned * inverseSqrt(length_squared), length_squared > 0.0);
 }
 
 // A pixel's place relative to the camera, along the world's axes.

@@ -27,16 +27,24 @@ fn fragment(in: Surface) -> Targets {
     let across = cross(dpdx(in.relative), dpdy(in.relative));
     let material = materials[in.material];
 
-    var normal = normalize(in.normal);
-    if material.double_sided == 1u {
-        // Whichever way the triangle is wound, its visible side is the one that faces the camera; the normal goes with it.
-        let facing = across * -sign(dot(across, in.relative));
-        normal *= select(1.0, -1.0, dot(normal, facing) < 0.0);
+    // Whichever way the triangle is wound, its visible side is the one that faces the camera.
+    let facing = unit_or(across * -sign(dot(across, in.relative)), -normalize(in.relative));
+    var normal = unit_or(in.normal, facing);
+    if material.double_sided == 1u && dot(normal, facing) < 0.0 {
+        normal = -normal;
     }
     let diffuse = diffuse_at(material, in.uv, gradient_x, gradient_y);
     return Targets(
         octahedral_from_direction(normal),
         vec4<f32>(diffuse.rgb, 1.0),
-        vec4<f32>(material.emission, 1.0),
+        // Past this a half float would be infinite.
+        vec4<f32>(min(material.emission, vec3<f32>(60000.0)), 1.0),
     );
+}
+
+// A vector brought to unit length, or another where it has no direction.
+fn unit_or(vector: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
+    let length_squared = dot(vector, vector);
+    let has_direction = length_squared > 0.0 && length_squared < 1e38;
+    return select(other, vector * inverseSqrt(length_squared), has_direction);
 }

@@ -98,7 +98,7 @@ impl Asset for Mesh {
 pub struct Vertex {
     /// In object space, in metres.
     pub position: [f32; 3],
-    /// In object space; only its direction counts.
+    /// In object space. Only its direction counts; a normal of 0 stands for the triangle's own.
     pub normal: [f32; 3],
     /// Texture coordinates: (0, 0) is the picture's top left, (1, 1) its bottom right, and they repeat.
     pub uv: [f32; 2],

@@ -2,7 +2,7 @@
 
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Texture, Topology};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -18,7 +18,8 @@ pub const CASES: &[Case] = &[
     ("the_nearer_object_hides_the_farther_whatever_comes_first", nearer_hides),
     ("a_mirrored_object_shows_its_outside", mirrored),
     ("what_faces_away_is_culled_unless_double_sided", culled),
-    ("a_scale_of_zero_draws_without_a_stain", flat),
+    ("no_scale_leaves_a_pixel_that_is_not_a_number", extreme_scales),
+    ("a_normal_of_zero_stands_for_the_triangles_own", zero_normals),
     ("far_from_the_origin_is_as_near_it", far_away),
     ("each_view_has_its_own_picture", two_views),
 ];
@@ -181,8 +182,16 @@ fn culled() -> Result<(), Failed> {
     expect(&draw(&signs.scene)?, &[(45, 45, Hue::Red)])
 }
 
-fn flat() -> Result<(), Failed> {
-    for scale in [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::splat(1e-20)] {
+fn extreme_scales() -> Result<(), Failed> {
+    for scale in [
+        Vec3::ZERO,
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::new(0.0, 1.0, 0.0),
+        Vec3::splat(1e-20),
+        Vec3::new(1e6, 1.0, 1e-6),
+        Vec3::splat(1e18),
+        Vec3::splat(1e20),
+    ] {
         let mut scene = field(0);
         let (mesh, material) = (scene.add(cube())?, scene.add(Material::default())?);
         let mut object = RenderObject::new(mesh, material, DVec3::ZERO);
@@ -198,6 +207,21 @@ fn flat() -> Result<(), Failed> {
         }
     }
     Ok(())
+}
+
+fn zero_normals() -> Result<(), Failed> {
+    let with = |change: fn([f32; 3]) -> [f32; 3]| -> Result<Picture, Failed> {
+        let mut scene = field(0);
+        let mesh = cube();
+        let vertices = mesh.vertices().iter().map(|vertex| Vertex { normal: change(vertex.normal), ..*vertex });
+        let mesh = Mesh::new("cube", mesh.topology(), vertices.collect(), mesh.indices().to_vec())?;
+        let (mesh, material) = (scene.add(mesh)?, scene.add(Material::default())?);
+        scene.add_object(RenderObject { scale: Vec3::splat(3.0), ..RenderObject::new(mesh, material, DVec3::ZERO) })?;
+        draw(&scene)
+    };
+    let right = with(|normal| normal)?;
+    assert_alike(&with(|_| [0.0; 3])?, &right)?;
+    assert_alike(&with(|normal| normal.map(|component| component * 1e-12))?, &right)
 }
 
 fn far_away() -> Result<(), Failed> {
