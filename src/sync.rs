@@ -2,8 +2,9 @@
 //!
 //! Everything in the crate that blocks, counts or hands work over takes its atomics, locks, threads and deques from here.
 //! Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with `--cfg drawloom_loom`
-//! they are the model checker's, so that the tests beside the code walk through every interleaving. Both sides have one
-//! shape: a lock returns its guard and cannot be poisoned, and a wait takes the guard and gives it back.
+//! they are those of loom, a model checker, so that the tests beside the code walk through the interleavings of their
+//! threads. Both sides have one shape: a lock returns its guard and cannot be poisoned, and a wait takes the guard and
+//! gives it back.
 
 #[cfg(drawloom_loom)]
 pub(crate) use self::modelled::{Condvar, Deque, Mutex, Stealer};
@@ -19,7 +20,7 @@ pub(crate) use loom::{
         Arc,
         atomic::{AtomicBool, AtomicUsize, Ordering, fence},
     },
-    thread,
+    thread, thread_local,
 };
 #[cfg(not(drawloom_loom))]
 pub(crate) use std::{
@@ -28,7 +29,7 @@ pub(crate) use std::{
         Arc,
         atomic::{AtomicBool, AtomicUsize, Ordering, fence},
     },
-    thread,
+    thread, thread_local,
 };
 
 #[cfg(not(drawloom_loom))]
@@ -113,10 +114,6 @@ mod modelled {
 
         pub(crate) fn pop(&self) -> Option<T> {
             self.0.lock().pop_back()
-        }
-
-        pub(crate) fn is_empty(&self) -> bool {
-            self.0.lock().is_empty()
         }
     }
 

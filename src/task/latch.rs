@@ -5,13 +5,14 @@
 //! - `add` is relaxed. Whoever adds is counted itself, so the count is at least one before and after, and nobody can take
 //!   the addition for a release. The job that was added reaches its worker through a deque or a lock, which order it.
 //! - `finish` is a release: what a job did happens before its decrement. Every change of the count is a
-//!   read-modify-write, so all decrements lie in one release sequence, and the one load that reads zero synchronises with
+//!   read-modify-write, so all decrements lie in one release sequence, and the load that reads zero synchronises with
 //!   every one of them, not only with the last.
 //! - `is_released` is the acquire that closes the pair. After it returned true the waiter sees the effects of all jobs,
-//!   the dropping of what they had captured included.
+//!   the dropping of what they had captured included. `finish` acquires nothing: that it returned true is no leave to
+//!   touch what the jobs wrote.
 //!
-//! The latch wakes nobody. The worker whose `finish` returned true does that, through [`Sleep`](super::sleep::Sleep), and
-//! may find the scope gone by then: what it needs has to be reachable without the scope.
+//! The latch wakes nobody. The worker whose `finish` returned true does that, through [`Sleep`](super::sleep::Sleep).
+//! From its decrement on the scope may end at any moment, so that worker holds a share of its own of all it still uses.
 
 use crate::sync::{AtomicUsize, Ordering};
 
@@ -32,7 +33,6 @@ impl Latch {
     }
 
     /// Takes one off, and says whether it was the last.
-    #[must_use = "whoever takes the last one off wakes the waiter"]
     pub(super) fn finish(&self) -> bool {
         self.outstanding.fetch_sub(1, Ordering::Release) == 1
     }
@@ -40,5 +40,83 @@ impl Latch {
     /// Whether the last one has been taken off.
     pub(super) fn is_released(&self) -> bool {
         self.outstanding.load(Ordering::Acquire) == 0
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::Latch;
+
+    #[test]
+    fn only_the_last_one_releases() {
+        let latch = Latch::new(1);
+        latch.add();
+        assert!(!latch.finish());
+        assert!(!latch.is_released());
+        assert!(latch.finish());
+        assert!(latch.is_released());
+    }
+}
+
+#[cfg(all(test, drawloom_loom))]
+mod loom_tests {
+    use loom::{cell::UnsafeCell, model, thread};
+
+    use super::Latch;
+    use crate::sync::Arc;
+
+    /// What one job writes and the waiter reads, checked by loom for races.
+    struct Cells([UnsafeCell<usize>; 2]);
+
+    #[test]
+    fn the_waiter_sees_what_every_job_did() {
+        model(|| {
+            let state = Arc::new((Latch::new(1), Cells([UnsafeCell::new(0), UnsafeCell::new(0)])));
+            let jobs = [0, 1].map(|job| {
+                state.0.add();
+                let state = Arc::clone(&state);
+                thread::spawn(move || {
+                    // SAFETY: the cell is this job's alone until it has finished; loom checks that.
+                    state.1.0[job].with_mut(|cell| unsafe { *cell = 1 });
+                    state.0.finish()
+                })
+            });
+            let last_here = state.0.finish();
+            if state.0.is_released() {
+                // SAFETY: all jobs have finished; loom checks that this is seen here.
+                let sum: usize = state.1.0.iter().map(|cell| cell.with(|cell| unsafe { *cell })).sum();
+                assert_eq!(sum, 2);
+            }
+            let last_in_jobs = jobs.map(|job| job.join().unwrap());
+            let last: usize = last_in_jobs.into_iter().map(usize::from).sum();
+            assert_eq!(last + usize::from(last_here), 1, "one of them is the last");
+            assert!(state.0.is_released());
+        });
+    }
+
+    #[test]
+    fn a_job_that_adds_another_keeps_the_latch_shut() {
+        model(|| {
+            let state = Arc::new((Latch::new(1), UnsafeCell::new(0)));
+            state.0.add();
+            let first = Arc::clone(&state);
+            let job = thread::spawn(move || {
+                first.0.add();
+                let second = Arc::clone(&first);
+                let child = thread::spawn(move || {
+                    // SAFETY: nobody else writes, and the reader waits for the latch; loom checks that.
+                    second.1.with_mut(|cell| unsafe { *cell = 1 });
+                    second.0.finish();
+                });
+                first.0.finish();
+                child.join().unwrap();
+            });
+            state.0.finish();
+            if state.0.is_released() {
+                // SAFETY: both jobs have finished; loom checks that this is seen here.
+                assert_eq!(state.1.with(|cell| unsafe { *cell }), 1);
+            }
+            job.join().unwrap();
+        });
     }
 }

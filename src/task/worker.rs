@@ -1,8 +1,10 @@
-//! Workers.
+//! What a worker does: run jobs, look for jobs, sleep.
 
 use std::{
     cell::{Cell, RefCell},
-    mem::{self, ManuallyDrop},
+    fmt,
+    marker::PhantomData,
+    mem,
     rc::Rc,
 };
 
@@ -10,150 +12,183 @@ use crate::sync::{Arc, Deque, Steal, spin_loop};
 
 use super::{job::Job, scheduler::Shared, scope::ScopeState};
 
-/// How often an idle worker looks for work before it sleeps, and how long it pauses between two looks.
-#[cfg(not(drawloom_loom))]
-const SPIN_ROUNDS: usize = 16;
-#[cfg(drawloom_loom)]
-const SPIN_ROUNDS: usize = 1;
-#[cfg(not(drawloom_loom))]
-const SPIN_PAUSES: usize = 16;
-#[cfg(drawloom_loom)]
-const SPIN_PAUSES: usize = 0;
+/// How often a worker looks for jobs in vain before it sleeps. With the pauses between, that is some microseconds, less
+/// than a sleep and a wake-up cost together.
+const IDLE_ROUNDS: usize = if cfg!(drawloom_loom) { 0 } else { 16 };
 
-thread_local! {
-    static SEATS: ManuallyDrop<RefCell<Vec<Rc<Worker>>>> = const { ManuallyDrop::new(RefCell::new(Vec::new())) };
-}
+/// How many pauses of the processor lie between two looks.
+const PAUSES: usize = 16;
 
-/// The witness that code runs as a job.
+/// The witness that code runs as a job of a scheduler: only there can a reference to it be had, and it stays on its thread.
+///
+/// No two threads are the same worker at the same time, so what an engine keeps once per [`index`](Self::index) is never
+/// shared between threads. But a job that opens a scope or a loop and waits in it may find itself interrupted by another
+/// job on the same worker, so such a thing should not stay borrowed over a wait.
+///
+/// ```compile_fail,E0277
+/// # let scheduler = drawloom::task::Scheduler::new(2)?;
+/// scheduler.scope(|scope| {
+///     // A witness could testify for a thread that is no worker at all.
+///     scope.spawn(|_scope, worker| std::thread::scope(|threads| { threads.spawn(|| worker.index()); }));
+/// })?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Worker {
     index: usize,
     deque: Deque<Job>,
     shared: Arc<Shared>,
-    /// Whom to rob first: the last victim that had something.
+    /// Whom to steal from first: where there was something the last time.
     victim: Cell<usize>,
+    /// The passes this worker is inside of, the innermost last.
     visits: RefCell<Vec<Visit>>,
+    on_this_thread: PhantomData<Rc<()>>,
 }
 
 impl Worker {
     pub(super) fn new(index: usize, deque: Deque<Job>, shared: Arc<Shared>) -> Self {
-        Self { index, deque, shared, victim: Cell::new(index), visits: RefCell::new(Vec::new()) }
+        Self {
+            index,
+            deque,
+            shared,
+            victim: Cell::new(0),
+            visits: RefCell::new(Vec::new()),
+            on_this_thread: PhantomData,
+        }
     }
 
-    /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers).
+    /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that called
+    /// the scheduler.
     pub fn index(&self) -> usize {
         self.index
-    }
-
-    /// Who this thread is for that scheduler.
-    pub(super) fn current(shared: &Arc<Shared>) -> Option<Rc<Self>> {
-        SEATS.with(|seats| seats.borrow().iter().rev().find(|worker| Arc::ptr_eq(&worker.shared, shared)).cloned())
     }
 
     pub(super) fn shared(&self) -> &Arc<Shared> {
         &self.shared
     }
 
+    pub(super) fn into_deque(self) -> Deque<Job> {
+        self.deque
+    }
+
+    /// Queues a job here, and wakes somebody for it.
     pub(super) fn push(&self, job: Job) {
         self.deque.push(job);
         self.shared.sleep().wake_any();
     }
 
-    /// Runs jobs, and sleeps where there are none, until that has come.
+    /// Runs jobs, and sleeps where there are none, until that time has come. Does not unwind.
     pub(super) fn work(&self, until: Until<'_>) {
         let mut idle_rounds = 0;
-        while !until.reached(self) {
+        let mut called = false;
+        while !until.has_come(&self.shared) {
+            called = false;
             if let Some(job) = self.next_job(until) {
                 job.run(self);
                 idle_rounds = 0;
-            } else if idle_rounds < SPIN_ROUNDS {
-                (0..SPIN_PAUSES).for_each(|_| spin_loop());
-                idle_rounds += 1;
-            } else {
+            } else if idle_rounds == IDLE_ROUNDS {
                 self.sleep(until);
+                called = true;
                 idle_rounds = 0;
+            } else {
+                (0..PAUSES).for_each(|_| spin_loop());
+                idle_rounds += 1;
             }
         }
-    }
-
-    fn next_job(&self, until: Until<'_>) -> Option<Job> {
-        until.pinned_job().or_else(|| self.deque.pop()).or_else(|| self.steal())
-    }
-
-    fn sleep(&self, until: Until<'_>) {
-        self.shared.sleep().sleep(self.index, || until.reached(self) || until.has_pinned_job() || self.sees_loot());
-        if until.reached(self) && self.sees_loot() {
+        // It may have been called for a job that it does not look for any more.
+        if called && self.sees_loot() {
             self.shared.sleep().wake_any();
         }
     }
 
+    /// Pinned jobs come first, as nobody else can run them: while this worker does, others take those of its deque.
+    fn next_job(&self, until: Until<'_>) -> Option<Job> {
+        until.pinned_job().or_else(|| self.deque.pop()).or_else(|| self.steal())
+    }
+
+    /// One job of somebody else.
     fn steal(&self) -> Option<Job> {
         let stealers = self.shared.stealers();
         let first = self.victim.get();
         loop {
-            let mut contended = false;
-            for victim in (first..stealers.len()).chain(0..first) {
-                if victim == self.index {
-                    continue;
-                }
+            let mut interrupted = false;
+            for victim in (first..stealers.len()).chain(0..first).filter(|&victim| victim != self.index) {
                 match stealers[victim].steal() {
                     Steal::Success(job) => {
                         self.victim.set(victim);
                         return Some(job);
                     }
-                    Steal::Retry => contended = true,
+                    // Another thief was faster, and there may be more.
+                    Steal::Retry => interrupted = true,
                     Steal::Empty => {}
                 }
             }
-            if !contended {
+            if !interrupted {
                 return None;
             }
             spin_loop();
         }
     }
 
-    fn sees_loot(&self) -> bool {
-        self.shared.stealers().iter().enumerate().any(|(victim, stealer)| victim != self.index && !stealer.is_empty())
+    fn sleep(&self, until: Until<'_>) {
+        let sees_work = || until.has_come(&self.shared) || until.has_pinned_job() || self.sees_loot();
+        self.shared.sleep().sleep(self.index, sees_work);
     }
 
-    /// Notes that the worker is inside of the pass, or, where it already is, that it was brought the pass's token again.
+    /// Whether there is something to steal. Its own deque is empty when a worker asks, as nobody else puts anything in.
+    fn sees_loot(&self) -> bool {
+        let others = self.shared.stealers().iter().enumerate().filter(|&(victim, _)| victim != self.index);
+        others.map(|(_, stealer)| stealer).any(|stealer| !stealer.is_empty())
+    }
+
+    /// Goes into the pass, and holds the token that it was brought. Is the worker inside already, further out, it stays
+    /// there, holds the token there, and this is false.
     pub(super) fn enter(&self, pass: usize) -> bool {
         let mut visits = self.visits.borrow_mut();
         if let Some(visit) = visits.iter_mut().find(|visit| visit.pass == pass) {
-            visit.token = true;
+            visit.holds_token = true;
             return false;
         }
-        visits.push(Visit { pass, token: true });
+        visits.push(Visit { pass, holds_token: true });
         true
     }
 
-    /// Takes the token of the pass entered last, if the worker has it.
+    /// Takes the token of the innermost pass off the worker, if it holds that.
     pub(super) fn take_token(&self) -> bool {
-        self.visits.borrow_mut().last_mut().is_some_and(|visit| mem::take(&mut visit.token))
+        self.visits.borrow_mut().last_mut().is_some_and(|visit| mem::take(&mut visit.holds_token))
     }
 
+    /// Leaves the innermost pass.
     pub(super) fn leave(&self) {
         self.visits.borrow_mut().pop();
     }
 }
 
-struct Visit {
-    pass: usize,
-    token: bool,
+impl fmt::Debug for Worker {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Worker").field("index", &self.index).finish_non_exhaustive()
+    }
 }
 
-/// What a worker works towards.
+/// A worker's stay inside a pass.
+struct Visit {
+    /// The address of the pass.
+    pass: usize,
+    holds_token: bool,
+}
+
+/// How long a worker works.
 #[derive(Clone, Copy)]
 pub(super) enum Until<'state> {
-    /// The end of the scheduler.
+    /// Until the scheduler ends.
     Shutdown,
-    /// The end of a scope that this worker opened.
+    /// Until the jobs of the scope have run. The worker is the one that opened it, and runs its pinned jobs.
     Finished(&'state ScopeState),
 }
 
 impl Until<'_> {
-    fn reached(self, worker: &Worker) -> bool {
+    fn has_come(self, shared: &Shared) -> bool {
         match self {
-            Self::Shutdown => worker.shared.is_shut_down(),
+            Self::Shutdown => shared.is_shut_down(),
             Self::Finished(scope) => scope.is_finished(),
         }
     }
@@ -171,27 +206,4 @@ impl Until<'_> {
             Self::Finished(scope) => !scope.mailbox().is_empty(),
         }
     }
-}
-
-/// Makes this thread the worker for as long as `body` runs, and gives the deque back. `body` must not unwind, as the deque
-/// would be lost with it.
-pub(super) fn occupy<R>(
-    index: usize,
-    deque: Deque<Job>,
-    shared: Arc<Shared>,
-    body: impl FnOnce(&Worker) -> R,
-) -> (R, Deque<Job>) {
-    let worker = Rc::new(Worker::new(index, deque, shared));
-    SEATS.with(|seats| seats.borrow_mut().push(Rc::clone(&worker)));
-    let result = body(&worker);
-    SEATS.with(|seats| {
-        let mut seats = seats.borrow_mut();
-        seats.pop();
-        if seats.is_empty() {
-            // Nothing frees a `ManuallyDrop` when the thread ends.
-            *seats = Vec::new();
-        }
-    });
-    let worker = Rc::into_inner(worker).expect("what `current` hands out lives no longer than the call it is for");
-    (result, worker.deque)
 }

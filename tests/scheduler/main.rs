@@ -1,0 +1,320 @@
+//! The job system from outside: what an embedder can rely on, against plain loops and counts.
+
+mod panics;
+mod stress;
+
+use std::{
+    collections::HashSet,
+    ops::Range,
+    sync::{
+        Barrier, Mutex,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+    thread::{self, ThreadId},
+};
+
+use drawloom::task::{Scheduler, SchedulerError, Scope};
+use proptest::prelude::{ProptestConfig, prop_assert, prop_assert_eq, proptest};
+
+fn scheduler(workers: usize) -> Scheduler {
+    Scheduler::new(workers).expect("threads can be started")
+}
+
+/// Every worker of the scheduler still runs jobs.
+fn assert_intact(scheduler: &Scheduler) {
+    let together = Barrier::new(scheduler.workers());
+    let outcome = scheduler.parallel_for(scheduler.workers(), 1, |_range, _worker| {
+        together.wait();
+    });
+    assert_eq!(outcome, Ok(()));
+}
+
+/// How often a loop over `length` items visits each of them, and how long its chunks are.
+fn visits(scheduler: &Scheduler, length: usize, chunk: usize) -> (Vec<usize>, Vec<Range<usize>>) {
+    let visited: Vec<AtomicUsize> = (0..length).map(|_| AtomicUsize::new(0)).collect();
+    let ranges = Mutex::new(Vec::new());
+    let outcome = scheduler.parallel_for(length, chunk, |range, _worker| {
+        for index in range.clone() {
+            visited[index].fetch_add(1, Ordering::Relaxed);
+        }
+        ranges.lock().unwrap().push(range);
+    });
+    assert_eq!(outcome, Ok(()));
+    (visited.into_iter().map(AtomicUsize::into_inner).collect(), ranges.into_inner().unwrap())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn a_loop_visits_each_index_exactly_once(length in 0_usize..3_000, chunk in 0_usize..200) {
+        for workers in [1, 2, 4, 7] {
+            let (visited, mut ranges) = visits(&scheduler(workers), length, chunk);
+            prop_assert!(visited.iter().all(|&count| count == 1));
+            ranges.sort_by_key(|range| range.start);
+            let plain: Vec<_> = (0..length).step_by(chunk.max(1)).map(|start| start..(start + chunk.max(1)).min(length)).collect();
+            prop_assert_eq!(ranges, plain);
+        }
+    }
+}
+
+#[test]
+fn a_loop_over_nothing_calls_nobody() {
+    let outcome = scheduler(2).parallel_for(0, 0, |_range, _worker| panic!("there is nothing to do"));
+    assert_eq!(outcome, Ok(()));
+}
+
+#[test]
+fn a_loop_as_long_as_numbers_go_gives_the_last_index() {
+    for workers in [1, 4] {
+        let ranges = Mutex::new(Vec::new());
+        let quarter = usize::MAX / 4;
+        scheduler(workers)
+            .parallel_for(usize::MAX, quarter, |range, _worker| ranges.lock().unwrap().push(range))
+            .unwrap();
+        let mut ranges = ranges.into_inner().unwrap();
+        ranges.sort_by_key(|range| range.start);
+        assert_eq!(ranges.len(), 5);
+        assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
+        assert_eq!((ranges[0].start, ranges[4].end), (0, usize::MAX));
+    }
+}
+
+#[test]
+fn workers_have_an_index_each_and_the_caller_has_the_first() {
+    let scheduler = scheduler(4);
+    assert_eq!(scheduler.workers(), 4);
+    let together = Barrier::new(4);
+    let seen = Mutex::new(Vec::new());
+    scheduler
+        .parallel_for(4, 1, |_range, worker| {
+            // Four chunks that wait for each other can only be run by four workers.
+            together.wait();
+            seen.lock().unwrap().push((worker.index(), thread::current().id()));
+        })
+        .unwrap();
+    let mut seen = seen.into_inner().unwrap();
+    seen.sort_by_key(|&(index, _)| index);
+    assert_eq!(seen.iter().map(|&(index, _)| index).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    assert_eq!(seen[0].1, thread::current().id());
+    assert_eq!(seen.iter().map(|&(_, thread)| thread).collect::<HashSet<_>>().len(), 4);
+}
+
+#[test]
+fn jobs_borrow_what_outlives_the_scope() {
+    let words: Vec<String> = (0..100).map(|number| number.to_string()).collect();
+    let mut lengths = vec![0; words.len()];
+    let returned = scheduler(3).scope(|scope| {
+        for (word, length) in words.iter().zip(&mut lengths) {
+            scope.spawn(move |_scope, _worker| *length = word.len());
+        }
+        "the body's result"
+    });
+    assert_eq!(returned, Ok("the body's result"));
+    assert_eq!(lengths, words.iter().map(String::len).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_a_job_owns_is_dropped_before_the_scope_returns() {
+    struct Counted<'count>(&'count AtomicUsize);
+    impl Drop for Counted<'_> {
+        fn drop(&mut self) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+    let scheduler = scheduler(4);
+    for panics in [false, true] {
+        let dropped = AtomicUsize::new(0);
+        let outcome = scheduler.scope(|scope| {
+            for index in 0..200 {
+                let counted = Counted(&dropped);
+                scope.spawn(move |_scope, _worker| {
+                    let _counted = &counted;
+                    assert!(!panics || index % 3 != 0, "every third");
+                });
+            }
+        });
+        assert_eq!(outcome.is_err(), panics);
+        assert_eq!(dropped.into_inner(), 200);
+    }
+}
+
+fn grow<'scope>(scope: &Scope<'scope>, grown: &'scope AtomicUsize, depth: usize) {
+    grown.fetch_add(1, Ordering::Relaxed);
+    if depth > 0 {
+        for _branch in 0..10 {
+            scope.spawn(move |scope, _worker| grow(scope, grown, depth - 1));
+        }
+    }
+}
+
+#[test]
+fn jobs_spawn_jobs_into_their_scope() {
+    for workers in [1, 2, 4] {
+        let grown = AtomicUsize::new(0);
+        scheduler(workers).scope(|scope| grow(scope, &grown, 4)).unwrap();
+        assert_eq!(grown.into_inner(), 11_111);
+    }
+}
+
+#[test]
+fn scopes_and_loops_nest_on_every_worker() {
+    let scheduler = scheduler(4);
+    let together = Barrier::new(4);
+    let sum = AtomicUsize::new(0);
+    scheduler
+        .parallel_for(4, 1, |_range, outer| {
+            together.wait();
+            scheduler
+                .scope(|scope| {
+                    for _job in 0..5 {
+                        scope.spawn(|_scope, _worker| {
+                            scheduler
+                                .parallel_for(100, 7, |range, _worker| {
+                                    sum.fetch_add(range.sum(), Ordering::Relaxed);
+                                })
+                                .unwrap();
+                        });
+                    }
+                })
+                .unwrap();
+            let opener = (thread::current().id(), outer.index());
+            let pinned = scheduler.scope(|scope| {
+                scope.spawn_pinned(move |_scope, inner| assert_eq!((thread::current().id(), inner.index()), opener));
+            });
+            assert_eq!(pinned, Ok(()));
+        })
+        .unwrap();
+    assert_eq!(sum.into_inner(), 4 * 5 * 4_950);
+}
+
+#[test]
+fn pinned_jobs_run_on_the_thread_that_opened_their_scope() {
+    fn pin<'scope>(scope: &Scope<'scope>, ran: &'scope Mutex<Vec<(ThreadId, usize)>>) {
+        scope.spawn_pinned(|_scope, worker| ran.lock().unwrap().push((thread::current().id(), worker.index())));
+    }
+    let scheduler = scheduler(4);
+    let together = Barrier::new(4);
+    let ran = Mutex::new(Vec::new());
+    scheduler
+        .scope(|scope| {
+            pin(scope, &ran);
+            for _job in 0..4 {
+                // The barrier brings the jobs to four workers, so three pin from elsewhere.
+                scope.spawn(|scope, _worker| {
+                    together.wait();
+                    pin(scope, &ran);
+                    scope.spawn_pinned(|scope, _worker| pin(scope, &ran));
+                });
+            }
+        })
+        .unwrap();
+    assert_eq!(ran.into_inner().unwrap(), vec![(thread::current().id(), 0); 9]);
+}
+
+#[test]
+fn a_scope_may_be_handed_to_a_thread_that_is_no_worker() {
+    let scheduler = scheduler(2);
+    let ran = AtomicUsize::new(0);
+    scheduler
+        .scope(|scope| {
+            thread::scope(|threads| {
+                threads.spawn(|| {
+                    for _job in 0..10 {
+                        scope.spawn(|_scope, _worker| {
+                            ran.fetch_add(1, Ordering::Relaxed);
+                        });
+                    }
+                });
+            });
+        })
+        .unwrap();
+    assert_eq!(ran.into_inner(), 10);
+}
+
+#[test]
+fn threads_take_turns_on_one_scheduler() {
+    let scheduler = scheduler(3);
+    let (together, busy) = (Barrier::new(4), AtomicBool::new(false));
+    thread::scope(|threads| {
+        for _thread in 0..4 {
+            threads.spawn(|| {
+                together.wait();
+                for _round in 0..200 {
+                    let sum = AtomicUsize::new(0);
+                    let outcome = scheduler.scope(|scope| {
+                        // Gives the others the time to find the seat taken.
+                        thread::yield_now();
+                        assert!(!busy.swap(true, Ordering::Relaxed), "two threads sit on one seat");
+                        scope.spawn_pinned(|_scope, _worker| busy.store(false, Ordering::Relaxed));
+                        scope.spawn(|_scope, _worker| {
+                            sum.fetch_add(1, Ordering::Relaxed);
+                        });
+                    });
+                    assert_eq!((outcome, sum.into_inner()), (Ok(()), 1));
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn schedulers_nest() {
+    let (outer, inner) = (scheduler(3), scheduler(2));
+    let together = Barrier::new(3);
+    let sum = AtomicUsize::new(0);
+    let outcome = outer.parallel_for(3, 1, |_range, on_outer| {
+        together.wait();
+        let index = on_outer.index();
+        for _round in 0..20 {
+            let outcome = inner.scope(|scope| {
+                scope.spawn(|_scope, on_inner| {
+                    assert!(on_inner.index() < 2);
+                    sum.fetch_add(1, Ordering::Relaxed);
+                });
+                // The thread sits in both, and is still the same worker of the outer one.
+                let again = outer.parallel_for(1, 1, |_range, worker| assert_eq!(worker.index(), index));
+                assert_eq!(again, Ok(()));
+            });
+            assert_eq!(outcome, Ok(()));
+        }
+    });
+    assert_eq!((outcome, sum.into_inner()), (Ok(()), 60));
+}
+
+#[test]
+fn a_scheduler_on_many_more_workers_than_cores_works() {
+    let scheduler = scheduler(64);
+    assert_intact(&scheduler);
+    let (visited, _ranges) = visits(&scheduler, 10_000, 3);
+    assert!(visited.iter().all(|&count| count == 1));
+}
+
+#[test]
+fn a_scheduler_needs_a_worker_and_takes_so_many() {
+    assert!(matches!(Scheduler::new(0), Err(SchedulerError::NoWorkers)));
+    assert!(matches!(Scheduler::new(usize::MAX), Err(SchedulerError::TooManyWorkers { workers: usize::MAX })));
+    assert!(Scheduler::with_available_parallelism().unwrap().workers() >= 1);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_dropped_scheduler_leaves_no_thread() {
+    /// How many threads of this process bear the name.
+    fn threads_named(name: &str) -> usize {
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+        // A thread of another test may end between being listed and being read.
+        let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
+        names.filter(|found| found.trim() == name).count()
+    }
+    // No other test has that many workers, so none but this one starts threads of that name.
+    let (workers, last) = (66, "drawloom-65");
+    for _scheduler in 0..200 {
+        let scheduler = scheduler(workers);
+        assert_eq!(scheduler.parallel_for(2, 1, |_range, _worker| {}), Ok(()));
+    }
+    assert_eq!(threads_named(last), 0);
+    let intact = scheduler(workers);
+    assert_intact(&intact);
+    assert_eq!(threads_named(last), 1);
+}

@@ -1,0 +1,94 @@
+//! Random trees of spawned jobs, pinned jobs, scopes and loops, against a plain recursion.
+
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+use drawloom::task::{Scheduler, Scope, Worker};
+
+/// What a random tree of jobs is made of. A subtree has a seed and a height.
+#[derive(Clone, Copy)]
+enum Branch {
+    Spawn(u64),
+    Pinned(u64),
+    Scope(u64),
+    Loop(usize, usize),
+}
+
+/// The branches that grow from a seed, by the generator SplitMix64.
+fn branches(seed: u64) -> impl Iterator<Item = Branch> {
+    let random = move |step: u64| {
+        let mixed = seed.wrapping_add(step.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    };
+    (1..=random(1) % 5).map(move |branch| {
+        let [kind, child, size] = [2, 3, 4].map(|step| random(5 * branch + step));
+        match kind % 5 {
+            0 | 1 => Branch::Spawn(child),
+            2 => Branch::Pinned(child),
+            3 => Branch::Scope(child),
+            _ => Branch::Loop((size % 300) as usize, (size / 300 % 20) as usize),
+        }
+    })
+}
+
+/// Grows the tree with jobs, scopes and loops, and counts the items of the loops and the ends of branches.
+fn plant<'scope>(
+    scheduler: &'scope Scheduler,
+    scope: &Scope<'scope>,
+    leaves: &'scope AtomicUsize,
+    seed: u64,
+    height: usize,
+) {
+    if height == 0 {
+        leaves.fetch_add(1, Ordering::Relaxed);
+        return;
+    }
+    for branch in branches(seed) {
+        match branch {
+            Branch::Spawn(seed) => scope.spawn(move |scope, _worker| plant(scheduler, scope, leaves, seed, height - 1)),
+            Branch::Pinned(seed) => {
+                scope.spawn_pinned(move |scope, _worker| plant(scheduler, scope, leaves, seed, height - 1));
+            }
+            Branch::Scope(seed) => {
+                scheduler.scope(|scope| plant(scheduler, scope, leaves, seed, height - 1)).unwrap();
+            }
+            Branch::Loop(length, chunk) => {
+                let visit = |range: Range<usize>, _worker: &Worker| {
+                    leaves.fetch_add(range.len(), Ordering::Relaxed);
+                };
+                scheduler.parallel_for(length, chunk, visit).unwrap();
+            }
+        }
+    }
+}
+
+/// What [`plant`] counts, without any job.
+fn leaves(seed: u64, height: usize) -> usize {
+    if height == 0 {
+        return 1;
+    }
+    let count = |branch| match branch {
+        Branch::Spawn(seed) | Branch::Pinned(seed) | Branch::Scope(seed) => leaves(seed, height - 1),
+        Branch::Loop(length, _chunk) => length,
+    };
+    branches(seed).map(count).sum()
+}
+
+/// Random trees on few and many workers. `DRAWLOOM_STRESS` is how many; without it, a short run.
+#[test]
+fn random_trees_of_jobs_count_what_a_plain_recursion_counts() {
+    let trees =
+        std::env::var("DRAWLOOM_STRESS").map_or(300, |trees| trees.parse().expect("DRAWLOOM_STRESS is a number"));
+    let schedulers = [1, 2, 4, 7].map(|workers| Scheduler::new(workers).unwrap());
+    for seed in 0..trees {
+        for scheduler in &schedulers {
+            let counted = AtomicUsize::new(0);
+            scheduler.scope(|scope| plant(scheduler, scope, &counted, seed, 6)).unwrap();
+            assert_eq!(counted.into_inner(), leaves(seed, 6), "seed {seed}, {} workers", scheduler.workers());
+        }
+    }
+}
