@@ -1,10 +1,10 @@
 //! The primitives that threads meet in, behind one switch.
 //!
-//! Everything in the crate that blocks, counts or hands work over takes its atomics, locks, threads and deques from here.
-//! Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with `--cfg drawloom_loom`
-//! they are those of loom, a model checker, so that the tests beside the code walk through the interleavings of their
-//! threads. Both sides have one shape: a lock returns its guard and cannot be poisoned, and a wait takes the guard and
-//! gives it back.
+//! Everything in the crate that blocks, counts or hands work over takes its atomics, locks, threads and deques from
+//! here. Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with
+//! `--cfg drawloom_loom` they are those of loom, a model checker, so that the tests beside the code walk through the
+//! interleavings of their threads. Both sides have one shape: a lock returns its guard and cannot be poisoned, and a
+//! wait takes the guard and gives it back.
 
 #[cfg(drawloom_loom)]
 pub(crate) use self::modelled::{Condvar, Deque, Mutex, Stealer};

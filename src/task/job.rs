@@ -20,14 +20,15 @@ use super::{
 #[error("a job panicked: {message}")]
 #[non_exhaustive]
 pub struct JobPanic {
-    /// What the panic said: its payload where that is a `&str` or a `String`, as with the `panic!` macro, and otherwise a
-    /// fixed text.
+    /// What the panic said: its payload where that is a `&str` or a `String`, as with the `panic!` macro, and otherwise
+    /// a fixed text.
     pub message: String,
 }
 
 /// Calls `call`, and makes an error of its panic.
 ///
-/// The closure need not be unwind safe: whoever goes on after the error has to see to it that nothing half-done is used.
+/// The closure need not be unwind safe: whoever goes on after the error has to see to it that nothing half-done is
+/// used.
 ///
 /// # Errors
 ///
@@ -48,8 +49,8 @@ pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
     })
 }
 
-/// Drops what is a user's and may panic at that, which then has nobody left to hear it. The payload of that second panic
-/// is leaked, as dropping it might panic as well, and so on.
+/// Drops what is a user's and may panic at that, which then has nobody left to hear it. The payload of that second
+/// panic is leaked, as dropping it might panic as well, and so on.
 pub(super) fn discard<T>(value: T) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(value))) {
         mem::forget(payload);
@@ -78,8 +79,8 @@ impl Job {
         Self { closure, scope }
     }
 
-    /// Runs the closure, and then counts it off: by then the call has returned or unwound, and the closure and all it had
-    /// captured are gone, so the scope may end.
+    /// Runs the closure, and then counts it off: by then the call has returned or unwound, and the closure and all it
+    /// had captured are gone, so the scope may end.
     pub(super) fn run(self, worker: &Worker) {
         let Self { closure, scope } = self;
         let scope = Scope::new(scope);

@@ -2,8 +2,9 @@
 //!
 //! # Memory ordering
 //!
-//! - `add` is relaxed. Whoever adds is counted itself, so the count is at least one before and after, and nobody can take
-//!   the addition for a release. The job that was added reaches its worker through a deque or a lock, which order it.
+//! - `add` is relaxed. Whoever adds is counted itself, so the count is at least one before and after, and nobody can
+//!   take the addition for a release. The job that was added reaches its worker through a deque or a lock, which order
+//!   it.
 //! - `finish` is a release: what a job did happens before its decrement. Every change of the count is a
 //!   read-modify-write, so all decrements lie in one release sequence, and the load that reads zero synchronises with
 //!   every one of them, not only with the last.

@@ -78,15 +78,15 @@
 //! # Panics in jobs
 //!
 //! The panic of a job, of a loop's body or of a scope's is caught. It harms no worker, and the call returns it as a
-//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the process
-//! ends on the spot, and no error names anything.
+//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the
+//! process ends on the spot, and no error names anything.
 //!
 //! # What it costs
 //!
-//! A spawned job is one allocation. A loop allocates per worker that joins it, not per chunk. Idle workers sleep and take
-//! no time from anybody; waking one costs the waker some microseconds, so a chunk should be worth more than that.
-//! A thread that waits for a scope runs other jobs meanwhile, on top of its stack. Jobs that open scopes in which
-//! jobs open scopes, without bound, need a stack without bound, as any recursion does.
+//! A spawned job is one allocation. A loop allocates per worker that joins it, not per chunk. Idle workers sleep and
+//! take no time from anybody; waking one costs the waker some microseconds, so a chunk should be worth more than that.
+//! A thread that waits for a scope runs other jobs meanwhile, on top of its stack. Jobs that open scopes in which jobs
+//! open scopes, without bound, need a stack without bound, as any recursion does.
 
 mod job;
 mod latch;

@@ -1,14 +1,14 @@
 //! One loop, run by as many workers as join it.
 //!
-//! A loop of a thousand chunks is not a thousand jobs. It is a *pass*: a ticket that counts the chunks taken, and one token,
-//! a job in some deque. Whoever comes across the token joins the pass: it puts the token back for the next one, if there is
-//! more than one chunk left, and takes chunks by ticket until there are none. So workers join in a chain, as far as there is
-//! work, and a chunk costs one addition.
+//! A loop of a thousand chunks is not a thousand jobs. It is a *pass*: a ticket that counts the chunks taken, and one
+//! token, a job in some deque. Whoever comes across the token joins the pass: it puts the token back for the next one,
+//! if there is more than one chunk left, and takes chunks by ticket until there are none. So workers join in a chain,
+//! as far as there is work, and a chunk costs one addition.
 //!
-//! A worker that waits inside a chunk, for a scope or a loop nested in it, may come across the token of the very pass it
-//! is in. It takes no second chunk on top of the first. Otherwise every chunk could come to lie on the stack of one
-//! thread, and the loop's body would be entered anew on a worker that is in the midst of it. It holds the token, and puts it
-//! back when it has finished its chunk.
+//! A worker that waits inside a chunk, for a scope or a loop nested in it, may come across the token of the very pass
+//! it is in. It takes no second chunk on top of the first. Otherwise every chunk could come to lie on the stack of one
+//! thread, and the loop's body would be entered anew on a worker that is in the midst of it. It holds the token, and
+//! puts it back when it has finished its chunk.
 //!
 //! # Memory ordering
 //!
@@ -127,7 +127,8 @@ mod tests {
         })
     }
 
-    /// Brings three workers, step by step, to where one waits inside a chunk and nothing is left but the token of its pass.
+    /// Brings three workers, step by step, to where one waits inside a chunk and nothing is left but the token of its
+    /// pass.
     #[test]
     fn a_worker_that_waits_inside_a_chunk_holds_the_token_and_passes_it_on_later() {
         let scheduler = Scheduler::new(3).unwrap();

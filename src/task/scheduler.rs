@@ -17,14 +17,14 @@ use super::{
 
 /// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it has to do with threads.
 ///
-/// The thread that calls [`scope`](Self::scope) or [`parallel_for`](Self::parallel_for) is a worker for the length of the
-/// call, so a scheduler of four workers starts three threads, which sleep as long as there is no work (L 3.3).
+/// The thread that calls [`scope`](Self::scope) or [`parallel_for`](Self::parallel_for) is a worker for the length of
+/// the call, so a scheduler of four workers starts three threads, which sleep as long as there is no work (L 3.3).
 ///
-/// Any number of threads may share a scheduler, but only one from outside is served at a time: the next one waits until the
-/// call of the first has returned. A call from within a job, on whichever worker, waits for nobody. It follows
-/// that a call waits for ever if the call it has to let pass waits for it in turn. That happens where a body or a job
-/// starts a thread that calls the same scheduler, and waits for this thread, or where a job of one scheduler calls a
-/// second one, and a job of that calls the first from a thread of the second.
+/// Any number of threads may share a scheduler, but only one from outside is served at a time: the next one waits until
+/// the call of the first has returned. A call from within a job, on whichever worker, waits for nobody. It follows that
+/// a call waits for ever if the call it has to let pass waits for it in turn. That happens where a body or a job starts
+/// a thread that calls the same scheduler, and waits for this thread, or where a job of one scheduler calls a second
+/// one, and a job of that calls the first from a thread of the second.
 ///
 /// Dropping the scheduler ends its threads and waits until they are gone.
 ///
@@ -49,14 +49,14 @@ impl Scheduler {
     /// The most workers a scheduler can have.
     pub const MOST_WORKERS: usize = 1024;
 
-    /// A scheduler of that many workers, the calling thread included: 1 starts no thread. There may be more workers than
-    /// the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
+    /// A scheduler of that many workers, the calling thread included: 1 starts no thread. There may be more workers
+    /// than the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
     ///
     /// # Errors
     ///
     /// [`SchedulerError::NoWorkers`] for 0 and [`SchedulerError::TooManyWorkers`] beyond
-    /// [`MOST_WORKERS`](Self::MOST_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those started
-    /// by then have ended when this returns.
+    /// [`MOST_WORKERS`](Self::MOST_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those
+    /// started by then have ended when this returns.
     pub fn new(workers: usize) -> Result<Self, SchedulerError> {
         Self::start(workers, |builder, body| builder.spawn(body))
     }
@@ -78,12 +78,13 @@ impl Scheduler {
     }
 
     /// Calls `body` with a scope, and returns what it returns when every job spawned in the scope has run and has been
-    /// dropped. Jobs may borrow all that outlives the call. While it waits, the thread runs jobs, not all of them its own.
+    /// dropped. Jobs may borrow all that outlives the call. While it waits, the thread runs jobs, not all of them its
+    /// own.
     ///
     /// # Errors
     ///
-    /// The first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler is as
-    /// good as new.
+    /// The first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler is
+    /// as good as new.
     pub fn scope<'scope, R>(&self, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
         self.seated(|worker| scope::open(worker, body))
     }

@@ -33,8 +33,8 @@ pub struct Scope<'scope> {
 }
 
 impl<'scope> Scope<'scope> {
-    /// A scope over the state. Its lifetime is right if it is the one that the state was opened with, or if nobody but a
-    /// job of this scope gets to see it, as such a job has been erased together with it.
+    /// A scope over the state. Its lifetime is right if it is the one that the state was opened with, or if nobody but
+    /// a job of this scope gets to see it, as such a job has been erased together with it.
     pub(super) fn new(state: Arc<ScopeState>) -> Self {
         Self { state, lifetime: PhantomData }
     }
@@ -42,8 +42,8 @@ impl<'scope> Scope<'scope> {
     /// Adds a job that any worker may run, in no particular order.
     ///
     /// It is queued with the worker this is called on, who runs the newest of its jobs first, while others take its
-    /// oldest. Called on a thread that is no worker of the scheduler just now, one that was lent the scope by the body or
-    /// a job, it falls to the thread that opened the scope.
+    /// oldest. Called on a thread that is no worker of the scheduler just now, one that was lent the scope by the body
+    /// or a job, it falls to the thread that opened the scope.
     pub fn spawn(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let job = self.job(job);
         match seat::current(&self.state.shared) {
@@ -72,10 +72,11 @@ impl<'scope> Scope<'scope> {
         // call through the other. That leaves two obligations.
         // 1. The closure is gone, run and dropped, before `'scope` ends. `'scope` outlives the call of `open` that made
         //    the state, as it is a parameter of that function. `open` returns only when the latch is released, and
-        //    cannot unwind before: it catches the panic of its body, and `Job::run` that of a job. The count that
-        //    is added below is taken off by `Job::run` after the closure is gone, and whoever spawns is counted itself: the
-        //    body until it has returned, a job until it has run, and nobody can keep the scope for longer, as both
-        //    are lent it for a lifetime of their own. A job that were lost would keep `open` waiting, not let it return.
+        //    cannot unwind before: it catches the panic of its body, and `Job::run` that of a job. The count that is
+        //    added below is taken off by `Job::run` after the closure is gone, and whoever spawns is counted itself:
+        //    the body until it has returned, a job until it has run, and nobody can keep the scope for longer, as both
+        //    are lent it for a lifetime of their own. A job that were lost would keep `open` waiting, not let it
+        //    return.
         // 2. The closure is called with a `Scope<'static>` where it was made for a `Scope<'scope>`. It takes it for the
         //    latter, and may, as a scope holds nothing of that lifetime. Nobody sees it as `Scope<'static>` but
         //    `Job::run`, which spawns nothing.
@@ -155,8 +156,8 @@ impl ScopeState {
 
 /// The jobs that only the owner of the scope runs, first in, first out.
 ///
-/// The count is only a hint, so it is relaxed: it saves the owner the lock where there is nothing. That a sleeping owner
-/// learns of a job is up to the fences of [`Sleep`](super::sleep::Sleep), and the lock orders the job itself.
+/// The count is only a hint, so it is relaxed: it saves the owner the lock where there is nothing. That a sleeping
+/// owner learns of a job is up to the fences of [`Sleep`](super::sleep::Sleep), and the lock orders the job itself.
 pub(super) struct Mailbox {
     count: AtomicUsize,
     jobs: Mutex<VecDeque<Job>>,

@@ -1,8 +1,8 @@
 //! Who is who: which worker of which scheduler a thread is just now.
 //!
 //! The threads a scheduler starts are its workers from 1 up for as long as they live. Worker 0 is a *seat*: the thread
-//! that calls the scheduler takes it for the length of the call. A thread can be a worker of several schedulers at once,
-//! if a job of the one calls the other, so what it is forms a stack.
+//! that calls the scheduler takes it for the length of the call. A thread can be a worker of several schedulers at
+//! once, if a job of the one calls the other, so what it is forms a stack.
 
 use std::{cell::RefCell, mem::ManuallyDrop, rc::Rc};
 
@@ -11,8 +11,8 @@ use crate::sync::{Arc, Condvar, Deque, Mutex, thread_local};
 use super::{job::Job, scheduler::Shared, worker::Worker};
 
 thread_local! {
-    /// What this thread is, the newest last. Without a destructor, so that a scheduler can be called from the destructor
-    /// of some other thread-local.
+    /// What this thread is, the newest last. Without a destructor, so that a scheduler can be called from the
+    /// destructor of some other thread-local.
     static SEATS: Seats = Seats::default();
 }
 

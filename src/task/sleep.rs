@@ -1,9 +1,10 @@
-//! Where workers sleep that find nothing to do, so that an idle scheduler costs no time, and how they are woken, so that
-//! no work waits for a worker that sleeps through it. Nobody pays a system call while nobody sleeps.
+//! Where workers sleep that find nothing to do, so that an idle scheduler costs no time, and how they are woken, so
+//! that no work waits for a worker that sleeps through it. Nobody pays a system call while nobody sleeps.
 //!
 //! # Protocol
 //!
-//! *Work* is whatever a worker may wait for: a job in somebody's deque, a pinned job, a released latch, the shutdown flag.
+//! *Work* is whatever a worker may wait for: a job in somebody's deque, a pinned job, a released latch, the shutdown
+//! flag.
 //!
 //! ```text
 //!  sleeper                                        waker
@@ -18,12 +19,12 @@
 //! # Proof
 //!
 //! **No wake-up is lost.** Both fences are sequentially consistent, so one of them comes first. Is it W2, then S3 comes
-//! after W1 and sees the work. Is it S2, then W3 comes after S1 and reads a count that has the sleeper in it, unless the
-//! sleeper has been taken off since. If it was taken off by itself, it is awake. If another waker took it off, it has
-//! been called or will be, and is going to look for work, with a fence of its own, before it can wait again. In either case it passes
-//! S2 again *after* W2, and S3 sees the work. If it is still on the list, W4 finds it, or, where any sleeper will do,
-//! another one that looks for work as well. One kind of sleeper does not: the owner of a scope that ended while it was
-//! called for something else. It passes the call on (`Worker::work`).
+//! after W1 and sees the work. Is it S2, then W3 comes after S1 and reads a count that has the sleeper in it, unless
+//! the sleeper has been taken off since. If it was taken off by itself, it is awake. If another waker took it off, it
+//! has been called or will be, and is going to look for work, with a fence of its own, before it can wait again. In
+//! either case it passes S2 again *after* W2, and S3 sees the work. If it is still on the list, W4 finds it, or, where
+//! any sleeper will do, another one that looks for work as well. One kind of sleeper does not: the owner of a scope
+//! that ended while it was called for something else. It passes the call on (`Worker::work`).
 //!
 //! **A call is neither lost nor left over.** Under the lock exactly one thread takes a sleeper off the list. Is that a
 //! waker, it calls once, and the sleeper waits for this one call even if it has seen work meanwhile. Is it the sleeper,
@@ -83,7 +84,8 @@ impl Sleep {
 
     /// Wakes every worker that sleeps. What they are woken for has been published.
     pub(super) fn wake_all(&self) {
-        // No fence: the lock is taken in any case, and whoever lies down after that sees what has been published before.
+        // No fence: the lock is taken in any case, and whoever lies down after that sees what has been published
+        // before.
         while let Some(sleeper) = self.take_off(last) {
             self.beds[sleeper].call();
         }

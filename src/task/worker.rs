@@ -19,11 +19,12 @@ const IDLE_ROUNDS: usize = if cfg!(drawloom_loom) { 0 } else { 16 };
 /// How many pauses of the processor lie between two looks.
 const PAUSES: usize = 16;
 
-/// The witness that code runs as a job of a scheduler: only there can a reference to it be had, and it stays on its thread.
+/// The witness that code runs as a job of a scheduler: only there can a reference to it be had, and it stays on its
+/// thread.
 ///
-/// No two threads are the same worker at the same time, so what an engine keeps once per [`index`](Self::index) is never
-/// shared between threads. But a job that opens a scope or a loop and waits in it may find itself interrupted by another
-/// job on the same worker, so such a thing should not stay borrowed over a wait.
+/// No two threads are the same worker at the same time, so what an engine keeps once per [`index`](Self::index) is
+/// never shared between threads. But a job that opens a scope or a loop and waits in it may find itself interrupted by
+/// another job on the same worker, so such a thing should not stay borrowed over a wait.
 ///
 /// ```compile_fail,E0277
 /// # let scheduler = drawloom::task::Scheduler::new(2)?;
@@ -56,8 +57,8 @@ impl Worker {
         }
     }
 
-    /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that called
-    /// the scheduler.
+    /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that
+    /// called the scheduler.
     pub fn index(&self) -> usize {
         self.index
     }
