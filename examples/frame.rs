@@ -37,17 +37,23 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let scene = load_scene(arguments)?;
-    match arguments.backend {
-        BackendName::Null => draw(arguments, &scene, NullBackend, |_| Ok(())),
+    let report = match arguments.backend {
+        BackendName::Null => draw(arguments, &scene, NullBackend, |_| Ok(()))?.1,
         BackendName::Noop => {
             let (device, queue) = adapter::noop_device()?;
-            draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)
+            draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?.1
         }
         BackendName::Wgpu => {
             let (device, queue) = adapter::device()?;
-            let submission = draw_and_keep(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?;
-            save(arguments, &submission.submission)
+            let (last, report) = draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?;
+            save(arguments, &last.submission)?;
+            report
         }
+    };
+    report.print();
+    match &arguments.report {
+        Some(path) => report.write(path),
+        None => Ok(()),
     }
 }
 
@@ -74,26 +80,17 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
         }
         camera.size = arguments.size.0;
     }
-    scene.duplicate_objects(arguments.copies.get());
+    scene.duplicate_objects(arguments.copies as usize);
     Ok(scene)
 }
 
+/// Draws all frames, and returns the last, and the report on all of them.
 fn draw<B: Backend>(
     arguments: &Arguments,
     scene: &Scene,
     backend: B,
     wait: impl Fn(&B::Submission) -> Result<(), drawloom::backend::BackendError>,
-) -> Result<(), Box<dyn Error>> {
-    draw_and_keep(arguments, scene, backend, wait).map(|_| ())
-}
-
-/// Draws all frames, reports on them, and returns the last.
-fn draw_and_keep<B: Backend>(
-    arguments: &Arguments,
-    scene: &Scene,
-    backend: B,
-    wait: impl Fn(&B::Submission) -> Result<(), drawloom::backend::BackendError>,
-) -> Result<Submitted<B>, Box<dyn Error>> {
+) -> Result<(Submitted<B>, Report), Box<dyn Error>> {
     let scheduler = Arc::new(match arguments.workers {
         Some(workers) => Scheduler::new(workers.get())?,
         None => Scheduler::with_available_parallelism()?,
@@ -102,10 +99,10 @@ fn draw_and_keep<B: Backend>(
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred().granularity(arguments.granularity.0).build(scheduler)?;
 
-    let frames = arguments.frames.get();
-    let progress = ProgressBar::new(frames as u64);
+    let frames = arguments.frames;
+    let progress = ProgressBar::new(u64::from(frames));
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left")?);
-    let mut measured: Vec<(Duration, FrameStatistics)> = Vec::with_capacity(frames);
+    let mut measured: Vec<(Duration, FrameStatistics)> = Vec::new();
     let mut last = None;
     for _ in 0..frames {
         let start = Instant::now();
@@ -121,11 +118,7 @@ fn draw_and_keep<B: Backend>(
     progress.finish_and_clear();
 
     let report = Report::new(renderer.backend().adapter(), arguments, workers, &measured);
-    report.print();
-    if let Some(path) = &arguments.report {
-        report.write(path)?;
-    }
-    last.ok_or_else(|| "no frame was drawn".into())
+    Ok((last.ok_or("no frame was drawn")?, report))
 }
 
 fn save(arguments: &Arguments, submission: &WgpuSubmission) -> Result<(), Box<dyn Error>> {

@@ -12,6 +12,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Handle<T> {
     index: u32,
     generation: u32,
+    /// Whose entry it is: the lower half of [`Slots::identity`].
+    collection: u32,
     kind: PhantomData<fn() -> T>,
 }
 
@@ -80,7 +82,8 @@ impl<T> Slots<T> {
         let entry = &mut self.entries[index as usize];
         entry.revision = revision;
         entry.value = Some(value);
-        Handle { index, generation: entry.generation, kind: PhantomData }
+        let generation = entry.generation;
+        self.handle(index, generation)
     }
 
     /// Takes an entry out; its handle is stale from here on.
@@ -88,7 +91,9 @@ impl<T> Slots<T> {
     /// # Errors
     /// If the handle is stale already.
     pub fn remove(&mut self, handle: Handle<T>) -> Result<T, StaleHandle> {
-        let entry = self.entries.get_mut(handle.index as usize).filter(|entry| entry.generation == handle.generation);
+        let belongs = self.belongs(handle);
+        let entry = self.entries.get_mut(handle.index as usize);
+        let entry = entry.filter(|entry| belongs && entry.generation == handle.generation);
         let Some((entry, value)) = entry.and_then(|entry| entry.value.take().map(|value| (&mut *entry, value))) else {
             return Err(handle.stale());
         };
@@ -110,7 +115,7 @@ impl<T> Slots<T> {
     pub fn get(&self, handle: Handle<T>) -> Result<&T, StaleHandle> {
         self.entries
             .get(handle.index as usize)
-            .filter(|entry| entry.generation == handle.generation)
+            .filter(|entry| self.belongs(handle) && entry.generation == handle.generation)
             .and_then(|entry| entry.value.as_ref())
             .ok_or_else(|| handle.stale())
     }
@@ -120,16 +125,11 @@ impl<T> Slots<T> {
     /// # Errors
     /// If the handle is stale.
     pub fn get_mut(&mut self, handle: Handle<T>) -> Result<&mut T, StaleHandle> {
+        self.get(handle)?;
         self.revision += 1;
-        let revision = self.revision;
-        self.entries
-            .get_mut(handle.index as usize)
-            .filter(|entry| entry.generation == handle.generation)
-            .and_then(|entry| {
-                entry.revision = revision;
-                entry.value.as_mut()
-            })
-            .ok_or_else(|| handle.stale())
+        let entry = &mut self.entries[handle.index as usize];
+        entry.revision = self.revision;
+        entry.value.as_mut().ok_or_else(|| handle.stale())
     }
 
     /// The number of entries.
@@ -155,9 +155,17 @@ impl<T> Slots<T> {
     /// The entries in slot order, each with the revision at which it last changed.
     pub fn iter_revised(&self) -> impl Iterator<Item = (Handle<T>, u64, &T)> {
         self.entries.iter().enumerate().filter_map(|(index, entry)| {
-            let handle = Handle { index: index as u32, generation: entry.generation, kind: PhantomData };
+            let handle = self.handle(index as u32, entry.generation);
             entry.value.as_ref().map(|value| (handle, entry.revision, value))
         })
+    }
+
+    fn handle(&self, index: u32, generation: u32) -> Handle<T> {
+        Handle { index, generation, collection: self.identity as u32, kind: PhantomData }
+    }
+
+    fn belongs(&self, handle: Handle<T>) -> bool {
+        handle.collection == self.identity as u32
     }
 
     /// A number that no other collection of this process has, so that a cache knows whose entries it holds.
@@ -195,7 +203,7 @@ impl<T> Copy for Handle<T> {}
 
 impl<T> PartialEq for Handle<T> {
     fn eq(&self, other: &Self) -> bool {
-        (self.index, self.generation) == (other.index, other.generation)
+        (self.index, self.generation, self.collection) == (other.index, other.generation, other.collection)
     }
 }
 
@@ -203,7 +211,7 @@ impl<T> Eq for Handle<T> {}
 
 impl<T> Hash for Handle<T> {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        (self.index, self.generation).hash(state);
+        (self.index, self.generation, self.collection).hash(state);
     }
 }
 
@@ -225,7 +233,9 @@ mod tests {
         let second = names.insert(String::from("second"));
         assert_eq!(second.index(), first.index());
         assert_eq!(names.get(first), Err(StaleHandle { kind: "String", index: 0, generation: 0 }));
+        let revision = names.revision();
         assert!(names.get_mut(first).is_err());
+        assert_eq!(names.revision(), revision);
         assert!(names.remove(first).is_err());
         assert_eq!(names.get(second), Ok(&String::from("second")));
         assert_eq!((names.len(), names.slot_count()), (1, 1));
@@ -258,5 +268,12 @@ mod tests {
         let mut many = Slots::new();
         let handles: Vec<_> = (0..3).map(|number| many.insert(number)).collect();
         assert!(Slots::<i32>::new().get(handles[2]).is_err());
+        let mut as_many = Slots::new();
+        for number in 0..3 {
+            as_many.insert(number);
+        }
+        assert!(as_many.get(handles[1]).is_err() && as_many.get_mut(handles[1]).is_err());
+        assert!(as_many.remove(handles[1]).is_err());
+        assert_eq!(as_many.len(), 3);
     }
 }

@@ -34,12 +34,12 @@ pub struct Arguments {
     pub granularity: JobSize,
 
     /// The scene's objects N times over, at the same place.
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub copies: NonZeroUsize,
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub copies: u32,
 
     /// How many frames to draw.
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub frames: NonZeroUsize,
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: u32,
 
     /// The picture's size in pixels.
     #[arg(long, value_name = "WxH", default_value = "960x540")]

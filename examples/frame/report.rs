@@ -93,7 +93,14 @@ impl Report {
             },
             cpu_ms: Cpu { median: milliseconds(*median), p95: milliseconds(at_share(0.95).0) },
             rejections: rejections
-                .map(|rejection| format!("{} × {}", rejection.count, rejection.reason.name()))
+                .map(|rejection| {
+                    format!(
+                        "{} × {}, the first is number {}",
+                        rejection.count,
+                        rejection.reason.name(),
+                        rejection.first
+                    )
+                })
                 .collect(),
         }
     }

@@ -9,7 +9,7 @@ use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::SceneRef;
 use crate::task::Worker;
-use crate::view::{ObjectRecord, Rejections, RenderView};
+use crate::view::{ObjectTable, Rejections, RenderView};
 
 #[cfg(feature = "wgpu")]
 pub use self::wgpu::{Picture, WgpuBackend, WgpuSubmission};
@@ -39,7 +39,7 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device cannot hold or make what the frame needs.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
-    /// Uploads objects, from the object `first` on.
+    /// Uploads objects: these blocks of the table.
     ///
     /// # Errors
     /// If the device refuses.
@@ -47,8 +47,8 @@ pub trait Backend: Send + Sync + 'static {
         &self,
         worker: &Worker,
         frame: &Self::Frame,
-        first: usize,
-        records: &[ObjectRecord],
+        objects: &ObjectTable,
+        blocks: Range<usize>,
     ) -> Result<(), BackendError>;
 
     /// Makes a pass of commands ready to be recorded: uploads which objects it draws, and makes the pipelines it needs.
@@ -86,7 +86,7 @@ pub trait Backend: Send + Sync + 'static {
     /// Submits a frame's passes in this order. Called on the device thread alone.
     ///
     /// # Errors
-    /// If the device refuses, or is lost.
+    /// If the device refuses.
     fn submit(&self, frame: Self::Frame, passes: Vec<(Pass, Self::Commands)>)
     -> Result<Self::Submission, BackendError>;
 }
@@ -148,16 +148,8 @@ pub enum BackendError {
         /// What the device says.
         message: String,
     },
-    /// A process needs what this backend does not have.
-    #[error("process {process:?} cannot be drawn by this backend: {reason}")]
-    Unsupported {
-        /// The process.
-        process: String,
-        /// Why.
-        reason: &'static str,
-    },
     /// The view's camera is too far from the world's origin, or its numbers are not finite.
-    #[error("view {view:?} is out of reach: its camera is more than 2^33 m from the origin")]
+    #[error("view {view:?} is out of reach: its camera is more than 2^32 m from the origin")]
     ViewOutOfReach {
         /// The view.
         view: String,

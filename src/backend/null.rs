@@ -1,6 +1,6 @@
 //! A backend without a device: it counts what it is given, and checks it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use parking_lot::Mutex;
@@ -10,7 +10,7 @@ use crate::process::{Draws, Pass};
 use crate::queue::{Batch, DrawList};
 use crate::scene::Mesh;
 use crate::task::Worker;
-use crate::view::{LightRecord, ObjectRecord, ViewRecord};
+use crate::view::{LightRecord, ObjectTable, ViewRecord};
 
 /// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
 /// that draw what is no mesh or that lie beyond a bundle, passes recorded twice or submitted out of order.
@@ -49,6 +49,9 @@ pub struct NullFrame {
     triangles: Vec<Option<usize>>,
     object_count: usize,
     uploaded: Mutex<BTreeSet<usize>>,
+    /// How many objects each pass was prepared for.
+    prepared: Mutex<BTreeMap<Pass, usize>>,
+    recorded: Mutex<BTreeSet<(Pass, usize)>>,
     finished: Mutex<BTreeSet<Pass>>,
 }
 
@@ -88,6 +91,8 @@ impl Backend for NullBackend {
             triangles,
             object_count: request.scene.object_count(),
             uploaded: Mutex::default(),
+            prepared: Mutex::default(),
+            recorded: Mutex::default(),
             finished: Mutex::default(),
         })
     }
@@ -96,19 +101,24 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        first: usize,
-        records: &[ObjectRecord],
+        objects: &ObjectTable,
+        blocks: Range<usize>,
     ) -> Result<(), BackendError> {
         let mut uploaded = frame.uploaded.lock();
-        for object in first..first + records.len() {
-            ensure(object < frame.object_count, || format!("object {object} is not in the scene"))?;
-            ensure(uploaded.insert(object), || format!("object {object} was uploaded twice"))?;
+        for block in blocks {
+            let (first, records) = objects.records_of(block);
+            for object in first..first + records.len() {
+                ensure(object < frame.object_count, || format!("object {object} is not in the scene"))?;
+                ensure(uploaded.insert(object), || format!("object {object} was uploaded twice"))?;
+            }
         }
         Ok(())
     }
 
     fn prepare(&self, _worker: &Worker, frame: &NullFrame, pass: Pass, list: &DrawList) -> Result<(), BackendError> {
         ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
+        let before = frame.prepared.lock().insert(pass, list.objects.len());
+        ensure(before.is_none(), || format!("{pass:?} was prepared twice"))?;
         ensure(list.objects.len() == list.commands.len(), || "objects and commands differ in number".to_owned())?;
         let ordered = list.commands.is_sorted_by_key(|command| (command.key, command.object));
         ensure(ordered, || "commands are not sorted".to_owned())?;
@@ -120,11 +130,16 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        _pass: Pass,
+        pass: Pass,
         list: &DrawList,
         bundles: Range<usize>,
     ) -> Result<Vec<NullBundle>, BackendError> {
-        bundles.map(|bundle| record_bundle(frame, list.bundle(bundle))).collect()
+        let record = |bundle| {
+            let first_time = frame.recorded.lock().insert((pass, bundle));
+            ensure(first_time, || format!("bundle {bundle} of {pass:?} was recorded twice"))?;
+            record_bundle(frame, list.bundle(bundle))
+        };
+        bundles.map(record).collect()
     }
 
     fn finish(
@@ -145,6 +160,8 @@ impl Backend for NullBackend {
             ensure(bundle.objects.start == end, || "bundles are not in order".to_owned())?;
             end = bundle.objects.end;
         }
+        let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
+        ensure(end == prepared, || format!("{end} of {prepared} objects recorded"))?;
         Ok(NullPass {
             process: process.name().to_owned(),
             view: pass.view,

@@ -2,7 +2,7 @@
 
 use crate::backend::BackendError;
 use crate::graph::{GraphProblem, NodeError, RunError};
-use crate::process::{PlanError, ProcessPanic};
+use crate::process::{PlanError, ProcessError};
 use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
 
@@ -72,9 +72,9 @@ pub enum FrameError {
         /// What the panic said.
         message: String,
     },
-    /// A process panicked when it was asked what it draws.
+    /// A process cannot say what it draws, or says it wrong.
     #[error(transparent)]
-    Process(#[from] ProcessPanic),
+    Process(#[from] ProcessError),
     /// A job outside of every process panicked.
     #[error(transparent)]
     Job(#[from] JobPanic),

@@ -110,7 +110,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
         let tables = frame.tables;
         match *self {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
-            Self::Upload => tables.objects.len().div_ceil(Blocks::<ObjectRecord>::SIZE),
+            Self::Upload => tables.objects.block_count(),
             Self::Fill { pass } => tables.visible[frame.request.passes[pass].view].count(),
             Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
             Self::Compact { .. }
@@ -156,7 +156,9 @@ impl Phase {
         let tables = frame.tables;
         match self {
             Self::Objects => tables.objects.fill(frame.request.scene, range),
-            Self::Upload => return upload(frame, range, worker),
+            Self::Upload => {
+                return frame.backend.upload_objects(worker, frame.frame, &tables.objects, range);
+            }
             Self::Visibility { view } => see(frame, view, range),
             Self::Compact { view } => tables.visible[view].compact(),
             Self::Fill { pass } => fill(frame, pass, range),
@@ -175,16 +177,6 @@ impl Phase {
         }
         Ok(())
     }
-}
-
-fn upload<B: Backend>(frame: &FrameContext<'_, B>, blocks: Range<usize>, worker: &Worker) -> Result<(), BackendError> {
-    let objects = &frame.tables.objects;
-    for block in blocks {
-        let first = block * Blocks::<ObjectRecord>::SIZE;
-        let count = (objects.len() - first).min(Blocks::<ObjectRecord>::SIZE);
-        frame.backend.upload_objects(worker, frame.frame, first, &objects.records().read(block)[..count])?;
-    }
-    Ok(())
 }
 
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
@@ -227,7 +219,9 @@ fn record<B: Backend>(
 
 fn finish<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, worker: &Worker) -> Result<(), BackendError> {
     let recording = &frame.recordings[pass];
-    let bundles: Vec<_> = std::mem::take(&mut *recording.bundles.lock()).into_iter().flatten().collect();
+    let bundles = std::mem::take(&mut *recording.bundles.lock()).into_iter().collect::<Option<Vec<_>>>();
+    let lost = || BackendError::BrokenRule { rule: "every bundle is recorded before its pass is finished".to_owned() };
+    let bundles = bundles.ok_or_else(lost)?;
     let finished = frame.backend.finish(worker, frame.frame, frame.request, frame.request.passes[pass], bundles)?;
     *recording.finished.lock() = Some(finished);
     Ok(())

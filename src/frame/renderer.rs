@@ -9,7 +9,7 @@ use super::phase::{FrameContext, FrameTables, Recording};
 use super::recorded::{Recorded, ViewQueue};
 use super::statistics::{Stage, StageClock};
 use super::{FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
-use crate::backend::{Backend, FrameRequest};
+use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::process::{Draws, FramePlan};
 use crate::queue::DrawList;
 use crate::scene::{Light, SceneError, SceneRef};
@@ -96,7 +96,7 @@ impl<B: Backend> Renderer<B> {
         };
         jobs.schedule.run(&self.scheduler, &context)?;
 
-        let queues = queues_of(&request, recordings);
+        let queues = queues_of(&request, recordings)?;
         let statistics = statistics_of(&request, &self.tables, &clock);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) })
     }
@@ -149,7 +149,7 @@ fn valid_lights(scene: &SceneRef<'_>, rejections: &Rejections) -> Vec<Light> {
     let valid = scene.lights.iter().enumerate().filter(|(index, light)| {
         let checked = light.check(*index);
         if let Err(error) = &checked {
-            tracing::warn!(target: "drawloom", %error, "light left out");
+            tracing::debug!(target: "drawloom", %error, "light left out");
             rejections.count(RejectionReason::InvalidLight, *index);
         }
         checked.is_ok()
@@ -158,12 +158,16 @@ fn valid_lights(scene: &SceneRef<'_>, rejections: &Rejections) -> Vec<Light> {
 }
 
 /// One queue for each view, its passes in the order of the plan.
-fn queues_of<B: Backend>(request: &FrameRequest<'_>, recordings: Vec<Recording<B>>) -> Vec<ViewQueue<B::Commands>> {
+fn queues_of<B: Backend>(
+    request: &FrameRequest<'_>,
+    recordings: Vec<Recording<B>>,
+) -> Result<Vec<ViewQueue<B::Commands>>, FrameError> {
     let mut queues: Vec<_> = (0..request.views.len()).map(|view| ViewQueue { view, passes: Vec::new() }).collect();
     for (&pass, recording) in request.passes.iter().zip(recordings) {
-        queues[pass.view].passes.extend(recording.into_finished().map(|finished| (pass, finished)));
+        let lost = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
+        queues[pass.view].passes.push((pass, recording.into_finished().ok_or_else(lost)?));
     }
-    queues
+    Ok(queues)
 }
 
 fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &StageClock) -> FrameStatistics {

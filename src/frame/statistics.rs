@@ -11,7 +11,7 @@ use crate::view::Rejection;
 pub struct FrameStatistics {
     /// Objects in the scene.
     pub objects: usize,
-    /// Lights in the scene.
+    /// Lights in the scene that can be; the others are among the rejections.
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,

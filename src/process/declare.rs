@@ -41,7 +41,7 @@ impl Declare {
         self.access(target, Access::Sample);
     }
 
-    /// A raw pass writes a target by commands of its own.
+    /// A raw pass writes a target by commands of its own; as a storage texture too, where [`Format::can_be_stored`].
     pub fn writes(&mut self, target: &str, format: Format) {
         self.access(target, Access::Write(format));
     }

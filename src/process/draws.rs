@@ -47,7 +47,8 @@ impl Default for CommandDraws<'_> {
     }
 }
 
-/// Every pixel of the view once, by one triangle.
+/// Every pixel of the view once, by one triangle that is infinitely far away: where the process tests depth, it shows where
+/// nothing else is.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FullScreen<'a> {
     /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is

@@ -24,6 +24,11 @@ impl Format {
         self == Self::Depth32Float
     }
 
+    /// Whether a compute shader can write it as a storage texture on every adapter.
+    pub fn can_be_stored(self) -> bool {
+        matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float)
+    }
+
     /// Bytes a pixel.
     pub fn bytes(self) -> usize {
         match self {

@@ -18,7 +18,7 @@ pub use draws::{CommandDraws, Draws, FullScreen};
 pub use format::Format;
 pub use geometry_buffer::GeometryBuffer;
 pub use lighting::Lighting;
-pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessPanic};
+pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, Resolved};
 pub use tone_mapping::ToneMapping;
@@ -62,10 +62,11 @@ pub trait RenderProcess: Send + Sync {
     /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
     fn name(&self) -> &str;
 
-    /// Says which views it is for, and what it reads and writes. Asked once, when the graph is built.
+    /// Says which views it is for, and what it reads and writes. Asked once, when the renderer is built.
     fn declare(&self, declare: &mut Declare);
 
-    /// Says what it draws. Asked once a frame; the shader must stay the same, the parameters may change.
+    /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending makes
+    /// new pipelines.
     fn draws(&self) -> Draws<'_>;
 }
 

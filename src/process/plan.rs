@@ -19,13 +19,13 @@ impl FramePlan {
     ///
     /// # Errors
     /// See [`PlanError`].
-    pub fn new(mut processes: Vec<Box<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
-        processes.sort_by_key(|process| declaration_of(process.as_ref()).views);
+    pub fn new(processes: Vec<Box<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
+        let mut declared = processes.into_iter().map(declared).collect::<Result<Vec<_>, _>>()?;
+        declared.sort_by_key(|planned| planned.declaration.views);
         let mut graph = FrameGraph::new();
         let mut added = Vec::new();
-        for process in processes {
+        for PlannedProcess { process, declaration } in declared {
             let name = process.name().to_owned();
-            let declaration = declaration_of(process.as_ref());
             let id = graph.add(name.clone(), PlannedProcess { process, declaration: declaration.clone() });
             for (target, access) in &declaration.accesses {
                 let resource = graph.resource(resource_name(declaration.views, target));
@@ -81,14 +81,9 @@ impl FramePlan {
     /// Asks every process what it draws in this frame, in order.
     ///
     /// # Errors
-    /// If one panics, naming it.
-    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessPanic> {
-        let ask = |planned: &'a PlannedProcess| {
-            let named =
-                |panic: JobPanic| ProcessPanic { process: planned.process.name().to_owned(), message: panic.message };
-            catch(|| planned.process.draws()).map_err(named)
-        };
-        self.processes.iter().map(ask).collect()
+    /// If one panics, or draws in a way that it did not declare.
+    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
+        self.processes.iter().map(PlannedProcess::draws).collect()
     }
 
     /// The targets that views of each kind have.
@@ -115,6 +110,29 @@ pub struct PlannedProcess {
     pub declaration: Declaration,
 }
 
+impl PlannedProcess {
+    fn draws(&self) -> Result<Draws<'_>, ProcessError> {
+        let process = || self.process.name().to_owned();
+        let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
+        let draws = catch(|| self.process.draws()).map_err(panicked)?;
+        let raw = match draws {
+            Draws::Commands(_) | Draws::FullScreen(_) => false,
+            #[cfg(feature = "wgpu")]
+            Draws::Raw(_) => true,
+        };
+        let fits = |access: &Access| match access {
+            Access::ClearColor(..) | Access::DrawOver | Access::ClearDepth(_) | Access::TestDepth | Access::Sample => {
+                !raw
+            }
+            Access::Write(_) | Access::Change | Access::Read => raw,
+        };
+        match self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
+            Some((target, _)) => Err(ProcessError::Misdeclared { process: process(), target: target.clone() }),
+            None => Ok(draws),
+        }
+    }
+}
+
 /// A target that each view of one kind has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlannedTarget {
@@ -124,8 +142,8 @@ pub struct PlannedTarget {
     pub views: ViewKind,
     /// Its format.
     pub format: Format,
-    /// Whether a process draws into it.
-    pub drawn: bool,
+    /// Whether a raw pass may write it as a storage texture.
+    pub stored: bool,
 }
 
 /// One process in one view: what is recorded as a unit, and finished on one worker.
@@ -172,25 +190,54 @@ pub enum PlanError {
         /// Its format.
         format: Format,
     },
+    /// A process has two depth targets.
+    #[error("process {process:?} has more than one depth target")]
+    TwoDepths {
+        /// The process.
+        process: String,
+    },
+    /// A process could not say what it reads and writes.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
     /// No process is left, because none leads to an output.
     #[error("no process leads to an output")]
     Empty,
 }
 
-/// A process panicked when it was asked what it draws.
+/// What is wrong with what a process says of itself.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("process {process:?} panicked when it was asked what it draws: {message}")]
-pub struct ProcessPanic {
-    /// The process.
-    pub process: String,
-    /// What the panic said.
-    pub message: String,
+#[non_exhaustive]
+pub enum ProcessError {
+    /// It panicked when it was asked.
+    #[error("process {process:?} panicked when it was asked what it does: {message}")]
+    Panicked {
+        /// The process.
+        process: String,
+        /// What the panic said.
+        message: String,
+    },
+    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads one
+    /// by commands of its own.
+    #[error("process {process:?} does not use target {target:?} in the way that it declares")]
+    Misdeclared {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+    },
 }
 
-fn declaration_of(process: &dyn RenderProcess) -> Declaration {
+/// Asks a process once for what it reads and writes.
+fn declared(process: Box<dyn RenderProcess>) -> Result<PlannedProcess, PlanError> {
     let mut declare = Declare::default();
-    process.declare(&mut declare);
-    declare.finish()
+    catch(|| process.declare(&mut declare))
+        .map_err(|panic| ProcessError::Panicked { process: process.name().to_owned(), message: panic.message })?;
+    let declaration = declare.finish();
+    let is_depth = |(_, access): &&(String, Access)| matches!(access, Access::ClearDepth(_) | Access::TestDepth);
+    if declaration.accesses.iter().filter(is_depth).count() > 1 {
+        return Err(PlanError::TwoDepths { process: process.name().to_owned() });
+    }
+    Ok(PlannedProcess { process, declaration })
 }
 
 /// Views of different kinds have different targets, even where their names are the same.
@@ -216,7 +263,7 @@ fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanEr
                 return Err(PlanError::TwoFormats { target: target.clone(), first: known.format, second: format });
             }
             Some(_) => {}
-            None => targets.push(PlannedTarget { name: target.clone(), views, format, drawn: false }),
+            None => targets.push(PlannedTarget { name: target.clone(), views, format, stored: false }),
         }
     }
     for (planned, target, access) in accesses() {
@@ -229,7 +276,7 @@ fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanEr
             Access::ClearDepth(_) | Access::TestDepth => Some(true),
             _ => None,
         };
-        known.drawn |= wants_depth.is_some();
+        known.stored |= matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored();
         if wants_depth.is_some_and(|depth| depth != known.format.is_depth()) {
             let process = planned.process.name().to_owned();
             return Err(PlanError::WrongFormat { process, target: target.clone(), format: known.format });

@@ -7,7 +7,9 @@ struct Parameters {
 
 @fragment
 fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
-    let radiance = textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb * parameters.exposure;
+    // What several processes added up may be past the end of half floats, and then it is infinite.
+    let sum = min(textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb, vec3<f32>(65504.0));
+    let radiance = min(sum * parameters.exposure, vec3<f32>(65504.0));
     return vec4<f32>(filmic(radiance), 1.0);
 }
 

@@ -49,7 +49,7 @@ impl Fill<'_> {
     /// Writes one slot of `commands` for each visible object whose rank is in `ranks`; what the process does not draw
     /// becomes [`RenderCommand::NOTHING`].
     pub fn run(&self, ranks: Range<usize>, commands: &Blocks<RenderCommand>) {
-        let forward = self.view.camera.orientation * Vec3::NEG_Z;
+        let forward = self.view.camera.orientation.normalize() * Vec3::NEG_Z;
         for (block, part) in Blocks::<RenderCommand>::parts(ranks) {
             let mut slots = commands.write(block);
             // Visible objects come in order, so the table's blocks are changed seldom.

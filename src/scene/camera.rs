@@ -3,6 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::SceneError;
+use super::scene_ref::is_unit;
 
 /// A perspective camera: it looks along its own −Z, +Y is up, +X to the right. Its far plane is infinitely far away.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +14,7 @@ pub struct Camera {
     pub position: DVec3,
     /// From camera space to the world; of unit length.
     pub orientation: Quat,
-    /// The angle between the picture's lower and upper edge, in radians, between 0 and π.
+    /// The angle between the picture's lower and upper edge, in radians, from a ten-thousandth of a degree to just below π.
     pub field_of_view: f32,
     /// The distance of the near plane, in metres, above 0.
     pub near: f32,
@@ -80,10 +81,10 @@ impl Camera {
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         let reason = if !self.position.is_finite() {
             "its position is not finite"
-        } else if !self.orientation.is_finite() || !self.orientation.is_normalized() {
+        } else if !is_unit(self.orientation.length_squared()) {
             "its orientation is not of unit length"
-        } else if !(self.field_of_view > 0.0 && self.field_of_view < std::f32::consts::PI) {
-            "its field of view is not between 0 and 180 degrees"
+        } else if !(self.field_of_view >= NARROWEST && self.field_of_view < std::f32::consts::PI) {
+            "its field of view is not between 0.0001 and 180 degrees"
         } else if !(self.near > 0.0 && self.near.is_finite()) {
             "its near plane is not a positive distance"
         } else {
@@ -92,3 +93,6 @@ impl Camera {
         Err(SceneError::InvalidCamera { camera: self.name.clone(), reason })
     }
 }
+
+/// The narrowest field of view in radians: some 2 m at a million metres. Far below it the projection leaves the range of f32.
+const NARROWEST: f32 = 1.7e-6;

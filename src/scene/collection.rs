@@ -10,7 +10,7 @@ use crate::handle::{Handle, Slots, StaleHandle};
 /// between frames.
 #[derive(Debug, Default)]
 pub struct Scene {
-    /// A main view for each.
+    /// A view for each.
     pub cameras: Vec<Camera>,
     /// The lights.
     pub lights: Vec<Light>,
@@ -197,7 +197,10 @@ impl Scene {
         let meshes_before = self.assets.meshes.revision();
         self.assets.replace(handle, asset)?;
         if self.assets.meshes.revision() != meshes_before {
-            for (bounds, &mesh) in self.bounds.iter_mut().zip(&self.meshes) {
+            // It was a mesh: what objects copied of it is renewed.
+            for (bounds, &mesh) in
+                self.bounds.iter_mut().zip(&self.meshes).filter(|(_, mesh)| mesh.index() == handle.index())
+            {
                 if let Ok(mesh) = self.assets.get(mesh) {
                     *bounds = mesh.bounds();
                 }

@@ -5,6 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 use glam::{DVec3, Vec3};
 
 use super::SceneError;
+use super::scene_ref::is_unit;
 
 /// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
 ///
@@ -88,7 +89,7 @@ impl Light {
 }
 
 fn direction_problem(direction: Vec3) -> Option<&'static str> {
-    (!direction.is_finite() || !direction.is_normalized()).then_some("its direction is not of unit length")
+    (!is_unit(direction.length_squared())).then_some("its direction is not of unit length")
 }
 
 fn color_problem(color: Vec3) -> Option<&'static str> {
@@ -107,5 +108,8 @@ fn place_problem(position: DVec3, range: f32) -> Option<&'static str> {
 
 fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
     let ordered = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
-    (!ordered).then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees")
+    // Shaders fade between the cosines, which must differ.
+    let distinct = inner.cos() > outer.cos();
+    (!ordered || !distinct)
+        .then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees, or too close to fade")
 }

@@ -12,7 +12,7 @@ use crate::handle::Handle;
 /// [`Renderer::record`](crate::Renderer::record) returns (L 3).
 #[derive(Clone, Copy, Debug)]
 pub struct SceneRef<'a> {
-    /// Where each object's origin is in the world, in metres. Anywhere up to 8.5 million kilometres from the world's origin.
+    /// Where each object's origin is in the world, in metres. Anywhere up to 2³² m, 4.3 million kilometres, from the world's origin.
     pub positions: &'a [DVec3],
     /// From object space to the world's axes; of unit length.
     pub orientations: &'a [Quat],
@@ -28,7 +28,7 @@ pub struct SceneRef<'a> {
     pub assets: &'a Assets,
     /// The lights.
     pub lights: &'a [Light],
-    /// A main view for each (M 10.4).
+    /// A view for each (M 10.4).
     pub cameras: &'a [Camera],
     /// Radiance that reaches every surface from everywhere, linear: a surface of diffuse 1 then looks just as bright.
     pub ambient: Vec3,
@@ -65,8 +65,12 @@ impl SceneRef<'_> {
     }
 }
 
+/// Whether the square of a length is that of a unit vector or quaternion. What an engine's own arithmetic has turned many
+/// times may have drifted by a thousandth, and is brought back to unit length where it is used.
+pub(super) fn is_unit(length_squared: f32) -> bool {
+    (length_squared - 1.0).abs() < 2e-3
+}
+
 pub(super) fn transform_is_valid(position: DVec3, orientation: Quat, scale: Vec3) -> bool {
-    // A quaternion from an engine's own arithmetic may have drifted; a thousandth in length is a thousandth in size.
-    let length_squared = orientation.length_squared();
-    position.is_finite() && scale.is_finite() && (length_squared - 1.0).abs() < 2e-3
+    position.is_finite() && scale.is_finite() && is_unit(orientation.length_squared())
 }

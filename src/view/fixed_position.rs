@@ -11,16 +11,18 @@ use glam::DVec3;
 pub struct FixedPosition([i64; 3]);
 
 impl FixedPosition {
-    /// The farthest coordinate in metres: 2³³, about 8.6 million kilometres.
-    pub const REACH: f64 = 8_589_934_592.0;
+    /// The farthest coordinate in metres: 2³², about 4.3 million kilometres. The difference of any two such positions fits
+    /// into 64 bits too.
+    pub const REACH: f64 = 4_294_967_296.0;
 
     const STEPS_PER_METRE: f64 = 1_073_741_824.0;
 
-    /// The position, each coordinate cut to a whole step towards zero; `None` where one is not finite or beyond
-    /// [`FixedPosition::REACH`].
+    /// The nearest fixed-point position; `None` where a coordinate is not finite or beyond [`FixedPosition::REACH`].
     pub fn new(position: DVec3) -> Option<Self> {
         let within = position.is_finite() && position.abs().max_element() < Self::REACH;
-        within.then(|| Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| steps as i64)))
+        within.then(|| {
+            Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| (steps + 0.5_f64.copysign(steps)) as i64))
+        })
     }
 
     /// Lower and upper 32 bits of each coordinate.
@@ -55,16 +57,23 @@ mod tests {
     proptest! {
         #[test]
         fn differences_are_as_exact_as_f32_can_say(
-            place in -8.5e9..8.5e9_f64, sign in prop::bool::ANY, exponent in -9.0..9.0_f64,
+            place in -4.29e9..4.29e9_f64, sign in prop::bool::ANY, exponent in -9.0..9.93_f64,
         ) {
             let offset = if sign { 10_f64.powf(exponent) } else { -10_f64.powf(exponent) };
-            let other = (place + offset).clamp(-8.58e9, 8.58e9);
+            let other = (place + offset).clamp(-4.29e9, 4.29e9);
             let (camera, object) = (DVec3::splat(place), DVec3::splat(other));
             let found = difference(FixedPosition::new(object).unwrap(), FixedPosition::new(camera).unwrap());
             let exact = other - place;
-            let bound = 2_f64.powi(-29) + exact.abs() * 2_f64.powi(-22);
+            let bound = 2_f64.powi(-30) + exact.abs() * 2_f64.powi(-22);
             prop_assert!((f64::from(found[0]) - exact).abs() <= bound, "{} for {exact}", found[0]);
         }
+    }
+
+    #[test]
+    fn opposite_corners_of_the_world_are_as_far_apart_as_they_are() {
+        let (one, other) = (DVec3::splat(-4.29e9), DVec3::splat(4.29e9));
+        let found = difference(FixedPosition::new(other).unwrap(), FixedPosition::new(one).unwrap());
+        assert!(found.iter().all(|&distance| (f64::from(distance) - 8.58e9).abs() < 1024.0), "{found:?}");
     }
 
     #[test]
@@ -72,6 +81,6 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY, FixedPosition::REACH, -1e300] {
             assert_eq!(FixedPosition::new(DVec3::new(0.0, bad, 0.0)), None);
         }
-        assert!(FixedPosition::new(DVec3::splat(-8.5e9)).is_some());
+        assert!(FixedPosition::new(DVec3::splat(-4.29e9)).is_some());
     }
 }

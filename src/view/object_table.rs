@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use glam::DVec3;
+use parking_lot::{MappedRwLockReadGuard, RwLockReadGuard};
 
 use super::{FixedPosition, RejectionReason, Rejections};
 use crate::blocks::Blocks;
@@ -59,9 +60,19 @@ impl ObjectTable {
         self.length == 0
     }
 
-    /// What is uploaded, 64 bytes an object.
-    pub fn records(&self) -> &Blocks<ObjectRecord> {
-        &self.records
+    /// The number of blocks that the objects fill.
+    pub fn block_count(&self) -> usize {
+        self.length.div_ceil(Blocks::<ObjectRecord>::SIZE)
+    }
+
+    /// What is uploaded, 64 bytes an object: the first object of a block, and the records of all of them.
+    ///
+    /// # Panics
+    /// If there is no such block.
+    pub fn records_of(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [ObjectRecord]>) {
+        let first = block * Blocks::<ObjectRecord>::SIZE;
+        let count = (self.length - first).min(Blocks::<ObjectRecord>::SIZE);
+        (first, RwLockReadGuard::map(self.records.read(block), |records| &records[..count]))
     }
 
     /// Where each object is.

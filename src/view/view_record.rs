@@ -90,7 +90,7 @@ impl LightRecord {
         let relative = |position: DVec3| (position - origin).as_vec3();
         match *light {
             Light::Directional { direction, illuminance } => {
-                Self { kind: 0, direction, intensity: illuminance, ..nothing }
+                Self { kind: 0, direction: direction.normalize(), intensity: illuminance, ..nothing }
             }
             Light::Point { position, intensity, range } => {
                 Self { kind: 1, position: relative(position), intensity, range, ..nothing }
@@ -98,16 +98,21 @@ impl LightRecord {
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle } => Self {
                 kind: 2,
                 position: relative(position),
-                direction,
+                direction: direction.normalize(),
                 intensity,
                 range,
                 cone_begin: inner_angle.cos(),
                 cone_end: outer_angle.cos(),
                 ..nothing
             },
-            Light::Hemispherical { position, direction, intensity, range } => {
-                Self { kind: 3, position: relative(position), direction, intensity, range, ..nothing }
-            }
+            Light::Hemispherical { position, direction, intensity, range } => Self {
+                kind: 3,
+                position: relative(position),
+                direction: direction.normalize(),
+                intensity,
+                range,
+                ..nothing
+            },
         }
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use drawloom::backend::NullBackend;
-use drawloom::process::{Declare, Draws, FullScreen, RenderProcess};
+use drawloom::process::{Declare, Draws, FullScreen, ProcessError, RenderProcess};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 
@@ -47,9 +47,9 @@ fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_runs() {
                 assert!(!broken);
                 assert_eq!(submitter.submit(recorded).unwrap().submission.passes.len(), 8);
             }
-            Err(FrameError::Process(panic)) => {
+            Err(FrameError::Process(ProcessError::Panicked { process, message })) => {
                 assert!(broken);
-                assert_eq!((panic.process.as_str(), panic.message.as_str()), ("fragile", "the glass is broken"));
+                assert_eq!((process.as_str(), message.as_str()), ("fragile", "the glass is broken"));
             }
             Err(other) => panic!("{other}"),
         }

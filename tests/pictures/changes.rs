@@ -2,11 +2,12 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Texture, Topology};
+use drawloom::view::RejectionReason;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::assert_different;
-use crate::scenes::{cube, field, square};
+use crate::scenes::{cube, field, square, textured};
 use crate::studio::{Studio, draw};
 
 pub const CASES: &[Case] = &[
@@ -17,6 +18,7 @@ pub const CASES: &[Case] = &[
     ("a_frame_that_is_dropped_leaves_no_trace", dropped),
     ("another_scene_takes_the_place_of_the_first", another_scene),
     ("views_come_and_go", views_come_and_go),
+    ("a_removed_texture_is_counted_in_every_frame", removed_texture),
 ];
 
 fn resized() -> Result<(), Failed> {
@@ -126,11 +128,31 @@ fn dropped() -> Result<(), Failed> {
 fn another_scene() -> Result<(), Failed> {
     let mut studio = Studio::new()?;
     studio.draw(&field(100))?;
-    // The same handles, with other things behind them.
-    let mut scene = field(100);
-    let mesh = scene.as_scene_ref().meshes[0];
-    scene.replace(mesh, square(Topology::TriangleList))?;
+    // The same slots, in collections that have changed as often, with other things in them.
+    let with = |mesh: Mesh| -> Result<Scene, Failed> {
+        let mut scene = field(0);
+        let (mesh, material) = (scene.add(mesh)?, scene.add(Material::default())?);
+        scene.add_object(RenderObject { scale: Vec3::splat(3.0), ..RenderObject::new(mesh, material, DVec3::ZERO) })?;
+        Ok(scene)
+    };
+    studio.draw(&with(cube())?)?;
+    let scene = with(square(Topology::TriangleList))?;
     if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("it is mixed with the first".into()) }
+}
+
+fn removed_texture() -> Result<(), Failed> {
+    let (mut scene, textures) = textured(3);
+    let mut studio = Studio::new()?;
+    scene.remove(textures[1])?;
+    for _ in 0..2 {
+        let recorded = studio.record(&scene)?;
+        let told = recorded.statistics().rejections.iter();
+        let told: Vec<_> = told.map(|rejection| (rejection.reason, rejection.count)).collect();
+        if told != [(RejectionReason::StaleTexture, 1)] {
+            return Err(format!("{told:?}").into());
+        }
+    }
+    Ok(())
 }
 
 fn views_come_and_go() -> Result<(), Failed> {

@@ -4,16 +4,20 @@ use std::sync::Arc;
 
 use drawloom::backend::{BackendError, WgpuBackend};
 use drawloom::task::Scheduler;
+use drawloom::view::{Rejection, RejectionReason};
 use drawloom::{Granularity, Renderer, wgpu};
 use libtest_mimic::Failed;
 
-use crate::scenes::field;
+use crate::scenes::{field, textured};
 use crate::{Case, adapter};
 
 pub const CASES: &[Case] = &[
     ("noop_takes_every_frame", noop),
     ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
+    ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
+    ("a_lost_device_is_an_error", lost_device),
+    ("textures_beyond_the_devices_layers_are_counted", many_textures),
 ];
 
 fn noop() -> Result<(), Failed> {
@@ -53,6 +57,62 @@ fn large_picture() -> Result<(), Failed> {
     match renderer.record(scene.as_scene_ref()).err() {
         Some(drawloom::FrameError::Backend(BackendError::Limit { needed: 5000, .. })) => Ok(()),
         other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn many_objects() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let (few, mut many) = (field(1000), field(1000));
+    many.duplicate_objects(WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64 / 1000 + 1);
+    for scene in [&few, &many, &many, &few] {
+        let refused = match renderer.record(scene.as_scene_ref()) {
+            Ok(recorded) => {
+                submitter.submit(recorded)?;
+                false
+            }
+            Err(drawloom::FrameError::Backend(BackendError::Limit { limit, .. })) => limit.contains("storage_buffer"),
+            Err(other) => return Err(other.into()),
+        };
+        if refused != (scene.object_count() > 1000) {
+            return Err(format!("{} objects, refused: {refused}", scene.object_count()).into());
+        }
+    }
+    Ok(())
+}
+
+fn many_textures() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    let layers = device.limits().max_texture_array_layers;
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let (mut renderer, _) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let recorded = renderer.record(textured(layers + 2).0.as_scene_ref())?;
+    match recorded.statistics().rejections.as_slice() {
+        [Rejection { reason: RejectionReason::TextureLimit, count: 2, .. }] => Ok(()),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn lost_device() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let backend = WgpuBackend::new(device.clone(), queue)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred().build(scheduler)?;
+    let scene = field(500);
+    submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
+    let recorded = renderer.record(scene.as_scene_ref())?;
+    device.destroy();
+    if let Ok(submitted) = submitter.submit(recorded) {
+        match (submitted.submission.wait(), submitted.submission.read(0, "picture")) {
+            (Err(BackendError::DeviceLost { .. }), Err(BackendError::DeviceLost { .. })) => {}
+            other => return Err(format!("{other:?}").into()),
+        }
+    }
+    match renderer.record(scene.as_scene_ref()) {
+        Err(drawloom::FrameError::Panicked { phase, message }) => Err(format!("{phase} panicked: {message}").into()),
+        Err(_) => Ok(()),
+        Ok(_) => Err("a frame was recorded on a lost device".into()),
     }
 }
 

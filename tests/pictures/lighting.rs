@@ -18,6 +18,7 @@ pub const CASES: &[Case] = &[
     ("a_hemispherical_light_falls_off_with_the_cosine", hemispherical),
     ("ambient_light_and_emission_add_up", ambient_and_emission),
     ("the_background_is_where_nothing_is", background),
+    ("a_light_that_cannot_be_lights_nothing", invalid_light),
 ];
 
 const DIFFUSE: f64 = 0.5;
@@ -119,6 +120,15 @@ fn ambient_and_emission() -> Result<(), Failed> {
     })?;
     let diffuse = ((188.0 / 255.0 + 0.055) / 1.055_f64).powf(2.4);
     assert_color(found, tone_mapped([0.4 * diffuse, 0.2 * diffuse + 0.1, 0.3]))
+}
+
+fn invalid_light() -> Result<(), Failed> {
+    let without = middle_of_wall(None, |scene| scene.ambient = Vec3::splat(0.2))?;
+    for intensity in [f32::INFINITY, -5.0] {
+        let light = Light::Point { position: DVec3::Z, intensity: Vec3::splat(intensity), range: 5.0 };
+        assert_color(middle_of_wall(Some(light), |scene| scene.ambient = Vec3::splat(0.2))?, without)?;
+    }
+    Ok(())
 }
 
 fn background() -> Result<(), Failed> {

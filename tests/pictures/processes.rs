@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, RawPass, RenderProcess, Resolved,
+    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, GeometryBuffer, RawPass, RenderProcess, Resolved,
+    ToneMapping,
 };
 use drawloom::queue::Selection;
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
@@ -15,7 +16,7 @@ use drawloom::{FrameError, wgpu};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::assert_color;
+use crate::judge::{assert_color, tone_mapped};
 use crate::scenes::{field, sized, square};
 use crate::studio::{Studio, pixel};
 
@@ -24,7 +25,13 @@ pub const CASES: &[Case] = &[
     ("blended_objects_go_back_to_front", back_to_front),
     ("parameters_change_from_frame_to_frame", parameters),
     ("a_raw_pass_writes_a_target", raw_pass),
+    ("what_a_process_draws_may_change_from_frame_to_frame", other_draws),
+    ("a_full_screen_pass_that_tests_depth_shows_where_nothing_is", behind_everything),
+    ("blended_objects_hide_nothing_behind_them", blended_leaves_depth),
+    ("exposure_brightens", exposure),
     ("a_shader_that_does_not_compile_is_named", broken_shader),
+    ("a_shader_without_its_entry_point_is_named_in_every_frame", missing_entry_point),
+    ("too_few_parameters_are_named", short_parameters),
     ("a_pass_that_the_device_refuses_is_named", refused_pass),
     ("a_raw_pass_that_fails_or_panics_is_named", failing_raw_pass),
 ];
@@ -231,6 +238,140 @@ fn raw_pass() -> Result<(), Failed> {
     let recorded = studio.record(&panes(&[])?)?;
     let picture = studio.submit(recorded)?.read(0, "raw")?;
     assert_color(pixel(&picture, 5, 5), [255, 255, 0])
+}
+
+/// Draws one thing, then another.
+struct Changing {
+    step: Arc<AtomicU32>,
+}
+
+impl RenderProcess for Changing {
+    fn name(&self) -> &str {
+        "changing"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("changing", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 0.5, 1.0]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let red =
+            "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> { return vec4(1.0, 0.0, 0.0, 0.5); }";
+        let green =
+            "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> { return vec4(0.0, 1.0, 0.0, 0.5); }";
+        match self.step.load(Ordering::Relaxed) {
+            0 => Draws::FullScreen(FullScreen { shader: red, ..FullScreen::default() }),
+            1 => Draws::FullScreen(FullScreen { shader: green, ..FullScreen::default() }),
+            2 => Draws::FullScreen(FullScreen { shader: red, blend: Blend::Additive, ..FullScreen::default() }),
+            _ => plain_color(Selection::Opaque),
+        }
+    }
+}
+
+fn other_draws() -> Result<(), Failed> {
+    let step = Arc::new(AtomicU32::new(0));
+    let changing = Changing { step: Arc::clone(&step) };
+    let mut studio = Studio::with(2, |builder| builder.process(changing).output("changing"))?;
+    let scene = panes(&[(0.0, Vec3::ONE, Blend::None)])?;
+    let expected = [
+        ([255, 0, 0], [255, 0, 0]),
+        ([0, 255, 0], [0, 255, 0]),
+        ([255, 0, 128], [255, 0, 128]),
+        ([255; 3], [0, 0, 128]),
+    ];
+    for (index, (middle, corner)) in
+        [(0, expected[0]), (1, expected[1]), (2, expected[2]), (3, expected[3]), (0, expected[0])]
+    {
+        step.store(index, Ordering::Relaxed);
+        let recorded = studio.record(&scene)?;
+        let picture = studio.submit(recorded)?.read(0, "changing")?;
+        assert_color(pixel(&picture, 16, 16), middle)?;
+        assert_color(pixel(&picture, 0, 0), corner)?;
+    }
+    Ok(())
+}
+
+fn behind_everything() -> Result<(), Failed> {
+    let sky = Made {
+        name: "sky",
+        declare: |declare| {
+            declare.draws_over("plain");
+            declare.tests_depth("plain depth");
+        },
+        draws: || {
+            Draws::FullScreen(FullScreen {
+                shader: "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> { return vec4(1.0); }",
+                ..FullScreen::default()
+            })
+        },
+    };
+    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).process(sky).output("plain"))?;
+    let recorded = studio.record(&panes(&[(0.0, Vec3::X, Blend::None)])?)?;
+    let picture = studio.submit(recorded)?.read(0, "plain")?;
+    assert_color(pixel(&picture, 16, 16), [255, 0, 0])?;
+    assert_color(pixel(&picture, 0, 0), [255; 3])
+}
+
+fn blended_leaves_depth() -> Result<(), Failed> {
+    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain depth").output("plain"))?;
+    let recorded = studio.record(&panes(&[(0.0, Vec3::X, Blend::Alpha)])?)?;
+    let depth = studio.submit(recorded)?.read(0, "plain depth")?;
+    let untouched = depth.bytes.iter().all(|&byte| byte == 0);
+    if untouched { Ok(()) } else { Err("glass wrote its depth".into()) }
+}
+
+fn exposure() -> Result<(), Failed> {
+    let mut scene = panes(&[])?;
+    scene.background = Vec3::splat(0.1);
+    for exposure in [0.5, 1.0, 4.0] {
+        let tone_mapping = ToneMapping { exposure };
+        let mut studio =
+            Studio::with(2, |builder| builder.process(GeometryBuffer).process(tone_mapping).output("picture"))?;
+        let radiance = 0.1 * f64::from(exposure);
+        assert_color(pixel(&studio.draw(&scene)?, 3, 3), tone_mapped([radiance; 3]))?;
+    }
+    Ok(())
+}
+
+fn missing_entry_point() -> Result<(), Failed> {
+    for draws in
+        [(|| Draws::FullScreen(FullScreen { shader: "", ..FullScreen::default() })) as fn() -> Draws<'static>, || {
+            let shader = PLAIN_COLOR;
+            Draws::Commands(CommandDraws { shader, fragment: Some("fragmnet"), ..CommandDraws::default() })
+        }]
+    {
+        let nameless = Made {
+            name: "nameless",
+            declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
+            draws,
+        };
+        let error = error_of(Studio::with(2, |builder| builder.process(nameless).output("picture"))?)?;
+        expect_named(&error, "nameless", "entry point")?;
+    }
+    Ok(())
+}
+
+fn short_parameters() -> Result<(), Failed> {
+    let short = Made {
+        name: "short",
+        declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
+        draws: || {
+            Draws::FullScreen(FullScreen {
+                shader: "
+                    @group(2) @binding(0) var<uniform> wide: mat4x4<f32>;
+
+                    @fragment
+                    fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                        return wide[3];
+                    }
+                ",
+                parameters: vec![0; 16].into(),
+                ..FullScreen::default()
+            })
+        },
+    };
+    let error = error_of(Studio::with(2, |builder| builder.process(short).output("picture"))?)?;
+    expect_named(&error, "short", "size")
 }
 
 fn error_of(mut studio: Studio) -> Result<FrameError, Failed> {

@@ -3,7 +3,10 @@
 #![allow(dead_code, reason = "each test program uses its own part")]
 
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::scene::{Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, Topology, Vertex};
+use drawloom::handle::Handle;
+use drawloom::scene::{
+    Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, Texture, Topology, Vertex,
+};
 
 /// A box of 2 m, its triangles wound counter-clockwise seen from outside.
 pub fn cube() -> Mesh {
@@ -94,6 +97,20 @@ fn make_field(count: usize) -> Result<Scene, SceneError> {
         sized(Camera::looking_at("side", DVec3::new(-24.0, 6.0, -10.0), DVec3::new(0.0, 0.0, -10.0)), [200, 200]),
     ];
     Ok(scene)
+}
+
+/// As many squares, each of a material with a texture of its own; and the textures.
+pub fn textured(count: u32) -> (Scene, Vec<Handle<Texture>>) {
+    let mut scene = field(0);
+    let mesh = scene.add(square(Topology::TriangleList)).unwrap();
+    let mut textures = Vec::new();
+    for index in 0..count {
+        let texture = scene.add(Texture::new("one", 1, 1, vec![index as u8, 9, 9, 255]).unwrap()).unwrap();
+        let material = scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
+        scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        textures.push(texture);
+    }
+    (scene, textures)
 }
 
 /// A camera with a picture of this size.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::arena::{Arena, new_buffer};
+use super::frame_buffers::check_storage;
 use super::layouts::Layouts;
 use super::textures::{TextureArrays, TexturePlace};
 use crate::backend::BackendError;
@@ -157,6 +158,7 @@ impl AssetCache {
             records[handle.index() as usize] = MaterialRecord::new(material, place);
         }
         let bytes: &[u8] = bytemuck::cast_slice(&records);
+        check_storage(device, bytes.len())?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let materials = new_buffer(device, "materials", bytes.len() as u64, usage)?;
         queue.write_buffer(&materials, 0, bytes);

@@ -21,6 +21,11 @@ pub(super) struct BufferPool {
 }
 
 impl BufferPool {
+    /// Drops what is free, because a device error may have left it unusable.
+    pub(super) fn forget(&self) {
+        self.free.lock().clear();
+    }
+
     pub(super) fn take(self: &Arc<Self>) -> FrameBuffers {
         let buffers = self.free.lock().pop().unwrap_or_default();
         FrameBuffers { buffers, pool: Arc::clone(self) }
@@ -56,15 +61,22 @@ impl FrameBuffers {
         let (parameters, parameter_ranges) = parameter_bytes(request.passes, request.draws);
         let objects = request.scene.object_count().max(1);
         let drawn_stride = aligned(objects * 4);
+        let drawn_places = drawn_places(request);
+        let drawn_count = drawn_places.iter().flatten().count();
 
+        for bytes in [objects * size_of::<ObjectRecord>(), drawn_stride, light_stride] {
+            check_storage(device, bytes)?;
+        }
         let buffers = &mut self.buffers;
         let sizes = [
             objects * size_of::<ObjectRecord>(),
             views.len(),
             lights.len(),
-            request.passes.len() * drawn_stride,
+            drawn_count * drawn_stride,
             parameters.len(),
         ];
+        // If this ends early, what the groups were made for is forgotten, and so are they.
+        let groups_key = buffers.groups_key.take();
         let mut renewed = false;
         for (buffer, size) in buffers.all().into_iter().zip(sizes) {
             renewed |= buffer.reserve(device, size)?;
@@ -73,12 +85,14 @@ impl FrameBuffers {
         buffers.lights.write(queue, 0, &lights);
         buffers.parameters.write(queue, 0, &parameters);
 
-        let key = GroupsKey { passes: request.passes.to_vec(), objects, light_stride, drawn_stride };
-        if renewed || buffers.groups_key.as_ref() != Some(&key) {
+        let passes = request.passes.iter().copied().zip(drawn_places.iter().copied()).collect();
+        let key = GroupsKey { passes, objects, light_stride, drawn_stride };
+        if renewed || groups_key.as_ref() != Some(&key) {
             buffers.groups = (0..request.passes.len()).map(|pass| buffers.group(device, layouts, &key, pass)).collect();
-            buffers.groups_key = Some(key);
         }
+        buffers.groups_key = Some(key);
         buffers.drawn_stride = drawn_stride;
+        buffers.drawn_places = drawn_places;
         buffers.parameter_ranges = parameter_ranges;
         Ok(())
     }
@@ -99,7 +113,9 @@ impl FrameBuffers {
     }
 
     pub(super) fn write_drawn(&self, queue: &wgpu::Queue, pass: usize, objects: &[u32]) {
-        self.buffers.drawn.write(queue, pass * self.buffers.drawn_stride, bytemuck::cast_slice(objects));
+        if let Some(place) = self.buffers.drawn_places[pass] {
+            self.buffers.drawn.write(queue, place * self.buffers.drawn_stride, bytemuck::cast_slice(objects));
+        }
     }
 }
 
@@ -109,9 +125,11 @@ struct Buffers {
     views: GrowingBuffer,
     /// Each view's lights, relative to its camera.
     lights: GrowingBuffer,
-    /// For each pass, which objects it draws; `drawn_stride` bytes apart.
+    /// For each pass of commands, which objects it draws; `drawn_stride` bytes apart.
     drawn: GrowingBuffer,
     drawn_stride: usize,
+    /// For each pass, its place in `drawn`; none for a pass without commands.
+    drawn_places: Vec<Option<usize>>,
     /// Each pass's parameters, and where in the buffer they are.
     parameters: GrowingBuffer,
     parameter_ranges: Vec<Option<(usize, usize)>>,
@@ -123,7 +141,8 @@ struct Buffers {
 /// What bind groups depend on, beside the buffers themselves.
 #[derive(PartialEq)]
 struct GroupsKey {
-    passes: Vec<Pass>,
+    /// Each with its place in `drawn`.
+    passes: Vec<(Pass, Option<usize>)>,
     objects: usize,
     light_stride: usize,
     drawn_stride: usize,
@@ -139,6 +158,7 @@ impl Default for Buffers {
             lights: storage("lights"),
             drawn: storage("drawn objects"),
             drawn_stride: 0,
+            drawn_places: Vec::new(),
             parameters: uniform("parameters"),
             parameter_ranges: Vec::new(),
             groups: Vec::new(),
@@ -153,11 +173,13 @@ impl Buffers {
     }
 
     fn group(&self, device: &wgpu::Device, layouts: &Layouts, key: &GroupsKey, pass: usize) -> wgpu::BindGroup {
-        let view = key.passes[pass].view;
+        let (Pass { view, .. }, drawn_place) = key.passes[pass];
+        // A pass without commands reads nothing there, but its layout has the binding: any part will do.
+        let drawn = drawn_place.map_or((0, ALIGNMENT), |place| (place * key.drawn_stride, key.drawn_stride));
         let bindings = [
             self.views.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
             self.objects.binding(0, key.objects * size_of::<ObjectRecord>()),
-            self.drawn.binding(pass * key.drawn_stride, key.drawn_stride),
+            self.drawn.binding(drawn.0, drawn.1),
             self.lights.binding(view * key.light_stride, key.light_stride),
         ];
         let entries: Vec<_> = (0..)
@@ -209,6 +231,16 @@ impl GrowingBuffer {
     }
 }
 
+/// # Errors
+/// If a shader on this device cannot read a storage buffer of that many bytes.
+pub(super) fn check_storage(device: &wgpu::Device, bytes: usize) -> Result<(), BackendError> {
+    let (allowed, needed) = (device.limits().max_storage_buffer_binding_size, bytes as u64);
+    if needed > allowed {
+        return Err(BackendError::Limit { limit: "max_storage_buffer_binding_size", allowed, needed });
+    }
+    Ok(())
+}
+
 /// Every device takes multiples of this as offsets into uniform and storage buffers.
 const ALIGNMENT: usize = 256;
 
@@ -252,6 +284,15 @@ fn parameter_bytes(passes: &[Pass], draws: &[Draws<'_>]) -> (Vec<u8>, Vec<Option
     };
     let ranges = passes.iter().map(&mut append).collect();
     (bytes, ranges)
+}
+
+fn drawn_places(request: &FrameRequest<'_>) -> Vec<Option<usize>> {
+    let mut next = 0..;
+    let of_pass = |pass: &Pass| match request.draws[pass.process] {
+        Draws::Commands(_) => next.next(),
+        _ => None,
+    };
+    request.passes.iter().map(of_pass).collect()
 }
 
 fn append_aligned(bytes: &mut Vec<u8>, more: &[u8]) {

@@ -45,12 +45,13 @@ impl Layouts {
 /// it has neither.
 pub(super) fn process_layout(
     device: &wgpu::Device,
-    has_parameters: bool,
+    parameter_bytes: usize,
     samples: impl Iterator<Item = Format>,
 ) -> Option<wgpu::BindGroupLayout> {
     let mut entries = Vec::new();
-    if has_parameters {
-        entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(0)));
+    if parameter_bytes > 0 {
+        // The size is said here so that a shader that wants more is refused when its pipeline is made.
+        entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(parameter_bytes as u64)));
     }
     for (binding, format) in (1..).zip(samples) {
         let sample_type = if format.is_depth() {

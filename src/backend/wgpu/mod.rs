@@ -18,12 +18,12 @@ mod texels;
 mod textures;
 
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use parking_lot::Mutex;
 
 use self::assets::{AssetCache, AssetSnapshot};
-use self::error_scope::checked;
+use self::error_scope::{caught, checked};
 use self::frame_buffers::{BufferPool, FrameBuffers};
 use self::layouts::Layouts;
 use self::pipelines::ProcessPipelines;
@@ -32,7 +32,7 @@ use super::{Backend, BackendError, FrameRequest};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::task::Worker;
-use crate::view::ObjectRecord;
+use crate::view::ObjectTable;
 
 pub use picture::{Picture, WgpuSubmission};
 
@@ -42,12 +42,14 @@ pub use picture::{Picture, WgpuSubmission};
 /// on more of it.
 ///
 /// Errors of what Drawloom records come back as `Result`. What the device does on its own accord does not: an engine sets
-/// its own `Device::set_device_lost_callback` and `Device::on_uncaptured_error`.
+/// its own `Device::set_device_lost_callback` and `Device::on_uncaptured_error`. A lost device takes what is submitted
+/// without a word; the next [`WgpuSubmission::wait`] or [`WgpuSubmission::read`] tells, and so does the next frame.
 pub struct WgpuBackend {
     device: wgpu::Device,
     queue: wgpu::Queue,
     layouts: Layouts,
-    pipelines: OnceLock<Vec<ProcessPipelines>>,
+    /// One for each process of the plan.
+    pipelines: Mutex<Vec<Arc<ProcessPipelines>>>,
     assets: Mutex<AssetCache>,
     targets: Mutex<TargetCache>,
     buffers: Arc<BufferPool>,
@@ -82,7 +84,7 @@ impl WgpuBackend {
             device,
             queue,
             layouts,
-            pipelines: OnceLock::new(),
+            pipelines: Mutex::default(),
             assets: Mutex::default(),
             targets: Mutex::default(),
             buffers: Arc::default(),
@@ -99,16 +101,64 @@ impl WgpuBackend {
         &self.queue
     }
 
-    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<&[ProcessPipelines], BackendError> {
-        if let Some(pipelines) = self.pipelines.get() {
-            return Ok(pipelines);
-        }
-        let made = plan.processes().iter().zip(draws).map(|(planned, draws)| {
+    /// The pipelines of every process, made anew where a process draws in another way than it did.
+    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Vec<Arc<ProcessPipelines>>, BackendError> {
+        let mut pipelines = self.pipelines.lock();
+        for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
+            if pipelines.get(index).is_some_and(|pipelines| pipelines.fit(draws)) {
+                continue;
+            }
             let label = format!("the shader of {:?}", planned.process.name());
-            checked(&self.device, &label, || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws))
-        });
-        let made = made.collect::<Result<Vec<_>, _>>()?;
-        Ok(self.pipelines.get_or_init(|| made))
+            let make = || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws);
+            let made = Arc::new(checked(&self.device, &label, make)?);
+            // Processes are made in order, so the new one replaces another or comes at the end.
+            match pipelines.get_mut(index) {
+                Some(old) => *old = made,
+                None => pipelines.push(made),
+            }
+        }
+        Ok(pipelines.clone())
+    }
+
+    fn start(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
+        let FrameRequest { plan, draws, views, passes, scene, rejections } = *request;
+        let pipelines = self.pipelines(plan, draws)?;
+        let assets = checked(&self.device, "meshes, materials and textures", || {
+            self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
+        })??;
+        let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
+        let (buffers, process_groups) = checked(&self.device, "the frame's buffers", || {
+            let mut buffers = self.buffers.take();
+            buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
+            let groups = passes.iter().enumerate().map(|(index, pass)| {
+                let parameters = buffers.parameters(index);
+                let declaration = &plan.processes()[pass.process].declaration;
+                pipelines[pass.process].process_group(&self.device, parameters, &targets[pass.view], declaration)
+            });
+            let groups: Vec<_> = groups.collect();
+            Ok::<_, BackendError>((buffers, groups))
+        })??;
+        let label = |pass: &Pass| {
+            format!("{:?} in view {:?}", plan.processes()[pass.process].process.name(), views[pass.view].name())
+        };
+        Ok(WgpuFrame {
+            labels: passes.iter().map(label).collect(),
+            passes: passes.to_vec(),
+            pipelines,
+            assets,
+            targets,
+            process_groups,
+            background: scene.background.as_dvec3().to_array(),
+            buffers,
+        })
+    }
+
+    /// Drops everything that is kept from frame to frame. After a device error some of it may be unusable, and the next
+    /// frame is to find out for itself.
+    fn forget(&self) {
+        *self.assets.lock() = AssetCache::default();
+        *self.targets.lock() = TargetCache::default();
+        self.buffers.forget();
     }
 }
 
@@ -116,6 +166,8 @@ impl WgpuBackend {
 pub struct WgpuFrame {
     labels: Vec<String>,
     passes: Vec<Pass>,
+    /// One for each process.
+    pipelines: Vec<Arc<ProcessPipelines>>,
     assets: Arc<AssetSnapshot>,
     targets: Vec<Arc<ViewTargets>>,
     /// For each pass, its targets and parameters at `@group(2)`; none for a pass without.
@@ -145,55 +197,33 @@ impl Backend for WgpuBackend {
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, views, passes, scene, rejections } = *request;
-        let pipelines = self.pipelines(plan, draws)?;
-        let assets = checked(&self.device, "meshes, materials and textures", || {
-            self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
-        })??;
-        let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
-        let (buffers, process_groups) = checked(&self.device, "the frame's buffers", || {
-            let mut buffers = self.buffers.take();
-            buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
-            let groups = passes.iter().enumerate().map(|(index, pass)| {
-                let parameters = buffers.parameters(index);
-                let declaration = &plan.processes()[pass.process].declaration;
-                pipelines[pass.process].process_group(&self.device, parameters, &targets[pass.view], declaration)
-            });
-            let groups: Vec<_> = groups.collect();
-            Ok::<_, BackendError>((buffers, groups))
-        })??;
-        let label = |pass: &Pass| {
-            format!("{:?} in view {:?}", plan.processes()[pass.process].process.name(), views[pass.view].name())
-        };
-        Ok(WgpuFrame {
-            labels: passes.iter().map(label).collect(),
-            passes: passes.to_vec(),
-            assets,
-            targets,
-            process_groups,
-            background: scene.background.as_dvec3().to_array(),
-            buffers,
-        })
+        self.start(request).inspect_err(|_| self.forget())
     }
 
     fn upload_objects(
         &self,
         _worker: &Worker,
         frame: &WgpuFrame,
-        first: usize,
-        records: &[ObjectRecord],
+        objects: &ObjectTable,
+        blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        checked(&self.device, "objects", || frame.buffers.write_objects(&self.queue, first, records))
+        checked(&self.device, "objects", || {
+            for block in blocks {
+                let (first, records) = objects.records_of(block);
+                frame.buffers.write_objects(&self.queue, first, &records);
+            }
+        })
     }
 
     fn prepare(&self, _worker: &Worker, frame: &WgpuFrame, pass: Pass, list: &DrawList) -> Result<(), BackendError> {
         let index = frame.index(pass);
-        checked(&self.device, &frame.labels[index], || {
+        let pipelines = &frame.pipelines[pass.process];
+        let made = checked(&self.device, &frame.labels[index], || {
             frame.buffers.write_drawn(&self.queue, index, &list.objects);
-            if let Some(pipelines) = self.pipelines.get() {
-                pipelines[pass.process].prepare(&self.device, &list.batches);
-            }
-        })
+            pipelines.make_missing(&self.device, &list.batches)
+        })?;
+        pipelines.keep(made);
+        Ok(())
     }
 
     fn record(
@@ -205,13 +235,10 @@ impl Backend for WgpuBackend {
         bundles: Range<usize>,
     ) -> Result<Vec<wgpu::RenderBundle>, BackendError> {
         let index = frame.index(pass);
-        let Some(pipelines) = self.pipelines.get() else { return Ok(Vec::new()) };
+        let label = &frame.labels[index];
+        let record = |bundle| record::bundle(&self.device, frame, index, list.bundle(bundle));
         // One scope for the whole job: a scope locks the device twice.
-        checked(&self.device, &frame.labels[index], || {
-            let record =
-                |bundle| record::bundle(&self.device, frame, index, &pipelines[pass.process], list.bundle(bundle));
-            bundles.map(record).collect()
-        })
+        checked(&self.device, label, || caught(label, || bundles.map(record).collect::<Result<_, _>>()))??
     }
 
     fn finish(
@@ -223,9 +250,6 @@ impl Backend for WgpuBackend {
         bundles: Vec<wgpu::RenderBundle>,
     ) -> Result<wgpu::CommandBuffer, BackendError> {
         let index = frame.index(pass);
-        let Some(pipelines) = self.pipelines.get() else {
-            return Err(BackendError::BrokenRule { rule: "finish comes after begin".to_owned() });
-        };
         checked(&self.device, &frame.labels[index], || {
             let mut encoder = self
                 .device
@@ -234,8 +258,7 @@ impl Backend for WgpuBackend {
                 Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, pass, *raw)?,
                 draws => {
                     let declaration = &request.plan.processes()[pass.process].declaration;
-                    let pipelines = &pipelines[pass.process];
-                    record::pass(&mut encoder, frame, index, pipelines, declaration, draws, &bundles);
+                    record::pass(&mut encoder, frame, index, declaration, draws, &bundles)?;
                 }
             }
             Ok(encoder.finish())

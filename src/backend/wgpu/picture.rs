@@ -57,18 +57,22 @@ impl WgpuSubmission {
     /// # Errors
     /// If there is no such target, or the device refuses or is lost.
     pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
+        // A lost device is told of here, and nowhere after it.
+        self.wait()?;
         let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
         let found = self.targets.get(view).and_then(|targets| targets.find(target)).ok_or_else(unknown)?;
         let (size, format) = (found.texture.size(), found.format);
         let row = size.width as usize * format.bytes();
         let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
-        let buffer = checked(&self.device, target, || self.copy(&found.texture, padded_row))?;
-
         let (sender, receiver) = std::sync::mpsc::channel();
-        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver waits below, so it is there.
-            let _ = sender.send(result);
-        });
+        let buffer = checked(&self.device, target, || {
+            let buffer = self.copy(&found.texture, padded_row);
+            buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+                // The receiver waits below, unless the device refused, and then nobody asks.
+                let _ = sender.send(result);
+            });
+            buffer
+        })?;
         let lost = |message: String| BackendError::DeviceLost { message };
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
         let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;

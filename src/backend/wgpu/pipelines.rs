@@ -13,6 +13,7 @@ use crate::scene::{Blend, Topology, Vertex};
 
 /// The pipelines of one process: one for each state that a scene has needed so far.
 pub(super) struct ProcessPipelines {
+    recipe: Recipe,
     /// `@group(2)`; `None` for a process that has nothing there.
     process_layout: Option<wgpu::BindGroupLayout>,
     /// `None` for a raw pass.
@@ -22,11 +23,46 @@ pub(super) struct ProcessPipelines {
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
 }
 
+/// All that pipelines are made from and that a process may change from frame to frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Recipe {
+    shader: String,
+    /// Empty for a raw pass.
+    vertex: &'static str,
+    fragment: Option<String>,
+    parameter_bytes: usize,
+    writes_depth: bool,
+    /// For a full-screen triangle.
+    blend: Blend,
+}
+
+impl Recipe {
+    fn new(draws: &Draws<'_>) -> Self {
+        match draws {
+            Draws::Commands(commands) => Self {
+                shader: commands.shader.to_owned(),
+                vertex: "vertex",
+                fragment: commands.fragment.map(str::to_owned),
+                parameter_bytes: commands.parameters.len(),
+                writes_depth: commands.writes_depth,
+                blend: Blend::None,
+            },
+            Draws::FullScreen(full_screen) => Self {
+                shader: full_screen.shader.to_owned(),
+                vertex: "full_screen",
+                fragment: Some("fragment".to_owned()),
+                parameter_bytes: full_screen.parameters.len(),
+                writes_depth: false,
+                blend: full_screen.blend,
+            },
+            Draws::Raw(_) => Self::default(),
+        }
+    }
+}
+
 struct Shader {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
-    vertex: &'static str,
-    fragment: Option<String>,
 }
 
 #[derive(Clone, Copy)]
@@ -48,53 +84,63 @@ impl ProcessPipelines {
             let mut targets = plan.targets().iter().filter(|planned| planned.views == declaration.views);
             targets.find(|planned| planned.name == target).map_or(Format::Rgba8Unorm, |planned| planned.format)
         };
-        let (source, vertex, fragment, has_parameters, writes_depth) = match draws {
-            Draws::Commands(commands) => {
-                let fragment = commands.fragment.map(str::to_owned);
-                (commands.shader, "vertex", fragment, !commands.parameters.is_empty(), commands.writes_depth)
-            }
-            Draws::FullScreen(full_screen) => {
-                let has_parameters = !full_screen.parameters.is_empty();
-                (full_screen.shader, "full_screen", Some("fragment".to_owned()), has_parameters, false)
-            }
-            Draws::Raw(_) => ("", "", None, false, false),
-        };
-        let process_layout = process_layout(device, has_parameters, declaration.samples().map(format_of));
-        let shader = (!vertex.is_empty()).then(|| {
+        let recipe = Recipe::new(draws);
+        let process_layout = process_layout(device, recipe.parameter_bytes, declaration.samples().map(format_of));
+        let shader = (!recipe.vertex.is_empty()).then(|| {
             let name = planned.process.name();
+            let source = format!("{SHADER_PRELUDE}\n{}", recipe.shader);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(format!("{SHADER_PRELUDE}\n{source}").into()),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
             });
-            let shared = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
+            let groups = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
             let used = if process_layout.is_some() { 3 } else { 2 };
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(name),
-                bind_group_layouts: &shared[..used],
+                bind_group_layouts: &groups[..used],
                 immediate_size: 0,
             });
-            Shader { module, layout, vertex, fragment }
+            Shader { module, layout }
         });
         let depth = declaration.depth().map(|(target, cleared)| Depth {
             format: texture_format(format_of(target)),
-            writes: cleared && writes_depth,
+            writes: cleared && recipe.writes_depth,
         });
         let colors = declaration.colors().map(|(target, _)| texture_format(format_of(target))).collect();
-        let pipelines = Self { process_layout, shader, colors, depth, by_state: RwLock::default() };
+        let pipelines = Self { recipe, process_layout, shader, colors, depth, by_state: RwLock::default() };
         if let Draws::FullScreen(full_screen) = draws {
-            pipelines.make(device, full_screen_state(full_screen.blend));
+            pipelines.keep(pipelines.make(device, full_screen_state(full_screen.blend)));
         }
         pipelines
     }
 
-    /// Makes the pipelines that these batches need and that are not there yet.
-    pub(super) fn prepare(&self, device: &wgpu::Device, batches: &[Batch]) {
-        let mut previous = None;
-        for batch in batches {
-            if previous.replace(batch.state) != Some(batch.state) && !self.prepared().contains_key(&batch.state) {
-                self.make(device, batch.state);
+    /// Whether they are what a process that draws this needs.
+    pub(super) fn fit(&self, draws: &Draws<'_>) -> bool {
+        self.recipe == Recipe::new(draws)
+    }
+
+    /// Makes the pipelines that these batches need and that are not there yet. They are to be kept only if the device found
+    /// no error in them.
+    #[must_use]
+    pub(super) fn make_missing(
+        &self,
+        device: &wgpu::Device,
+        batches: &[Batch],
+    ) -> HashMap<DrawState, wgpu::RenderPipeline> {
+        let mut made = HashMap::new();
+        let prepared = self.prepared();
+        for run in batches.chunk_by(|one, next| one.state == next.state) {
+            let state = run[0].state;
+            if !prepared.contains_key(&state) && !made.contains_key(&state) {
+                made.extend(self.make(device, state));
             }
         }
+        made
+    }
+
+    /// Keeps pipelines that were made.
+    pub(super) fn keep(&self, made: impl IntoIterator<Item = (DrawState, wgpu::RenderPipeline)>) {
+        self.by_state.write().extend(made);
     }
 
     /// The pipelines there are, by state.
@@ -148,8 +194,9 @@ impl ProcessPipelines {
         self.colors.iter().copied().map(Some).collect()
     }
 
-    fn make(&self, device: &wgpu::Device, state: DrawState) {
-        let Some(shader) = &self.shader else { return };
+    /// `None` for a raw pass, which has no pipelines.
+    fn make(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
+        let shader = self.shader.as_ref()?;
         let target = |format: &wgpu::TextureFormat| {
             Some(wgpu::ColorTargetState {
                 format: *format,
@@ -164,7 +211,7 @@ impl ProcessPipelines {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &attributes,
         })];
-        let has_vertices = shader.vertex == "vertex";
+        let full_screen = self.recipe.vertex == "full_screen";
         let (topology, strip_index_format) = match state.topology() {
             Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
             Topology::TriangleStrip => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
@@ -174,9 +221,9 @@ impl ProcessPipelines {
             layout: Some(&shader.layout),
             vertex: wgpu::VertexState {
                 module: &shader.module,
-                entry_point: Some(shader.vertex),
+                entry_point: Some(self.recipe.vertex),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: if has_vertices { &vertices } else { &[] },
+                buffers: if full_screen { &[] } else { &vertices },
             },
             primitive: wgpu::PrimitiveState {
                 topology,
@@ -193,12 +240,17 @@ impl ProcessPipelines {
                 format: depth.format,
                 // What mixes with what is behind it must not hide what is drawn after it.
                 depth_write_enabled: Some(depth.writes && state.blend() == Blend::None),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
+                // The full-screen triangle is infinitely far away, and is to show where nothing else is.
+                depth_compare: Some(if full_screen {
+                    wgpu::CompareFunction::GreaterEqual
+                } else {
+                    wgpu::CompareFunction::Greater
+                }),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState::default(),
-            fragment: shader.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
+            fragment: self.recipe.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
                 module: &shader.module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
@@ -207,7 +259,7 @@ impl ProcessPipelines {
             multiview_mask: None,
             cache: None,
         });
-        self.by_state.write().insert(state, pipeline);
+        Some((state, pipeline))
     }
 }
 

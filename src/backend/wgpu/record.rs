@@ -1,19 +1,22 @@
 //! Recording: batches into bundles, bundles into passes.
 
 use super::WgpuFrame;
-use super::pipelines::{ProcessPipelines, full_screen_state};
+use super::pipelines::full_screen_state;
 use crate::backend::BackendError;
 use crate::process::{ClearColor, Declaration, Draws, Pass, RawPass, Resolved};
 use crate::queue::Batch;
 
 /// Records batches. Whatever stays the same from one batch to the next is set once.
+///
+/// # Errors
+/// If what a batch needs was not made before: an error of Drawloom's own.
 pub(super) fn bundle(
     device: &wgpu::Device,
     frame: &WgpuFrame,
     pass: usize,
-    pipelines: &ProcessPipelines,
     batches: &[Batch],
-) -> wgpu::RenderBundle {
+) -> Result<wgpu::RenderBundle, BackendError> {
+    let pipelines = &frame.pipelines[frame.passes[pass].process];
     let color_formats = pipelines.color_formats();
     let label = &frame.labels[pass];
     let by_state = pipelines.prepared();
@@ -26,27 +29,30 @@ pub(super) fn bundle(
     encoder.set_vertex_buffer(0, frame.assets.vertices.slice(..));
     encoder.set_index_buffer(frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
     for run in batches.chunk_by(|one, next| one.state == next.state) {
-        let Some(pipeline) = by_state.get(&run[0].state) else { continue };
+        let pipeline = by_state.get(&run[0].state).ok_or_else(|| broken("a pipeline is made before it is used"))?;
         encoder.set_pipeline(pipeline);
         for batch in run {
-            let Some(mesh) = frame.assets.meshes.get(batch.mesh as usize).copied().flatten() else { continue };
+            let mesh = frame.assets.meshes.get(batch.mesh as usize).copied().flatten();
+            let mesh = mesh.ok_or_else(|| broken("a batch draws a mesh that is there"))?;
             let indices = mesh.first_index..mesh.first_index + mesh.index_count;
             encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
         }
     }
-    encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(label) })
+    Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(label) }))
 }
 
 /// Encodes a pass: clears its targets, and replays its bundles or draws its full-screen triangle.
+///
+/// # Errors
+/// If what the pass needs was not made before: an error of Drawloom's own.
 pub(super) fn pass(
     encoder: &mut wgpu::CommandEncoder,
     frame: &WgpuFrame,
     index: usize,
-    pipelines: &ProcessPipelines,
     declaration: &Declaration,
     draws: &Draws<'_>,
     bundles: &[wgpu::RenderBundle],
-) {
+) -> Result<(), BackendError> {
     let targets = &frame.targets[frame.passes[index].view];
     let colors: Vec<_> = declaration
         .colors()
@@ -77,17 +83,18 @@ pub(super) fn pass(
     });
     let Draws::FullScreen(full_screen) = draws else {
         render_pass.execute_bundles(bundles);
-        return;
+        return Ok(());
     };
-    if let Some(pipeline) = pipelines.prepared().get(&full_screen_state(full_screen.blend)) {
-        render_pass.set_pipeline(pipeline);
-        render_pass.set_bind_group(0, frame.buffers.group(index), &[]);
-        render_pass.set_bind_group(1, &frame.assets.group, &[]);
-        if let Some(group) = &frame.process_groups[index] {
-            render_pass.set_bind_group(2, group, &[]);
-        }
-        render_pass.draw(0..3, 0..1);
+    let by_state = frame.pipelines[frame.passes[index].process].prepared();
+    let pipeline = by_state.get(&full_screen_state(full_screen.blend));
+    render_pass.set_pipeline(pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?);
+    render_pass.set_bind_group(0, frame.buffers.group(index), &[]);
+    render_pass.set_bind_group(1, &frame.assets.group, &[]);
+    if let Some(group) = &frame.process_groups[index] {
+        render_pass.set_bind_group(2, group, &[]);
     }
+    render_pass.draw(0..3, 0..1);
+    Ok(())
 }
 
 /// Lets a raw pass encode itself.
@@ -107,11 +114,19 @@ pub(super) fn raw(
     raw.encode(encoder, &resources).map_err(BackendError::RawPass)
 }
 
+fn broken(rule: &str) -> BackendError {
+    BackendError::BrokenRule { rule: rule.to_owned() }
+}
+
 fn load(clear: Option<ClearColor>, background: [f64; 3]) -> wgpu::LoadOp<wgpu::Color> {
     let [r, g, b, a] = match clear {
         None => return wgpu::LoadOp::Load,
         Some(ClearColor::Value(value)) => value,
-        Some(ClearColor::Background) => [background[0], background[1], background[2], 1.0],
+        // Past this a half float would be infinite.
+        Some(ClearColor::Background) => {
+            let [r, g, b] = background.map(|radiance| radiance.min(60_000.0));
+            [r, g, b, 1.0]
+        }
     };
     wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a })
 }

@@ -35,6 +35,10 @@ impl ViewTargets {
         if needed > allowed {
             return Err(BackendError::Limit { limit: "max_texture_dimension_2d", allowed, needed });
         }
+        let usual = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC
+            | wgpu::TextureUsages::COPY_DST;
         let planned = plan.targets().iter().filter(|target| target.views == view.kind());
         let targets = planned.map(|target| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -44,10 +48,7 @@ impl ViewTargets {
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format: texture_format(target.format),
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-                    | wgpu::TextureUsages::TEXTURE_BINDING
-                    | wgpu::TextureUsages::COPY_SRC
-                    | wgpu::TextureUsages::COPY_DST,
+                usage: if target.stored { usual | wgpu::TextureUsages::STORAGE_BINDING } else { usual },
                 view_formats: &[],
             });
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());

@@ -103,7 +103,8 @@ impl Array {
         let missing = wanted.len() - self.layers.len();
         let room = self.texture.as_ref().map_or(0, |texture| texture.depth_or_array_layers() - self.used);
         if missing > room as usize {
-            let layers = (wanted.len() as u32).next_power_of_two().min(most_layers);
+            // Room for as many again, so that one that changes every frame does not move the others every frame.
+            let layers = (wanted.len() as u32 * 2).min(most_layers);
             *self = Self { texture: Some(new_array(device, side, layers)), ..Self::default() };
         }
         let Some(array) = &self.texture else { return };
