@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod failing_process;
+mod rules;
 mod same_result;
 mod views;
 #[path = "../scenes/mod.rs"]

@@ -1,0 +1,121 @@
+//! The null backend refuses what breaks a rule of the frame.
+
+use drawloom::Granularity;
+use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend};
+use drawloom::process::{FramePlan, GeometryBuffer, Pass};
+use drawloom::queue::DrawList;
+use drawloom::scene::Scene;
+use drawloom::task::{Scheduler, Worker};
+use drawloom::view::{ObjectTable, Rejections, RenderView};
+
+use crate::renderer;
+use crate::scenes::field;
+
+const PASS: Pass = Pass { process: 0, view: 0 };
+
+/// Runs `play` on a worker, with a frame of the field's first view, and returns the rule that it broke.
+fn broken_rule(
+    play: impl Fn(&Worker, &<NullBackend as Backend>::Frame, &DrawList, &FrameRequest<'_>) -> Result<(), BackendError>
+    + Sync,
+) -> String {
+    let scene = one_view();
+    let (mut renderer, _) = renderer(1, Granularity::default());
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    let list = renderer.draw_list("geometry buffer", 0).unwrap().clone();
+
+    let plan = FramePlan::new(vec![Box::new(GeometryBuffer)], &["diffuse".to_owned()]).unwrap();
+    let views = [RenderView::new(&scene.cameras[0])];
+    let request = FrameRequest {
+        plan: &plan,
+        draws: &plan.draws().unwrap(),
+        views: &views,
+        passes: &[PASS],
+        scene: &scene.as_scene_ref(),
+        rejections: &Rejections::default(),
+    };
+    let frame = NullBackend.begin(&request).unwrap();
+    let rule = std::sync::Mutex::new(String::new());
+    Scheduler::new(1)
+        .unwrap()
+        .parallel_for(1, 1, |_, worker| {
+            let Err(error) = play(worker, &frame, &list, &request) else { return };
+            *rule.lock().unwrap() = error.to_string();
+        })
+        .unwrap();
+    rule.into_inner().unwrap()
+}
+
+fn one_view() -> Scene {
+    let mut scene = field(300);
+    scene.cameras.truncate(1);
+    scene
+}
+
+#[test]
+fn a_frame_by_the_rules_breaks_none() {
+    let rule = broken_rule(|worker, frame, list, request| {
+        NullBackend.prepare(worker, frame, PASS, list)?;
+        let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
+        NullBackend.finish(worker, frame, request, PASS, bundles).map(|_| ())
+    });
+    assert_eq!(rule, "");
+}
+
+#[test]
+fn commands_out_of_order_are_refused() {
+    let rule = broken_rule(|worker, frame, list, _| {
+        let mut list = list.clone();
+        list.commands.reverse();
+        NullBackend.prepare(worker, frame, PASS, &list)
+    });
+    assert!(rule.contains("not sorted"), "{rule}");
+}
+
+#[test]
+fn a_bundle_that_is_lost_or_recorded_twice_is_refused() {
+    let lost = broken_rule(|worker, frame, list, request| {
+        NullBackend.prepare(worker, frame, PASS, list)?;
+        NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())
+    });
+    assert!(lost.contains("objects recorded"), "{lost}");
+    let twice = broken_rule(|worker, frame, list, _| {
+        NullBackend.record(worker, frame, PASS, list, 0..1)?;
+        NullBackend.record(worker, frame, PASS, list, 0..1).map(|_| ())
+    });
+    assert!(twice.contains("recorded twice"), "{twice}");
+}
+
+#[test]
+fn batches_that_overlap_or_draw_no_mesh_are_refused() {
+    let overlap = broken_rule(|worker, frame, list, _| {
+        let mut list = list.clone();
+        list.batches[1].first -= 1;
+        NullBackend.record(worker, frame, PASS, &list, 0..1).map(|_| ())
+    });
+    assert!(overlap.contains("overlap"), "{overlap}");
+    let no_mesh = broken_rule(|worker, frame, list, _| {
+        let mut list = list.clone();
+        list.batches[0].mesh = 99;
+        NullBackend.record(worker, frame, PASS, &list, 0..1).map(|_| ())
+    });
+    assert!(no_mesh.contains("slot 99"), "{no_mesh}");
+}
+
+#[test]
+fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
+    let twice = broken_rule(|worker, frame, list, request| {
+        NullBackend.prepare(worker, frame, PASS, list)?;
+        let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
+        NullBackend.finish(worker, frame, request, PASS, bundles)?;
+        NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())
+    });
+    assert!(twice.contains("finished twice"), "{twice}");
+    let uploaded = broken_rule(|worker, frame, _, request| {
+        let mut table = ObjectTable::default();
+        table.reset(request.scene.object_count());
+        table.fill(request.scene, 0..table.len());
+        NullBackend.upload_objects(worker, frame, &table, 0..table.block_count())?;
+        NullBackend.upload_objects(worker, frame, &table, 0..1)
+    });
+    assert!(uploaded.contains("uploaded twice"), "{uploaded}");
+}
