@@ -14,7 +14,7 @@ use crate::process::{Draws, FramePlan};
 use crate::queue::DrawList;
 use crate::scene::{Light, SceneError, SceneRef};
 use crate::task::Scheduler;
-use crate::view::{RejectionReason, Rejections, RenderView, VisibleSet};
+use crate::view::{Rejection, RejectionReason, Rejections, RenderView, VisibleSet};
 
 /// Produces frames: records a scene on all workers, and gives it back when that is done.
 ///
@@ -43,6 +43,8 @@ pub struct Renderer<B: Backend> {
     scheduler: Arc<Scheduler>,
     jobs: Option<FrameJobs>,
     tables: FrameTables,
+    /// What the last warnings were about.
+    told: Vec<Rejection>,
 }
 
 impl<B: Backend> Renderer<B> {
@@ -52,13 +54,13 @@ impl<B: Backend> Renderer<B> {
     }
 
     pub(super) fn new(backend: Arc<B>, plan: FramePlan, granularity: Granularity, scheduler: Arc<Scheduler>) -> Self {
-        Self { backend, plan, granularity, scheduler, jobs: None, tables: FrameTables::default() }
+        Self { backend, plan, granularity, scheduler, jobs: None, tables: FrameTables::default(), told: Vec::new() }
     }
 
     /// Records a frame: everything up to submission. The calling thread works too.
     ///
     /// Objects, lights and textures that cannot be drawn are left out, counted in the statistics, and warned of through
-    /// `tracing`.
+    /// `tracing` when their number changes.
     ///
     /// # Errors
     /// If the scene has no camera, a camera that cannot be, or slices of different lengths; if the device refuses
@@ -98,6 +100,7 @@ impl<B: Backend> Renderer<B> {
 
         let queues = queues_of(&request, recordings)?;
         let statistics = statistics_of(&request, &self.tables, &clock);
+        warn_of_changes(&statistics.rejections, &mut self.told);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) })
     }
 
@@ -188,18 +191,23 @@ fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &Stage
         }
         statistics
     };
-    let rejections = request.rejections.list();
-    for rejection in &rejections {
-        let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-        tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
-    }
     FrameStatistics {
         objects: request.scene.object_count(),
         lights: request.scene.lights.len(),
         views: request.views.iter().enumerate().map(of_view).collect(),
         stages: clock.times(),
-        rejections,
+        rejections: request.rejections.list(),
     }
+}
+
+/// Warns of what is left out, once and not in every frame.
+fn warn_of_changes(rejections: &[Rejection], told: &mut Vec<Rejection>) {
+    for rejection in rejections.iter().filter(|rejection| !told.contains(rejection)) {
+        let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
+        tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
+    }
+    told.clear();
+    told.extend_from_slice(rejections);
 }
 
 /// What must hold of a scene as a whole. Single objects and lights are left out instead.
