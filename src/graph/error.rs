@@ -14,6 +14,7 @@ pub type NodeError = Box<dyn Error + Send + Sync>;
 /// A graph that does not compile, and why.
 #[derive(Error)]
 #[error("{problem}")]
+#[non_exhaustive]
 pub struct CompileError<P> {
     /// The graph as it was, so that it can be put right and compiled again.
     pub graph: Box<FrameGraph<P>>,

@@ -23,8 +23,9 @@
 //! the sleeper has been taken off since. If it was taken off by itself, it is awake. If another waker took it off, it
 //! has been called or will be, and is going to look for work, with a fence of its own, before it can wait again. In
 //! either case it passes S2 again *after* W2, and S3 sees the work. If it is still on the list, W4 finds it, or, where
-//! any sleeper will do, another one that looks for work as well. One kind of sleeper does not: the owner of a scope
-//! that ended while it was called for something else. It passes the call on (`Worker::work`).
+//! any sleeper will do, another one that looks for work as well. Two kinds of sleepers do
+//! not look, or not at once: the owner of a scope that ended while it was called for something else, and one that finds
+//! another job first, a pinned one, and is away with it. Both pass the call on (`Worker::pass_on`).
 //!
 //! **A call is neither lost nor left over.** Under the lock exactly one thread takes a sleeper off the list. Is that a
 //! waker, it calls once, and the sleeper waits for this one call even if it has seen work meanwhile. Is it the sleeper,

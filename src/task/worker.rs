@@ -82,8 +82,10 @@ impl Worker {
         let mut idle_rounds = 0;
         let mut called = false;
         while !until.has_come(&self.shared) {
-            called = false;
+            let was_called = mem::take(&mut called);
             if let Some(job) = self.next_job(until) {
+                // It may have been called for another job than the one it found, a pinned one say.
+                self.pass_on(was_called);
                 job.run(self);
                 idle_rounds = 0;
             } else if idle_rounds == IDLE_ROUNDS {
@@ -96,7 +98,12 @@ impl Worker {
             }
         }
         // It may have been called for a job that it does not look for any more.
-        if called && self.sees_loot() {
+        self.pass_on(called);
+    }
+
+    /// Passes a call on, if there was one and there is something that others could do.
+    fn pass_on(&self, was_called: bool) {
+        if was_called && self.sees_loot() {
             self.shared.sleep().wake_any();
         }
     }

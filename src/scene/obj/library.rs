@@ -52,11 +52,11 @@ pub(super) fn definitions(library: &str, text: &str, warnings: &mut Vec<ObjWarni
 
 /// One number for all channels, or one each, from 0 to `largest`.
 fn color(values: &str, largest: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> {
-    let mut numbers = values.split_whitespace().map_while(|word| word.parse::<f32>().ok());
-    let first = numbers.next();
-    let color = match (first, numbers.next(), numbers.next()) {
-        (Some(red), Some(green), Some(blue)) => Vec3::new(red, green, blue),
-        (Some(gray), None, None) => Vec3::splat(gray),
+    let numbers = values.split_once('#').map_or(values, |(numbers, _)| numbers);
+    let numbers: Result<Vec<f32>, _> = numbers.split_whitespace().map(str::parse).collect();
+    let color = match numbers.as_deref() {
+        Ok([red, green, blue, ..]) => Vec3::new(*red, *green, *blue),
+        Ok([gray]) => Vec3::splat(*gray),
         _ => Vec3::NAN,
     };
     if !color.is_finite() {

@@ -14,7 +14,7 @@ pub(super) struct Tidy {
     /// What tobj reads. Materials are called by their index in `materials`. Every corner of a face has all three indices,
     /// and what it lacked refers to [`NOTHING`].
     pub text: String,
-    /// What `mtllib` names, in order.
+    /// What `mtllib` names, each once, in order.
     pub libraries: Vec<String>,
     /// What `usemtl` names, each once.
     pub materials: Vec<String>,
@@ -33,7 +33,9 @@ pub(super) struct Tidy {
     /// Corners that refer to a normal or texture coordinate that is not there.
     pub dangling_corners: usize,
     counts: Counts,
-    origin_is_set: bool,
+    positions: Vec<DVec3>,
+    /// The position of the first face's first corner.
+    first_corner: Option<usize>,
 }
 
 /// A line that cannot be understood: its number from 1, and why.
@@ -68,6 +70,7 @@ impl Tidy {
         for (line, statement) in statements(source) {
             tidy.statement(&statement).map_err(|reason| BadLine { line, reason })?;
         }
+        tidy.place();
         Ok(tidy)
     }
 
@@ -107,7 +110,9 @@ impl Tidy {
                 Ok(())
             }
             "mtllib" => {
-                self.libraries.push(rest.to_owned());
+                if !self.libraries.iter().any(|name| name == rest) {
+                    self.libraries.push(rest.to_owned());
+                }
                 Ok(())
             }
             _ => Ok(()),
@@ -125,14 +130,24 @@ impl Tidy {
             [_, _, _, weight] => DVec3::new(x, y, z) / weight,
             _ => DVec3::new(x, y, z),
         };
-        if !self.origin_is_set && position.abs().cmple(DVec3::splat(FARTHEST_ORIGIN)).all() {
-            self.origin = (position / ORIGIN_STEP).trunc() * ORIGIN_STEP;
-            self.origin_is_set = true;
-        }
-        let DVec3 { x, y, z } = position - self.origin;
+        self.positions.push(position);
         self.counts.positions += 1;
-        self.emit(format_args!("v {x:e} {y:e} {z:e}"));
         Ok(())
+    }
+
+    /// Writes the positions, before all else, relative to the first corner of a face: vertices that no face refers to may be
+    /// anywhere.
+    fn place(&mut self) {
+        let within = |position: &&DVec3| position.abs().cmple(DVec3::splat(FARTHEST_ORIGIN)).all();
+        let anchor = self.first_corner.and_then(|corner| self.positions.get(corner)).filter(within);
+        self.origin = anchor.map_or(DVec3::ZERO, |anchor| (*anchor / ORIGIN_STEP).trunc() * ORIGIN_STEP);
+        let mut text = String::new();
+        for position in &self.positions {
+            let DVec3 { x, y, z } = *position - self.origin;
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "v {x:e} {y:e} {z:e}");
+        }
+        self.text.insert_str(0, &text);
     }
 
     fn texture_coordinates(&mut self, values: &str) -> Result<(), String> {
@@ -192,6 +207,7 @@ impl Tidy {
         let Counts { positions, texture_coordinates, normals } = self.counts;
         let position = absolute(position, positions)
             .ok_or_else(|| format!("a face refers to vertex {position}, and there are {positions} so far"))?;
+        self.first_corner.get_or_insert(position as usize - 1);
         let found = [(texture, texture_coordinates), (normal, normals)]
             .map(|(index, count)| index.map(|index| absolute(index, count)));
         self.dangling_corners += usize::from(found.contains(&Some(None)));
@@ -211,6 +227,10 @@ pub(super) fn statements(source: &str) -> impl Iterator<Item = (usize, String)> 
     let mut begun = String::new();
     let lines = source.strip_prefix('\u{feff}').unwrap_or(source).lines().chain([""]);
     lines.enumerate().filter_map(move |(index, line)| {
+        // A comment ends with its line, whatever it ends in: many name a folder.
+        if begun.is_empty() && line.trim_start().starts_with('#') {
+            return None;
+        }
         if let Some(part) = line.strip_suffix('\\') {
             begun.push_str(part);
             begun.push(' ');
@@ -241,10 +261,12 @@ mod tests {
 
     #[test]
     fn a_scene_far_away_keeps_its_millimetres() {
-        let tidy = Tidy::new("v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\n").unwrap();
+        let stray_vertex = "v 999999999 0 0\n";
+        let face = "v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\nf 2 3 2\n";
+        let tidy = Tidy::new(&format!("{stray_vertex}{face}")).unwrap();
         assert_eq!(tidy.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
         let second: Vec<f32> =
-            tidy.text.lines().last().unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
+            tidy.text.lines().nth(2).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
         assert!((f64::from(second[1]) + tidy.origin.y - 4_500_000.002).abs() < 5e-4);
     }
 
@@ -252,5 +274,7 @@ mod tests {
     fn a_line_goes_on_after_a_backslash_and_keeps_its_number() {
         let found: Vec<_> = statements("# head\r\nf 1 2 \\\r\n 3\r\n\nv 1\\").collect();
         assert_eq!(found, [(3, String::from("f 1 2   3")), (6, String::from("v 1"))]);
+        let found: Vec<_> = statements("# C:\\models\\\nv 1\n  # D:\\\nv 2").collect();
+        assert_eq!(found, [(2, String::from("v 1")), (4, String::from("v 2"))]);
     }
 }
