@@ -23,8 +23,9 @@ use super::{
 /// Any number of threads may share a scheduler, but only one from outside is served at a time: the next one waits until
 /// the call of the first has returned. A call from within a job, on whichever worker, waits for nobody. It follows that
 /// a call waits for ever if the call it has to let pass waits for it in turn. That happens where a body or a job starts
-/// a thread that calls the same scheduler, and waits for this thread, or where a job of one scheduler calls a second
-/// one, and a job of that calls the first from a thread of the second.
+/// a thread that calls the same scheduler, and waits for this thread; where a job of one scheduler calls a second one,
+/// and a job of that calls the first from a thread of the second; or where two threads each call one of two schedulers
+/// from within a call of the other.
 ///
 /// Dropping the scheduler ends its threads and waits until they are gone.
 ///
@@ -95,7 +96,7 @@ impl Scheduler {
     /// The ranges are `chunk` indices long, the last one may be shorter. A chunk of 0 is taken for 1, and a `length`
     /// beyond any slice, more than `isize::MAX`, may get chunks of up to 3. With a single worker or a single chunk
     /// everything happens on the calling thread. `body` is not entered on a worker that is in the midst of it for this
-    /// loop, even where it waits for a scope or a loop of its own.
+    /// loop, even where it waits for a scope or a loop of its own; and until it has waited, no further worker may join.
     ///
     /// # Errors
     ///

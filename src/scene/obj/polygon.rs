@@ -1,5 +1,7 @@
 //! Polygons, cut into triangles.
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 
 /// Cutting ears off takes time that grows with the cube of the corners, in the worst case.
@@ -16,15 +18,23 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) ->
     let mut ring: Vec<usize> = (0..corners.len()).collect();
     let smallest =
         (1..flat.len() - 1).map(|corner| turn(flat[0], flat[corner], flat[corner + 1])).fold(f64::INFINITY, f64::min);
+    // Seen from its first corner, a polygon that goes round more than once covers itself, though it never turns back.
+    let swept: f64 = (1..flat.len() - 1).map(|corner| angle(flat[0], flat[corner], flat[corner + 1])).sum();
+    let is_single = swept < TAU;
     let exact = if corners.len() <= MOST_CORNERS {
         // A fan with a triangle without area would do, but then something lies on its edge that need not.
-        smallest > 0.0 || cut_ears(&flat, &mut ring, triangles)
+        (is_single && smallest > 0.0) || cut_ears(&flat, &mut ring, triangles)
     } else {
-        smallest >= 0.0
+        is_single && smallest >= 0.0
     };
     // Whatever is left, and everything if it is convex, is a fan around its first corner.
     triangles.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));
     exact
+}
+
+/// The angle at `from` between two others, from −π to π.
+fn angle(from: DVec2, one: DVec2, other: DVec2) -> f64 {
+    (one - from).angle_to(other - from)
 }
 
 /// Cuts off corners whose triangle lies inside, until three are left. False if that cannot be done.
@@ -120,6 +130,16 @@ mod tests {
         let mut triangles = Vec::new();
         assert!(!triangulate(&bow, &mut triangles));
         assert_eq!(triangles.len(), 2);
+    }
+
+    #[test]
+    fn a_polygon_that_goes_round_more_than_once_is_said_to() {
+        let around = |degrees: f64| DVec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        let mut spiral = vec![DVec3::ZERO];
+        spiral.extend([0.0, 100.0, 200.0, 300.0, 400.0, 500.0].map(around));
+        let mut triangles = Vec::new();
+        assert!(!triangulate(&spiral, &mut triangles));
+        assert_eq!(triangles.len(), 5);
     }
 
     #[test]
