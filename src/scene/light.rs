@@ -4,8 +4,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec3};
 
-use super::SceneError;
 use super::scene_ref::is_unit;
+use super::{Camera, SceneError, ViewKind};
 
 /// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
 ///
@@ -65,6 +65,41 @@ impl Light {
         16.0 * intensity.max_element().max(0.0).sqrt()
     }
 
+    /// The camera of the light's shadow map, `side` pixels wide and high, to be added to a scene's cameras: a view for each
+    /// light that is to cast shadows (M 10.4). It sees what the light reaches, from a thousandth of its range on.
+    ///
+    /// `None` for all but spot lights, whose light alone fits into a perspective picture; a cone of more than 170° is seen up
+    /// to that.
+    ///
+    /// ```
+    /// use drawloom::glam::{DVec3, Vec3};
+    /// use drawloom::scene::{Light, Scene, ViewKind};
+    ///
+    /// let mut scene = Scene::new();
+    /// let lamp = Light::Spot {
+    ///     position: DVec3::Y * 4.0,
+    ///     direction: Vec3::NEG_Y,
+    ///     intensity: Vec3::splat(10.0),
+    ///     range: 20.0,
+    ///     inner_angle: 0.4,
+    ///     outer_angle: 0.5,
+    /// };
+    /// scene.lights.push(lamp);
+    /// scene.cameras.extend(lamp.shadow_camera("lamp", 1024));
+    /// assert_eq!(scene.cameras[0].kind, ViewKind::Shadow);
+    /// ```
+    pub fn shadow_camera(&self, name: impl Into<String>, side: u32) -> Option<Camera> {
+        let Self::Spot { position, direction, range, outer_angle, .. } = *self else { return None };
+        let target = position + direction.as_dvec3();
+        Some(Camera {
+            field_of_view: (2.0 * outer_angle).min(WIDEST_SHADOW),
+            near: range * 1e-3,
+            size: [side; 2],
+            kind: ViewKind::Shadow,
+            ..Camera::looking_at(name, position, target)
+        })
+    }
+
     /// Says what is wrong with it, if anything.
     pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
         let problem = match *self {
@@ -87,6 +122,9 @@ impl Light {
         problem.map_or(Ok(()), |reason| Err(SceneError::InvalidLight { light: index, reason }))
     }
 }
+
+/// In radians. Towards 180° the middle of a perspective picture shrinks to nothing.
+const WIDEST_SHADOW: f32 = 2.967;
 
 fn direction_problem(direction: Vec3) -> Option<&'static str> {
     (!is_unit(direction.length_squared())).then_some("its direction is not of unit length")
