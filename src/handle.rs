@@ -91,12 +91,9 @@ impl<T> Slots<T> {
     /// # Errors
     /// If the handle is stale already.
     pub fn remove(&mut self, handle: Handle<T>) -> Result<T, StaleHandle> {
-        let belongs = self.belongs(handle);
-        let entry = self.entries.get_mut(handle.index as usize);
-        let entry = entry.filter(|entry| belongs && entry.generation == handle.generation);
-        let Some((entry, value)) = entry.and_then(|entry| entry.value.take().map(|value| (&mut *entry, value))) else {
-            return Err(handle.stale());
-        };
+        self.get(handle)?;
+        let entry = &mut self.entries[handle.index as usize];
+        let value = entry.value.take().ok_or_else(|| handle.stale())?;
         self.revision += 1;
         self.length -= 1;
         entry.revision = self.revision;
@@ -160,14 +157,6 @@ impl<T> Slots<T> {
         })
     }
 
-    fn handle(&self, index: u32, generation: u32) -> Handle<T> {
-        Handle { index, generation, collection: self.identity as u32, kind: PhantomData }
-    }
-
-    fn belongs(&self, handle: Handle<T>) -> bool {
-        handle.collection == self.identity as u32
-    }
-
     /// A number that no other collection of this process has, so that a cache knows whose entries it holds.
     pub fn identity(&self) -> u64 {
         self.identity
@@ -176,6 +165,14 @@ impl<T> Slots<T> {
     /// Grows whenever an entry is added, changed or removed.
     pub fn revision(&self) -> u64 {
         self.revision
+    }
+
+    fn handle(&self, index: u32, generation: u32) -> Handle<T> {
+        Handle { index, generation, collection: self.identity as u32, kind: PhantomData }
+    }
+
+    fn belongs(&self, handle: Handle<T>) -> bool {
+        handle.collection == self.identity as u32
     }
 }
 

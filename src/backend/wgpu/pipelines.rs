@@ -1,5 +1,6 @@
 //! Pipelines: what a process and a draw's state become on the device.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use parking_lot::{RwLock, RwLockReadGuard};
@@ -13,7 +14,7 @@ use crate::scene::{Blend, Topology, Vertex};
 
 /// The pipelines of one process: one for each state that a scene has needed so far.
 pub(super) struct ProcessPipelines {
-    recipe: Recipe,
+    recipe: Recipe<'static>,
     /// `@group(2)`; `None` for a process that has nothing there.
     process_layout: Option<wgpu::BindGroupLayout>,
     /// `None` for a raw pass.
@@ -25,38 +26,44 @@ pub(super) struct ProcessPipelines {
 
 /// All that pipelines are made from and that a process may change from frame to frame.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Recipe {
-    shader: String,
+struct Recipe<'a> {
+    shader: Cow<'a, str>,
     /// Empty for a raw pass.
     vertex: &'static str,
-    fragment: Option<String>,
+    fragment: Option<Cow<'a, str>>,
     parameter_bytes: usize,
     writes_depth: bool,
     /// For a full-screen triangle.
     blend: Blend,
 }
 
-impl Recipe {
-    fn new(draws: &Draws<'_>) -> Self {
+impl<'a> Recipe<'a> {
+    /// Borrowed, because every frame compares it with what the pipelines were made from.
+    fn new(draws: &Draws<'a>) -> Self {
         match draws {
             Draws::Commands(commands) => Self {
-                shader: commands.shader.to_owned(),
+                shader: Cow::Borrowed(commands.shader),
                 vertex: "vertex",
-                fragment: commands.fragment.map(str::to_owned),
+                fragment: commands.fragment.map(Cow::Borrowed),
                 parameter_bytes: commands.parameters.len(),
                 writes_depth: commands.writes_depth,
                 blend: Blend::None,
             },
             Draws::FullScreen(full_screen) => Self {
-                shader: full_screen.shader.to_owned(),
+                shader: Cow::Borrowed(full_screen.shader),
                 vertex: "full_screen",
-                fragment: Some("fragment".to_owned()),
+                fragment: Some(Cow::Borrowed("fragment")),
                 parameter_bytes: full_screen.parameters.len(),
                 writes_depth: false,
                 blend: full_screen.blend,
             },
             Draws::Raw(_) => Self::default(),
         }
+    }
+
+    fn into_owned(self) -> Recipe<'static> {
+        let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
+        Recipe { shader: owned(self.shader), fragment: self.fragment.map(owned), ..self }
     }
 }
 
@@ -84,7 +91,7 @@ impl ProcessPipelines {
             let mut targets = plan.targets().iter().filter(|planned| planned.views == declaration.views);
             targets.find(|planned| planned.name == target).map_or(Format::Rgba8Unorm, |planned| planned.format)
         };
-        let recipe = Recipe::new(draws);
+        let recipe = Recipe::new(draws).into_owned();
         let process_layout = process_layout(device, recipe.parameter_bytes, declaration.samples().map(format_of));
         let shader = (!recipe.vertex.is_empty()).then(|| {
             let name = planned.process.name();
