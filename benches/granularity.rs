@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use drawloom::backend::{Backend, BackendError, NullBackend, WgpuBackend, WgpuSubmission};
 use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer, Submitter};
@@ -129,7 +130,7 @@ impl Turns<'_> {
         for workers in self.workers {
             let scheduler = Arc::new(Scheduler::new(workers)?);
             for (name, granularity) in GRANULARITIES {
-                let builder = Renderer::builder(open()?).deferred().granularity(granularity);
+                let builder = Renderer::builder(open()?).deferred(Deferred::to_picture()).granularity(granularity);
                 let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
                 settings.push(Setting { workers, granularity: name, renderer, submitter, times: Vec::new() });
             }

@@ -18,9 +18,7 @@ use std::time::{Duration, Instant};
 use drawloom::backend::WgpuBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::process::{
-    CommandDraws, Declare, Draws, GeometryBuffer, Lighting, RawPass, RenderProcess, Resolved, ToneMapping,
-};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RawPass, RenderProcess, Resolved, ToneMapping};
 use drawloom::queue::Selection;
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
@@ -38,12 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // One scheduler for the engine's own jobs and for Drawloom's.
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue)?)
-        .process(GeometryBuffer)
-        .process(Lighting)
-        .process(Glow)
-        .process(ToneMapping { exposure: 1.2 })
+        .deferred(Deferred::new().post(ToneMapping { exposure: 1.2 }).replace("transparency", Glow))
         .process(Present { surface: Arc::clone(&surface) })
-        .output("picture")
         .build(Arc::clone(&scheduler))?;
 
     let mut world = World::new()?;
@@ -114,6 +108,7 @@ impl World {
                 Light::Directional {
                     direction: Vec3::new(-0.5, -0.7, -0.5).normalize(),
                     illuminance: Vec3::splat(2.5),
+                    casts_shadow: true,
                 },
                 Light::Point { position: DVec3::Y * 4.0, intensity: Vec3::new(20.0, 30.0, 60.0), range: 30.0 },
             ],
@@ -164,7 +159,7 @@ impl World {
     }
 }
 
-/// A pipeline of the engine's own over Drawloom's commands: objects of additive materials glow, brightest at their rims.
+/// A pipeline of the engine's own over Drawloom's commands, in the place of Drawloom's transparency: objects of additive materials glow, brightest at their rims.
 struct Glow;
 
 impl RenderProcess for Glow {
@@ -175,13 +170,11 @@ impl RenderProcess for Glow {
     fn declare(&self, declare: &mut Declare) {
         declare.draws_over("radiance");
         declare.tests_depth("depth");
-        // Lighting changes the radiance too, so the order has to be said.
-        declare.after("lighting");
     }
 
     fn draws(&self) -> Draws<'_> {
         Draws::Commands(CommandDraws {
-            selection: Selection::Blended,
+            selection: Selection::BLENDED,
             shader: "
                 struct Rim {
                     @builtin(position) clip: vec4<f32>,

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, NullBackend, WgpuBackend, WgpuSubmission};
+use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::{Scene, obj, sample};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Renderer, Submitted};
@@ -96,8 +97,10 @@ fn draw<B: Backend>(
         None => Scheduler::with_available_parallelism()?,
     });
     let workers = scheduler.workers();
+    let deferred =
+        Deferred::new().depth_pre_pass(arguments.depth_pre_pass).post(ToneMapping::default()).post(Fxaa::default());
     let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred().granularity(arguments.granularity.0).build(scheduler)?;
+        Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?;
 
     let frames = arguments.frames;
     let progress = ProgressBar::new(u64::from(frames));
@@ -116,6 +119,10 @@ fn draw<B: Backend>(
         progress.inc(1);
     }
     progress.finish_and_clear();
+    if let Some(path) = &arguments.graph {
+        std::fs::write(path, renderer.plan().to_dot())
+            .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+    }
 
     let report = Report::new(renderer.backend().adapter(), arguments, workers, &measured);
     Ok((last.ok_or("no frame was drawn")?, report))

@@ -157,6 +157,12 @@ impl<T> Slots<T> {
         })
     }
 
+    /// The entry in a slot, with the revision at which it last changed.
+    pub fn revised_at(&self, slot: u32) -> Option<(u64, &T)> {
+        let entry = self.entries.get(slot as usize)?;
+        entry.value.as_ref().map(|value| (entry.revision, value))
+    }
+
     /// A number that no other collection of this process has, so that a cache knows whose entries it holds.
     pub fn identity(&self) -> u64 {
         self.identity

@@ -49,6 +49,14 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 
+    /// Draws depth before the geometry buffer.
+    #[arg(long)]
+    pub depth_pre_pass: bool,
+
+    /// Writes the graph of the frame's processes and targets in the DOT language.
+    #[arg(long, value_name = "FILE")]
+    pub graph: Option<PathBuf>,
+
     /// Writes the figures as JSON.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,

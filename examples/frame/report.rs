@@ -21,7 +21,7 @@ pub struct Report {
     views: Vec<View>,
     stages_ms: Stages,
     cpu_ms: Cpu,
-    /// What was left out; only printed.
+    /// What was left out or not drawn as asked; only printed.
     #[serde(skip)]
     rejections: Vec<String>,
 }
@@ -31,6 +31,7 @@ struct View {
     name: String,
     kind: &'static str,
     visible: usize,
+    lights: usize,
     commands: usize,
     batches: usize,
     bundles: usize,
@@ -70,6 +71,7 @@ impl Report {
             name: view.name.clone(),
             kind: view.kind.name(),
             visible: view.visible,
+            lights: view.lights,
             commands: view.commands,
             batches: view.batches,
             bundles: view.bundles,
@@ -112,13 +114,16 @@ impl Report {
         println!("frames   {frames} on {backend}, {workers} workers, {granularity}");
         println!("objects  {objects}");
         for rejection in &self.rejections {
-            println!("left out {rejection}");
+            println!("not as asked: {rejection}");
         }
         println!();
-        println!("{:<16} {:<10} {:>9} {:>9} {:>9} {:>9}", "view", "kind", "visible", "commands", "batches", "bundles");
+        println!(
+            "{:<18} {:<8} {:>8} {:>7} {:>9} {:>8} {:>8}",
+            "view", "kind", "visible", "lights", "commands", "batches", "bundles"
+        );
         for view in &self.views {
-            let View { name, kind, visible, commands, batches, bundles } = view;
-            println!("{name:<16} {kind:<10} {visible:>9} {commands:>9} {batches:>9} {bundles:>9}");
+            let View { name, kind, visible, lights, commands, batches, bundles } = view;
+            println!("{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}");
         }
         println!();
         let stages = &self.stages_ms;

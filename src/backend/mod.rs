@@ -9,10 +9,10 @@ use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::SceneRef;
 use crate::task::Worker;
-use crate::view::{ObjectTable, Rejections, RenderView};
+use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 #[cfg(feature = "wgpu")]
-pub use self::wgpu::{Picture, WgpuBackend, WgpuSubmission};
+pub use self::wgpu::{Picture, WgpuBackend, WgpuResources, WgpuSubmission};
 pub use null::{NullBackend, NullPass, NullSubmission};
 
 /// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
@@ -55,7 +55,14 @@ pub trait Backend: Send + Sync + 'static {
     ///
     /// # Errors
     /// If the device refuses; a shader of the process that does not compile is found here at the latest.
-    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: Pass, list: &DrawList) -> Result<(), BackendError>;
+    fn prepare(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        request: &FrameRequest<'_>,
+        pass: Pass,
+        list: &DrawList,
+    ) -> Result<(), BackendError>;
 
     /// Records bundles of a pass.
     ///
@@ -100,6 +107,8 @@ pub struct FrameRequest<'a> {
     pub draws: &'a [Draws<'a>],
     /// The views.
     pub views: &'a [RenderView],
+    /// The lights that reach each view.
+    pub lights: &'a [LightTable],
     /// Each process in each of its views, in the order they are submitted.
     pub passes: &'a [Pass],
     /// The scene.

@@ -75,7 +75,7 @@ impl Backend for NullBackend {
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
         for view in request.views {
-            if ViewRecord::new(view, request.scene, request.scene.lights.len()).is_none() {
+            if ViewRecord::new(view, request.scene, 0).is_none() {
                 return Err(BackendError::ViewOutOfReach { view: view.name().to_owned() });
             }
         }
@@ -112,7 +112,14 @@ impl Backend for NullBackend {
         Ok(())
     }
 
-    fn prepare(&self, _worker: &Worker, frame: &NullFrame, pass: Pass, list: &DrawList) -> Result<(), BackendError> {
+    fn prepare(
+        &self,
+        _worker: &Worker,
+        frame: &NullFrame,
+        _request: &FrameRequest<'_>,
+        pass: Pass,
+        list: &DrawList,
+    ) -> Result<(), BackendError> {
         ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
         let before = frame.prepared.lock().insert(pass, list.objects.len());
         ensure(before.is_none(), || format!("{pass:?} was prepared twice"))?;

@@ -2,12 +2,12 @@
 
 use crate::scene::{Blend, Topology};
 
-/// Topology, culling and blending, quantised into a byte (M listing 10.1). Together with the process that draws, it says
-/// which pipeline a command needs.
+/// Topology, culling, blending, and how often the mesh's edges are halved, quantised into a byte (M listing 10.1). Together
+/// with the process that draws, it says which pipeline a command needs, and together with the mesh which triangles.
 ///
 /// ```text
-/// bit   7  6  5 | 4  3 | 2  1 | 0
-///       unused  | blend| cull | topology
+/// bit   7  6  5     | 4  3 | 2  1 | 0
+///       subdivision | blend| cull | topology
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DrawState(u8);
@@ -17,11 +17,32 @@ impl DrawState {
     pub const PLAIN: Self = Self(0);
 
     /// How many states there can be: every state's [`DrawState::index`] is below it.
-    pub const COUNT: usize = 1 << 5;
+    pub const COUNT: usize = 1 << 8;
+
+    /// How often a mesh's edges can be halved.
+    pub const FINEST: u32 = 7;
 
     /// The state with these parts.
     pub fn new(topology: Topology, cull: Cull, blend: Blend) -> Self {
         Self(topology as u8 | (cull as u8) << 1 | (blend as u8) << 3)
+    }
+
+    /// The same with the mesh's edges halved so often: at most [`DrawState::FINEST`] times.
+    pub fn subdivided(self, halvings: u32) -> Self {
+        Self(self.0 & 0b1_1111 | (halvings.min(Self::FINEST) as u8) << 5)
+    }
+
+    /// How often the mesh's edges are halved.
+    pub fn halvings(self) -> u32 {
+        u32::from(self.0 >> 5)
+    }
+
+    /// What of the state the pipeline depends on. A subdivided mesh is a triangle list, whatever it was before.
+    pub fn of_pipeline(self) -> Self {
+        match self.halvings() {
+            0 => self,
+            _ => Self::new(Topology::TriangleList, self.cull(), self.blend()),
+        }
     }
 
     /// The byte, as a number to index by.
@@ -80,6 +101,11 @@ mod tests {
                     let state = DrawState::new(topology, cull, blend);
                     assert_eq!((state.topology(), state.cull(), state.blend()), (topology, cull, blend));
                     assert!(state.index() < DrawState::COUNT);
+                    let subdivided = state.subdivided(9);
+                    assert_eq!((state.halvings(), subdivided.halvings()), (0, DrawState::FINEST));
+                    assert_eq!(subdivided.subdivided(0), state);
+                    assert_eq!(state.of_pipeline(), state);
+                    assert_eq!(subdivided.of_pipeline(), DrawState::new(Topology::TriangleList, cull, blend));
                     assert!(seen.insert(state));
                 }
             }

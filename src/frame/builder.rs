@@ -2,39 +2,61 @@
 
 use std::sync::Arc;
 
+use super::plans::Plans;
 use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
 use crate::backend::Backend;
-use crate::process::{FramePlan, GeometryBuffer, Lighting, RenderProcess, ToneMapping};
+use crate::process::{Deferred, RenderProcess};
 use crate::task::Scheduler;
+use crate::view::ShadowMaps;
 
 /// Puts a renderer together from processes.
 pub struct RendererBuilder<B> {
     backend: B,
-    processes: Vec<Box<dyn RenderProcess>>,
+    deferred: Option<Deferred>,
+    processes: Vec<Arc<dyn RenderProcess>>,
     outputs: Vec<String>,
+    shadow_maps: ShadowMaps,
     granularity: Granularity,
 }
 
 impl<B: Backend> RendererBuilder<B> {
     pub(super) fn new(backend: B) -> Self {
-        Self { backend, processes: Vec::new(), outputs: Vec::new(), granularity: Granularity::default() }
+        Self {
+            backend,
+            deferred: None,
+            processes: Vec::new(),
+            outputs: Vec::new(),
+            shadow_maps: ShadowMaps::default(),
+            granularity: Granularity::default(),
+        }
     }
 
     /// Adds a process. The order of these calls only matters where reads and writes leave it open.
     pub fn process(mut self, process: impl RenderProcess + 'static) -> Self {
-        self.processes.push(Box::new(process));
+        self.processes.push(Arc::new(process));
         self
     }
 
-    /// Adds [`GeometryBuffer`], [`Lighting`] and [`ToneMapping`], and their output `picture`.
-    pub fn deferred(self) -> Self {
-        self.process(GeometryBuffer).process(Lighting).process(ToneMapping::default()).output("picture")
+    /// Adds the processes of a deferred pipeline, which follow from frame to frame what the scene requires, and its output.
+    pub fn deferred(mut self, deferred: Deferred) -> Self {
+        if let Some(maps) = deferred.maps() {
+            self.shadow_maps = *maps;
+        }
+        self.deferred = Some(deferred);
+        self
     }
 
     /// Names a target that the frame is for. Processes that lead to none are dropped.
     pub fn output(mut self, target: impl Into<String>) -> Self {
         self.outputs.push(target.into());
+        self
+    }
+
+    /// How lights that cast shadows are seen, for processes of the engine's own that draw in views of
+    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). A [`Deferred`] pipeline brings its own.
+    pub fn shadow_maps(mut self, maps: ShadowMaps) -> Self {
+        self.shadow_maps = maps;
         self
     }
 
@@ -48,14 +70,14 @@ impl<B: Backend> RendererBuilder<B> {
     /// thread: the submitter cannot leave it.
     ///
     /// # Errors
-    /// If the processes do not make a frame, or the granularity is a chunk of 0.
+    /// If the processes do not make a frame, if shadow maps cannot be as they are set, or if the granularity is a chunk of 0.
     pub fn build(self, scheduler: Arc<Scheduler>) -> Result<(Renderer<B>, Submitter<B>), BuildError> {
         if self.granularity == Granularity::Chunk(0) {
             return Err(BuildError::EmptyChunk);
         }
-        let plan = FramePlan::new(self.processes, &self.outputs)?;
+        let plans = Plans::new(self.deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = Arc::new(self.backend);
         let submitter = Submitter::new(Arc::clone(&backend));
-        Ok((Renderer::new(backend, plan, self.granularity, scheduler), submitter))
+        Ok((Renderer::new(backend, plans, self.granularity, scheduler), submitter))
     }
 }

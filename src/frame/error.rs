@@ -43,6 +43,17 @@ pub enum FrameError {
         /// Its kind.
         kind: ViewKind,
     },
+    /// Views that draw layers of one texture differ in size.
+    #[error("views {:?} and {:?} share the target {target:?}, but differ in size", views[0], views[1])]
+    UnequalLayers {
+        /// The target.
+        target: String,
+        /// Two views.
+        views: [String; 2],
+    },
+    /// The processes do not make a frame of what the scene requires.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// The scene cannot be drawn as it is.
     #[error(transparent)]
     Scene(#[from] SceneError),

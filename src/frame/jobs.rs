@@ -2,18 +2,22 @@
 
 use super::FrameError;
 use super::phase::{PassTable, Phase};
+use crate::command::RenderCommand;
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::Selection;
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// What a frame's jobs are, for one list of views. It stays the same until views come or go.
+/// What a frame's jobs are, for one plan and one list of views.
 pub(super) struct FrameJobs {
     pub(super) schedule: Schedule<Phase>,
     /// In the order they are submitted: by process, then by view.
     pub(super) passes: Vec<Pass>,
+    /// One for each pass; kept from frame to frame so that its memory is reused.
+    pub(super) tables: Vec<PassTable>,
     /// What the jobs were drawn up for.
+    plan: u64,
     views: Vec<(String, ViewKind)>,
     selections: Vec<Option<Selection>>,
 }
@@ -53,7 +57,7 @@ impl FrameJobs {
                 id
             };
             let mut previous = None;
-            if selection_of(&draws[pass.process]).is_some() {
+            if draws[pass.process].selection().is_some() {
                 let seen = *compacted[view].get_or_insert_with(|| {
                     let seen = add(format!("visibility, {view_name}"), Phase::Visibility { view }, Some(objects));
                     add(format!("compact, {view_name}"), Phase::Compact { view }, Some(seen))
@@ -73,28 +77,60 @@ impl FrameJobs {
         }
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
         let views = views.iter().map(|view| (view.name().to_owned(), view.kind())).collect();
-        Ok(Self { schedule, passes, views, selections: draws.iter().map(selection_of).collect() })
+        let selections: Vec<_> = draws.iter().map(Draws::selection).collect();
+        let table = |pass: &Pass| PassTable { selection: selections[pass.process], ..PassTable::default() };
+        let tables = passes.iter().map(table).collect();
+        Ok(Self { schedule, passes, tables, plan: plan.identity(), views, selections })
     }
 
-    /// Whether they still are what these draws and views need.
-    pub(super) fn fit(&self, draws: &[Draws<'_>], views: &[RenderView]) -> bool {
+    /// Whether they are what this plan, these draws and these views need.
+    pub(super) fn fit(&self, plan: &FramePlan, draws: &[Draws<'_>], views: &[RenderView]) -> bool {
         let names = self.views.iter().map(|(name, kind)| (name.as_str(), *kind));
-        names.eq(views.iter().map(|view| (view.name(), view.kind())))
-            && self.selections.iter().copied().eq(draws.iter().map(selection_of))
+        self.plan == plan.identity()
+            && names.eq(views.iter().map(|view| (view.name(), view.kind())))
+            && self.selections.iter().copied().eq(draws.iter().map(Draws::selection))
     }
 
-    /// Empty tables for the passes.
-    pub(super) fn pass_tables(&self) -> Vec<PassTable> {
-        let table = |pass: &Pass| PassTable { selection: self.selections[pass.process], ..PassTable::default() };
-        self.passes.iter().map(table).collect()
+    /// Makes room for a frame of `objects` objects.
+    pub(super) fn reset(&mut self, objects: usize) {
+        for table in self.tables.iter_mut().filter(|table| table.selection.is_some()) {
+            table.commands.reserve(objects, RenderCommand::NOTHING);
+        }
     }
 }
 
-/// Which objects a process draws; `None` for one that draws no objects.
-fn selection_of(draws: &Draws<'_>) -> Option<Selection> {
-    match draws {
-        Draws::Commands(commands) => Some(commands.selection),
-        _ => None,
+/// The jobs that were drawn up so far, the latest first. Scenes change what they require and change back, and then the jobs
+/// are there already; those that were not needed for longest are dropped.
+#[derive(Default)]
+pub(super) struct JobsCache {
+    latest_first: Vec<FrameJobs>,
+}
+
+impl JobsCache {
+    const MOST: usize = 16;
+
+    /// The jobs of a frame.
+    ///
+    /// # Errors
+    /// As [`FrameJobs::new`].
+    pub(super) fn find(
+        &mut self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+    ) -> Result<&mut FrameJobs, FrameError> {
+        let found = match self.latest_first.iter().position(|jobs| jobs.fit(plan, draws, views)) {
+            Some(index) => self.latest_first.remove(index),
+            None => FrameJobs::new(plan, draws, views)?,
+        };
+        self.latest_first.truncate(Self::MOST - 1);
+        self.latest_first.insert(0, found);
+        Ok(&mut self.latest_first[0])
+    }
+
+    /// Those of the last frame; `None` before the first one.
+    pub(super) fn latest(&self) -> Option<&FrameJobs> {
+        self.latest_first.first()
     }
 }
 

@@ -5,9 +5,11 @@ mod error;
 mod granularity;
 mod jobs;
 mod phase;
+mod plans;
 mod recorded;
 mod renderer;
 mod statistics;
+mod views;
 
 pub use builder::RendererBuilder;
 pub use error::{BuildError, FrameError, SubmitError};

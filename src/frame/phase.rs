@@ -43,6 +43,8 @@ pub(super) enum Phase {
 pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) request: &'a FrameRequest<'a>,
     pub(super) tables: &'a FrameTables,
+    /// One for each pass.
+    pub(super) passes: &'a [PassTable],
     pub(super) granularity: Granularity,
     pub(super) backend: &'a B,
     pub(super) frame: &'a B::Frame,
@@ -50,14 +52,12 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) clock: &'a StageClock,
 }
 
-/// What phases leave for each other; kept from frame to frame so that its memory is reused.
+/// What phases leave for each other, whatever the passes; kept from frame to frame so that its memory is reused.
 #[derive(Debug, Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
     /// One for each view.
     pub(super) visible: Vec<VisibleSet>,
-    /// One for each pass.
-    pub(super) passes: Vec<PassTable>,
 }
 
 /// What one pass draws, on its way from slots to batches.
@@ -70,16 +70,12 @@ pub(super) struct PassTable {
 }
 
 impl FrameTables {
-    /// Makes room for a frame of `objects` objects.
-    pub(super) fn reset(&mut self, objects: usize) {
-        self.objects.reset(objects);
+    /// Makes room for what `views` views see of the objects, for which there is room already.
+    pub(super) fn reset(&mut self, views: usize) {
+        let objects = self.objects.len();
+        self.visible.resize_with(views, VisibleSet::default);
         for visible in &mut self.visible {
             visible.reset(objects);
-        }
-        for pass in &mut self.passes {
-            if pass.selection.is_some() {
-                pass.commands.reserve(objects, RenderCommand::NOTHING);
-            }
         }
     }
 }
@@ -112,7 +108,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.block_count(),
             Self::Fill { pass } => tables.visible[frame.request.passes[pass].view].count(),
-            Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
+            Self::Record { pass } => frame.passes[pass].list.read().bundle_count(),
             Self::Compact { .. }
             | Self::Sort { .. }
             | Self::Instance { .. }
@@ -164,13 +160,13 @@ impl Phase {
             Self::Fill { pass } => fill(frame, pass, range),
             Self::Sort { pass } => {
                 let count = tables.visible[frame.request.passes[pass].view].count();
-                sort(&tables.passes[pass].commands, count, &mut tables.passes[pass].list.write().commands);
+                sort(&frame.passes[pass].commands, count, &mut frame.passes[pass].list.write().commands);
             }
-            Self::Instance { pass } => instance(&mut tables.passes[pass].list.write()),
+            Self::Instance { pass } => instance(&mut frame.passes[pass].list.write()),
             Self::Prepare { pass } => {
-                let list = tables.passes[pass].list.read();
+                let list = frame.passes[pass].list.read();
                 frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
-                return frame.backend.prepare(worker, frame.frame, frame.request.passes[pass], &list);
+                return frame.backend.prepare(worker, frame.frame, frame.request, frame.request.passes[pass], &list);
             }
             Self::Record { pass } => return record(frame, pass, range, worker),
             Self::Finish { pass } => return finish(frame, pass, worker),
@@ -191,13 +187,14 @@ fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>
 }
 
 fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
-    let table = &frame.tables.passes[pass];
+    let table = &frame.passes[pass];
     let view = frame.request.passes[pass].view;
     let fill = Fill {
         table: &frame.tables.objects,
         view: &frame.request.views[view],
         visible: &frame.tables.visible[view],
         selection: table.selection.unwrap_or_default(),
+        scene: frame.request.scene,
     };
     fill.run(ranks, &table.commands);
 }
@@ -208,7 +205,7 @@ fn record<B: Backend>(
     bundles: Range<usize>,
     worker: &Worker,
 ) -> Result<(), BackendError> {
-    let list = frame.tables.passes[pass].list.read();
+    let list = frame.passes[pass].list.read();
     let recorded = frame.backend.record(worker, frame.frame, frame.request.passes[pass], &list, bundles.clone())?;
     let mut slots = frame.recordings[pass].bundles.lock();
     for (slot, bundle) in slots[bundles].iter_mut().zip(recorded) {

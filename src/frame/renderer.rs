@@ -4,17 +4,19 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
-use super::jobs::FrameJobs;
-use super::phase::{FrameContext, FrameTables, Recording};
+use super::jobs::JobsCache;
+use super::phase::{FrameContext, FrameTables, PassTable, Recording};
+use super::plans::Plans;
 use super::recorded::{Recorded, ViewQueue};
 use super::statistics::{Stage, StageClock};
+use super::views::{ValidLights, views_of};
 use super::{FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, BackendError, FrameRequest};
-use crate::process::{Draws, FramePlan};
+use crate::process::{FramePlan, Pass};
 use crate::queue::DrawList;
-use crate::scene::{Light, SceneError, SceneRef};
+use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
-use crate::view::{Rejection, RejectionReason, Rejections, RenderView, VisibleSet};
+use crate::view::{LightTable, Rejection, RejectionReason, RenderView};
 
 /// Produces frames: records a scene on all workers, and gives it back when that is done.
 ///
@@ -22,12 +24,13 @@ use crate::view::{Rejection, RejectionReason, Rejections, RenderView, VisibleSet
 /// use std::sync::Arc;
 ///
 /// use drawloom::backend::NullBackend;
+/// use drawloom::process::Deferred;
 /// use drawloom::scene::sample;
 /// use drawloom::task::Scheduler;
 /// use drawloom::Renderer;
 ///
 /// let scheduler = Arc::new(Scheduler::new(2)?);
-/// let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred().build(scheduler)?;
+/// let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
 ///
 /// let scene = sample::colonnade()?;
 /// let recorded = renderer.record(scene.as_scene_ref())?;
@@ -38,10 +41,10 @@ use crate::view::{Rejection, RejectionReason, Rejections, RenderView, VisibleSet
 /// ```
 pub struct Renderer<B: Backend> {
     backend: Arc<B>,
-    plan: FramePlan,
+    plans: Plans,
     granularity: Granularity,
     scheduler: Arc<Scheduler>,
-    jobs: Option<FrameJobs>,
+    jobs: JobsCache,
     tables: FrameTables,
     /// What the last warnings were about.
     told: Vec<Rejection>,
@@ -53,8 +56,9 @@ impl<B: Backend> Renderer<B> {
         RendererBuilder::new(backend)
     }
 
-    pub(super) fn new(backend: Arc<B>, plan: FramePlan, granularity: Granularity, scheduler: Arc<Scheduler>) -> Self {
-        Self { backend, plan, granularity, scheduler, jobs: None, tables: FrameTables::default(), told: Vec::new() }
+    pub(super) fn new(backend: Arc<B>, plans: Plans, granularity: Granularity, scheduler: Arc<Scheduler>) -> Self {
+        let (jobs, tables) = (JobsCache::default(), FrameTables::default());
+        Self { backend, plans, granularity, scheduler, jobs, tables, told: Vec::new() }
     }
 
     /// Records a frame: everything up to submission. The calling thread works too.
@@ -69,18 +73,23 @@ impl<B: Backend> Renderer<B> {
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
         check(&scene)?;
-        let views: Vec<RenderView> = scene.cameras.iter().map(RenderView::new).collect();
-        let draws = self.plan.draws()?;
-        draw_up_jobs(&mut self.jobs, &mut self.tables, &self.plan, &draws, &views)?;
-        let Some(jobs) = &mut self.jobs else { return Err(FrameError::NoView) };
-        self.tables.reset(scene.object_count());
-        let lights = valid_lights(&scene, self.tables.objects.rejections());
+        self.tables.objects.reset(scene.object_count());
+        let lights = ValidLights::new(&scene, self.tables.objects.rejections());
+        let scene = SceneRef { lights: &lights.lights, ..scene };
+        let plan = self.plans.follow(&scene)?;
+        let views = views_of(&scene, &lights, self.plans.shadow_maps(), &plan)?;
+        let draws = plan.draws()?;
+        let jobs = self.jobs.find(&plan, &draws, &views)?;
+        jobs.reset(scene.object_count());
+        self.tables.reset(views.len());
+        let light_tables: Vec<_> = views.iter().map(|view| LightTable::new(view, scene.lights, &views)).collect();
         let request = FrameRequest {
-            plan: &self.plan,
+            plan: &plan,
             draws: &draws,
             views: &views,
+            lights: &light_tables,
             passes: &jobs.passes,
-            scene: &SceneRef { lights: &lights, ..scene },
+            scene: &scene,
             rejections: self.tables.objects.rejections(),
         };
 
@@ -90,6 +99,7 @@ impl<B: Backend> Renderer<B> {
         let context = FrameContext {
             request: &request,
             tables: &self.tables,
+            passes: &jobs.tables,
             granularity: self.granularity,
             backend: &*self.backend,
             frame: &frame,
@@ -99,65 +109,38 @@ impl<B: Backend> Renderer<B> {
         jobs.schedule.run(&self.scheduler, &context)?;
 
         let queues = queues_of(&request, recordings)?;
-        let statistics = statistics_of(&request, &self.tables, &clock);
+        let statistics = statistics_of(&request, &self.tables, &jobs.tables, &clock);
         warn_of_changes(&statistics.rejections, &mut self.told);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) })
     }
 
     /// What the last recorded frame drew in one view by one process; `None` where that process draws no commands there.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
-        let passes = &self.jobs.as_ref()?.passes;
-        let index = passes
-            .iter()
-            .position(|pass| pass.view == view && self.plan.processes()[pass.process].process.name() == process)?;
-        let table = &self.tables.passes[index];
+        let (jobs, plan) = (self.jobs.latest()?, self.plans.current());
+        let is_wanted = |pass: &Pass| pass.view == view && plan.processes()[pass.process].process.name() == process;
+        let table = &jobs.tables[jobs.passes.iter().position(is_wanted)?];
         table.selection.map(|_| table.list.read())
     }
 
-    /// The processes and their targets.
+    /// The processes of the last frame and their targets; before the first one, those of an empty scene.
     pub fn plan(&self) -> &FramePlan {
-        &self.plan
+        self.plans.current()
+    }
+
+    /// For how many different requirements of scenes plans are kept.
+    pub fn plan_count(&self) -> usize {
+        self.plans.count()
     }
 
     /// The last frame's jobs as a graph in the DOT language; `None` before the first frame.
     pub fn jobs_to_dot(&self) -> Option<String> {
-        self.jobs.as_ref().map(|jobs| jobs.schedule.to_dot())
+        self.jobs.latest().map(|jobs| jobs.schedule.to_dot())
     }
 
     /// What draws.
     pub fn backend(&self) -> &B {
         &self.backend
     }
-}
-
-/// Sees to it that the jobs are those that these views need.
-fn draw_up_jobs(
-    jobs: &mut Option<FrameJobs>,
-    tables: &mut FrameTables,
-    plan: &FramePlan,
-    draws: &[Draws<'_>],
-    views: &[RenderView],
-) -> Result<(), FrameError> {
-    if !jobs.as_ref().is_some_and(|jobs| jobs.fit(draws, views)) {
-        let new = FrameJobs::new(plan, draws, views)?;
-        tables.visible.resize_with(views.len(), VisibleSet::default);
-        tables.passes = new.pass_tables();
-        *jobs = Some(new);
-    }
-    Ok(())
-}
-
-/// The lights that can be; the others are counted.
-fn valid_lights(scene: &SceneRef<'_>, rejections: &Rejections) -> Vec<Light> {
-    let valid = scene.lights.iter().enumerate().filter(|(index, light)| {
-        let checked = light.check(*index);
-        if let Err(error) = &checked {
-            tracing::debug!(target: "drawloom", %error, "light left out");
-            rejections.count(RejectionReason::InvalidLight, *index);
-        }
-        checked.is_ok()
-    });
-    valid.map(|(_, light)| *light).collect()
 }
 
 /// One queue for each view, its passes in the order of the plan.
@@ -173,17 +156,23 @@ fn queues_of<B: Backend>(
     Ok(queues)
 }
 
-fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &StageClock) -> FrameStatistics {
+fn statistics_of(
+    request: &FrameRequest<'_>,
+    tables: &FrameTables,
+    passes: &[PassTable],
+    clock: &StageClock,
+) -> FrameStatistics {
     let of_view = |(index, view): (usize, &RenderView)| {
         let mut statistics = ViewStatistics {
             name: view.name().to_owned(),
             kind: view.kind(),
             visible: tables.visible[index].count(),
+            lights: request.lights[index].records().len(),
             commands: 0,
             batches: 0,
             bundles: 0,
         };
-        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
+        for (table, _) in passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
             let list = table.list.read();
             statistics.commands += list.commands.len();
             statistics.batches += list.batches.len();
@@ -200,11 +189,13 @@ fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &Stage
     }
 }
 
-/// Warns of what is left out, once and not in every frame.
+/// Warns of what is left out or cannot be drawn as asked, once and not in every frame.
 fn warn_of_changes(rejections: &[Rejection], told: &mut Vec<Rejection>) {
-    for rejection in rejections.iter().filter(|rejection| !told.contains(rejection)) {
+    // A light that is switched off is nothing to warn of.
+    let is_news = |rejection: &&Rejection| rejection.reason != RejectionReason::DarkLight && !told.contains(rejection);
+    for rejection in rejections.iter().filter(is_news) {
         let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-        tracing::warn!(target: "drawloom", count, first, "left out: {reason}");
+        tracing::warn!(target: "drawloom", count, first, "not drawn as asked: {reason}");
     }
     told.clear();
     told.extend_from_slice(rejections);

@@ -30,6 +30,8 @@ pub struct ViewStatistics {
     pub kind: ViewKind,
     /// Objects it sees.
     pub visible: usize,
+    /// Lights that reach it.
+    pub lights: usize,
     /// Commands, over all its processes.
     pub commands: usize,
     /// Instanced draws, over all its processes.

@@ -18,11 +18,17 @@ struct View {
     up: vec3<f32>,
     height: f32,
     forward: vec3<f32>,
-    padding: f32,
+    projection: u32,
     // Linear.
     ambient: vec3<f32>,
-    padding_end: f32,
+    far: f32,
 }
+
+const PERSPECTIVE: u32 = 0u;
+const ORTHOGRAPHIC: u32 = 1u;
+// What lies before the near plane is drawn onto it.
+const ORTHOGRAPHIC_SHADOW: u32 = 2u;
+const PARABOLOID: u32 = 3u;
 
 // A position is 64-bit fixed point in steps of 2^-30 m, as two halves.
 struct Object {
@@ -40,21 +46,27 @@ const POINT: u32 = 1u;
 const SPOT: u32 = 2u;
 const HEMISPHERICAL: u32 = 3u;
 
+const NO_SHADOW_MAP: u32 = 0xffffffffu;
+
 struct Light {
-    // Relative to the camera, along the world's axes.
+    // Relative to the camera, along the world's axes. Of a directional light: where its shadow map is seen from.
     position: vec3<f32>,
     kind: u32,
     // The way it travels.
     direction: vec3<f32>,
+    // Of a directional light: where its shadow map ends.
     range: f32,
     // At 1 m, or on a surface that faces a directional light.
     intensity: vec3<f32>,
     // Spot: from here to `cone_end` the cosine fades.
     cone_begin: f32,
     cone_end: f32,
-    padding_0: f32,
-    padding_1: f32,
-    padding_2: f32,
+    shadow_layer: u32,
+    // Half as wide as its shadow map: at 1 m for a spot light, in metres for a directional one.
+    shadow_half: f32,
+    shadow_near: f32,
+    // From the axes of the shadow map's camera to the world's.
+    shadow_orientation: vec4<f32>,
 }
 
 struct Material {
@@ -66,9 +78,12 @@ struct Material {
     texture_layer: u32,
     // 1 where both sides are drawn.
     double_sided: u32,
-    padding_0: u32,
-    padding_1: u32,
+    // 0 for none, 1 alpha, 2 additive, 3 subtractive.
+    blend: u32,
+    padding: u32,
 }
+
+const ALPHA: u32 = 1u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
@@ -96,6 +111,12 @@ struct FullScreenPixel {
     @location(0) clip: vec2<f32>,
 }
 
+// A pixel of what a light lights.
+struct LightPixel {
+    @builtin(position) position: vec4<f32>,
+    @location(0) @interpolate(flat) light: u32,
+}
+
 // One triangle that covers the picture.
 @vertex
 fn full_screen(@builtin(vertex_index) index: u32) -> FullScreenPixel {
@@ -118,8 +139,26 @@ fn relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
     return origin + rotate(object.orientation, object.scale * position);
 }
 
+// A shader that is to draw at just the depth of another calls this, and marks its position `@invariant`.
 fn clip_position(relative: vec3<f32>) -> vec4<f32> {
-    return view.clip_from_relative * vec4<f32>(relative, 1.0);
+    var clip = view.clip_from_relative * vec4<f32>(relative, 1.0);
+    if view.projection == PARABOLOID {
+        return paraboloid_position(clip.xyz);
+    }
+    if view.projection == ORTHOGRAPHIC_SHADOW {
+        clip.z = min(clip.z, 1.0);
+    }
+    return clip;
+}
+
+// From the camera's axes to clip space, as a mirror shaped like a paraboloid shows it (Brabec et al. 2002). The half space
+// before the camera becomes a disc as wide as the picture, and depth is the distance.
+fn paraboloid_position(place: vec3<f32>) -> vec4<f32> {
+    let distance = length(place);
+    let forward = -place.z / max(distance, 1e-30);
+    let depth = (view.far - distance) / (view.far - view.near);
+    // Straight behind the camera is everywhere at once. What lies there is outside the picture anyway, so it is left out.
+    return vec4<f32>(place.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
 }
 
 // From object space to the world's axes, of unit length; 0 where there is none to be had. The cofactors of a scale need no
@@ -138,7 +177,24 @@ fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
 
 // A pixel's place relative to the camera, along the world's axes.
 fn relative_of_pixel(clip: vec2<f32>, depth: f32) -> vec3<f32> {
-    return (clip.x * view.right + clip.y * view.up + view.forward) * (view.near / depth);
+    let across = clip.x * view.right + clip.y * view.up;
+    if view.projection == PERSPECTIVE {
+        return (across + view.forward) * (view.near / depth);
+    }
+    return across + view.forward * mix(view.far, view.near, depth);
+}
+
+// A pixel's place in the picture, from (-1, -1) at its lower left to (1, 1) at its upper right.
+fn clip_of_pixel(position: vec4<f32>) -> vec2<f32> {
+    return position.xy / vec2<f32>(view.width, view.height) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
+}
+
+// The way from a place to the eye, of unit length.
+fn direction_to_eye(relative: vec3<f32>) -> vec3<f32> {
+    if view.projection == PERSPECTIVE {
+        return -normalize(relative);
+    }
+    return -view.forward;
 }
 
 // The exact difference of two fixed-point positions, rounded once, in metres.

@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use super::RawPass;
 use crate::queue::Selection;
 use crate::scene::Blend;
+use crate::view::LightClass;
 
 /// What a process draws in each of its views.
 #[derive(Clone)]
@@ -15,6 +16,8 @@ pub enum Draws<'a> {
     Commands(CommandDraws<'a>),
     /// Every pixel once.
     FullScreen(FullScreen<'a>),
+    /// What the lights of a class reach.
+    Lights(LightDraws<'a>),
     /// Whatever the process encodes itself: compute, copies, passes of its own.
     #[cfg(feature = "wgpu")]
     Raw(&'a dyn RawPass),
@@ -40,7 +43,7 @@ impl Default for CommandDraws<'_> {
         Self {
             shader: "",
             fragment: Some("fragment"),
-            selection: Selection::Opaque,
+            selection: Selection::OPAQUE,
             writes_depth: true,
             parameters: Cow::Borrowed(&[]),
         }
@@ -58,4 +61,39 @@ pub struct FullScreen<'a> {
     pub blend: Blend,
     /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
     pub parameters: Cow<'a, [u8]>,
+}
+
+/// The pixels that lights reach: each light is drawn as geometry that surrounds what it lights (L 4.2.1), all of a class in one
+/// instanced draw, and what they add up to is added to the targets. A process that draws lights tests depth, so that pixels
+/// whose surface is behind a light's geometry are left out before they are shaded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightDraws<'a> {
+    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
+    /// the prelude's `LightPixel`.
+    pub shader: &'a str,
+    /// Which lights.
+    pub class: LightClass,
+    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    pub parameters: Cow<'a, [u8]>,
+}
+
+impl Draws<'_> {
+    /// Which objects are drawn; `None` where none are.
+    pub fn selection(&self) -> Option<Selection> {
+        match self {
+            Self::Commands(commands) => Some(commands.selection),
+            _ => None,
+        }
+    }
+
+    /// The bytes of the uniform at `@group(2) @binding(0)`; empty where there is none.
+    pub fn parameters(&self) -> &[u8] {
+        match self {
+            Self::Commands(commands) => &commands.parameters,
+            Self::FullScreen(full_screen) => &full_screen.parameters,
+            Self::Lights(lights) => &lights.parameters,
+            #[cfg(feature = "wgpu")]
+            Self::Raw(_) => &[],
+        }
+    }
 }

@@ -29,6 +29,20 @@ impl Format {
         matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float)
     }
 
+    /// Whether it holds numbers below 0.
+    pub fn is_signed(self) -> bool {
+        !matches!(self, Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Depth32Float)
+    }
+
+    /// Numbers a pixel.
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgba16Float => 4,
+            Self::Rg16Float => 2,
+            Self::R32Float | Self::Depth32Float => 1,
+        }
+    }
+
     /// Bytes a pixel.
     pub fn bytes(self) -> usize {
         match self {

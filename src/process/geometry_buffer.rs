@@ -1,36 +1,123 @@
 //! The geometry buffer (L 4.1).
 
-use super::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use std::borrow::Cow;
 
-/// Draws what lighting needs to know of each pixel: depth, normal and diffuse colour, and the light that the surface gives
-/// off itself.
+use super::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use crate::queue::{Blending, MaterialShare, Selection};
+
+/// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for radiance:
 ///
-/// The seven steps of L 4.1 and where they are here: the viewport is the view's picture; the render targets and their
-/// clearing are declared below; depth is read and written, and what faces away is culled, by the pipeline; the objects
-/// are drawn from the view's queue; the command buffer is finished on a worker.
-///
-/// | target | format | what |
+/// | target | what | format, unless set otherwise |
 /// | --- | --- | --- |
-/// | `depth` | [`Format::Depth32Float`] | reversed: 1 at the near plane, 0 infinitely far away |
-/// | `normal` | [`Format::Rg16Float`] | world space, octahedral (Cigolle et al. 2014) |
-/// | `diffuse` | [`Format::Rgba8Srgb`] | share of light reflected |
-/// | `radiance` | [`Format::Rgba16Float`] | light given off, linear; the background where nothing is |
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GeometryBuffer;
+/// | `depth` | reversed depth, 0 where nothing is | [`Format::Depth32Float`] |
+/// | `normal` | in the world, octahedral (Cigolle et al. 2014), at most 0.02° off | [`Format::Rg16Float`] |
+/// | `diffuse` | the share of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
+/// | `radiance` | what the surface gives off by itself and reflects of the ambient light, and the scene's background | [`Format::Rgba16Float`] |
+///
+/// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the depth; draw
+/// each object; finish. The viewport is the picture's, and the states are the pipelines'.
+#[derive(Clone, Debug)]
+pub struct GeometryBuffer {
+    name: String,
+    shader: String,
+    formats: GeometryFormats,
+    share: MaterialShare,
+    has_depth: bool,
+}
+
+/// What the geometry buffer's targets are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GeometryFormats {
+    /// Of `normal`: two channels or more. With [`Format::Rgba8Unorm`] normals are up to 0.95° off.
+    pub normal: Format,
+    /// Of `diffuse`: three channels or more.
+    pub diffuse: Format,
+    /// Of `radiance`: three channels or more. A format that ends at 1 ends bright light there, before tone mapping.
+    pub radiance: Format,
+}
+
+impl Default for GeometryFormats {
+    fn default() -> Self {
+        Self { normal: Format::Rg16Float, diffuse: Format::Rgba8Srgb, radiance: Format::Rgba16Float }
+    }
+}
+
+impl GeometryFormats {
+    /// The first target whose format lacks a channel that it needs.
+    pub(super) fn misfit(&self) -> Option<(&'static str, Format)> {
+        let targets = [("normal", self.normal, 2), ("diffuse", self.diffuse, 3), ("radiance", self.radiance, 3)];
+        let misfit = targets.into_iter().find(|(_, format, channels)| format.channels() < *channels);
+        misfit.map(|(target, format, _)| (target, format))
+    }
+
+    /// WGSL that shaders of the targets need: whether normals are stored from 0 to 1 rather than from −1.
+    pub(super) fn constants(&self) -> String {
+        format!("const NORMALS_FROM_ZERO_TO_ONE: bool = {};\n", !self.normal.is_signed())
+    }
+}
+
+impl GeometryBuffer {
+    /// One that draws every opaque object.
+    pub fn new(formats: GeometryFormats) -> Self {
+        Self::of_share(formats, MaterialShare::ALL)
+    }
+
+    /// One that draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over
+    /// it: all of them are recorded at the same time.
+    pub fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
+        let name = if share.of <= 1 {
+            String::from("geometry buffer")
+        } else {
+            format!("geometry buffer {} of {}", share.index + 1, share.of)
+        };
+        let shader =
+            [include_str!("surface.wgsl"), &formats.constants(), include_str!("geometry_buffer.wgsl")].concat();
+        Self { name, shader, formats, share, has_depth: false }
+    }
+
+    /// The same after a [`DepthPrePass`](super::DepthPrePass): it draws only what has just the depth that is there.
+    pub fn after_depth_pre_pass(self) -> Self {
+        Self { has_depth: true, ..self }
+    }
+}
 
 impl RenderProcess for GeometryBuffer {
     fn name(&self) -> &str {
-        "geometry buffer"
+        &self.name
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.clears_color("normal", Format::Rg16Float, ClearColor::Value([0.0; 4]));
-        declare.clears_color("diffuse", Format::Rgba8Srgb, ClearColor::Value([0.0; 4]));
-        declare.clears_color("radiance", Format::Rgba16Float, ClearColor::Background);
-        declare.clears_depth("depth", Format::Depth32Float);
+        let GeometryFormats { normal, diffuse, radiance } = self.formats;
+        let nothing = ClearColor::Value([0.0; 4]);
+        let targets = [
+            ("normal", normal, nothing),
+            ("diffuse", diffuse, nothing),
+            ("radiance", radiance, ClearColor::Background),
+        ];
+        let first = self.share.index == 0;
+        for (target, format, clear) in targets {
+            if first {
+                declare.clears_color(target, format, clear);
+            } else {
+                declare.draws_over(target);
+            }
+        }
+        if self.has_depth {
+            declare.matches_depth("depth");
+        } else if first {
+            declare.clears_depth("depth", Format::Depth32Float);
+        } else {
+            declare.draws_depth("depth");
+        }
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::Commands(CommandDraws { shader: include_str!("geometry_buffer.wgsl"), ..CommandDraws::default() })
+        Draws::Commands(CommandDraws {
+            shader: &self.shader,
+            fragment: Some("fragment"),
+            selection: Selection { blending: Blending::Opaque, materials: self.share },
+            writes_depth: !self.has_depth,
+            parameters: Cow::Borrowed(&[]),
+        })
     }
 }

@@ -4,73 +4,39 @@
 //! a backend turns it into pipelines, bundles and passes.
 
 mod declare;
+mod deferred;
+mod depth_pre_pass;
 mod draws;
+mod error;
 mod format;
 mod geometry_buffer;
-mod lighting;
+mod light_volume;
+mod light_volumes;
 mod plan;
+mod planned_target;
+mod post;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
-mod tone_mapping;
+mod render_process;
+mod requirements;
+mod shadow_casters;
+mod transparency;
 
 pub use declare::{Access, ClearColor, Declaration, Declare};
-pub use draws::{CommandDraws, Draws, FullScreen};
+pub use deferred::Deferred;
+pub use depth_pre_pass::DepthPrePass;
+pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
+pub use error::{PlanError, ProcessError};
 pub use format::Format;
-pub use geometry_buffer::GeometryBuffer;
-pub use lighting::Lighting;
-pub use plan::{FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError};
+pub use geometry_buffer::{GeometryBuffer, GeometryFormats};
+pub use light_volume::{LightVolume, cone_corner};
+pub use light_volumes::LightVolumes;
+pub use plan::{FramePlan, Pass, Place, PlannedProcess};
+pub use planned_target::PlannedTarget;
+pub use post::{Fxaa, PostStep, ToneMapping};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, Resolved};
-pub use tone_mapping::ToneMapping;
-
-/// A step of the frame: it owns its trip from the objects a view sees to a recorded pass.
-///
-/// A process draws once in each view of its kind. It is shared by all workers while a frame is recorded, so what changes
-/// from frame to frame is behind a lock or an atomic of its own.
-///
-/// ```
-/// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
-///
-/// /// Draws the depth of everything, with the engine's own shader.
-/// struct DepthOnly;
-///
-/// impl RenderProcess for DepthOnly {
-///     fn name(&self) -> &str {
-///         "depth only"
-///     }
-///
-///     fn declare(&self, declare: &mut Declare) {
-///         declare.clears_depth("depth", Format::Depth32Float);
-///     }
-///
-///     fn draws(&self) -> Draws<'_> {
-///         Draws::Commands(CommandDraws {
-///             shader: "
-///                 @vertex
-///                 fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
-///                     let object = drawn_object(in.instance);
-///                     return clip_position(relative_position(object, in.position));
-///                 }
-///             ",
-///             fragment: None,
-///             ..CommandDraws::default()
-///         })
-///     }
-/// }
-/// ```
-pub trait RenderProcess: Send + Sync {
-    /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
-    fn name(&self) -> &str;
-
-    /// Says which views it is for, and what it reads and writes. Asked once, when the renderer is built.
-    fn declare(&self, declare: &mut Declare);
-
-    /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending makes
-    /// new pipelines.
-    fn draws(&self) -> Draws<'_>;
-}
-
-/// What every shader begins with: the bindings, the structures and the functions that Drawloom provides.
-///
-/// A process's own WGSL is appended to it. See the file `drawloom.wgsl` for what it may use.
-pub const SHADER_PRELUDE: &str = include_str!("drawloom.wgsl");
+pub use render_process::{RenderProcess, SHADER_PRELUDE};
+pub use requirements::Requirements;
+pub use shadow_casters::ShadowCasters;
+pub use transparency::Transparency;

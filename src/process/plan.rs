@@ -1,12 +1,17 @@
 //! From a list of processes to what a frame does, in order.
 
-use super::{Access, Declaration, Declare, Draws, Format, RenderProcess};
-use crate::graph::{FrameGraph, GraphProblem};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::planned_target::targets_of;
+use super::{Access, Declaration, Declare, Draws, PlanError, PlannedTarget, ProcessError, RenderProcess};
+use crate::graph::{FrameGraph, ProcessId};
 use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
 
 /// What every frame does: processes in the order they are submitted, and the targets they use.
 pub struct FramePlan {
+    identity: u64,
     processes: Vec<PlannedProcess>,
     targets: Vec<PlannedTarget>,
     dropped: Vec<String>,
@@ -14,21 +19,35 @@ pub struct FramePlan {
 }
 
 impl FramePlan {
-    /// Orders the processes by what they read and write. Those that lead to none of the outputs are dropped. Where that
-    /// leaves the order open, the earlier [`ViewKind`] goes first, then the one that was added first (M 10.4).
+    /// Orders processes by what they read and write. Those that lead to none of the outputs are dropped. Where that leaves
+    /// the order open, the earlier [`ViewKind`] goes first, then the one that was added first (M 10.4).
+    ///
+    /// `chain` are processes whose order is known: where two of them write one target, the earlier goes first. Some of its
+    /// places may be empty, for want of anything to do; others may come after or before such a place all the same. To be in
+    /// the chain says nothing of who else writes a target.
     ///
     /// # Errors
     /// See [`PlanError`].
-    pub fn new(processes: Vec<Box<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
-        let mut declared = processes.into_iter().map(declared).collect::<Result<Vec<_>, _>>()?;
-        declared.sort_by_key(|planned| planned.declaration.views);
+    pub fn new(
+        chain: Vec<Place>,
+        processes: Vec<Arc<dyn RenderProcess>>,
+        outputs: &[String],
+    ) -> Result<Self, PlanError> {
+        let (places, in_chain): (Vec<_>, Vec<_>) = chain.into_iter().map(|place| (place.name, place.process)).unzip();
+        let chained = in_chain.into_iter().enumerate().filter_map(|(place, process)| Some((Some(place), process?)));
+        let others = processes.into_iter().map(|process| (None, process));
+        let mut declared: Vec<_> = chained
+            .chain(others)
+            .map(|(place, process)| Ok((place, declared(process)?)))
+            .collect::<Result<_, PlanError>>()?;
+        declared.sort_by_key(|(_, planned)| planned.declaration.views);
         let mut graph = FrameGraph::new();
-        let mut added = Vec::new();
-        for PlannedProcess { process, declaration } in declared {
+        let mut added: Vec<Added> = Vec::new();
+        for (place, PlannedProcess { process, declaration }) in declared {
             let name = process.name().to_owned();
             let id = graph.add(name.clone(), PlannedProcess { process, declaration: declaration.clone() });
             for (target, access) in &declaration.accesses {
-                let resource = graph.resource(resource_name(declaration.views, target));
+                let resource = graph.resource(resource_name(access.views(declaration.views), target));
                 if access.reads() {
                     graph.read(id, resource);
                 }
@@ -39,21 +58,14 @@ impl FramePlan {
             if declaration.keep {
                 graph.keep(id);
             }
-            added.push((name, id, declaration));
+            added.push(Added { place, name, id, declaration });
         }
-        for (name, id, declaration) in &added {
-            for before in &declaration.after {
-                let known = added.iter().find(|(other, ..)| other == before);
-                let (_, before, _) =
-                    known.ok_or_else(|| PlanError::UnknownProcess { process: name.clone(), after: before.clone() })?;
-                graph.order(*before, *id);
-            }
+        for (before, after) in orders(&places, &added)? {
+            graph.order(before, after);
         }
         for output in outputs {
-            let written = added.iter().filter(|(_, _, declaration)| {
-                declaration.accesses.iter().any(|(target, access)| target == output && access.writes())
-            });
-            let mut kinds: Vec<_> = written.map(|(_, _, declaration)| declaration.views).collect();
+            let written = added.iter().filter(|added| added.declaration.written().any(|target| target == output));
+            let mut kinds: Vec<_> = written.map(|added| added.declaration.views).collect();
             if kinds.is_empty() {
                 kinds.push(ViewKind::Main);
             }
@@ -70,7 +82,14 @@ impl FramePlan {
             return Err(PlanError::Empty);
         }
         let targets = targets_of(&processes)?;
-        Ok(Self { processes, targets, dropped, dot })
+        // Only told apart, never ordered by.
+        let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { identity, processes, targets, dropped, dot })
+    }
+
+    /// A number that no other plan of this program has.
+    pub fn identity(&self) -> u64 {
+        self.identity
     }
 
     /// The processes in the order they are submitted.
@@ -84,6 +103,11 @@ impl FramePlan {
     /// If one panics, or draws in a way that it did not declare.
     pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
         self.processes.iter().map(PlannedProcess::draws).collect()
+    }
+
+    /// Whether views of this kind are drawn at all.
+    pub fn draws_views(&self, kind: ViewKind) -> bool {
+        self.processes.iter().any(|planned| planned.declaration.views == kind)
     }
 
     /// The targets that views of each kind have.
@@ -102,10 +126,21 @@ impl FramePlan {
     }
 }
 
+/// Where a process stands among others whose order is known.
+#[derive(Clone)]
+pub struct Place {
+    /// What the place is called: as the process that comes with the crate, whoever stands there.
+    pub name: String,
+    /// Who stands there.
+    pub process: Option<Arc<dyn RenderProcess>>,
+}
+
+static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
+
 /// A process and what it declared.
 pub struct PlannedProcess {
     /// The process.
-    pub process: Box<dyn RenderProcess>,
+    pub process: Arc<dyn RenderProcess>,
     /// What it declared.
     pub declaration: Declaration,
 }
@@ -116,34 +151,16 @@ impl PlannedProcess {
         let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
         let draws = catch(|| self.process.draws()).map_err(panicked)?;
         let raw = match draws {
-            Draws::Commands(_) | Draws::FullScreen(_) => false,
+            Draws::Commands(_) | Draws::FullScreen(_) | Draws::Lights(_) => false,
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };
-        let fits = |access: &Access| match access {
-            Access::ClearColor(..) | Access::DrawOver | Access::ClearDepth(_) | Access::TestDepth | Access::Sample => {
-                !raw
-            }
-            Access::Write(_) | Access::Change | Access::Read => raw,
-        };
+        let fits = |access: &Access| access.is_raw() == raw;
         match self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
             Some((target, _)) => Err(ProcessError::Misdeclared { process: process(), target: target.clone() }),
             None => Ok(draws),
         }
     }
-}
-
-/// A target that each view of one kind has.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlannedTarget {
-    /// Its name.
-    pub name: String,
-    /// The kind of view.
-    pub views: ViewKind,
-    /// Its format.
-    pub format: Format,
-    /// Whether a raw pass may write it as a storage texture.
-    pub stored: bool,
 }
 
 /// One process in one view: what is recorded as a unit, and finished on one worker.
@@ -155,86 +172,76 @@ pub struct Pass {
     pub view: usize,
 }
 
-/// Why no frame can be made of these processes.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlanError {
-    /// What they read and write does not fit together.
-    #[error(transparent)]
-    Graph(#[from] GraphProblem),
-    /// A process wants to come after one that is not there.
-    #[error("process {process:?} is to come after {after:?}, which is not in the graph")]
-    UnknownProcess {
-        /// The process.
-        process: String,
-        /// The one that is not there.
-        after: String,
-    },
-    /// Two processes give a target two formats.
-    #[error("target {target:?} is both {first:?} and {second:?}")]
-    TwoFormats {
-        /// The target.
-        target: String,
-        /// One format.
-        first: Format,
-        /// The other.
-        second: Format,
-    },
-    /// A target is used as depth with a format that holds colour, or the other way round.
-    #[error("process {process:?} uses target {target:?} as what its format {format:?} is not")]
-    WrongFormat {
-        /// The process.
-        process: String,
-        /// The target.
-        target: String,
-        /// Its format.
-        format: Format,
-    },
-    /// A process has two depth targets.
-    #[error("process {process:?} has more than one depth target")]
-    TwoDepths {
-        /// The process.
-        process: String,
-    },
-    /// A process could not say what it reads and writes.
-    #[error(transparent)]
-    Process(#[from] ProcessError),
-    /// No process is left, because none leads to an output.
-    #[error("no process leads to an output")]
-    Empty,
+/// A process on its way into the graph.
+struct Added {
+    /// In the chain.
+    place: Option<usize>,
+    name: String,
+    id: ProcessId,
+    declaration: Declaration,
 }
 
-/// What is wrong with what a process says of itself.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProcessError {
-    /// It panicked when it was asked.
-    #[error("process {process:?} panicked when it was asked what it does: {message}")]
-    Panicked {
-        /// The process.
-        process: String,
-        /// What the panic said.
-        message: String,
-    },
-    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads one
-    /// by commands of its own.
-    #[error("process {process:?} does not use target {target:?} in the way that it declares")]
-    Misdeclared {
-        /// The process.
-        process: String,
-        /// The target.
-        target: String,
-    },
+/// Who goes before whom: by the chain, and by what processes say themselves.
+fn orders(places: &[String], added: &[Added]) -> Result<Vec<(ProcessId, ProcessId)>, PlanError> {
+    let mut orders = Vec::new();
+    for earlier in added {
+        let follows = |later: &&Added| later.place.is_some() && earlier.place.is_some() && later.place > earlier.place;
+        for later in added.iter().filter(follows) {
+            let both = |target: &str| later.declaration.written().any(|other| other == target);
+            if earlier.declaration.views == later.declaration.views && earlier.declaration.written().any(both) {
+                orders.push((earlier.id, later.id));
+            }
+        }
+    }
+    for own in added {
+        for before in &own.declaration.after {
+            let known = find(places, added, before, |wanted, place| place <= wanted);
+            orders.extend(known.map_err(|place| place.unknown(own, before))?.map(|before| (before, own.id)));
+        }
+        for after in &own.declaration.before {
+            let known = find(places, added, after, |wanted, place| place >= wanted);
+            orders.extend(known.map_err(|place| place.unknown(own, after))?.map(|after| (own.id, after)));
+        }
+    }
+    Ok(orders)
+}
+
+/// The process of this name; where it is an empty place of the chain, the nearest on the side of it that `is_on_side` says.
+///
+/// # Errors
+/// If the name is nobody's.
+fn find(
+    places: &[String],
+    added: &[Added],
+    name: &str,
+    is_on_side: impl Fn(usize, usize) -> bool,
+) -> Result<Option<ProcessId>, NoSuchName> {
+    if let Some(found) = added.iter().find(|other| other.name == name) {
+        return Ok(Some(found.id));
+    }
+    let wanted = places.iter().position(|place| place == name).ok_or(NoSuchName)?;
+    let on_side = added.iter().filter_map(|other| other.place.map(|place| (place, other.id)));
+    let nearest =
+        on_side.filter(|(place, _)| is_on_side(wanted, *place)).min_by_key(|(place, _)| place.abs_diff(wanted));
+    Ok(nearest.map(|(_, id)| id))
+}
+
+/// A name that is nobody's.
+struct NoSuchName;
+
+impl NoSuchName {
+    fn unknown(self, process: &Added, other: &str) -> PlanError {
+        PlanError::UnknownProcess { process: process.name.clone(), other: other.to_owned() }
+    }
 }
 
 /// Asks a process once for what it reads and writes.
-fn declared(process: Box<dyn RenderProcess>) -> Result<PlannedProcess, PlanError> {
+fn declared(process: Arc<dyn RenderProcess>) -> Result<PlannedProcess, PlanError> {
     let mut declare = Declare::default();
     catch(|| process.declare(&mut declare))
         .map_err(|panic| ProcessError::Panicked { process: process.name().to_owned(), message: panic.message })?;
     let declaration = declare.finish();
-    let is_depth = |(_, access): &&(String, Access)| matches!(access, Access::ClearDepth(_) | Access::TestDepth);
-    if declaration.accesses.iter().filter(is_depth).count() > 1 {
+    if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
         return Err(PlanError::TwoDepths { process: process.name().to_owned() });
     }
     Ok(PlannedProcess { process, declaration })
@@ -248,47 +255,13 @@ fn resource_name(kind: ViewKind, target: &str) -> String {
     }
 }
 
-fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
-    let mut targets: Vec<PlannedTarget> = Vec::new();
-    let accesses = || {
-        processes.iter().flat_map(|planned| {
-            planned.declaration.accesses.iter().map(move |(target, access)| (planned, target, *access))
-        })
-    };
-    for (planned, target, access) in accesses() {
-        let Some(format) = access.format() else { continue };
-        let views = planned.declaration.views;
-        match targets.iter().find(|known| known.name == *target && known.views == views) {
-            Some(known) if known.format != format => {
-                return Err(PlanError::TwoFormats { target: target.clone(), first: known.format, second: format });
-            }
-            Some(_) => {}
-            None => targets.push(PlannedTarget { name: target.clone(), views, format, stored: false }),
-        }
-    }
-    for (planned, target, access) in accesses() {
-        let views = planned.declaration.views;
-        let Some(known) = targets.iter_mut().find(|known| known.name == *target && known.views == views) else {
-            continue;
-        };
-        let wants_depth = match access {
-            Access::ClearColor(..) | Access::DrawOver => Some(false),
-            Access::ClearDepth(_) | Access::TestDepth => Some(true),
-            _ => None,
-        };
-        known.stored |= matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored();
-        if wants_depth.is_some_and(|depth| depth != known.format.is_depth()) {
-            let process = planned.process.name().to_owned();
-            return Err(PlanError::WrongFormat { process, target: target.clone(), format: known.format });
-        }
-    }
-    Ok(targets)
-}
-
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::process::{ClearColor, CommandDraws, Draws, GeometryBuffer, Lighting, ToneMapping};
+    use crate::process::{
+        ClearColor, CommandDraws, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, ToneMapping,
+    };
+    use crate::scene::LightKind;
 
     struct Made<F>(&'static str, F);
 
@@ -306,19 +279,21 @@ mod tests {
         }
     }
 
-    fn plan(processes: Vec<Box<dyn RenderProcess>>) -> Result<FramePlan, PlanError> {
-        FramePlan::new(processes, &["picture".to_owned()])
+    fn plan(processes: Vec<Arc<dyn RenderProcess>>) -> Result<FramePlan, PlanError> {
+        FramePlan::new(Vec::new(), processes, &["picture".to_owned()])
     }
 
-    fn shipped() -> Vec<Box<dyn RenderProcess>> {
-        vec![Box::new(ToneMapping::default()), Box::new(Lighting), Box::new(GeometryBuffer)]
+    fn shipped() -> Vec<Arc<dyn RenderProcess>> {
+        let formats = GeometryFormats::default();
+        let lights = LightVolumes::new(LightKind::Point, formats);
+        vec![Arc::new(ToneMapping::default()), Arc::new(lights), Arc::new(GeometryBuffer::new(formats))]
     }
 
     #[test]
     fn the_order_follows_from_reads_and_writes_alone() {
         let plan = plan(shipped()).unwrap();
         let names: Vec<_> = plan.processes().iter().map(|planned| planned.process.name()).collect();
-        assert_eq!(names, ["geometry buffer", "lighting", "tone mapping"]);
+        assert_eq!(names, ["geometry buffer", "point lights", "tone mapping"]);
         let targets: Vec<_> = plan.targets().iter().map(|target| (target.name.as_str(), target.format)).collect();
         assert_eq!(
             targets,
@@ -335,7 +310,7 @@ mod tests {
     #[test]
     fn what_leads_to_no_output_is_dropped_and_its_targets_with_it() {
         let mut processes = shipped();
-        processes.push(Box::new(Made("overlay", |declare: &mut Declare| {
+        processes.push(Arc::new(Made("overlay", |declare: &mut Declare| {
             declare.clears_color("overlay", Format::Rgba8Unorm, ClearColor::Background);
         })));
         let plan = plan(processes).unwrap();
@@ -348,15 +323,15 @@ mod tests {
         let mut processes = shipped();
         processes.pop();
         let error = plan(processes).err().unwrap().to_string();
-        assert!(error.contains("nothing writes \"radiance\"") && error.contains("lighting"), "{error}");
+        assert!(error.contains("nothing writes \"radiance\"") && error.contains("point lights"), "{error}");
 
         let mut processes = shipped();
-        processes.push(Box::new(Made("fog", |declare: &mut Declare| declare.after("weather"))));
+        processes.push(Arc::new(Made("fog", |declare: &mut Declare| declare.after("weather"))));
         let error = plan(processes).err().unwrap();
-        assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), after: "weather".into() });
+        assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "weather".into() });
 
         let mut processes = shipped();
-        processes.push(Box::new(Made("again", |declare: &mut Declare| {
+        processes.push(Arc::new(Made("again", |declare: &mut Declare| {
             declare.clears_color("diffuse", Format::R32Float, ClearColor::Background);
             declare.after("geometry buffer");
             declare.keep();
@@ -365,14 +340,14 @@ mod tests {
         assert!(matches!(&error, PlanError::TwoFormats { target, .. } if target == "diffuse"), "{error}");
 
         let mut processes = shipped();
-        processes.push(Box::new(Made("blind", |declare: &mut Declare| {
+        processes.push(Arc::new(Made("blind", |declare: &mut Declare| {
             declare.tests_depth("diffuse");
             declare.keep();
         })));
         let error = plan(processes).err().unwrap();
         assert!(matches!(&error, PlanError::WrongFormat { process, .. } if process == "blind"), "{error}");
 
-        let error = FramePlan::new(shipped(), &["painting".to_owned()]).err().unwrap().to_string();
+        let error = FramePlan::new(Vec::new(), shipped(), &["painting".to_owned()]).err().unwrap().to_string();
         assert!(error.contains("painting"), "{error}");
         assert!(plan(Vec::new()).is_err());
     }

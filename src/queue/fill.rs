@@ -4,30 +4,69 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::subdivision::halvings;
 use crate::blocks::Blocks;
-use crate::command::{RenderCommand, SortKey};
-use crate::scene::Blend;
-use crate::view::{ObjectDraw, ObjectTable, RenderView, VisibleSet, WorldBounds};
+use crate::command::{DrawState, RenderCommand, SortKey};
+use crate::scene::{Blend, Projection, SceneRef};
+use crate::view::{ObjectDraw, ObjectTable, RejectionReason, RenderView, VisibleSet, WorldBounds};
 
 /// Which objects a process draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Selection {
-    /// Those that hide what is behind them.
-    #[default]
-    Opaque,
-    /// Those that mix with what is behind them.
-    Blended,
-    /// Both: first the opaque ones, then the others.
-    All,
+pub struct Selection {
+    /// By how they mix with what is behind them.
+    pub blending: Blending,
+    /// By their material.
+    pub materials: MaterialShare,
 }
 
 impl Selection {
-    fn takes(self, blend: Blend) -> bool {
-        match self {
-            Self::Opaque => blend == Blend::None,
-            Self::Blended => blend != Blend::None,
-            Self::All => true,
-        }
+    /// All that hide what is behind them.
+    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL };
+    /// All that mix with what is behind them.
+    pub const BLENDED: Self = Self { blending: Blending::Blended, materials: MaterialShare::ALL };
+    /// Every object: first the opaque ones, then the others.
+    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL };
+
+    fn takes(self, blend: Blend, material: u32) -> bool {
+        let blends = match self.blending {
+            Blending::Opaque => blend == Blend::None,
+            Blending::Blended => blend != Blend::None,
+            Blending::Both => true,
+        };
+        blends && material % self.materials.of.max(1) == self.materials.index
+    }
+}
+
+/// Objects by how they mix with what is behind them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Blending {
+    /// Those that hide it.
+    #[default]
+    Opaque,
+    /// Those that mix with it.
+    Blended,
+    /// Both.
+    Both,
+}
+
+/// A share of the materials: of every `of` slots, the one at `index`. Shares 0, 1 ... `of` − 1 together are all materials, and
+/// no material is in two: a process that is added once for each share splits its work by material (L 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MaterialShare {
+    /// Which share, from 0.
+    pub index: u32,
+    /// Of how many; 0 counts as 1.
+    pub of: u32,
+}
+
+impl MaterialShare {
+    /// Every material.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+}
+
+impl Default for MaterialShare {
+    fn default() -> Self {
+        Self::ALL
     }
 }
 
@@ -43,6 +82,8 @@ pub struct Fill<'a> {
     pub visible: &'a VisibleSet,
     /// What of that the process draws.
     pub selection: Selection,
+    /// The scene, for what only few views need to know of an object.
+    pub scene: &'a SceneRef<'a>,
 }
 
 impl Fill<'_> {
@@ -74,14 +115,22 @@ impl Fill<'_> {
 
     fn command(&self, object: usize, draw: ObjectDraw, bounds: &WorldBounds, forward: Vec3) -> RenderCommand {
         let blend = draw.state.blend();
-        if !self.selection.takes(blend) {
+        if !self.selection.takes(blend, draw.material) {
             return RenderCommand::NOTHING;
+        }
+        let mut state = draw.state;
+        if self.view.camera.projection == Projection::Paraboloid {
+            let Some(halvings) = halvings(self.view, self.scene, object) else { return RenderCommand::NOTHING };
+            state = state.subdivided(halvings);
+            if halvings > DrawState::FINEST {
+                self.table.rejections().count(RejectionReason::CoarseEdges, object);
+            }
         }
         let depth = forward.dot((bounds.center - self.view.camera.position).as_vec3());
         let key = match blend {
-            Blend::None => SortKey::opaque(draw.state, draw.material, draw.mesh, depth),
+            Blend::None => SortKey::opaque(state, draw.material, draw.mesh, depth),
             _ => SortKey::blended(depth),
         };
-        RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state: draw.state }
+        RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
     }
 }

@@ -4,8 +4,9 @@ mod draw_list;
 mod fill;
 mod instance;
 mod sort;
+mod subdivision;
 
 pub use draw_list::{Batch, DrawList};
-pub use fill::{Fill, Selection};
+pub use fill::{Blending, Fill, MaterialShare, Selection};
 pub use instance::instance;
 pub use sort::sort;

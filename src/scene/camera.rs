@@ -5,7 +5,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::SceneError;
 use super::scene_ref::is_unit;
 
-/// A perspective camera: it looks along its own −Z, +Y is up, +X to the right. Its far plane is infinitely far away.
+/// A camera: it looks along its own −Z, +Y is up, +X to the right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// What it is called in reports, and what its view is called.
@@ -14,14 +14,41 @@ pub struct Camera {
     pub position: DVec3,
     /// From camera space to the world; of unit length.
     pub orientation: Quat,
-    /// The angle between the picture's lower and upper edge, in radians, from a ten-thousandth of a degree to just below π.
-    pub field_of_view: f32,
-    /// The distance of the near plane, in metres, above 0.
+    /// How places become places of the picture.
+    pub projection: Projection,
+    /// The distance from which on it sees, in metres, above 0.
     pub near: f32,
+    /// The distance up to which it sees, in metres. In perspective it may be infinite; there it leaves out objects that are
+    /// farther away as a whole, and depth does not depend on it.
+    pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
     /// What the picture is for; decides which processes draw it.
     pub kind: ViewKind,
+}
+
+/// How places become places of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Projection {
+    /// Through one point: what is farther is smaller.
+    Perspective {
+        /// The angle between the picture's lower and upper edge, in radians, from a ten-thousandth of a degree to just below
+        /// π.
+        field_of_view: f32,
+    },
+    /// Along parallel rays: everything is as large as it is.
+    ///
+    /// In a [`ViewKind::Shadow`] picture, what is nearer than `near` is drawn as if it were just there: it casts its shadow
+    /// from however far in front of the picture it is.
+    Orthographic {
+        /// The distance between the picture's lower and upper edge, in metres.
+        height: f32,
+    },
+    /// Everything that lies before the camera, as a mirror shaped like a paraboloid shows it: the half space becomes a disc
+    /// as wide as the picture (Brabec et al. 2002; the shadow map of L 4.2.2). Straight edges are drawn straight although
+    /// they should be curved, so meshes are subdivided as far as their angle wants it. For [`ViewKind::Shadow`] alone.
+    Paraboloid,
 }
 
 /// What a view's picture is for (M listing 10.4). Where the graph leaves the order of two views open, the earlier kind
@@ -40,6 +67,9 @@ pub enum ViewKind {
 }
 
 impl ViewKind {
+    /// How many kinds there are.
+    pub const COUNT: usize = 4;
+
     /// In small letters, as reports print it.
     pub fn name(self) -> &'static str {
         match self {
@@ -63,8 +93,9 @@ impl Camera {
             name: name.into(),
             position,
             orientation: Quat::from_mat3(&axes).normalize(),
-            field_of_view: 60_f32.to_radians(),
+            projection: Projection::Perspective { field_of_view: 60_f32.to_radians() },
             near: 0.05,
+            far: f32::INFINITY,
             size: [960, 540],
             kind: ViewKind::Main,
         }
@@ -83,14 +114,32 @@ impl Camera {
             "its position is not finite"
         } else if !is_unit(self.orientation.length_squared()) {
             "its orientation is not of unit length"
-        } else if !(self.field_of_view >= NARROWEST && self.field_of_view < std::f32::consts::PI) {
-            "its field of view is not between 0.0001 and 180 degrees"
         } else if !(self.near > 0.0 && self.near.is_finite()) {
             "its near plane is not a positive distance"
+        } else if self.far.is_nan() || self.far <= self.near {
+            "its far plane is not beyond its near plane"
+        } else if let Some(reason) = self.projection_problem() {
+            reason
         } else {
             return Ok(());
         };
         Err(SceneError::InvalidCamera { camera: self.name.clone(), reason })
+    }
+
+    fn projection_problem(&self) -> Option<&'static str> {
+        let in_range = |value: f32, least: f32| value >= least && value.is_finite();
+        match self.projection {
+            Projection::Perspective { field_of_view } => (!in_range(field_of_view, NARROWEST)
+                || field_of_view >= std::f32::consts::PI)
+                .then_some("its field of view is not between 0.0001 and 180 degrees"),
+            _ if self.far.is_infinite() => Some("without perspective its far plane must be finite"),
+            Projection::Orthographic { height } => {
+                (!in_range(height, f32::MIN_POSITIVE)).then_some("its height is not a positive distance")
+            }
+            Projection::Paraboloid => {
+                (self.kind != ViewKind::Shadow).then_some("only what a light sees can be drawn as a paraboloid")
+            }
+        }
     }
 }
 

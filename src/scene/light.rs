@@ -4,8 +4,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec3};
 
+use super::SceneError;
 use super::scene_ref::is_unit;
-use super::{Camera, SceneError, ViewKind};
 
 /// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
 ///
@@ -20,6 +20,8 @@ pub enum Light {
         direction: Vec3,
         /// On a surface that faces it, per channel.
         illuminance: Vec3,
+        /// Whether objects keep it from what is behind them.
+        casts_shadow: bool,
     },
     /// The same in every direction.
     Point {
@@ -44,6 +46,9 @@ pub enum Light {
         inner_angle: f32,
         /// Between the axis and where it is gone, in radians, up to π/2.
         outer_angle: f32,
+        /// Whether objects keep it from what is behind them. A shadow map sees up to 85° from the axis; what the light reaches
+        /// beyond that is lit.
+        casts_shadow: bool,
     },
     /// A small lit surface that faces `direction`: it falls off with the cosine from its axis, and nothing goes backwards
     /// (the light of L 4.2.2).
@@ -56,6 +61,8 @@ pub enum Light {
         intensity: Vec3,
         /// Where it ends, in metres.
         range: f32,
+        /// Whether objects keep it from what is behind them.
+        casts_shadow: bool,
     },
 }
 
@@ -65,57 +72,62 @@ impl Light {
         16.0 * intensity.max_element().max(0.0).sqrt()
     }
 
-    /// The camera of the light's shadow map, `side` pixels wide and high, to be added to a scene's cameras: a view for each
-    /// light that is to cast shadows (M 10.4). It sees what the light reaches, from a thousandth of its range on.
-    ///
-    /// `None` for all but spot lights, whose light alone fits into a perspective picture; a cone of more than 170° is seen up
-    /// to that.
-    ///
-    /// ```
-    /// use drawloom::glam::{DVec3, Vec3};
-    /// use drawloom::scene::{Light, Scene, ViewKind};
-    ///
-    /// let mut scene = Scene::new();
-    /// let lamp = Light::Spot {
-    ///     position: DVec3::Y * 4.0,
-    ///     direction: Vec3::NEG_Y,
-    ///     intensity: Vec3::splat(10.0),
-    ///     range: 20.0,
-    ///     inner_angle: 0.4,
-    ///     outer_angle: 0.5,
-    /// };
-    /// scene.lights.push(lamp);
-    /// scene.cameras.extend(lamp.shadow_camera("lamp", 1024));
-    /// assert_eq!(scene.cameras[0].kind, ViewKind::Shadow);
-    /// ```
-    pub fn shadow_camera(&self, name: impl Into<String>, side: u32) -> Option<Camera> {
-        let Self::Spot { position, direction, range, outer_angle, .. } = *self else { return None };
-        let target = position + direction.as_dvec3();
-        Some(Camera {
-            field_of_view: (2.0 * outer_angle).min(WIDEST_SHADOW),
-            near: range * 1e-3,
-            size: [side; 2],
-            kind: ViewKind::Shadow,
-            ..Camera::looking_at(name, position, target)
-        })
+    /// What kind of light it is.
+    pub fn kind(&self) -> LightKind {
+        match self {
+            Self::Directional { .. } => LightKind::Directional,
+            Self::Point { .. } => LightKind::Point,
+            Self::Spot { .. } => LightKind::Spot,
+            Self::Hemispherical { .. } => LightKind::Hemispherical,
+        }
+    }
+
+    /// Whether objects keep it from what is behind them. Point lights cast no shadows.
+    pub fn casts_shadow(&self) -> bool {
+        match *self {
+            Self::Directional { casts_shadow, .. }
+            | Self::Spot { casts_shadow, .. }
+            | Self::Hemispherical { casts_shadow, .. } => casts_shadow,
+            Self::Point { .. } => false,
+        }
+    }
+
+    /// A sphere that holds all that it reaches: its centre in the world and its radius, in metres. `None` for a directional
+    /// light, which reaches everything.
+    pub fn reach(&self) -> Option<(DVec3, f32)> {
+        match *self {
+            Self::Directional { .. } => None,
+            Self::Point { position, range, .. }
+            | Self::Spot { position, range, .. }
+            | Self::Hemispherical { position, range, .. } => Some((position, range)),
+        }
+    }
+
+    /// Whether it gives no light at all.
+    pub(crate) fn is_dark(&self) -> bool {
+        let (Self::Directional { illuminance: color, .. }
+        | Self::Point { intensity: color, .. }
+        | Self::Spot { intensity: color, .. }
+        | Self::Hemispherical { intensity: color, .. }) = *self;
+        color == Vec3::ZERO
     }
 
     /// Says what is wrong with it, if anything.
     pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
         let problem = match *self {
-            Self::Directional { direction, illuminance } => {
+            Self::Directional { direction, illuminance, .. } => {
                 direction_problem(direction).or_else(|| color_problem(illuminance))
             }
             Self::Point { position, intensity, range } => {
                 place_problem(position, range).or_else(|| color_problem(intensity))
             }
-            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle } => {
+            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
                 place_problem(position, range)
                     .or_else(|| color_problem(intensity))
                     .or_else(|| direction_problem(direction))
                     .or_else(|| cone_problem(inner_angle, outer_angle))
             }
-            Self::Hemispherical { position, direction, intensity, range } => place_problem(position, range)
+            Self::Hemispherical { position, direction, intensity, range, .. } => place_problem(position, range)
                 .or_else(|| color_problem(intensity))
                 .or_else(|| direction_problem(direction)),
         };
@@ -123,8 +135,34 @@ impl Light {
     }
 }
 
-/// In radians. Towards 180° the middle of a perspective picture shrinks to nothing.
-const WIDEST_SHADOW: f32 = 2.967;
+/// What kind a [`Light`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum LightKind {
+    /// [`Light::Directional`].
+    Directional,
+    /// [`Light::Point`].
+    Point,
+    /// [`Light::Spot`].
+    Spot,
+    /// [`Light::Hemispherical`].
+    Hemispherical,
+}
+
+impl LightKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Directional, Self::Point, Self::Spot, Self::Hemispherical];
+
+    /// In small letters, as reports print it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Directional => "directional",
+            Self::Point => "point",
+            Self::Spot => "spot",
+            Self::Hemispherical => "hemispherical",
+        }
+    }
+}
 
 fn direction_problem(direction: Vec3) -> Option<&'static str> {
     (!is_unit(direction.length_squared())).then_some("its direction is not of unit length")

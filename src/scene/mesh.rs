@@ -14,10 +14,12 @@ pub struct Mesh {
     vertices: Vec<Vertex>,
     indices: Vec<u32>,
     bounds: Bounds,
+    corners: [Vec3; 2],
+    longest_edge: f32,
 }
 
 impl Mesh {
-    /// A mesh, with its bounds.
+    /// A mesh, with its bounds and the length of its longest edge.
     ///
     /// # Errors
     /// If it has no triangle, if an index points past the vertices, if a triangle list is not made of whole triangles,
@@ -41,11 +43,27 @@ impl Mesh {
         if let Some(vertex) = vertices.iter().position(|vertex| !vertex.is_finite()) {
             return Err(SceneError::NonFiniteVertex { mesh: name, vertex });
         }
-        let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
-        if !bounds.is_valid() {
-            return Err(SceneError::MeshTooLarge { mesh: name });
+        let mesh = Self::measured(name, topology, vertices, indices);
+        if !mesh.bounds.is_valid() {
+            return Err(SceneError::MeshTooLarge { mesh: mesh.name });
         }
-        Ok(Self { name, topology, vertices, indices, bounds })
+        Ok(mesh)
+    }
+
+    /// A mesh of parts that are known to fit each other.
+    pub(super) fn measured(name: String, topology: Topology, vertices: Vec<Vertex>, indices: Vec<u32>) -> Self {
+        let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
+        let start = Vec3::from(vertices.first().map_or([0.0; 3], |vertex| vertex.position));
+        let corners = vertices.iter().fold([start; 2], |[low, high], vertex| {
+            let place = Vec3::from(vertex.position);
+            [low.min(place), high.max(place)]
+        });
+        let mut mesh = Self { name, topology, vertices, indices, bounds, corners, longest_edge: 0.0 };
+        let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
+        let edges = triangles.filter(has_three_places).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
+        mesh.longest_edge = root_rounded_up(longest_squared);
+        mesh
     }
 
     /// What it is called in reports.
@@ -73,6 +91,17 @@ impl Mesh {
         self.bounds
     }
 
+    /// The lowest and the highest corner of the box around its vertices, along the axes of object space, in metres.
+    pub fn corners(&self) -> [Vec3; 2] {
+        self.corners
+    }
+
+    /// The length of the longest edge of its triangles, in metres in object space: rounded up from f64, and infinite past
+    /// the end of f32. A triangle with two corners at one place draws nothing, and does not count.
+    pub fn longest_edge(&self) -> f32 {
+        self.longest_edge
+    }
+
     /// The number of triangles.
     pub fn triangle_count(&self) -> usize {
         match self.topology {
@@ -80,6 +109,30 @@ impl Mesh {
             Topology::TriangleStrip => self.indices.len() - 2,
         }
     }
+
+    /// The indices of each triangle's corners, counter-clockwise seen from its visible side.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let (step, turned) = match self.topology {
+            Topology::TriangleList => (3, false),
+            Topology::TriangleStrip => (1, true),
+        };
+        let triangles = self.indices.array_windows().step_by(step).enumerate();
+        triangles.map(move |(number, &[a, b, c])| if turned && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
+    }
+}
+
+/// Whether a triangle's corners are at three different places. One that has no three of them has no area either, and stays
+/// without one however it is projected.
+pub(super) fn has_three_places(triangle: &[Vertex; 3]) -> bool {
+    let [a, b, c] = triangle.map(|vertex| vertex.position);
+    a != b && b != c && c != a
+}
+
+/// The smallest f32 whose square is not below `square`.
+fn root_rounded_up(square: f64) -> f32 {
+    let root = square.sqrt() as f32;
+    // Squares of f32 are exact in f64.
+    if f64::from(root) * f64::from(root) < square { root.next_up() } else { root }
 }
 
 impl Asset for Mesh {
@@ -105,6 +158,11 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// The square of the distance in metres, the same to the bit from either of the two.
+    pub(super) fn distance_squared(&self, other: &Self) -> f64 {
+        Vec3::from(self.position).as_dvec3().distance_squared(Vec3::from(other.position).as_dvec3())
+    }
+
     fn is_finite(&self) -> bool {
         self.position.iter().chain(&self.normal).chain(&self.uv).all(|value| value.is_finite())
     }
@@ -183,5 +241,42 @@ mod tests {
                 assert!(point.as_dvec3().distance(bounds.center.as_dvec3()) <= f64::from(bounds.radius), "{scale}");
             }
         }
+    }
+
+    /// Both are held against the edges of the list that the strip is.
+    #[test]
+    fn the_longest_edge_is_rounded_up_and_no_further() {
+        for scale in [1e-40_f32, 1e-20, 0.1, 1.0, 3e7, 1e30] {
+            let places = [[0.1, 0.2, 0.3], [1.7, 0.0, -0.4], [0.3, 2.9, 0.7], [-0.9, 2.2, 5.3], [0.3, 0.2, 0.1]];
+            let corners: Vec<_> = places.iter().map(|[x, y, z]| corner(x * scale, y * scale, z * scale)).collect();
+            let strip = Mesh::new("strip", Topology::TriangleStrip, corners.clone(), vec![0, 1, 2, 3, 4]).unwrap();
+            let list = vec![0, 1, 2, 1, 3, 2, 2, 3, 4];
+            assert!(strip.triangles().flatten().eq(list.iter().copied()));
+            let edges = [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
+            let place = |index: usize| Vec3::from(corners[index].position).as_dvec3();
+            let longest = edges.iter().map(|&[a, b]| place(a).distance(place(b))).fold(0.0, f64::max);
+            for mesh in [&strip, &Mesh::new("list", Topology::TriangleList, corners.clone(), list).unwrap()] {
+                let edge = mesh.longest_edge();
+                assert!(
+                    f64::from(edge) >= longest && f64::from(edge.next_down()) < longest,
+                    "{scale}: {edge} {longest}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_edge_that_f32_can_hold_is_not_rounded() {
+        let longest_of = |corners: [Vertex; 3]| {
+            Mesh::new("leaf", Topology::TriangleList, corners.to_vec(), vec![0, 1, 2]).unwrap().longest_edge()
+        };
+        assert_eq!(longest_of([corner(0.0, 0.0, 0.0), corner(3.0, 0.0, 0.0), corner(0.0, 4.0, 0.0)]), 5.0);
+        assert_eq!(
+            longest_of([corner(0.5, 0.0, 0.0), corner(0.0, 0.5, 0.0), corner(0.5, 0.5, 0.0)]),
+            0.5_f32.sqrt().next_up()
+        );
+        let far = f32::MAX * 0.75;
+        assert_eq!(longest_of([corner(far, 0.0, 0.0), corner(-far, 0.0, 0.0), corner(0.0, 1.0, 0.0)]), f32::INFINITY);
+        assert_eq!(longest_of([corner(0.0, 0.0, 0.0), corner(9.0, 0.0, 0.0), corner(9.0, 0.0, 0.0)]), 0.0);
     }
 }

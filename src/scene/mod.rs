@@ -14,12 +14,13 @@ mod mesh;
 pub mod obj;
 pub mod sample;
 mod scene_ref;
+mod subdivision;
 
 pub use assets::{Asset, Assets};
-pub use camera::{Camera, ViewKind};
+pub use camera::{Camera, Projection, ViewKind};
 pub use collection::{ObjectHandle, RenderObject, Scene};
 pub use error::SceneError;
-pub use light::Light;
+pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
 pub use scene_ref::SceneRef;

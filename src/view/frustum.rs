@@ -2,54 +2,87 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection, ViewKind};
 
-/// The pyramid that a camera sees, from its near plane to infinity.
+/// What a camera sees: a pyramid, a box or half a ball, within six planes.
 ///
 /// The planes are relative to the camera, so that a place far from the world's origin costs no precision: the only
 /// subtraction of large numbers, centre − camera, is done in f64.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frustum {
     origin: DVec3,
-    /// Inward normals of the left, right, lower and upper plane, which all pass through the camera.
-    sides: [Vec3; 4],
-    forward: Vec3,
-    near: f32,
+    /// Those of the picture's four edges, then near, then far.
+    planes: [Plane; 6],
+}
+
+/// A plane relative to the camera. What is at `normal · c + offset ≥ 0` is inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plane {
+    normal: Vec3,
+    /// In metres.
+    offset: f32,
+}
+
+impl Plane {
+    /// Everything is inside of it.
+    const NOWHERE: Self = Self { normal: Vec3::ZERO, offset: f32::INFINITY };
 }
 
 impl Frustum {
-    /// The pyramid of `camera`.
+    /// What `camera` sees.
     pub fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
-        let tangent_y = (f64::from(camera.field_of_view) * 0.5).tan();
-        let tangent_x = tangent_y * f64::from(camera.size[0]) / f64::from(camera.size[1]);
-        let side = |normal: DVec3| (orientation * normal.normalize()).as_vec3();
-        Self {
-            origin: camera.position,
-            sides: [
-                side(DVec3::new(1.0, 0.0, -tangent_x)),
-                side(DVec3::new(-1.0, 0.0, -tangent_x)),
-                side(DVec3::new(0.0, 1.0, -tangent_y)),
-                side(DVec3::new(0.0, -1.0, -tangent_y)),
-            ],
-            forward: (orientation * DVec3::NEG_Z).as_vec3(),
-            near: camera.near,
-        }
+        let plane = |normal: DVec3, offset: f32| Plane { normal: (orientation * normal.normalize()).as_vec3(), offset };
+        let [width, height] = camera.size.map(f64::from);
+        let near = plane(DVec3::NEG_Z, -camera.near);
+        let far = if camera.far.is_finite() { plane(DVec3::Z, camera.far) } else { Plane::NOWHERE };
+        // Offsets are rounded up, so that a plane is rather too far out.
+        let between = |reach_x: f64, reach_y: f64| {
+            [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y]
+                .map(|normal| plane(normal, (normal.abs().dot(DVec3::new(reach_x, reach_y, 0.0)) as f32).next_up()))
+        };
+        let (edges, near) = match camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let tangent_y = (f64::from(field_of_view) * 0.5).tan();
+                let tangent_x = tangent_y * width / height;
+                let edge = |x: f64, y: f64, tangent: f64| plane(DVec3::new(x, y, -tangent), 0.0);
+                let right_and_left = [edge(1.0, 0.0, tangent_x), edge(-1.0, 0.0, tangent_x)];
+                let up_and_down = [edge(0.0, 1.0, tangent_y), edge(0.0, -1.0, tangent_y)];
+                ([right_and_left[0], right_and_left[1], up_and_down[0], up_and_down[1]], near)
+            }
+            Projection::Orthographic { height: picture } => {
+                let half = f64::from(picture) * 0.5;
+                // Into a shadow map, what is before the near plane casts its shadow too.
+                let near = if camera.kind == ViewKind::Shadow { Plane::NOWHERE } else { near };
+                (between(half * width / height, half), near)
+            }
+            Projection::Paraboloid => {
+                let reach = f64::from(camera.far);
+                // Who filters a shadow map at the disc's rim looks a few pixels past it.
+                (between(reach, reach), plane(DVec3::NEG_Z, camera.far * PAST_THE_RIM))
+            }
+        };
+        let [right, left, upper, lower] = edges;
+        Self { origin: camera.position, planes: [right, left, upper, lower, near, far] }
     }
 
     /// Whether any of a sphere may be seen: never `false` for one that is, sometimes `true` for one just outside.
     ///
-    /// A plane's distance n·c is computed in f32 with n and c rounded to it. Each of the three products carries at most
-    /// four roundings of u = 2⁻²⁴ (n, c, the product, the sums), so the distance is off by no more than 4u(‖c‖₁ + r) to
+    /// A plane's distance n·c + o is computed in f32 with n, c and o rounded to it. Each of the three products carries at most
+    /// four roundings of u = 2⁻²⁴ (n, c, the product, the sums), so the distance is off by no more than 4u(‖c‖₁ + r + |o|) to
     /// first order; twice that is allowed for. The bound is made of magnitudes from before any cancellation.
     pub fn may_see(&self, center: DVec3, radius: f32) -> bool {
         let center = (center - self.origin).as_vec3();
-        let magnitude = center.x.abs() + center.y.abs() + center.z.abs() + radius + self.near;
-        let reach = radius + 8.0 * UNIT_ROUNDOFF * magnitude;
-        let beyond_near = self.forward.dot(center) - self.near >= -reach;
-        beyond_near & self.sides.iter().all(|side| side.dot(center) >= -reach)
+        let magnitude = center.x.abs() + center.y.abs() + center.z.abs() + radius;
+        self.planes.iter().all(|plane| {
+            let reach = radius + 8.0 * UNIT_ROUNDOFF * (magnitude + plane.offset.abs());
+            plane.normal.dot(center) + plane.offset >= -reach
+        })
     }
 }
+
+/// How far behind a paraboloid's camera is looked, as a share of its range.
+const PAST_THE_RIM: f32 = 0.05;
 
 const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;
 
@@ -63,18 +96,25 @@ mod tests {
     /// How far the sphere's centre is inside the nearest plane, in f64, from the camera's own definition.
     fn depth_inside(camera: &Camera, center: DVec3) -> f64 {
         let local = camera.orientation.as_dquat().normalize().inverse() * (center - camera.position);
-        let half = f64::from(camera.field_of_view) * 0.5;
-        let half_x = (half.tan() * f64::from(camera.size[0]) / f64::from(camera.size[1])).atan();
         let away = -local.z;
-        [
-            away - f64::from(camera.near),
-            away * half_x.sin() + local.x * half_x.cos(),
-            away * half_x.sin() - local.x * half_x.cos(),
-            away * half.sin() + local.y * half.cos(),
-            away * half.sin() - local.y * half.cos(),
-        ]
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
+        let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
+        let (near, far) = (away - f64::from(camera.near), f64::from(camera.far) - away);
+        let distances = match camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let half = f64::from(field_of_view) * 0.5;
+                let half_x = (half.tan() * aspect).atan();
+                let edge = |aside: f64, half: f64| away * half.sin() - aside.abs() * half.cos();
+                [near, far, edge(local.x, half_x), edge(local.y, half)]
+            }
+            Projection::Orthographic { height } => {
+                let half = f64::from(height) * 0.5;
+                let near = if camera.kind == ViewKind::Shadow { f64::INFINITY } else { near };
+                [near, far, half * aspect - local.x.abs(), half - local.y.abs()]
+            }
+            // The planes hold half a ball; what counts is that none of it is outside of them.
+            Projection::Paraboloid => [away, f64::from(camera.far) - local.length(), f64::INFINITY, f64::INFINITY],
+        };
+        distances.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     prop_compose! {
@@ -87,12 +127,24 @@ mod tests {
             width in 1_u32..4000,
             height in 1_u32..4000,
             near_exponent in -5.0..2.0_f32,
+            far_exponent in 0.001..6.0_f32,
+            projection in 0_usize..4,
         ) -> Camera {
             let mut camera = Camera::looking_at("any", DVec3::from(place) * 10_f64.powf(exponent), DVec3::ZERO);
             camera.orientation = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
-            camera.field_of_view = degrees.to_radians();
             camera.size = [width, height];
             camera.near = 10_f32.powf(near_exponent);
+            let perspective = Projection::Perspective { field_of_view: degrees.to_radians() };
+            camera.projection = match projection {
+                0 | 1 => perspective,
+                2 => Projection::Orthographic { height: degrees * camera.near },
+                _ => Projection::Paraboloid,
+            };
+            // One perspective in two sees for ever.
+            if projection != 0 {
+                camera.far = camera.near * 10_f32.powf(far_exponent);
+            }
+            camera.kind = if projection == 3 || width % 2 == 0 { ViewKind::Shadow } else { ViewKind::Main };
             camera
         }
     }
@@ -126,12 +178,28 @@ mod tests {
         ) {
             let center = camera.position + DVec3::from(direction).normalize_or(DVec3::X) * 10_f64.powf(exponent);
             let depth = depth_inside(&camera, center);
-            let slack = 4e-6 * ((center - camera.position).length() + f64::from(camera.near));
-            if depth < -slack {
+            let far = if camera.far.is_finite() { f64::from(camera.far) } else { 0.0 };
+            let slack = 4e-6 * ((center - camera.position).length() + f64::from(camera.near) + far);
+            if depth < -slack && camera.projection != Projection::Paraboloid {
                 let radius = (-depth - slack) as f32;
                 prop_assert!(!Frustum::new(&camera).may_see(center, radius), "depth {depth} radius {radius}");
             }
         }
+    }
+
+    #[test]
+    fn a_paraboloid_leaves_out_what_is_behind_it_and_beyond_its_range() {
+        let camera = Camera {
+            projection: Projection::Paraboloid,
+            far: 10.0,
+            kind: ViewKind::Shadow,
+            ..Camera::looking_at("lamp", DVec3::ZERO, DVec3::NEG_Y)
+        };
+        let frustum = Frustum::new(&camera);
+        assert!(frustum.may_see(DVec3::new(9.0, -0.1, 0.0), 0.0));
+        assert!(!frustum.may_see(DVec3::new(0.0, 2.0, 0.0), 1.0));
+        assert!(!frustum.may_see(DVec3::new(0.0, -12.0, 0.0), 1.0));
+        assert!(!frustum.may_see(DVec3::new(12.0, -1.0, 0.0), 1.0));
     }
 
     #[test]

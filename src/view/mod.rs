@@ -2,16 +2,20 @@
 
 mod fixed_position;
 mod frustum;
+mod light_table;
 mod object_table;
 mod rejection;
 mod render_view;
+mod shadow_maps;
 mod view_record;
 mod visible_set;
 
 pub use fixed_position::FixedPosition;
 pub use frustum::Frustum;
+pub use light_table::{LightClass, LightRecord, LightTable};
 pub use object_table::{ObjectDraw, ObjectRecord, ObjectTable, WorldBounds};
 pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
-pub use view_record::{LightRecord, ViewRecord};
+pub use shadow_maps::ShadowMaps;
+pub use view_record::ViewRecord;
 pub use visible_set::VisibleSet;

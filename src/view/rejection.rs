@@ -1,8 +1,8 @@
-//! What a frame left out, counted and told.
+//! What a frame left out or could not draw as asked, counted and told.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Counts what a frame leaves out. Any number of jobs may count at once.
+/// Counts what a frame leaves out or cannot draw as asked. Any number of jobs may count at once.
 #[derive(Debug, Default)]
 pub struct Rejections {
     by_reason: [Rejected; RejectionReason::ALL.len()],
@@ -25,7 +25,7 @@ impl Rejections {
     }
 }
 
-/// Objects or lights that a frame left out.
+/// Objects or lights that a frame left out or could not draw as asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejection {
     /// Why.
@@ -36,7 +36,7 @@ pub struct Rejection {
     pub first: usize,
 }
 
-/// Why something was left out of a frame.
+/// Why something was left out of a frame, or is not drawn as asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum RejectionReason {
@@ -50,6 +50,11 @@ pub enum RejectionReason {
     StaleMesh,
     /// An object's material was removed.
     StaleMaterial,
+    /// An object's edges are too long for the paraboloid shadow map that sees it: drawn straight there, they are off by more
+    /// than half a pixel in 1024. It is drawn all the same.
+    CoarseEdges,
+    /// A light gives no light: its intensity is 0.
+    DarkLight,
     /// A light has an intensity, a place, a direction, a range or angles that cannot be.
     InvalidLight,
     /// A material's texture was removed; the plain colour stands in.
@@ -59,12 +64,14 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 10] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
         Self::StaleMesh,
         Self::StaleMaterial,
+        Self::CoarseEdges,
+        Self::DarkLight,
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
@@ -78,6 +85,8 @@ impl RejectionReason {
             Self::OutOfReach => "object too far from the origin",
             Self::StaleMesh => "object with a removed mesh",
             Self::StaleMaterial => "object with a removed material",
+            Self::CoarseEdges => "object too near to a hemispherical light for its long edges",
+            Self::DarkLight => "light without intensity",
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3, Vec4};
 
 use super::Frustum;
-use crate::scene::{Camera, ViewKind};
+use crate::scene::{Camera, Projection, ViewKind};
 
 /// A camera, what it sees, and what kind of picture it makes (M listing 10.4). Its targets and its queue are kept by the
 /// backend under the view's index.
@@ -13,12 +13,16 @@ pub struct RenderView {
     pub camera: Camera,
     /// What it sees.
     pub frustum: Frustum,
+    /// The light whose shadow map it draws, by its index in the scene.
+    pub light: Option<usize>,
+    /// Which layer it draws of the targets that all views of its kind share.
+    pub layer: u32,
 }
 
 impl RenderView {
     /// The view of `camera`.
     pub fn new(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), frustum: Frustum::new(camera) }
+        Self { camera: camera.clone(), frustum: Frustum::new(camera), light: None, layer: 0 }
     }
 
     /// What it is called in reports: the camera's name.
@@ -31,26 +35,39 @@ impl RenderView {
         self.camera.kind
     }
 
-    /// From world axes relative to the camera to clip space: reversed depth (1 at the near plane, 0 infinitely far away).
+    /// From world axes relative to the camera to clip space: reversed depth, 1 at the near plane, and 0 at the far plane or, in
+    /// perspective, infinitely far away. For a paraboloid, which no matrix makes, to the camera's own axes.
     pub fn clip_from_relative(&self) -> Mat4 {
         let camera = &self.camera;
-        let projection = perspective_infinite_reverse(camera);
+        let aspect = camera.aspect();
+        let projection = match camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let scale = 1.0 / (field_of_view * 0.5).tan();
+                Mat4::from_cols(Vec4::X * (scale / aspect), Vec4::Y * scale, Vec4::NEG_W, Vec4::Z * camera.near)
+            }
+            Projection::Orthographic { height } => {
+                let scale = 2.0 / height;
+                let depth = 1.0 / (camera.far - camera.near);
+                let end = Vec4::new(0.0, 0.0, camera.far * depth, 1.0);
+                Mat4::from_cols(Vec4::X * (scale / aspect), Vec4::Y * scale, Vec4::Z * depth, end)
+            }
+            Projection::Paraboloid => Mat4::IDENTITY,
+        };
         projection * Mat4::from_quat(camera.orientation.normalize().inverse())
     }
 
-    /// The axes of the picture in the world: right and up, each as long as half the picture is at a distance of 1, and
-    /// forward. A pixel at (x, y) in clip space sees along x·right + y·up + forward.
+    /// The axes of the picture in the world: right and up, each as long as half the picture (in perspective, at a distance of
+    /// 1), and forward. A pixel at (x, y) in clip space sees along x·right + y·up + forward in perspective, and along forward
+    /// from x·right + y·up without.
     pub fn picture_axes(&self) -> [Vec3; 3] {
-        let tangent = (self.camera.field_of_view * 0.5).tan();
+        let half = match self.camera.projection {
+            Projection::Perspective { field_of_view } => (field_of_view * 0.5).tan(),
+            Projection::Orthographic { height } => height * 0.5,
+            Projection::Paraboloid => 1.0,
+        };
         let axis = |direction: Vec3| self.camera.orientation.normalize() * direction;
-        [axis(Vec3::X) * tangent * self.camera.aspect(), axis(Vec3::Y) * tangent, axis(Vec3::NEG_Z)]
+        [axis(Vec3::X) * half * self.camera.aspect(), axis(Vec3::Y) * half, axis(Vec3::NEG_Z)]
     }
-}
-
-fn perspective_infinite_reverse(camera: &Camera) -> Mat4 {
-    let scale_y = 1.0 / (camera.field_of_view * 0.5).tan();
-    let scale_x = scale_y / camera.aspect();
-    Mat4::from_cols(Vec4::X * scale_x, Vec4::Y * scale_y, Vec4::NEG_W, Vec4::Z * camera.near)
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -72,6 +89,22 @@ mod tests {
         assert!((depth_at(0.25) - 1.0).abs() < 1e-6);
         assert!((depth_at(2.5) - 0.1).abs() < 1e-6);
         assert!(depth_at(1e9) > 0.0);
+    }
+
+    #[test]
+    fn orthographic_depth_is_even_from_one_to_nothing() {
+        let camera = Camera {
+            projection: Projection::Orthographic { height: 8.0 },
+            near: 2.0,
+            far: 10.0,
+            ..Camera::looking_at("plan", DVec3::ZERO, DVec3::new(-1.0, 2.0, 0.5))
+        };
+        let view = RenderView::new(&camera);
+        let [right, up, forward] = view.picture_axes();
+        for (distance, depth) in [(2.0, 1.0), (4.0, 0.75), (10.0, 0.0)] {
+            let clip = view.clip_from_relative() * (right - up + forward * distance).extend(1.0);
+            assert!(clip.abs_diff_eq(Vec4::new(1.0, -1.0, depth, 1.0), 1e-6), "{clip}");
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! A view and its lights as shaders read them.
+//! A view as shaders read it.
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{Mat4, Vec3};
 
 use super::{FixedPosition, RenderView};
-use crate::scene::{Light, SceneRef};
+use crate::scene::{Projection, SceneRef, ViewKind};
 
 /// A view as shaders read it: `View` in `drawloom.wgsl`.
 #[repr(C)]
@@ -13,7 +13,7 @@ pub struct ViewRecord {
     pub clip_from_relative: Mat4,
     /// The lower halves of the camera's position.
     pub position_low: [u32; 3],
-    /// How many lights there are.
+    /// How many lights reach it.
     pub light_count: u32,
     /// The upper halves of the camera's position.
     pub position_high: [i32; 3],
@@ -29,12 +29,12 @@ pub struct ViewRecord {
     pub height: f32,
     /// The way the camera looks.
     pub forward: Vec3,
-    /// Keeps what follows at a multiple of 16 bytes, as WGSL wants it.
-    pub padding: f32,
+    /// 0 perspective, 1 orthographic, 2 the same with what lies before the near plane drawn onto it, 3 paraboloid.
+    pub projection: u32,
     /// The scene's ambient light.
     pub ambient: Vec3,
-    /// Makes the size a multiple of 16 bytes, as WGSL wants it.
-    pub padding_end: f32,
+    /// The far plane's distance in metres; infinite for most cameras.
+    pub far: f32,
 }
 
 impl ViewRecord {
@@ -54,65 +54,13 @@ impl ViewRecord {
             up,
             height,
             forward,
-            padding: 0.0,
+            projection: match view.camera.projection {
+                Projection::Perspective { .. } => 0,
+                Projection::Orthographic { .. } => 1 + u32::from(view.kind() == ViewKind::Shadow),
+                Projection::Paraboloid => 3,
+            },
             ambient: scene.ambient,
-            padding_end: 0.0,
+            far: view.camera.far,
         })
-    }
-}
-
-/// A light as shaders read it, relative to one view's camera: `Light` in `drawloom.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct LightRecord {
-    /// Relative to the camera, in metres.
-    pub position: Vec3,
-    /// 0 directional, 1 point, 2 spot, 3 hemispherical.
-    pub kind: u32,
-    /// The way it travels.
-    pub direction: Vec3,
-    /// Where it ends, in metres.
-    pub range: f32,
-    /// At 1 m, or on a surface that faces a directional light.
-    pub intensity: Vec3,
-    /// The cosine at which a spot light begins to fade.
-    pub cone_begin: f32,
-    /// The cosine at which a spot light is gone.
-    pub cone_end: f32,
-    /// Makes the size a multiple of 16 bytes, as WGSL wants it.
-    pub padding: [f32; 3],
-}
-
-impl LightRecord {
-    /// The record of `light` for a camera at `origin`.
-    pub fn new(light: &Light, origin: DVec3) -> Self {
-        let nothing = <Self as bytemuck::Zeroable>::zeroed();
-        let relative = |position: DVec3| (position - origin).as_vec3();
-        match *light {
-            Light::Directional { direction, illuminance } => {
-                Self { kind: 0, direction: direction.normalize(), intensity: illuminance, ..nothing }
-            }
-            Light::Point { position, intensity, range } => {
-                Self { kind: 1, position: relative(position), intensity, range, ..nothing }
-            }
-            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle } => Self {
-                kind: 2,
-                position: relative(position),
-                direction: direction.normalize(),
-                intensity,
-                range,
-                cone_begin: inner_angle.cos(),
-                cone_end: outer_angle.cos(),
-                ..nothing
-            },
-            Light::Hemispherical { position, direction, intensity, range } => Self {
-                kind: 3,
-                position: relative(position),
-                direction: direction.normalize(),
-                intensity,
-                range,
-                ..nothing
-            },
-        }
     }
 }

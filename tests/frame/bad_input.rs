@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::process::{GeometryBuffer, Lighting, PlanError, ToneMapping};
-use drawloom::scene::{Bounds, Camera, Light, Mesh, Scene, SceneError, SceneRef, ViewKind};
+use drawloom::process::{Deferred, GeometryBuffer, GeometryFormats, LightVolumes, PlanError, ToneMapping};
+use drawloom::scene::{Bounds, Camera, Light, LightKind, Mesh, Projection, Scene, SceneError, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::RejectionReason;
 use drawloom::{BuildError, FrameError, Granularity, Renderer, SubmitError};
@@ -39,7 +39,8 @@ fn an_empty_scene_is_a_frame_of_background() {
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let submitted = submitter.submit(recorded).unwrap();
     assert_eq!(submitted.statistics.objects, 0);
-    assert_eq!(submitted.submission.passes.len(), 6);
+    // The geometry buffer clears, and tone mapping maps; there is nothing to light.
+    assert_eq!(submitted.submission.passes.len(), 4);
 }
 
 #[test]
@@ -61,17 +62,31 @@ fn a_picture_without_pixels_is_refused_by_its_views_name() {
 
 #[test]
 fn a_camera_that_cannot_be_is_refused_by_name() {
-    let bad: [fn(&mut Camera); 10] = [
-        |camera| camera.position.y = f64::NAN,
-        |camera| camera.position.y = f64::INFINITY,
-        |camera| camera.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
-        |camera| camera.orientation.x = f32::NAN,
-        |camera| camera.field_of_view = 0.0,
-        |camera| camera.field_of_view = PI,
-        |camera| camera.field_of_view = f32::NAN,
-        |camera| camera.near = 0.0,
-        |camera| camera.near = f32::INFINITY,
-        |camera| camera.near = f32::NAN,
+    let perspective =
+        |camera: &mut Camera, field_of_view| camera.projection = Projection::Perspective { field_of_view };
+    let orthographic = |camera: &mut Camera, height| {
+        camera.projection = Projection::Orthographic { height };
+        camera.far = 10.0;
+    };
+    let bad: [&dyn Fn(&mut Camera); 16] = [
+        &|camera| camera.position.y = f64::NAN,
+        &|camera| camera.position.y = f64::INFINITY,
+        &|camera| camera.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+        &|camera| camera.orientation.x = f32::NAN,
+        &|camera| perspective(camera, 0.0),
+        &|camera| perspective(camera, PI),
+        &|camera| perspective(camera, f32::NAN),
+        &|camera| camera.near = 0.0,
+        &|camera| camera.near = f32::INFINITY,
+        &|camera| camera.near = f32::NAN,
+        &|camera| camera.far = camera.near,
+        &|camera| camera.far = f32::NAN,
+        &|camera| orthographic(camera, 0.0),
+        &|camera| orthographic(camera, f32::NAN),
+        // Without a far plane.
+        &|camera| camera.projection = Projection::Orthographic { height: 1.0 },
+        // Only lights see like that.
+        &|camera| (camera.projection, camera.far) = (Projection::Paraboloid, 10.0),
     ];
     for spoil in bad {
         let mut scene = field(10);
@@ -195,6 +210,7 @@ fn lights_that_cannot_be_are_counted_and_left_out() {
         range: 1.0,
         inner_angle,
         outer_angle,
+        casts_shadow: true,
     };
     scene.lights.extend([
         point(f32::NAN, 1.0),
@@ -202,30 +218,44 @@ fn lights_that_cannot_be_are_counted_and_left_out() {
         point(-1.0, 1.0),
         point(1.0, 0.0),
         point(1.0, f32::INFINITY),
-        Light::Directional { direction: Vec3::ZERO, illuminance: Vec3::ONE },
+        Light::Directional { direction: Vec3::ZERO, illuminance: Vec3::ONE, casts_shadow: true },
         Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 },
         spot(0.0, 0.0),
         spot(0.5, 0.4),
         spot(0.0, PI),
-        Light::Hemispherical { position: DVec3::ZERO, direction: Vec3::ONE, intensity: Vec3::ONE, range: 1.0 },
+        Light::Hemispherical {
+            position: DVec3::ZERO,
+            direction: Vec3::ONE,
+            intensity: Vec3::ONE,
+            range: 1.0,
+            casts_shadow: true,
+        },
     ]);
     assert_eq!(rejected(scene.as_scene_ref()), [(RejectionReason::InvalidLight, 11, 2)]);
     scene.lights.truncate(2);
-    scene.lights.extend([point(0.0, 1.0), spot(0.0, 0.5)]);
+    scene.lights.extend([point(1.0, 1.0), spot(0.0, 0.5)]);
     assert_eq!(rejected(scene.as_scene_ref()), []);
+    scene.lights.extend([point(0.0, 1.0), point(-0.0, 1.0)]);
+    assert_eq!(rejected(scene.as_scene_ref()), [(RejectionReason::DarkLight, 2, 4)]);
 }
 
 #[test]
 fn a_renderer_that_cannot_be_is_refused() {
     let scheduler = || Arc::new(Scheduler::new(1).unwrap());
-    let empty = Renderer::builder(NullBackend).deferred().granularity(Granularity::Chunk(0)).build(scheduler());
+    let empty = Renderer::builder(NullBackend)
+        .deferred(Deferred::to_picture())
+        .granularity(Granularity::Chunk(0))
+        .build(scheduler());
     assert!(matches!(empty.err(), Some(BuildError::EmptyChunk)));
     let nothing = Renderer::builder(NullBackend).build(scheduler());
     assert!(matches!(nothing.err(), Some(BuildError::Plan(PlanError::Empty))));
-    let unlit = Renderer::builder(NullBackend).process(Lighting).process(ToneMapping::default()).output("picture");
+    let formats = GeometryFormats::default();
+    let lights = LightVolumes::new(LightKind::Point, formats);
+    let unlit = Renderer::builder(NullBackend).process(lights).process(ToneMapping::default()).output("picture");
     let error = unlit.build(scheduler()).err().unwrap().to_string();
-    assert!(error.contains("lighting"), "{error}");
-    let twice = Renderer::builder(NullBackend).deferred().process(GeometryBuffer).build(scheduler());
+    assert!(error.contains("point lights"), "{error}");
+    let deferred = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let twice = deferred.process(GeometryBuffer::new(formats)).build(scheduler());
     assert!(twice.err().unwrap().to_string().contains("geometry buffer"));
 }
 

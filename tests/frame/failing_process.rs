@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use drawloom::backend::NullBackend;
-use drawloom::process::{Declare, Draws, FullScreen, ProcessError, RenderProcess};
+use drawloom::process::{Declare, Deferred, Draws, FullScreen, ProcessError, RenderProcess};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 
@@ -22,7 +22,7 @@ impl RenderProcess for Fragile {
 
     fn declare(&self, declare: &mut Declare) {
         declare.draws_over("radiance");
-        declare.after("lighting");
+        declare.after("transparency");
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -37,7 +37,7 @@ fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_runs() {
     let scheduler = Arc::new(Scheduler::new(3).unwrap());
     let fragile = Fragile { breaks: Arc::clone(&breaks) };
     let (mut renderer, submitter) =
-        Renderer::builder(NullBackend).deferred().process(fragile).build(scheduler).unwrap();
+        Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(fragile).build(scheduler).unwrap();
     let scene = field(500);
     for frame in 0..20 {
         let broken = frame % 2 == 1;
@@ -45,7 +45,7 @@ fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_runs() {
         match renderer.record(scene.as_scene_ref()) {
             Ok(recorded) => {
                 assert!(!broken);
-                assert_eq!(submitter.submit(recorded).unwrap().submission.passes.len(), 8);
+                assert_eq!(submitter.submit(recorded).unwrap().submission.passes.len(), 12);
             }
             Err(FrameError::Process(ProcessError::Panicked { process, message })) => {
                 assert!(broken);

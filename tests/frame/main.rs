@@ -11,11 +11,12 @@ mod scenes;
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
+use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer, Submitter};
 
 /// The shipped processes on the null backend.
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    Renderer::builder(NullBackend).deferred().granularity(granularity).build(scheduler).unwrap()
+    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).granularity(granularity).build(scheduler).unwrap()
 }

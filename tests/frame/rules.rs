@@ -1,12 +1,14 @@
 //! The null backend refuses what breaks a rule of the frame.
 
+use std::sync::Arc;
+
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend};
-use drawloom::process::{FramePlan, GeometryBuffer, Pass};
+use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
 use drawloom::queue::DrawList;
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
-use drawloom::view::{ObjectTable, Rejections, RenderView};
+use drawloom::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 use crate::renderer;
 use crate::scenes::field;
@@ -23,12 +25,14 @@ fn broken_rule(
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     let list = renderer.draw_list("geometry buffer", 0).unwrap().clone();
 
-    let plan = FramePlan::new(vec![Box::new(GeometryBuffer)], &["diffuse".to_owned()]).unwrap();
+    let geometry_buffer = GeometryBuffer::new(GeometryFormats::default());
+    let plan = FramePlan::new(Vec::new(), vec![Arc::new(geometry_buffer)], &["diffuse".to_owned()]).unwrap();
     let views = [RenderView::new(&scene.cameras[0])];
     let request = FrameRequest {
         plan: &plan,
         draws: &plan.draws().unwrap(),
         views: &views,
+        lights: &[LightTable::default()],
         passes: &[PASS],
         scene: &scene.as_scene_ref(),
         rejections: &Rejections::default(),
@@ -54,7 +58,7 @@ fn one_view() -> Scene {
 #[test]
 fn a_frame_by_the_rules_breaks_none() {
     let rule = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, PASS, list)?;
+        NullBackend.prepare(worker, frame, request, PASS, list)?;
         let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
         NullBackend.finish(worker, frame, request, PASS, bundles).map(|_| ())
     });
@@ -63,10 +67,10 @@ fn a_frame_by_the_rules_breaks_none() {
 
 #[test]
 fn commands_out_of_order_are_refused() {
-    let rule = broken_rule(|worker, frame, list, _| {
+    let rule = broken_rule(|worker, frame, list, request| {
         let mut list = list.clone();
         list.commands.reverse();
-        NullBackend.prepare(worker, frame, PASS, &list)
+        NullBackend.prepare(worker, frame, request, PASS, &list)
     });
     assert!(rule.contains("not sorted"), "{rule}");
 }
@@ -74,7 +78,7 @@ fn commands_out_of_order_are_refused() {
 #[test]
 fn a_bundle_that_is_lost_or_recorded_twice_is_refused() {
     let lost = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, PASS, list)?;
+        NullBackend.prepare(worker, frame, request, PASS, list)?;
         NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())
     });
     assert!(lost.contains("objects recorded"), "{lost}");
@@ -104,7 +108,7 @@ fn batches_that_overlap_or_draw_no_mesh_are_refused() {
 #[test]
 fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
     let twice = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, PASS, list)?;
+        NullBackend.prepare(worker, frame, request, PASS, list)?;
         let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
         NullBackend.finish(worker, frame, request, PASS, bundles)?;
         NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use drawloom::backend::NullPass;
 use drawloom::glam::DVec3;
 use drawloom::queue::DrawList;
-use drawloom::scene::{Blend, Scene, sample};
+use drawloom::scene::{Blend, Projection, Scene, sample};
 use drawloom::{FrameStatistics, Granularity};
 
 use crate::renderer;
@@ -83,7 +83,8 @@ fn a_view_draws_what_a_plain_loop_finds_visible() {
             let place =
                 camera.orientation.as_dquat().inverse() * (reference.positions[object] + offset - camera.position);
             let radius = f64::from(bounds.radius * reference.scales[object].abs().max_element());
-            let half = f64::from(camera.field_of_view) * 0.5;
+            let Projection::Perspective { field_of_view } = camera.projection else { unreachable!() };
+            let half = f64::from(field_of_view) * 0.5;
             let half_x = (half.tan() * f64::from(camera.aspect())).atan();
             let beside = |coordinate: f64, angle: f64| coordinate.abs() * angle.cos() + place.z * angle.sin() <= radius;
             -place.z + radius >= f64::from(camera.near) && beside(place.x, half_x) && beside(place.y, half)

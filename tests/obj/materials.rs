@@ -147,7 +147,9 @@ fn a_glowing_panel_shines_from_its_front() {
     for (face, normal) in [("f 4 3 2 1", Vec3::Y), ("f 4//1 3//1 2//1 1//1\n", Vec3::NEG_Y)] {
         let text = format!("{text}vn 0 -1 0\n{face}\n");
         let imported = Folder::new().with("a.obj", text).with("a.mtl", GLOW).load().unwrap();
-        let [Light::Hemispherical { position, direction, intensity, range }] = imported.scene.lights[..] else {
+        let [Light::Hemispherical { position, direction, intensity, range, casts_shadow: true }] =
+            imported.scene.lights[..]
+        else {
             panic!("{:?}", imported.scene.lights);
         };
         assert!(direction.abs_diff_eq(normal, 1e-6), "{direction}");

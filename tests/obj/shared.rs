@@ -116,7 +116,7 @@ fn cornell() {
     assert_eq!(material(&scene, "leftWall").diffuse, Vec3::new(0.63, 0.065, 0.05));
     assert_eq!(material(&scene, "rightWall").diffuse, Vec3::new(0.14, 0.45, 0.091));
     assert_eq!(material(&scene, "light").emission, Vec3::new(17.0, 12.0, 4.0));
-    let [Light::Hemispherical { position, direction, intensity, range }] = scene.lights[..] else {
+    let [Light::Hemispherical { position, direction, intensity, range, casts_shadow: true }] = scene.lights[..] else {
         panic!("{:?}", scene.lights);
     };
     assert_eq!(direction, Vec3::NEG_Y);

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use drawloom::backend::{BackendError, WgpuBackend};
+use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::view::{Rejection, RejectionReason};
 use drawloom::{Granularity, Renderer, wgpu};
@@ -26,7 +27,7 @@ fn noop() -> Result<(), Failed> {
         let backend = WgpuBackend::new(device.clone(), queue.clone())?;
         let scheduler = Arc::new(Scheduler::new(2)?);
         let (mut renderer, submitter) =
-            Renderer::builder(backend).deferred().granularity(granularity).build(scheduler)?;
+            Renderer::builder(backend).deferred(Deferred::to_picture()).granularity(granularity).build(scheduler)?;
         for count in [0, 10, 2000, 500] {
             let recorded = renderer.record(field(count).as_scene_ref())?;
             let submitted = submitter.submit(recorded)?;
@@ -51,7 +52,8 @@ fn low_limits() -> Result<(), Failed> {
 fn large_picture() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(1)?);
-    let (mut renderer, _) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let (mut renderer, _) =
+        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
     let mut scene = field(10);
     scene.cameras[0].size = [5000, 10];
     match renderer.record(scene.as_scene_ref()).err() {
@@ -63,7 +65,8 @@ fn large_picture() -> Result<(), Failed> {
 fn many_objects() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let (mut renderer, submitter) =
+        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
     let (few, mut many) = (field(1000), field(1000));
     many.duplicate_objects(WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64 / 1000 + 1);
     for scene in [&few, &many, &many, &few] {
@@ -86,7 +89,8 @@ fn many_textures() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let layers = device.limits().max_texture_array_layers;
     let scheduler = Arc::new(Scheduler::new(1)?);
-    let (mut renderer, _) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred().build(scheduler)?;
+    let (mut renderer, _) =
+        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
     let recorded = renderer.record(textured(layers + 2).0.as_scene_ref())?;
     match recorded.statistics().rejections.as_slice() {
         [Rejection { reason: RejectionReason::TextureLimit, count: 2, .. }] => Ok(()),
@@ -98,7 +102,7 @@ fn lost_device() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = WgpuBackend::new(device.clone(), queue)?;
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred().build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
     let scene = field(500);
     submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
     let recorded = renderer.record(scene.as_scene_ref())?;

@@ -49,6 +49,7 @@ fn directional() -> Result<(), Failed> {
         let light = Light::Directional {
             direction: Vec3::new(angle.sin(), 0.0, -angle.cos()),
             illuminance: Vec3::new(3.0, 2.0, 1.0),
+            casts_shadow: false,
         };
         let facing = f64::from(angle.cos()).max(0.0);
         expect(light, [3.0 * facing, 2.0 * facing, facing])?;
@@ -82,6 +83,7 @@ fn spot() -> Result<(), Failed> {
             range: 20.0,
             inner_angle: inner,
             outer_angle: outer,
+            casts_shadow: false,
         };
         let fade = if lit == 0.5 {
             let along = f64::from((aside as f32).cos());
@@ -104,6 +106,7 @@ fn hemispherical() -> Result<(), Failed> {
             direction: Vec3::new(0.0, angle.sin(), -angle.cos()),
             intensity: Vec3::splat(8.0),
             range: 20.0,
+            casts_shadow: false,
         };
         expect(light, [8.0 * share * f64::from(angle.cos()).max(0.0); 3])?;
     }
@@ -135,6 +138,7 @@ fn background() -> Result<(), Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::ZERO, DVec3::X), [16, 16])];
     scene.background = Vec3::new(0.1, 0.3, 0.7);
-    scene.lights = vec![Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::splat(5.0) }];
+    scene.lights =
+        vec![Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::splat(5.0), casts_shadow: false }];
     assert_color(pixel(&draw(&scene)?, 8, 8), tone_mapped([0.1, 0.3, 0.7]))
 }

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, GeometryBuffer, RawPass, RenderProcess, Resolved,
-    ToneMapping,
+    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, GeometryBuffer, GeometryFormats, RawPass,
+    RenderProcess, Resolved, ToneMapping,
 };
 use drawloom::queue::Selection;
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
@@ -86,7 +86,7 @@ const PLAIN: Made = Made {
         declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 1.0, 1.0]));
         declare.clears_depth("plain depth", Format::Depth32Float);
     },
-    draws: || plain_color(Selection::All),
+    draws: || plain_color(Selection::ALL),
 };
 
 fn panes(depths_and_blends: &[(f64, Vec3, Blend)]) -> Result<Scene, Failed> {
@@ -263,7 +263,7 @@ impl RenderProcess for Changing {
             0 => Draws::FullScreen(FullScreen { shader: red, ..FullScreen::default() }),
             1 => Draws::FullScreen(FullScreen { shader: green, ..FullScreen::default() }),
             2 => Draws::FullScreen(FullScreen { shader: red, blend: Blend::Additive, ..FullScreen::default() }),
-            _ => plain_color(Selection::Opaque),
+            _ => plain_color(Selection::OPAQUE),
         }
     }
 }
@@ -325,8 +325,9 @@ fn exposure() -> Result<(), Failed> {
     scene.background = Vec3::splat(0.1);
     for exposure in [0.5, 1.0, 4.0] {
         let tone_mapping = ToneMapping { exposure };
-        let mut studio =
-            Studio::with(2, |builder| builder.process(GeometryBuffer).process(tone_mapping).output("picture"))?;
+        let mut studio = Studio::with(2, |builder| {
+            builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
+        })?;
         let radiance = 0.1 * f64::from(exposure);
         assert_color(pixel(&studio.draw(&scene)?, 3, 3), tone_mapped([radiance; 3]))?;
     }
@@ -429,7 +430,7 @@ fn refused_pass() -> Result<(), Failed> {
     let first_writer = Made {
         name: "head",
         declare: |declare| declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background),
-        draws: || plain_color(Selection::Opaque),
+        draws: || plain_color(Selection::OPAQUE),
     };
     let studio = Studio::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
     expect_named(&error_of(studio)?, "ouroboros", "finish")?;

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use drawloom::backend::{Picture, WgpuBackend, WgpuSubmission};
+use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Recorded, Renderer, RendererBuilder, Submitter, wgpu};
@@ -25,7 +26,7 @@ pub struct Studio {
 impl Studio {
     /// The shipped processes on two workers.
     pub fn new() -> Result<Self, Failed> {
-        Self::with(2, RendererBuilder::deferred)
+        Self::with(2, |builder| builder.deferred(Deferred::to_picture()))
     }
 
     /// Other processes, or other settings.
@@ -41,7 +42,7 @@ impl Studio {
 
     /// The shipped processes with this many workers and this granularity.
     pub fn cut(workers: usize, granularity: Granularity) -> Result<Self, Failed> {
-        Self::with(workers, |builder| builder.deferred().granularity(granularity))
+        Self::with(workers, |builder| builder.deferred(Deferred::to_picture()).granularity(granularity))
     }
 
     pub fn record(&mut self, scene: &Scene) -> Result<Recorded<WgpuBackend>, Failed> {

@@ -87,7 +87,11 @@ fn make_field(count: usize) -> Result<Scene, SceneError> {
         scene.add_object(object)?;
     }
     scene.lights = vec![
-        Light::Directional { direction: Vec3::new(0.3, -0.8, -0.5).normalize(), illuminance: Vec3::splat(2.0) },
+        Light::Directional {
+            direction: Vec3::new(0.3, -0.8, -0.5).normalize(),
+            illuminance: Vec3::splat(2.0),
+            casts_shadow: false,
+        },
         Light::Point { position: DVec3::new(0.0, 3.0, -5.0), intensity: Vec3::new(30.0, 10.0, 5.0), range: 40.0 },
     ];
     scene.ambient = Vec3::splat(0.1);

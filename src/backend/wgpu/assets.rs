@@ -216,7 +216,8 @@ struct MaterialRecord {
     texture_array: u32,
     texture_layer: u32,
     double_sided: u32,
-    padding: [u32; 2],
+    blend: u32,
+    padding: u32,
 }
 
 impl MaterialRecord {
@@ -229,7 +230,8 @@ impl MaterialRecord {
             texture_array: place.array,
             texture_layer: place.layer,
             double_sided: u32::from(material.double_sided),
-            padding: [0; 2],
+            blend: material.blend as u32,
+            padding: 0,
         }
     }
 }

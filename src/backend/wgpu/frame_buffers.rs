@@ -9,7 +9,7 @@ use super::arena::new_buffer;
 use super::layouts::Layouts;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
-use crate::view::{LightRecord, ObjectRecord, ViewRecord};
+use crate::view::{LightTable, ObjectRecord, ViewRecord};
 
 /// Buffers that no frame uses at present.
 ///
@@ -21,6 +21,12 @@ pub(super) struct BufferPool {
 }
 
 impl BufferPool {
+    /// The bytes of all buffers that no frame uses.
+    pub(super) fn bytes(&self) -> u64 {
+        let size = |buffer: &GrowingBuffer| buffer.buffer.as_ref().map_or(0, wgpu::Buffer::size);
+        self.free.lock().iter().flat_map(|buffers| buffers.all().map(size)).sum()
+    }
+
     /// Drops what is free, because a device error may have left it unusable.
     pub(super) fn forget(&self) {
         self.free.lock().clear();
@@ -57,14 +63,15 @@ impl FrameBuffers {
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
         let views = view_bytes(request)?;
-        let (lights, light_stride) = light_bytes(request);
+        let (lights, light_ranges) = light_bytes(request);
         let (parameters, parameter_ranges) = parameter_bytes(request.passes, request.draws);
         let objects = request.scene.object_count().max(1);
         let drawn_stride = aligned(objects * 4);
         let drawn_places = drawn_places(request);
         let drawn_count = drawn_places.iter().flatten().count();
 
-        for bytes in [objects * size_of::<ObjectRecord>(), drawn_stride, light_stride] {
+        let longest = light_ranges.iter().map(|(_, bytes)| *bytes).max().unwrap_or(0);
+        for bytes in [objects * size_of::<ObjectRecord>(), drawn_stride, longest] {
             check_storage(device, bytes)?;
         }
         let buffers = &mut self.buffers;
@@ -78,7 +85,7 @@ impl FrameBuffers {
         // If this ends early, what the groups were made for is forgotten, and so are they.
         let groups_key = buffers.groups_key.take();
         let mut renewed = false;
-        for (buffer, size) in buffers.all().into_iter().zip(sizes) {
+        for (buffer, size) in buffers.all_mut().into_iter().zip(sizes) {
             renewed |= buffer.reserve(device, size)?;
         }
         buffers.views.write(queue, 0, &views);
@@ -86,7 +93,7 @@ impl FrameBuffers {
         buffers.parameters.write(queue, 0, &parameters);
 
         let passes = request.passes.iter().copied().zip(drawn_places.iter().copied()).collect();
-        let key = GroupsKey { passes, objects, light_stride, drawn_stride };
+        let key = GroupsKey { passes, objects, light_ranges, drawn_stride };
         if renewed || groups_key.as_ref() != Some(&key) {
             buffers.groups = (0..request.passes.len()).map(|pass| buffers.group(device, layouts, &key, pass)).collect();
         }
@@ -123,7 +130,7 @@ struct Buffers {
     objects: GrowingBuffer,
     /// A [`ViewRecord`] a view.
     views: GrowingBuffer,
-    /// Each view's lights, relative to its camera.
+    /// The lights that reach each view, relative to its camera.
     lights: GrowingBuffer,
     /// For each pass of commands, which objects it draws; `drawn_stride` bytes apart.
     drawn: GrowingBuffer,
@@ -144,7 +151,8 @@ struct GroupsKey {
     /// Each with its place in `drawn`.
     passes: Vec<(Pass, Option<usize>)>,
     objects: usize,
-    light_stride: usize,
+    /// Each view's place and length in the buffer of lights.
+    light_ranges: Vec<(usize, usize)>,
     drawn_stride: usize,
 }
 
@@ -168,7 +176,11 @@ impl Default for Buffers {
 }
 
 impl Buffers {
-    fn all(&mut self) -> [&mut GrowingBuffer; 5] {
+    fn all(&self) -> [&GrowingBuffer; 5] {
+        [&self.objects, &self.views, &self.lights, &self.drawn, &self.parameters]
+    }
+
+    fn all_mut(&mut self) -> [&mut GrowingBuffer; 5] {
         [&mut self.objects, &mut self.views, &mut self.lights, &mut self.drawn, &mut self.parameters]
     }
 
@@ -180,7 +192,7 @@ impl Buffers {
             self.views.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
             self.objects.binding(0, key.objects * size_of::<ObjectRecord>()),
             self.drawn.binding(drawn.0, drawn.1),
-            self.lights.binding(view * key.light_stride, key.light_stride),
+            self.lights.binding(key.light_ranges[view].0, key.light_ranges[view].1),
         ];
         let entries: Vec<_> = (0..)
             .zip(bindings.into_iter().flatten())
@@ -250,34 +262,31 @@ fn aligned(bytes: usize) -> usize {
 
 fn view_bytes(request: &FrameRequest<'_>) -> Result<Vec<u8>, BackendError> {
     let mut bytes = Vec::with_capacity(request.views.len() * ALIGNMENT);
-    for view in request.views {
-        let record = ViewRecord::new(view, request.scene, request.scene.lights.len())
+    for (view, lights) in request.views.iter().zip(request.lights) {
+        let record = ViewRecord::new(view, request.scene, lights.records().len())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
         append_aligned(&mut bytes, bytemuck::bytes_of(&record));
     }
     Ok(bytes)
 }
 
-fn light_bytes(request: &FrameRequest<'_>) -> (Vec<u8>, usize) {
-    let stride = aligned(request.scene.lights.len() * size_of::<LightRecord>());
-    let mut bytes = Vec::with_capacity(request.views.len() * stride);
-    for (count, view) in (1..).zip(request.views) {
-        for light in request.scene.lights {
-            bytes.extend_from_slice(bytemuck::bytes_of(&LightRecord::new(light, view.camera.position)));
-        }
-        bytes.resize(count * stride, 0);
-    }
-    (bytes, stride)
+fn light_bytes(request: &FrameRequest<'_>) -> (Vec<u8>, Vec<(usize, usize)>) {
+    let mut bytes = Vec::new();
+    let append = |lights: &LightTable| {
+        let offset = bytes.len();
+        append_aligned(&mut bytes, bytemuck::cast_slice(lights.records()));
+        // A view that no light reaches reads nothing there, but its layout has the binding.
+        bytes.resize(bytes.len().max(offset + ALIGNMENT), 0);
+        (offset, bytes.len() - offset)
+    };
+    let ranges = request.lights.iter().map(append).collect();
+    (bytes, ranges)
 }
 
 fn parameter_bytes(passes: &[Pass], draws: &[Draws<'_>]) -> (Vec<u8>, Vec<Option<(usize, usize)>>) {
     let mut bytes = Vec::new();
     let mut append = |pass: &Pass| {
-        let parameters = match &draws[pass.process] {
-            Draws::Commands(commands) => &commands.parameters,
-            Draws::FullScreen(full_screen) => &full_screen.parameters,
-            Draws::Raw(_) => return None,
-        };
+        let parameters = draws[pass.process].parameters();
         let offset = bytes.len();
         append_aligned(&mut bytes, parameters);
         (!parameters.is_empty()).then_some((offset, parameters.len()))

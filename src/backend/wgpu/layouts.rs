@@ -41,25 +41,34 @@ impl Layouts {
     }
 }
 
+/// A target that a shader reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sampled {
+    pub(super) format: Format,
+    /// As the array that all views of a kind share.
+    pub(super) layered: bool,
+}
+
 /// The layout of a process's own `@group(2)`: its parameters where it has some, then the targets it samples. `None` where
 /// it has neither.
 pub(super) fn process_layout(
     device: &wgpu::Device,
     parameter_bytes: usize,
-    samples: impl Iterator<Item = Format>,
+    samples: &[Sampled],
 ) -> Option<wgpu::BindGroupLayout> {
     let mut entries = Vec::new();
     if parameter_bytes > 0 {
         // The size is said here so that a shader that wants more is refused when its pipeline is made.
         entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(parameter_bytes as u64)));
     }
-    for (binding, format) in (1..).zip(samples) {
-        let sample_type = if format.is_depth() {
+    for (binding, sampled) in (1..).zip(samples) {
+        let sample_type = if sampled.format.is_depth() {
             wgpu::TextureSampleType::Depth
         } else {
             wgpu::TextureSampleType::Float { filterable: false }
         };
-        let view_dimension = wgpu::TextureViewDimension::D2;
+        let view_dimension =
+            if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
         let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
         entries.push(entry(binding, ShaderStages::FRAGMENT, texture));
     }

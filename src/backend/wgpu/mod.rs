@@ -10,29 +10,34 @@ mod assets;
 mod error_scope;
 mod frame_buffers;
 mod layouts;
+mod light_meshes;
 mod picture;
 mod pipelines;
 mod record;
+mod subdivisions;
 mod targets;
 mod texels;
 mod textures;
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use parking_lot::Mutex;
+use parking_lot::{Mutex, RwLock};
 
 use self::assets::{AssetCache, AssetSnapshot};
 use self::error_scope::{caught, checked};
 use self::frame_buffers::{BufferPool, FrameBuffers};
 use self::layouts::Layouts;
+use self::light_meshes::LightMeshes;
 use self::pipelines::ProcessPipelines;
-use self::targets::{TargetCache, ViewTargets};
+use self::subdivisions::{SubdividedMesh, Subdivisions};
+use self::targets::{FrameTargets, TargetCache};
 use super::{Backend, BackendError, FrameRequest};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::task::Worker;
-use crate::view::ObjectTable;
+use crate::view::{ObjectTable, RejectionReason};
 
 pub use picture::{Picture, WgpuSubmission};
 
@@ -48,9 +53,12 @@ pub struct WgpuBackend {
     device: wgpu::Device,
     queue: wgpu::Queue,
     layouts: Layouts,
-    /// One for each process of the plan.
-    pipelines: Mutex<Vec<Arc<ProcessPipelines>>>,
+    /// For each plan by its identity, one for each process.
+    pipelines: Mutex<HashMap<u64, Vec<Arc<ProcessPipelines>>>>,
+    /// Made when a plan draws lights for the first time.
+    light_meshes: Mutex<Option<Arc<LightMeshes>>>,
     assets: Mutex<AssetCache>,
+    subdivisions: Subdivisions,
     targets: Mutex<TargetCache>,
     buffers: Arc<BufferPool>,
 }
@@ -85,7 +93,9 @@ impl WgpuBackend {
             queue,
             layouts,
             pipelines: Mutex::default(),
+            light_meshes: Mutex::default(),
             assets: Mutex::default(),
+            subdivisions: Subdivisions::default(),
             targets: Mutex::default(),
             buffers: Arc::default(),
         })
@@ -101,28 +111,63 @@ impl WgpuBackend {
         &self.queue
     }
 
-    /// The pipelines of every process, made anew where a process draws in another way than it did.
+    /// What is kept on the device from frame to frame, beside the scene's own meshes and textures.
+    pub fn resources(&self) -> WgpuResources {
+        let kept = self.pipelines.lock();
+        let mut distinct: Vec<_> = kept.values().flatten().collect();
+        distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
+        distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
+        let pipelines = distinct.into_iter().map(|pipelines| pipelines.prepared().len()).sum();
+        let (targets, target_bytes) = self.targets.lock().current().sizes();
+        WgpuResources { pipelines, targets, target_bytes, buffer_bytes: self.buffers.bytes() }
+    }
+
+    /// The pipelines of every process of a plan: those there are, also from other plans, or new ones where a process draws in
+    /// another way than it did.
     fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Vec<Arc<ProcessPipelines>>, BackendError> {
-        let mut pipelines = self.pipelines.lock();
+        let mut kept = self.pipelines.lock();
+        let mut of_plan = kept.get(&plan.identity()).cloned().unwrap_or_default();
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
-            if pipelines.get(index).is_some_and(|pipelines| pipelines.fit(draws)) {
+            if of_plan.get(index).is_some_and(|pipelines| pipelines.still_fit(draws)) {
                 continue;
             }
-            let label = format!("the shader of {:?}", planned.process.name());
-            let make = || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws);
-            let made = Arc::new(checked(&self.device, &label, make)?);
-            // Processes are made in order, so the new one replaces another or comes at the end.
-            match pipelines.get_mut(index) {
+            let fitting = kept.values().flatten().find(|pipelines| pipelines.fit(plan, planned, draws)).cloned();
+            let made = match fitting {
+                Some(fitting) => fitting,
+                None => {
+                    let label = format!("the shader of {:?}", planned.process.name());
+                    let make = || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws);
+                    Arc::new(checked(&self.device, &label, make)?)
+                }
+            };
+            // Processes are gone through in order, so the new one replaces another or comes at the end.
+            match of_plan.get_mut(index) {
                 Some(old) => *old = made,
-                None => pipelines.push(made),
+                None => of_plan.push(made),
             }
         }
-        Ok(pipelines.clone())
+        kept.insert(plan.identity(), of_plan.clone());
+        Ok(of_plan)
+    }
+
+    /// The geometry of lights, where something draws it.
+    fn light_meshes(&self, draws: &[Draws<'_>]) -> Result<Option<Arc<LightMeshes>>, BackendError> {
+        if !draws.iter().any(|draws| matches!(draws, Draws::Lights(_))) {
+            return Ok(None);
+        }
+        let mut kept = self.light_meshes.lock();
+        if kept.is_none() {
+            let make = || LightMeshes::new(&self.device, &self.queue);
+            *kept = Some(Arc::new(checked(&self.device, "the geometry of lights", make)??));
+        }
+        Ok(kept.clone())
     }
 
     fn start(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, views, passes, scene, rejections } = *request;
+        let FrameRequest { plan, draws, views, passes, scene, rejections, .. } = *request;
         let pipelines = self.pipelines(plan, draws)?;
+        let light_meshes = self.light_meshes(draws)?;
+        self.subdivisions.begin(scene.assets);
         let assets = checked(&self.device, "meshes, materials and textures", || {
             self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
         })??;
@@ -133,7 +178,7 @@ impl WgpuBackend {
             let groups = passes.iter().enumerate().map(|(index, pass)| {
                 let parameters = buffers.parameters(index);
                 let declaration = &plan.processes()[pass.process].declaration;
-                pipelines[pass.process].process_group(&self.device, parameters, &targets[pass.view], declaration)
+                pipelines[pass.process].process_group(&self.device, parameters, &targets, pass.view, declaration)
             });
             let groups: Vec<_> = groups.collect();
             Ok::<_, BackendError>((buffers, groups))
@@ -146,6 +191,8 @@ impl WgpuBackend {
             passes: passes.to_vec(),
             pipelines,
             assets,
+            light_meshes,
+            subdivided: RwLock::default(),
             targets,
             process_groups,
             background: scene.background.as_dvec3().to_array(),
@@ -153,13 +200,44 @@ impl WgpuBackend {
         })
     }
 
+    /// Finds or makes the subdivided meshes that batches draw.
+    fn subdivide(&self, frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) -> Result<(), BackendError> {
+        for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
+            let halvings = batch.state.halvings();
+            let assets = request.scene.assets;
+            let mesh = self.subdivisions.find(&self.device, &self.queue, assets, batch.mesh, halvings)?;
+            if mesh.is_coarse {
+                for rank in batch.first..batch.first + batch.count {
+                    request.rejections.count(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);
+                }
+            }
+            frame.subdivided.write().insert((batch.mesh, halvings), mesh);
+        }
+        Ok(())
+    }
+
     /// Drops everything that is kept from frame to frame. After a device error some of it may be unusable, and the next
     /// frame is to find out for itself.
     fn forget(&self) {
         *self.assets.lock() = AssetCache::default();
+        *self.light_meshes.lock() = None;
+        self.subdivisions.forget();
         *self.targets.lock() = TargetCache::default();
         self.buffers.forget();
     }
+}
+
+/// What a [`WgpuBackend`] keeps on the device from frame to frame, beside the scene's own meshes and textures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WgpuResources {
+    /// Of all processes that were drawn so far.
+    pub pipelines: usize,
+    /// Textures that the last frame's views draw into; one that several views share counts once.
+    pub targets: usize,
+    /// Their pixels.
+    pub target_bytes: u64,
+    /// Of the buffers for objects, views, lights and parameters that no frame on its way is using.
+    pub buffer_bytes: u64,
 }
 
 /// A frame on its way through the wgpu backend.
@@ -169,7 +247,10 @@ pub struct WgpuFrame {
     /// One for each process.
     pipelines: Vec<Arc<ProcessPipelines>>,
     assets: Arc<AssetSnapshot>,
-    targets: Vec<Arc<ViewTargets>>,
+    light_meshes: Option<Arc<LightMeshes>>,
+    /// By mesh slot, and how often its edges are halved.
+    subdivided: RwLock<HashMap<(u32, u32), Arc<SubdividedMesh>>>,
+    targets: FrameTargets,
     /// For each pass, its targets and parameters at `@group(2)`; none for a pass without.
     process_groups: Vec<Option<wgpu::BindGroup>>,
     background: [f64; 3],
@@ -215,13 +296,21 @@ impl Backend for WgpuBackend {
         })
     }
 
-    fn prepare(&self, _worker: &Worker, frame: &WgpuFrame, pass: Pass, list: &DrawList) -> Result<(), BackendError> {
+    fn prepare(
+        &self,
+        _worker: &Worker,
+        frame: &WgpuFrame,
+        request: &FrameRequest<'_>,
+        pass: Pass,
+        list: &DrawList,
+    ) -> Result<(), BackendError> {
         let index = frame.index(pass);
         let pipelines = &frame.pipelines[pass.process];
         let made = checked(&self.device, &frame.labels[index], || {
             frame.buffers.write_drawn(&self.queue, index, &list.objects);
-            pipelines.make_missing(&self.device, &list.batches)
-        })?;
+            self.subdivide(frame, request, list)?;
+            Ok::<_, BackendError>(pipelines.make_missing(&self.device, &list.batches))
+        })??;
         pipelines.keep(made);
         Ok(())
     }
@@ -255,11 +344,8 @@ impl Backend for WgpuBackend {
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(&frame.labels[index]) });
             match &request.draws[pass.process] {
-                Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, pass, *raw)?,
-                draws => {
-                    let declaration = &request.plan.processes()[pass.process].declaration;
-                    record::pass(&mut encoder, frame, index, declaration, draws, &bundles)?;
-                }
+                Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, request, pass, *raw)?,
+                _ => record::pass(&mut encoder, frame, request, index, &bundles)?,
             }
             Ok(encoder.finish())
         })?

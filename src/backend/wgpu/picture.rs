@@ -1,9 +1,7 @@
 //! What is known of a submitted frame, and its pictures brought back.
 
-use std::sync::Arc;
-
 use super::error_scope::checked;
-use super::targets::ViewTargets;
+use super::targets::{FrameTargets, Target};
 use crate::backend::BackendError;
 use crate::process::Format;
 
@@ -12,7 +10,7 @@ pub struct WgpuSubmission {
     device: wgpu::Device,
     queue: wgpu::Queue,
     index: wgpu::SubmissionIndex,
-    targets: Vec<Arc<ViewTargets>>,
+    targets: FrameTargets,
 }
 
 /// A target's pixels.
@@ -33,14 +31,15 @@ impl WgpuSubmission {
         device: wgpu::Device,
         queue: wgpu::Queue,
         index: wgpu::SubmissionIndex,
-        targets: Vec<Arc<ViewTargets>>,
+        targets: FrameTargets,
     ) -> Self {
         Self { device, queue, index, targets }
     }
 
-    /// One of a view's targets, to show or to copy. The next frame draws into the same texture.
+    /// One of a view's targets, to show or to copy; of a target that views share, the texture of all of them. The next frame
+    /// draws into the same texture.
     pub fn texture(&self, view: usize, target: &str) -> Option<&wgpu::Texture> {
-        self.targets.get(view)?.find(target).map(|target| &target.texture)
+        self.targets.find(view, target).map(|target| &target.texture)
     }
 
     /// Waits until the device has drawn the frame.
@@ -60,13 +59,13 @@ impl WgpuSubmission {
         // A lost device is told of here, and nowhere after it.
         self.wait()?;
         let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
-        let found = self.targets.get(view).and_then(|targets| targets.find(target)).ok_or_else(unknown)?;
-        let (size, format) = (found.texture.size(), found.format);
+        let found = self.targets.find(view, target).ok_or_else(unknown)?;
+        let (size, format) = (found.texture.size(), found.format());
         let row = size.width as usize * format.bytes();
         let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
         let (sender, receiver) = std::sync::mpsc::channel();
         let buffer = checked(&self.device, target, || {
-            let buffer = self.copy(&found.texture, padded_row);
+            let buffer = self.copy(found, padded_row);
             buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
                 // The receiver waits below, unless the device refused, and then nobody asks.
                 let _ = sender.send(result);
@@ -82,8 +81,8 @@ impl WgpuSubmission {
         Ok(Picture { width: size.width, height: size.height, format, bytes })
     }
 
-    fn copy(&self, texture: &wgpu::Texture, padded_row: usize) -> wgpu::Buffer {
-        let size = texture.size();
+    fn copy(&self, target: &Target, padded_row: usize) -> wgpu::Buffer {
+        let size = wgpu::Extent3d { depth_or_array_layers: 1, ..target.texture.size() };
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("picture"),
             size: padded_row as u64 * u64::from(size.height),
@@ -94,7 +93,10 @@ impl WgpuSubmission {
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row as u32), rows_per_image: None };
         encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { z: target.layer, ..wgpu::Origin3d::ZERO },
+                ..target.texture.as_image_copy()
+            },
             wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
             size,
         );

@@ -5,59 +5,62 @@ use std::collections::HashMap;
 
 use parking_lot::{RwLock, RwLockReadGuard};
 
-use super::layouts::{Layouts, process_layout, texture_format};
-use super::targets::ViewTargets;
+use super::layouts::{Layouts, Sampled, process_layout, texture_format};
+use super::targets::FrameTargets;
 use crate::command::{Cull, DrawState};
-use crate::process::{Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
+use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
 use crate::queue::Batch;
-use crate::scene::{Blend, Topology, Vertex};
+use crate::scene::{Blend, LightKind, Topology, Vertex, ViewKind};
 
 /// The pipelines of one process: one for each state that a scene has needed so far.
 pub(super) struct ProcessPipelines {
+    name: String,
     recipe: Recipe<'static>,
+    attachments: Attachments,
     /// `@group(2)`; `None` for a process that has nothing there.
     process_layout: Option<wgpu::BindGroupLayout>,
     /// `None` for a raw pass.
     shader: Option<Shader>,
-    colors: Vec<wgpu::TextureFormat>,
-    depth: Option<Depth>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
 }
 
 /// All that pipelines are made from and that a process may change from frame to frame.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Recipe<'a> {
     shader: Cow<'a, str>,
-    /// Empty for a raw pass.
-    vertex: &'static str,
+    vertices: Vertices,
     fragment: Option<Cow<'a, str>>,
     parameter_bytes: usize,
     writes_depth: bool,
-    /// For a full-screen triangle.
-    blend: Blend,
+    /// The one state of what is not drawn by commands.
+    state: Option<DrawState>,
+}
+
+/// What a process draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Vertices {
+    Meshes,
+    /// One triangle, infinitely far away.
+    FullScreen,
+    LightVolumes,
+    /// Whatever a raw pass encodes.
+    None,
 }
 
 impl<'a> Recipe<'a> {
     /// Borrowed, because every frame compares it with what the pipelines were made from.
     fn new(draws: &Draws<'a>) -> Self {
+        let parameter_bytes = draws.parameters().len();
+        let state = fixed_state(draws);
+        let of = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
+            let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
+            Self { shader, vertices, fragment, parameter_bytes, writes_depth, state }
+        };
         match draws {
-            Draws::Commands(commands) => Self {
-                shader: Cow::Borrowed(commands.shader),
-                vertex: "vertex",
-                fragment: commands.fragment.map(Cow::Borrowed),
-                parameter_bytes: commands.parameters.len(),
-                writes_depth: commands.writes_depth,
-                blend: Blend::None,
-            },
-            Draws::FullScreen(full_screen) => Self {
-                shader: Cow::Borrowed(full_screen.shader),
-                vertex: "full_screen",
-                fragment: Some(Cow::Borrowed("fragment")),
-                parameter_bytes: full_screen.parameters.len(),
-                writes_depth: false,
-                blend: full_screen.blend,
-            },
-            Draws::Raw(_) => Self::default(),
+            Draws::Commands(draws) => of(draws.shader, Vertices::Meshes, draws.fragment, draws.writes_depth),
+            Draws::FullScreen(draws) => of(draws.shader, Vertices::FullScreen, Some("fragment"), false),
+            Draws::Lights(draws) => of(draws.shader, Vertices::LightVolumes, Some("fragment"), false),
+            Draws::Raw(_) => of("", Vertices::None, None, false),
         }
     }
 
@@ -67,15 +70,48 @@ impl<'a> Recipe<'a> {
     }
 }
 
+/// What a process draws into and reads from.
+#[derive(Clone, Debug, PartialEq)]
+struct Attachments {
+    colors: Vec<wgpu::TextureFormat>,
+    depth: Option<Depth>,
+    sampled: Vec<Sampled>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Depth {
+    format: wgpu::TextureFormat,
+    /// Whether the pass may write it at all; a draw may still leave it alone.
+    writable: bool,
+    /// Whether only what has just the depth that is there is drawn.
+    matches: bool,
+}
+
+impl Attachments {
+    fn new(plan: &FramePlan, declaration: &Declaration) -> Self {
+        let planned = |views: ViewKind, target: &str| {
+            plan.targets().iter().find(|planned| planned.views == views && planned.name == target)
+        };
+        let format_of =
+            |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
+        let colors = declaration.colors().map(|(target, _)| texture_format(format_of(declaration.views, target)));
+        let depth = declaration.depth().map(|(target, access)| Depth {
+            format: texture_format(format_of(declaration.views, target)),
+            writable: access.writes(),
+            matches: access == Access::MatchDepth,
+        });
+        let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
+            Access::Sample => Some(Sampled { format: format_of(declaration.views, target), layered: false }),
+            Access::SampleLayers(views) => Some(Sampled { format: format_of(*views, target), layered: true }),
+            _ => None,
+        });
+        Self { colors: colors.collect(), depth, sampled: sampled.collect() }
+    }
+}
+
 struct Shader {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
-}
-
-#[derive(Clone, Copy)]
-struct Depth {
-    format: wgpu::TextureFormat,
-    writes: bool,
 }
 
 impl ProcessPipelines {
@@ -86,15 +122,11 @@ impl ProcessPipelines {
         planned: &PlannedProcess,
         draws: &Draws<'_>,
     ) -> Self {
-        let declaration = &planned.declaration;
-        let format_of = |target: &str| {
-            let mut targets = plan.targets().iter().filter(|planned| planned.views == declaration.views);
-            targets.find(|planned| planned.name == target).map_or(Format::Rgba8Unorm, |planned| planned.format)
-        };
+        let name = planned.process.name();
         let recipe = Recipe::new(draws).into_owned();
-        let process_layout = process_layout(device, recipe.parameter_bytes, declaration.samples().map(format_of));
-        let shader = (!recipe.vertex.is_empty()).then(|| {
-            let name = planned.process.name();
+        let attachments = Attachments::new(plan, &planned.declaration);
+        let process_layout = process_layout(device, recipe.parameter_bytes, &attachments.sampled);
+        let shader = (recipe.vertices != Vertices::None).then(|| {
             let source = format!("{SHADER_PRELUDE}\n{}", recipe.shader);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
@@ -109,20 +141,23 @@ impl ProcessPipelines {
             });
             Shader { module, layout }
         });
-        let depth = declaration.depth().map(|(target, cleared)| Depth {
-            format: texture_format(format_of(target)),
-            writes: cleared && recipe.writes_depth,
-        });
-        let colors = declaration.colors().map(|(target, _)| texture_format(format_of(target))).collect();
-        let pipelines = Self { recipe, process_layout, shader, colors, depth, by_state: RwLock::default() };
-        if let Draws::FullScreen(full_screen) = draws {
-            pipelines.keep(pipelines.make(device, full_screen_state(full_screen.blend)));
+        let (name, by_state) = (name.to_owned(), RwLock::default());
+        let pipelines = Self { name, recipe, attachments, process_layout, shader, by_state };
+        if let Some(state) = pipelines.recipe.state {
+            pipelines.keep(pipelines.make(device, state));
         }
         pipelines
     }
 
-    /// Whether they are what a process that draws this needs.
-    pub(super) fn fit(&self, draws: &Draws<'_>) -> bool {
+    /// Whether they are what a process of this plan that draws this needs.
+    pub(super) fn fit(&self, plan: &FramePlan, planned: &PlannedProcess, draws: &Draws<'_>) -> bool {
+        self.name == planned.process.name()
+            && self.recipe == Recipe::new(draws)
+            && self.attachments == Attachments::new(plan, &planned.declaration)
+    }
+
+    /// Whether they still are what a process draws, which they were made for.
+    pub(super) fn still_fit(&self, draws: &Draws<'_>) -> bool {
         self.recipe == Recipe::new(draws)
     }
 
@@ -137,7 +172,7 @@ impl ProcessPipelines {
         let mut made = HashMap::new();
         let prepared = self.prepared();
         for run in batches.chunk_by(|one, next| one.state == next.state) {
-            let state = run[0].state;
+            let state = run[0].state.of_pipeline();
             if !prepared.contains_key(&state) && !made.contains_key(&state) {
                 made.extend(self.make(device, state));
             }
@@ -160,14 +195,19 @@ impl ProcessPipelines {
         &self,
         device: &wgpu::Device,
         parameters: Option<wgpu::BufferBinding<'_>>,
-        targets: &ViewTargets,
+        targets: &FrameTargets,
+        view: usize,
         declaration: &Declaration,
     ) -> Option<wgpu::BindGroup> {
         let layout = self.process_layout.as_ref()?;
         let parameters = parameters.map(|buffer| (0, wgpu::BindingResource::Buffer(buffer)));
-        let sampled = (1..).zip(declaration.samples()).filter_map(|(binding, name)| {
-            targets.find(name).map(|target| (binding, wgpu::BindingResource::TextureView(&target.view)))
-        });
+        let texture = |(name, access): &(String, Access)| match access {
+            Access::Sample => targets.find(view, name).map(|target| &target.view),
+            Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
+            _ => None,
+        };
+        let sampled = (1..).zip(declaration.accesses.iter().filter_map(texture));
+        let sampled = sampled.map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));
         let entries: Vec<_> = parameters
             .into_iter()
             .chain(sampled)
@@ -186,9 +226,9 @@ impl ProcessPipelines {
         wgpu::RenderBundleEncoderDescriptor {
             label: Some(label),
             color_formats,
-            depth_stencil: self.depth.map(|depth| wgpu::RenderBundleDepthStencil {
+            depth_stencil: self.attachments.depth.map(|depth| wgpu::RenderBundleDepthStencil {
                 format: depth.format,
-                depth_read_only: !depth.writes,
+                depth_read_only: !depth.writable,
                 stencil_read_only: true,
             }),
             sample_count: 1,
@@ -198,7 +238,7 @@ impl ProcessPipelines {
 
     /// The formats of the colour targets.
     pub(super) fn color_formats(&self) -> Vec<Option<wgpu::TextureFormat>> {
-        self.colors.iter().copied().map(Some).collect()
+        self.attachments.colors.iter().copied().map(Some).collect()
     }
 
     /// `None` for a raw pass, which has no pipelines.
@@ -211,14 +251,18 @@ impl ProcessPipelines {
                 write_mask: wgpu::ColorWrites::ALL,
             })
         };
-        let targets: Vec<_> = self.colors.iter().map(target).collect();
+        let targets: Vec<_> = self.attachments.colors.iter().map(target).collect();
         let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
-        let vertices = [Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
+        let layout = |bytes: usize, attributes| wgpu::VertexBufferLayout {
+            array_stride: bytes as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &attributes,
-        })];
-        let full_screen = self.recipe.vertex == "full_screen";
+            attributes,
+        };
+        let (entry_point, vertices) = match self.recipe.vertices {
+            Vertices::Meshes => ("vertex", Some(Some(layout(size_of::<Vertex>(), &attributes[..])))),
+            Vertices::LightVolumes => ("light_volume", Some(Some(layout(size_of::<[f32; 3]>(), &attributes[..1])))),
+            Vertices::FullScreen | Vertices::None => ("full_screen", None),
+        };
         let (topology, strip_index_format) = match state.topology() {
             Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
             Topology::TriangleStrip => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
@@ -228,9 +272,9 @@ impl ProcessPipelines {
             layout: Some(&shader.layout),
             vertex: wgpu::VertexState {
                 module: &shader.module,
-                entry_point: Some(self.recipe.vertex),
+                entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: if full_screen { &[] } else { &vertices },
+                buffers: vertices.as_slice(),
             },
             primitive: wgpu::PrimitiveState {
                 topology,
@@ -243,16 +287,11 @@ impl ProcessPipelines {
                 },
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: self.depth.map(|depth| wgpu::DepthStencilState {
+            depth_stencil: self.attachments.depth.map(|depth| wgpu::DepthStencilState {
                 format: depth.format,
                 // What mixes with what is behind it must not hide what is drawn after it.
-                depth_write_enabled: Some(depth.writes && state.blend() == Blend::None),
-                // The full-screen triangle is infinitely far away, and is to show where nothing else is.
-                depth_compare: Some(if full_screen {
-                    wgpu::CompareFunction::GreaterEqual
-                } else {
-                    wgpu::CompareFunction::Greater
-                }),
+                depth_write_enabled: Some(depth.writable && self.recipe.writes_depth && state.blend() == Blend::None),
+                depth_compare: Some(self.depth_compare(depth)),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
@@ -268,11 +307,33 @@ impl ProcessPipelines {
         });
         Some((state, pipeline))
     }
+
+    /// Depth is reversed: what is nearer is greater.
+    fn depth_compare(&self, depth: Depth) -> wgpu::CompareFunction {
+        match self.recipe.vertices {
+            _ if depth.matches => wgpu::CompareFunction::Equal,
+            // Infinitely far away, it shows where nothing else is.
+            Vertices::FullScreen => wgpu::CompareFunction::GreaterEqual,
+            // The far side of what a light reaches, where it is behind a surface; and never where there is none.
+            Vertices::LightVolumes => wgpu::CompareFunction::Less,
+            Vertices::Meshes | Vertices::None => wgpu::CompareFunction::Greater,
+        }
+    }
 }
 
-/// The state that a full-screen triangle is drawn with.
-pub(super) fn full_screen_state(blend: Blend) -> DrawState {
-    DrawState::new(Topology::TriangleList, Cull::Nothing, blend)
+/// The one state that is drawn with what is not drawn by commands; `None` for commands, of which each has its own.
+pub(super) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
+    match draws {
+        Draws::FullScreen(full_screen) => {
+            Some(DrawState::new(Topology::TriangleList, Cull::Nothing, full_screen.blend))
+        }
+        Draws::Lights(lights) => {
+            // Their far sides alone: those are seen from inside too.
+            let cull = if lights.class.kind == LightKind::Directional { Cull::Nothing } else { Cull::Front };
+            Some(DrawState::new(Topology::TriangleList, cull, Blend::Additive))
+        }
+        _ => None,
+    }
 }
 
 fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {

@@ -4,84 +4,185 @@ use std::sync::Arc;
 
 use super::layouts::texture_format;
 use crate::backend::BackendError;
-use crate::process::{Format, FramePlan};
+use crate::process::{Format, FramePlan, PlannedTarget};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// The targets of one view.
-pub(super) struct ViewTargets {
-    kind: ViewKind,
-    pub(super) size: [u32; 2],
-    targets: Vec<Target>,
+/// The targets of one frame.
+#[derive(Clone, Default)]
+pub(super) struct FrameTargets {
+    /// One for each view: those it has for itself, and its layers of those it shares.
+    views: Vec<Vec<Target>>,
+    /// Those that all views of a kind share.
+    layered: Vec<LayeredTarget>,
 }
 
-/// One target.
+/// A target as one view draws into it.
+#[derive(Clone)]
 pub(super) struct Target {
-    name: String,
-    pub(super) format: Format,
+    planned: Arc<PlannedTarget>,
     pub(super) texture: wgpu::Texture,
+    /// Of the view's layer alone.
     pub(super) view: wgpu::TextureView,
+    pub(super) layer: u32,
 }
 
-impl ViewTargets {
-    pub(super) fn find(&self, name: &str) -> Option<&Target> {
-        self.targets.iter().find(|target| target.name == name)
-    }
+/// A texture array of which each view of a kind has a layer.
+#[derive(Clone)]
+struct LayeredTarget {
+    planned: Arc<PlannedTarget>,
+    texture: wgpu::Texture,
+    array: wgpu::TextureView,
+}
 
-    fn new(device: &wgpu::Device, plan: &FramePlan, view: &RenderView) -> Result<Self, BackendError> {
-        let size = view.camera.size;
-        let allowed = u64::from(device.limits().max_texture_dimension_2d);
-        let needed = u64::from(size[0].max(size[1]));
-        if needed > allowed {
-            return Err(BackendError::Limit { limit: "max_texture_dimension_2d", allowed, needed });
-        }
-        let usual = wgpu::TextureUsages::RENDER_ATTACHMENT
-            | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC
-            | wgpu::TextureUsages::COPY_DST;
-        let planned = plan.targets().iter().filter(|target| target.views == view.kind());
-        let targets = planned.map(|target| {
-            let texture = device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(&target.name),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: texture_format(target.format),
-                usage: if target.stored { usual | wgpu::TextureUsages::STORAGE_BINDING } else { usual },
-                view_formats: &[],
-            });
-            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            Target { name: target.name.clone(), format: target.format, texture, view }
-        });
-        Ok(Self { kind: view.kind(), size, targets: targets.collect() })
+impl Target {
+    pub(super) fn format(&self) -> Format {
+        self.planned.format
     }
 }
 
-/// Keeps each view's targets from frame to frame, and makes new ones when its picture's size changes.
+impl FrameTargets {
+    /// The target of one view by its name.
+    pub(super) fn find(&self, view: usize, name: &str) -> Option<&Target> {
+        self.views.get(view)?.iter().find(|target| target.planned.name == name)
+    }
+
+    /// The array that all views of a kind share.
+    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
+        let found = self.layered.iter().find(|target| target.planned.views == kind && target.planned.name == name);
+        found.map(|target| (&target.texture, &target.array))
+    }
+
+    /// How many textures there are, and how many bytes they take.
+    pub(super) fn sizes(&self) -> (usize, u64) {
+        let own = self.views.iter().flatten().filter(|target| !target.planned.layered);
+        let textures = own.map(|target| (&target.planned, &target.texture));
+        let textures = textures.chain(self.layered.iter().map(|target| (&target.planned, &target.texture)));
+        textures.fold((0, 0), |(count, bytes), (planned, texture)| {
+            let size = texture.size();
+            let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+            (count + 1, bytes + pixels * planned.format.bytes() as u64)
+        })
+    }
+}
+
+/// Keeps targets from frame to frame, and makes new ones where a picture's size or the plan changes. What no frame needs any
+/// more is dropped.
 #[derive(Default)]
 pub(super) struct TargetCache {
-    views: Vec<Arc<ViewTargets>>,
+    current: FrameTargets,
 }
 
 impl TargetCache {
     /// # Errors
-    /// If a picture is larger than the device allows.
+    /// If a picture is larger than the device allows, or more views share a target than a texture can have layers.
     pub(super) fn update(
         &mut self,
         device: &wgpu::Device,
         plan: &FramePlan,
         views: &[RenderView],
-    ) -> Result<Vec<Arc<ViewTargets>>, BackendError> {
-        self.views.truncate(views.len());
-        for (index, view) in views.iter().enumerate() {
-            let fits = |targets: &Arc<ViewTargets>| (targets.size, targets.kind) == (view.camera.size, view.kind());
-            match self.views.get_mut(index) {
-                Some(targets) if fits(targets) => {}
-                Some(targets) => *targets = Arc::new(ViewTargets::new(device, plan, view)?),
-                None => self.views.push(Arc::new(ViewTargets::new(device, plan, view)?)),
-            }
+    ) -> Result<FrameTargets, BackendError> {
+        let mut next = FrameTargets::default();
+        for planned in plan.targets().iter().filter(|planned| planned.layered) {
+            next.layered.push(self.layered(device, planned, views)?);
         }
-        Ok(self.views.clone())
+        for (index, view) in views.iter().enumerate() {
+            let planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
+            let targets = planned.map(|planned| {
+                if !planned.layered {
+                    return self.own(device, planned, index, view.camera.size);
+                }
+                let shared = next.layered.iter().find(|shared| *shared.planned == *planned);
+                let lost = || BackendError::BrokenRule { rule: "every shared target is made first".to_owned() };
+                Ok(layer_of(shared.ok_or_else(lost)?, view.layer))
+            });
+            let targets = targets.collect::<Result<_, _>>()?;
+            next.views.push(targets);
+        }
+        self.current = next.clone();
+        Ok(next)
     }
+
+    /// What is kept.
+    pub(super) fn current(&self) -> &FrameTargets {
+        &self.current
+    }
+
+    fn own(
+        &self,
+        device: &wgpu::Device,
+        planned: &PlannedTarget,
+        view: usize,
+        size: [u32; 2],
+    ) -> Result<Target, BackendError> {
+        let extent = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
+        let kept = self.current.find(view, &planned.name);
+        if let Some(kept) = kept.filter(|kept| *kept.planned == *planned && kept.texture.size() == extent) {
+            return Ok(kept.clone());
+        }
+        let texture = new_texture(device, planned, extent)?;
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Target { planned: Arc::new(planned.clone()), texture, view, layer: 0 })
+    }
+
+    fn layered(
+        &self,
+        device: &wgpu::Device,
+        planned: &PlannedTarget,
+        views: &[RenderView],
+    ) -> Result<LayeredTarget, BackendError> {
+        let sharing = || views.iter().filter(|view| view.kind() == planned.views);
+        // Without a view there still is something to bind: a pixel where nothing is.
+        let [width, height] = sharing().next().map_or([1, 1], |view| view.camera.size);
+        let layers = sharing().count().max(1) as u32;
+        let extent = wgpu::Extent3d { width, height, depth_or_array_layers: layers };
+        let kept = self.current.layered.iter().find(|kept| *kept.planned == *planned && kept.texture.size() == extent);
+        if let Some(kept) = kept {
+            return Ok(kept.clone());
+        }
+        let texture = new_texture(device, planned, extent)?;
+        let dimension = Some(wgpu::TextureViewDimension::D2Array);
+        let array = texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
+        Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
+    }
+}
+
+fn layer_of(shared: &LayeredTarget, layer: u32) -> Target {
+    let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2),
+        base_array_layer: layer,
+        array_layer_count: Some(1),
+        ..wgpu::TextureViewDescriptor::default()
+    });
+    Target { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, layer }
+}
+
+fn new_texture(
+    device: &wgpu::Device,
+    planned: &PlannedTarget,
+    size: wgpu::Extent3d,
+) -> Result<wgpu::Texture, BackendError> {
+    let limits = device.limits();
+    for (limit, allowed, needed) in [
+        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, size.width.max(size.height)),
+        ("max_texture_array_layers", limits.max_texture_array_layers, size.depth_or_array_layers),
+    ] {
+        if needed > allowed {
+            return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
+        }
+    }
+    let usual = wgpu::TextureUsages::RENDER_ATTACHMENT
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC
+        | wgpu::TextureUsages::COPY_DST;
+    Ok(device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(&planned.name),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: texture_format(planned.format),
+        usage: if planned.stored { usual | wgpu::TextureUsages::STORAGE_BINDING } else { usual },
+        view_formats: &[],
+    }))
 }

@@ -6,7 +6,7 @@ mod view;
 use glam::{DVec3, Vec3};
 
 use self::surfaces::Surfaces;
-use super::{Camera, Light, SceneRef};
+use super::{Camera, Light, Projection, SceneRef};
 
 /// Light from everywhere, weak and cool, for scenes that bring none.
 pub const AMBIENT: Vec3 = Vec3::new(0.10, 0.11, 0.13);
@@ -38,7 +38,7 @@ pub fn camera(scene: SceneRef<'_>) -> Camera {
     let view = view::best(&surfaces);
     let place = |point: Vec3| surfaces.center + point.as_dvec3() * surfaces.radius;
     Camera {
-        field_of_view: view.field_of_view,
+        projection: Projection::Perspective { field_of_view: view.field_of_view },
         near: ((surfaces.radius * 1e-3) as f32).max(f32::MIN_POSITIVE),
         ..Camera::looking_at("main", place(view.eye), place(view.target))
     }
@@ -55,10 +55,12 @@ pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
         Light::Directional {
             direction: (right * 0.5 - up * 0.75 - back * 0.6).normalize(),
             illuminance: Vec3::new(2.2, 1.9, 1.5),
+            casts_shadow: false,
         },
         Light::Directional {
             direction: (-right * 0.8 - up * 0.2 - back * 0.5).normalize(),
             illuminance: Vec3::new(0.3, 0.45, 0.8),
+            casts_shadow: false,
         },
         Light::Point {
             position: camera.position + lamp,

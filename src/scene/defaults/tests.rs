@@ -1,7 +1,7 @@
 use glam::Quat;
 
 use super::*;
-use crate::scene::{Material, Mesh, RenderObject, Scene, Topology, Vertex};
+use crate::scene::{Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex};
 
 /// The sides of a cube from −1 to 1, as normal and two directions along the side.
 const SIDES: [[Vec3; 3]; 6] = [
@@ -137,7 +137,8 @@ fn a_single_face_is_seen_from_its_front() {
 
 /// Every corner of the box is in the picture, and it fills at least half of it one way.
 fn fits(camera: &Camera, half_size: Vec3) {
-    let slope = (camera.field_of_view / 2.0).tan();
+    let Projection::Perspective { field_of_view } = camera.projection else { panic!("{camera:?}") };
+    let slope = (field_of_view / 2.0).tan();
     let mut most = Vec3::ZERO;
     for corner in 0..8 {
         let sign = |bit: u32| if corner & (1 << bit) == 0 { -1.0 } else { 1.0 };

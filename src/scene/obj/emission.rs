@@ -43,6 +43,7 @@ pub(super) fn light(shape: &Shape, position: DVec3, radiance: Vec3, size: f64) -
             direction: direction.as_vec3().normalize(),
             intensity,
             range: range(intensity),
+            casts_shadow: true,
         }
     } else {
         let intensity = intensity(area / 4.0);

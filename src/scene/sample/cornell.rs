@@ -59,6 +59,7 @@ pub(super) fn add_cornell_box(scene: &mut Scene, place: DVec3) -> Result<(), Sce
         direction: Vec3::NEG_Y,
         intensity,
         range: Light::range_for(intensity),
+        casts_shadow: true,
     });
     Ok(())
 }

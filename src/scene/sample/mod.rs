@@ -1,13 +1,18 @@
 //! The project's own scene: the Cornell box in a colonnade at dusk.
 
 mod cornell;
+mod fire;
+mod glass;
+mod glows;
+mod lamp;
+mod lights;
 mod props;
 mod shape;
 
 use glam::{DVec3, Quat, Vec3};
 
 use self::props::Props;
-use super::{Camera, Light, RenderObject, Scene, SceneError};
+use super::{Camera, Projection, RenderObject, Scene, SceneError};
 use crate::handle::Handle;
 use crate::scene::{Material, Mesh};
 
@@ -22,12 +27,27 @@ const FIRST: f32 = 7.6;
 /// The height of the podium that the box stands on.
 const PODIUM: f32 = 0.6;
 
-/// A Cornell box on a podium in a colonnade, some 500 objects of twenty meshes: slabs of checkered floor, fluted columns
-/// with bases, capitals and arches, roof beams, banners, urns, lanterns and cypresses. Lit by a low sun, the sky, the box's
-/// own lamp, lanterns and spotlights. Its camera `main` looks down the nave into the box.
+/// A Cornell box on a podium in a colonnade at dusk, some 950 objects of 26 meshes: slabs of checkered floor, fluted columns
+/// with bases, capitals and arches, roof beams, banners, urns, candlesticks and cypresses. Its camera `main` looks down the
+/// nave into the box.
 ///
-/// It has what tests and benchmarks want of a scene: instances that are turned, scaled and mirrored, triangle lists and a
-/// strip, a texture, single- and double-sided materials, and every kind of light. It is the same every time.
+/// It has what shows a whole frame:
+///
+/// - a lamp over the nave ([`Light::Hemispherical`]) that stands in a ring of candlesticks, whose shadows it throws across the
+///   floor, and a second one in the box;
+/// - some 60 small point lights, none of which reaches further than a few metres: coloured lanterns, candles, fires and
+///   glow-worms; 20 spotlights down columns and onto banners; a low sun and the sky;
+/// - coloured glass ([`Blend::Alpha`]), panes one behind the other and a window; flames and hundreds of sparks
+///   ([`Blend::Additive`]); smoke ([`Blend::Subtractive`]);
+/// - instances that are turned, scaled and mirrored, triangle lists and a strip, a texture, single- and double-sided
+///   materials.
+///
+/// It is the same every time.
+///
+/// [`Light::Hemispherical`]: super::Light::Hemispherical
+/// [`Blend::Alpha`]: super::Blend::Alpha
+/// [`Blend::Additive`]: super::Blend::Additive
+/// [`Blend::Subtractive`]: super::Blend::Subtractive
 ///
 /// ```
 /// use drawloom::scene::sample;
@@ -50,10 +70,15 @@ pub fn colonnade() -> Result<Scene, SceneError> {
     site.shrine()?;
     site.cypresses()?;
     cornell::add_cornell_box(&mut site.scene, DVec3::new(0.0, f64::from(PODIUM), 0.0))?;
-    site.lights();
+    site.sky();
+    site.lamp()?;
+    site.spotlights();
+    site.glows()?;
+    site.glass()?;
+    site.fires()?;
     let mut scene = site.scene;
     let camera = Camera::looking_at("main", DVec3::new(1.7, 2.6, 11.8), DVec3::new(-0.3, 3.3, -4.0));
-    scene.cameras.push(Camera { field_of_view: 58_f32.to_radians(), ..camera });
+    scene.cameras.push(Camera { projection: Projection::Perspective { field_of_view: 58_f32.to_radians() }, ..camera });
     Ok(scene)
 }
 
@@ -115,9 +140,9 @@ impl Site {
         Ok(())
     }
 
-    /// Urns on pedestals between the columns, with plants in some, and lanterns under the arches.
+    /// Urns on pedestals between the columns, with plants in some.
     fn nave(&mut self) -> Result<(), SceneError> {
-        let Props { block, urn, plant, lantern, stones, bronze, leaves, glow, wood, .. } = self.props;
+        let Props { block, urn, plant, stones, bronze, leaves, .. } = self.props;
         for side in [-1.0, 1.0] {
             for (bay, z) in bays().enumerate() {
                 let x = side * ROWS[0];
@@ -129,8 +154,6 @@ impl Site {
                     let place = Vec3::new(x, 0.6 + 1.22 * size, z);
                     self.turned(plant, leaves, place, turn, Vec3::new(0.48, 0.36, 0.48) * size)?;
                 }
-                self.scaled(block, wood, Vec3::new(x, 6.2, z), Vec3::new(0.03, 0.7, 0.03))?;
-                self.scaled(lantern, glow, Vec3::new(x, 5.75, z), Vec3::splat(0.16))?;
             }
         }
         Ok(())
@@ -169,51 +192,13 @@ impl Site {
         });
         let behind = (0..13).map(|tree| Vec3::new((tree as f32 - 6.0) * 2.9, -0.35, -48.0));
         for (tree, place) in avenue.chain(behind).enumerate() {
-            // Steps of the golden ratio are spread evenly without repeating.
-            let share = (tree as f32 * 0.618_034).fract();
+            let share = golden_share(tree);
             let offset = Vec3::new(share - 0.5, 0.0, (share * 7.0).fract() - 0.5);
             let size = Vec3::new(0.9 + 0.3 * share, 7.0 + 3.0 * (share * 5.0).fract(), 0.9 + 0.3 * share);
             let Props { cypress, leaves, .. } = self.props;
             self.turned(cypress, leaves, place + offset, Quat::from_rotation_y(share * 6.0), size)?;
         }
         Ok(())
-    }
-
-    fn lights(&mut self) {
-        let scene = &mut self.scene;
-        scene.ambient = Vec3::new(0.055, 0.065, 0.10);
-        scene.background = Vec3::new(0.10, 0.17, 0.34);
-        let sun = Light::Directional {
-            direction: Vec3::new(0.62, -0.42, -0.66).normalize(),
-            illuminance: Vec3::new(2.3, 1.35, 0.75),
-        };
-        let sky = Light::Directional {
-            direction: Vec3::new(-0.5, -0.8, -0.15).normalize(),
-            illuminance: Vec3::new(0.16, 0.26, 0.52),
-        };
-        scene.lights.extend([sun, sky]);
-        let lantern = Vec3::new(9.0, 5.2, 2.0);
-        for (bay, z) in bays().enumerate().filter(|(bay, _)| bay % 3 == 0) {
-            for side in [-1.0, 1.0] {
-                let intensity = if bay == 3 { lantern * Vec3::new(1.0, 0.7, 0.6) } else { lantern };
-                let position = Vec3::new(side * ROWS[0], 5.75, z).as_dvec3();
-                scene.lights.push(Light::Point { position, intensity, range: 14.0 });
-            }
-        }
-        for (bay, z) in bays().enumerate().filter(|(bay, _)| bay % 2 == 1).take(2) {
-            for (side, color) in [(-1.0, Vec3::new(6.0, 34.0, 40.0)), (1.0, Vec3::new(40.0, 8.0, 28.0))] {
-                // In front of the banner, so that it lights the floor and the columns.
-                let position = Vec3::new(side * (ROWS[0] + BAY / 2.0), 7.0, z + 1.3).as_dvec3();
-                scene.lights.push(Light::Spot {
-                    position,
-                    direction: Vec3::new(side * 0.12, -1.0, 0.1).normalize(),
-                    intensity: color * (1.0 + bay as f32 * 0.3),
-                    range: 18.0,
-                    inner_angle: 0.35,
-                    outer_angle: 0.75,
-                });
-            }
-        }
     }
 
     fn scaled(
@@ -238,6 +223,11 @@ impl Site {
         self.scene.add_object(object)?;
         Ok(())
     }
+}
+
+/// A share from 0 to 1: steps of the golden ratio are spread evenly without repeating.
+fn golden_share(step: usize) -> f32 {
+    (step as f32 * 0.618_034).fract()
 }
 
 /// Where the rows are, from left to right.

@@ -26,7 +26,7 @@ pub(super) struct Props {
     pub urn: Handle<Mesh>,
     pub plant: Handle<Mesh>,
     /// A ball of radius 1 around its origin.
-    pub lantern: Handle<Mesh>,
+    pub ball: Handle<Mesh>,
     /// Of height 1, to be scaled.
     pub cypress: Handle<Mesh>,
     /// It hangs from its origin.
@@ -37,7 +37,6 @@ pub(super) struct Props {
     pub wood: Handle<Material>,
     pub bronze: Handle<Material>,
     pub leaves: Handle<Material>,
-    pub glow: Handle<Material>,
     pub banners: [Handle<Material>; 4],
 }
 
@@ -68,7 +67,6 @@ impl Props {
         ];
         let floor =
             Material { name: "floor".into(), diffuse: Vec3::ONE, texture: Some(checker), ..Material::default() };
-        let glow = Material { name: "lantern".into(), emission: Vec3::new(9.0, 5.2, 2.0), ..Material::default() };
         Ok(Self {
             block: Shape::default().block(Vec3::splat(-0.5), Vec3::splat(0.5)).add_to(scene, "block")?,
             slab: Shape::default()
@@ -81,11 +79,10 @@ impl Props {
             buttress: buttress().add_to(scene, "buttress")?,
             urn: urn().add_to(scene, "urn")?,
             plant: ball(0.14, 13).add_to(scene, "plant")?,
-            lantern: ball(0.0, 0).add_to(scene, "lantern")?,
+            ball: ball(0.0, 0).add_to(scene, "ball")?,
             cypress: cypress().add_to(scene, "cypress")?,
             banner: scene.add(banner(2.6)?)?,
             checker: scene.add(floor)?,
-            glow: scene.add(glow)?,
             stones,
             lawn,
             wood,

@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::{Bounds, Texture, Topology, Vertex};
+use crate::scene::{Blend, Bounds, Light, Texture, Topology, Vertex};
 
 /// A mesh's triangles as they are wound, every second one of a strip turned around.
 fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
@@ -15,6 +15,11 @@ fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
 fn facing(corners: &[Vertex; 3]) -> Vec3 {
     let [a, b, c] = corners.map(|corner| Vec3::from(corner.position));
     (b - a).cross(c - a)
+}
+
+fn of_mesh<'a>(scene: &'a Scene, name: &'a str) -> impl Iterator<Item = RenderObject> + 'a {
+    let objects = scene.objects().map(|handle| scene.object(handle).unwrap());
+    objects.filter(move |object| scene.assets().get(object.mesh).unwrap().name() == name)
 }
 
 #[test]
@@ -35,7 +40,7 @@ fn every_triangle_is_wound_around_its_normals_which_have_unit_length() {
 fn solids_are_closed_and_have_their_volume() {
     let scene = colonnade().unwrap();
     // The published footprints, 165 and 330 high, in units of a hundredth.
-    for (name, volume) in [("block", 1.0), ("slab", 0.3), ("short block", 4.5), ("tall block", 9.1), ("lantern", 4.0)] {
+    for (name, volume) in [("block", 1.0), ("slab", 0.3), ("short block", 4.5), ("tall block", 9.1), ("ball", 4.0)] {
         let mesh = scene.assets().iter::<Mesh>().map(|(_, mesh)| mesh).find(|mesh| mesh.name() == name).unwrap();
         let triangles = triangles(mesh);
         let outward: Vec3 = triangles.iter().map(facing).sum();
@@ -70,8 +75,11 @@ fn the_box_has_its_published_measurements() {
             assert!(facing(&corners).dot(inward) > 0.0, "{name}");
         }
     }
-    let lamp = |light: &&Light| matches!(light, Light::Hemispherical { direction: Vec3::NEG_Y, .. });
-    assert_eq!(scene.lights.iter().filter(lamp).count(), 1);
+    let is_lamp = |light: &&Light| match light {
+        Light::Hemispherical { position, direction: Vec3::NEG_Y, .. } => (-5.6..0.0).contains(&position.z),
+        _ => false,
+    };
+    assert_eq!(scene.lights.iter().filter(is_lamp).count(), 1);
 }
 
 #[test]
@@ -79,23 +87,104 @@ fn it_has_what_a_test_wants_of_a_scene() {
     let scene = colonnade().unwrap();
     let reference = scene.as_scene_ref();
     let objects = reference.object_count();
-    assert!((300..=900).contains(&objects), "{objects}");
+    assert!((800..=1100).contains(&objects), "{objects}");
     let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(_, mesh)| mesh).collect();
     assert!(meshes.len() * 10 < objects, "instanced from {} meshes", meshes.len());
     assert!(meshes.iter().any(|mesh| mesh.topology() == Topology::TriangleStrip));
     assert_eq!(scene.assets().iter::<Texture>().count(), 1);
     assert!(reference.scales.iter().any(|scale| scale.min_element() < 0.0), "none is mirrored");
     assert!(reference.orientations.iter().any(|&orientation| orientation != Quat::IDENTITY), "none is turned");
-    let kind = |light: &Light| std::mem::discriminant(light);
-    let mut kinds: Vec<_> = scene.lights.iter().map(kind).collect();
-    kinds.dedup();
-    assert!(kinds.len() >= 4, "{} kinds of light in a row", kinds.len());
-    assert!((8..=24).contains(&scene.lights.len()), "{}", scene.lights.len());
-    for (index, light) in scene.lights.iter().enumerate() {
-        light.check(index).unwrap();
-    }
     scene.cameras[0].check().unwrap();
     assert!(reference.bounds.iter().all(Bounds::is_valid));
+    assert!((0..objects).all(|object| reference.transform_is_valid(object)));
+}
+
+#[test]
+fn many_small_lights_and_a_few_large_ones_shine() {
+    let scene = colonnade().unwrap();
+    let [mut directional, mut points, mut spots, mut lamps] = [0, 0, 0, 0];
+    for (index, light) in scene.lights.iter().enumerate() {
+        light.check(index).unwrap();
+        match *light {
+            Light::Directional { .. } => directional += 1,
+            Light::Point { range, .. } => {
+                points += 1;
+                assert!((2.0..=6.0).contains(&range), "point light {index} reaches {range} m");
+            }
+            Light::Spot { range, .. } => {
+                spots += 1;
+                assert!((2.0..=7.0).contains(&range), "spotlight {index} reaches {range} m");
+            }
+            Light::Hemispherical { .. } => lamps += 1,
+        }
+    }
+    assert_eq!((directional, lamps), (2, 2));
+    assert!((40..=60).contains(&points), "{points}");
+    assert!((16..=24).contains(&spots), "{spots}");
+}
+
+#[test]
+fn the_lamp_over_the_nave_stands_in_a_ring_of_what_throws_shadows() {
+    let scene = colonnade().unwrap();
+    let lamps = scene.lights.iter().filter_map(|light| match light {
+        Light::Hemispherical { position, direction: Vec3::NEG_Y, .. } if position.z > 1.5 => Some(*position),
+        _ => None,
+    });
+    let [lamp] = lamps.collect::<Vec<_>>()[..] else { panic!("one lamp hangs over the nave") };
+    let around = of_mesh(&scene, "candlestick").map(|object| object.position - lamp.with_y(0.0)).collect::<Vec<_>>();
+    for [x, z] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+        let has_one = around.iter().any(|place| place.x * x > 0.5 && place.z * z > 0.5 && place.length() < lamp.y);
+        assert!(has_one, "none stands towards {x}, {z}");
+    }
+    // None of the lamp is where it shines.
+    for mesh in ["lamp shade", "ball"] {
+        for object in of_mesh(&scene, mesh).filter(|object| (object.position - lamp).length() < 0.5) {
+            let bottom = object.position.y - if mesh == "ball" { f64::from(object.scale.y) } else { 0.0 };
+            assert!(bottom > lamp.y, "{mesh}");
+        }
+    }
+}
+
+#[test]
+fn glass_stands_before_glass_and_fire_and_smoke_are_blended() {
+    let scene = colonnade().unwrap();
+    let material = |object: &RenderObject| scene.assets().get(object.material).unwrap();
+    let panes: Vec<_> = of_mesh(&scene, "pane").collect();
+    for pane in &panes {
+        let glass = material(pane);
+        assert!(glass.blend == Blend::Alpha && glass.double_sided && glass.opacity < 0.5, "{}", glass.name);
+    }
+    let mut glasses: Vec<_> = panes.iter().map(|pane| material(pane).name.clone()).collect();
+    glasses.sort_unstable();
+    glasses.dedup();
+    assert!(glasses.len() >= 4, "{glasses:?}");
+    // How many panes a look at the middle of each goes through.
+    let eye = scene.cameras[0].position;
+    let depths = panes.iter().map(|target| {
+        let towards = (target.position - eye).as_vec3();
+        let is_passed = |pane: &&RenderObject| {
+            let into = |vector: Vec3| pane.orientation.inverse() * vector / pane.scale;
+            let [from, along] = [into((eye - pane.position).as_vec3()), into(towards)];
+            let hit = from - along * (from.z / along.z);
+            hit.x.abs() < 0.5 && hit.y.abs() < 0.5
+        };
+        panes.iter().filter(is_passed).count()
+    });
+    let deepest = depths.max();
+    assert!(deepest >= Some(3), "{deepest:?} panes, one behind the other");
+
+    for (mesh, blend, least) in
+        [("flame", Blend::Additive, 12), ("spark", Blend::Additive, 200), ("puff", Blend::Subtractive, 12)]
+    {
+        let objects: Vec<_> = of_mesh(&scene, mesh).collect();
+        assert!(objects.len() >= least, "{} of {mesh}", objects.len());
+        for object in &objects {
+            let made_of = material(object);
+            assert_eq!(made_of.blend, blend, "{mesh}");
+            // It is as bright as it gives off, wherever it is.
+            assert!(made_of.diffuse == Vec3::ZERO && made_of.emission != Vec3::ZERO, "{mesh}");
+        }
+    }
 }
 
 #[test]

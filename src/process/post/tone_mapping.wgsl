@@ -7,9 +7,11 @@ struct Parameters {
 
 @fragment
 fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
-    // What several processes added up may be past the end of half floats, and then it is infinite.
-    let sum = min(textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb, vec3<f32>(65504.0));
-    let radiance = min(sum * parameters.exposure, vec3<f32>(65504.0));
+    // What several processes added up may be past the end of half floats, and then it is infinite; what they took away may
+    // be more than there was.
+    let sum = textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb;
+    let finite = clamp(sum, vec3<f32>(0.0), vec3<f32>(65504.0));
+    let radiance = min(finite * parameters.exposure, vec3<f32>(65504.0));
     return vec4<f32>(filmic(radiance), 1.0);
 }
 

@@ -1,0 +1,86 @@
+//! Which processes a frame is made of, as the scene requires.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
+use crate::scene::{SceneRef, ViewKind};
+use crate::view::ShadowMaps;
+
+/// A renderer's processes, and a plan for everything that scenes have required of them so far.
+pub(super) struct Plans {
+    deferred: Option<Deferred>,
+    processes: Vec<Arc<dyn RenderProcess>>,
+    outputs: Vec<String>,
+    shadow_maps: ShadowMaps,
+    compiled: HashMap<Requirements, Arc<FramePlan>>,
+    current: Arc<FramePlan>,
+}
+
+impl Plans {
+    /// # Errors
+    /// If the processes do not make a frame, of an empty scene or of one that has everything.
+    pub(super) fn new(
+        deferred: Option<Deferred>,
+        processes: Vec<Arc<dyn RenderProcess>>,
+        mut outputs: Vec<String>,
+        shadow_maps: ShadowMaps,
+    ) -> Result<Self, PlanError> {
+        if let Some(problem) = shadow_maps.problem() {
+            return Err(PlanError::ShadowMaps { problem });
+        }
+        if let Some(deferred) = &deferred {
+            deferred.check()?;
+            outputs.push(deferred.output().to_owned());
+            compile(Some(deferred), &processes, &outputs, &Requirements::all())?;
+        }
+        let nothing = Requirements::default();
+        let current = Arc::new(compile(deferred.as_ref(), &processes, &outputs, &nothing)?);
+        let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
+        Ok(Self { deferred, processes, outputs, shadow_maps, compiled, current })
+    }
+
+    /// The plan of the last frame; before the first one, of an empty scene.
+    pub(super) fn current(&self) -> &Arc<FramePlan> {
+        &self.current
+    }
+
+    /// The plan that draws `scene`: the one there is, if scenes have required the same before.
+    ///
+    /// # Errors
+    /// If the processes do not make a frame.
+    pub(super) fn follow(&mut self, scene: &SceneRef<'_>) -> Result<Arc<FramePlan>, PlanError> {
+        if let Some(deferred) = &self.deferred {
+            let requirements = Requirements::of(scene, deferred.maps().is_some());
+            self.current = match self.compiled.get(&requirements) {
+                Some(plan) => Arc::clone(plan),
+                None => {
+                    let plan = Arc::new(compile(Some(deferred), &self.processes, &self.outputs, &requirements)?);
+                    self.compiled.insert(requirements, Arc::clone(&plan));
+                    plan
+                }
+            };
+        }
+        Ok(Arc::clone(&self.current))
+    }
+
+    /// How shadow maps are seen; `None` where the current plan draws none.
+    pub(super) fn shadow_maps(&self) -> Option<&ShadowMaps> {
+        self.current.draws_views(ViewKind::Shadow).then_some(&self.shadow_maps)
+    }
+
+    /// How many plans are kept.
+    pub(super) fn count(&self) -> usize {
+        self.compiled.len()
+    }
+}
+
+fn compile(
+    deferred: Option<&Deferred>,
+    processes: &[Arc<dyn RenderProcess>],
+    outputs: &[String],
+    requirements: &Requirements,
+) -> Result<FramePlan, PlanError> {
+    let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
+    FramePlan::new(chain, processes.to_vec(), outputs)
+}

@@ -1,0 +1,196 @@
+//! The deferred pipeline (L 4), put together from what a scene requires.
+
+use std::sync::Arc;
+
+use super::{
+    DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, PlanError, PostStep, RenderProcess,
+    Requirements, ShadowCasters, ToneMapping, Transparency,
+};
+use crate::queue::MaterialShare;
+use crate::view::{LightClass, ShadowMaps};
+
+/// The deferred pipeline of L 4: its settings, its post-processing, and what an engine replaces or leaves out. What it adds
+/// goes to the renderer's builder beside it.
+///
+/// It models only what a scene requires. Lights of a class that the scene has none of get no process; without a light that
+/// casts shadows there is no shadow map; without a material that mixes with what is behind it there is no transparency. When a
+/// scene changes what it requires, the processes follow.
+///
+/// ```text
+///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
+///  depth pre-pass → geometry buffer → lights, a process a class → transparency → post-processing
+/// ```
+///
+/// ```
+/// use drawloom::process::{Deferred, Fxaa, ToneMapping};
+///
+/// let deferred = Deferred::new()
+///     .depth_pre_pass(true)
+///     .post(ToneMapping { exposure: 0.5 })
+///     .post(Fxaa::default());
+/// assert_eq!(deferred.output(), "picture");
+/// ```
+#[derive(Clone)]
+pub struct Deferred {
+    depth_pre_pass: bool,
+    geometry_shares: u32,
+    formats: GeometryFormats,
+    shadow_maps: Option<ShadowMaps>,
+    post: Vec<Arc<dyn PostStep>>,
+    replaced: Vec<(String, Arc<dyn RenderProcess>)>,
+    left_out: Vec<String>,
+}
+
+impl Deferred {
+    /// Without post-processing: the picture is the target `radiance`, which has no upper end.
+    pub fn new() -> Self {
+        Self {
+            depth_pre_pass: false,
+            geometry_shares: 1,
+            formats: GeometryFormats::default(),
+            shadow_maps: Some(ShadowMaps::default()),
+            post: Vec::new(),
+            replaced: Vec::new(),
+            left_out: Vec::new(),
+        }
+    }
+
+    /// With tone mapping alone, into the target `picture`.
+    pub fn to_picture() -> Self {
+        Self::new().post(ToneMapping::default())
+    }
+
+    /// Whether depth is drawn before the geometry buffer; it is not unless asked for. See [`DepthPrePass`].
+    pub fn depth_pre_pass(self, depth_pre_pass: bool) -> Self {
+        Self { depth_pre_pass, ..self }
+    }
+
+    /// Into how many processes the geometry buffer is split, by material (L 5); 0 counts as 1.
+    pub fn geometry_shares(self, geometry_shares: u32) -> Self {
+        Self { geometry_shares, ..self }
+    }
+
+    /// What the geometry buffer's targets are.
+    pub fn formats(self, formats: GeometryFormats) -> Self {
+        Self { formats, ..self }
+    }
+
+    /// How shadow maps are drawn and read; with `None`, no light casts shadows.
+    pub fn shadow_maps(self, shadow_maps: Option<ShadowMaps>) -> Self {
+        Self { shadow_maps, ..self }
+    }
+
+    /// Adds a step of post-processing behind those that are there. The first reads `radiance`, the last draws `picture`.
+    pub fn post(mut self, step: impl PostStep + 'static) -> Self {
+        self.post.push(Arc::new(step));
+        self
+    }
+
+    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there.
+    pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
+        self.replaced.push((name.into(), Arc::new(process)));
+        self
+    }
+
+    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`.
+    pub fn leave_out(mut self, name: impl Into<String>) -> Self {
+        self.left_out.push(name.into());
+        self
+    }
+
+    /// The target that the frame is for.
+    pub fn output(&self) -> &'static str {
+        if self.post.is_empty() { RADIANCE } else { PICTURE }
+    }
+
+    /// The names of all processes there may be, whatever the scene, in their order.
+    pub fn names(&self) -> Vec<String> {
+        self.built(&Requirements::all()).iter().map(|process| process.name().to_owned()).collect()
+    }
+
+    /// How shadow maps are drawn, if at all.
+    pub(crate) fn maps(&self) -> Option<&ShadowMaps> {
+        self.shadow_maps.as_ref()
+    }
+
+    /// The processes that draw a scene, at the places where they stand.
+    pub(crate) fn chain(&self, requirements: &Requirements) -> Vec<Place> {
+        let mut built = self.built(requirements);
+        let place = |name: String| {
+            let standing =
+                built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
+            let own = self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, own)| Arc::clone(own));
+            let process = standing.map(|standing| own.unwrap_or(standing));
+            Place { process: process.filter(|_| !self.left_out.contains(&name)), name }
+        };
+        self.names().into_iter().map(place).collect()
+    }
+
+    /// # Errors
+    /// If a setting cannot be, or a name of what is replaced or left out is nobody's.
+    pub(crate) fn check(&self) -> Result<(), PlanError> {
+        if let Some((target, format)) = self.formats.misfit() {
+            let process = String::from("geometry buffer");
+            return Err(PlanError::WrongFormat { process, target: target.to_owned(), format });
+        }
+        if let Some(problem) = self.shadow_maps.as_ref().and_then(ShadowMaps::problem) {
+            return Err(PlanError::ShadowMaps { problem });
+        }
+        let names = self.names();
+        let mut wanted = self.replaced.iter().map(|(name, _)| name).chain(&self.left_out);
+        match wanted.find(|name| !names.contains(name)) {
+            Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
+            None => Ok(()),
+        }
+    }
+
+    /// As they come with the crate.
+    fn built(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+        let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
+        let maps = self.shadow_maps.as_ref().filter(|_| requirements.shadows());
+        if maps.is_some() {
+            processes.push(Arc::new(ShadowCasters));
+        }
+        if self.depth_pre_pass {
+            processes.push(Arc::new(DepthPrePass));
+        }
+        let of = self.geometry_shares.max(1);
+        for index in 0..of {
+            let geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
+            processes.push(if self.depth_pre_pass {
+                Arc::new(geometry_buffer.after_depth_pre_pass())
+            } else {
+                Arc::new(geometry_buffer)
+            });
+        }
+        for class in LightClass::all().filter(|class| requirements.lights(*class)) {
+            match maps {
+                None if class.shadowed => {}
+                Some(maps) if class.shadowed => {
+                    processes.push(Arc::new(LightVolumes::shadowed(class.kind, self.formats, maps)));
+                }
+                _ => processes.push(Arc::new(LightVolumes::new(class.kind, self.formats))),
+            }
+        }
+        if requirements.transparency() {
+            processes.push(Arc::new(Transparency::new(maps)));
+        }
+        let mut source = RADIANCE.to_owned();
+        for (index, step) in self.post.iter().enumerate() {
+            let last = index + 1 == self.post.len();
+            let target = if last { PICTURE.to_owned() } else { format!("post-processed {}", index + 1) };
+            processes.push(step.process(&source, &target));
+            source = target;
+        }
+        processes
+    }
+}
+
+impl Default for Deferred {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+const RADIANCE: &str = "radiance";
+const PICTURE: &str = "picture";

@@ -1,0 +1,105 @@
+//! Post-processing: what is done to a picture after it was lit, step by step.
+
+mod fxaa;
+mod tone_mapping;
+
+use std::sync::Arc;
+
+use super::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
+
+pub use fxaa::Fxaa;
+pub use tone_mapping::ToneMapping;
+
+/// A step of post-processing that does not know yet where in the chain it stands.
+///
+/// The chain begins at the target `radiance`, which is linear, and ends at the target `picture`. Each step samples what
+/// the step before it wrote, and writes a target of its own, in a format of its own choice; before [`ToneMapping`] that is
+/// [`Format::Rgba16Float`], from there on [`Format::Rgba8Srgb`]. A step may sample other targets too, `depth` for one.
+///
+/// A closure from the names of the two targets to a process is a step:
+///
+/// ```
+/// use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, PostStep, RenderProcess};
+///
+/// /// Turns the picture into its negative.
+/// struct Negative {
+///     source: String,
+///     target: String,
+/// }
+///
+/// impl RenderProcess for Negative {
+///     fn name(&self) -> &str {
+///         "negative"
+///     }
+///
+///     fn declare(&self, declare: &mut Declare) {
+///         declare.samples(&self.source);
+///         declare.clears_color(&self.target, Format::Rgba8Srgb, ClearColor::Value([0.0; 4]));
+///     }
+///
+///     fn draws(&self) -> Draws<'_> {
+///         Draws::FullScreen(FullScreen {
+///             shader: "
+///                 @group(2) @binding(1) var source: texture_2d<f32>;
+///
+///                 @fragment
+///                 fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+///                     let color = textureLoad(source, vec2<i32>(in.position.xy), 0);
+///                     return vec4<f32>(1.0 - color.rgb, color.a);
+///                 }
+///             ",
+///             ..FullScreen::default()
+///         })
+///     }
+/// }
+///
+/// let step = |source: &str, target: &str| Negative { source: source.to_owned(), target: target.to_owned() };
+/// assert_eq!(step.process("mapped", "picture").name(), "negative");
+/// ```
+pub trait PostStep: Send + Sync {
+    /// The process that does this step from the target `source` to the target `target`.
+    fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess>;
+}
+
+impl<F, P> PostStep for F
+where
+    F: Fn(&str, &str) -> P + Send + Sync,
+    P: RenderProcess + 'static,
+{
+    fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
+        Arc::new(self(source, target))
+    }
+}
+
+/// A shipped step that knows where it stands.
+struct FullScreenStep {
+    name: &'static str,
+    source: String,
+    target: String,
+    full_screen: FullScreen<'static>,
+}
+
+impl FullScreenStep {
+    fn between(source: &str, target: &str, name: &'static str, full_screen: FullScreen<'static>) -> Arc<Self> {
+        Arc::new(Self { name, source: source.to_owned(), target: target.to_owned(), full_screen })
+    }
+}
+
+impl RenderProcess for FullScreenStep {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare_step(declare, &self.source, &self.target);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(self.full_screen.clone())
+    }
+}
+
+fn declare_step(declare: &mut Declare, source: &str, target: &str) {
+    declare.samples(source);
+    declare.clears_color(target, Format::Rgba8Srgb, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
+}

@@ -1,0 +1,49 @@
+//! What a scene requires of the processes that draw it.
+
+use crate::scene::{Blend, Material, SceneRef};
+use crate::view::LightClass;
+
+/// What a scene requires. A frame is made of the processes that this asks for and of no others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Requirements {
+    /// A bit for each class of lights that the scene has, by [`LightClass::index`].
+    lights: u8,
+    /// Whether a material mixes with what is behind it.
+    transparency: bool,
+}
+
+const _: () = assert!(LightClass::COUNT <= 8);
+
+impl Requirements {
+    /// Of a scene whose lights may cast shadows or, where `shadows` is false, are taken to cast none.
+    pub fn of(scene: &SceneRef<'_>, shadows: bool) -> Self {
+        let mut requirements = Self::default();
+        for light in scene.lights {
+            let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() };
+            requirements.lights |= 1 << class.index();
+        }
+        let mut materials = scene.assets.iter::<Material>();
+        requirements.transparency = materials.any(|(_, material)| material.blend != Blend::None);
+        requirements
+    }
+
+    /// Everything there is.
+    pub fn all() -> Self {
+        Self { lights: u8::MAX, transparency: true }
+    }
+
+    /// Whether the scene has lights of this class.
+    pub fn lights(&self, class: LightClass) -> bool {
+        self.lights & 1 << class.index() != 0
+    }
+
+    /// Whether a light casts shadows.
+    pub fn shadows(&self) -> bool {
+        LightClass::all().any(|class| class.shadowed && self.lights(class))
+    }
+
+    /// Whether a material mixes with what is behind it.
+    pub fn transparency(&self) -> bool {
+        self.transparency
+    }
+}

@@ -1,0 +1,51 @@
+//! Shadow maps (L 4.2.2, steps 1 to 6).
+
+use super::{CommandDraws, Declare, Draws, Format, RenderProcess};
+use crate::scene::ViewKind;
+
+/// Draws, for every light that casts shadows, the depth of all opaque objects as the light sees them: the target `shadow map`
+/// of [`ViewKind::Shadow`], of which each light has a layer.
+///
+/// Each map is a view of its own, so its objects are culled, sorted, merged and recorded like any other's, at the same time
+/// (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the rasterizer
+/// state; clear the depth; draw all objects that cast shadows. The last three are those of
+/// [`LightVolumes`](super::LightVolumes).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ShadowCasters;
+
+impl ShadowCasters {
+    /// The target's name.
+    pub const TARGET: &str = "shadow map";
+}
+
+impl RenderProcess for ShadowCasters {
+    fn name(&self) -> &str {
+        "shadow casters"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Shadow);
+        declare.clears_depth_layer(Self::TARGET, Format::Depth32Float);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = include_str!("shadow_map.wgsl");
+        Draws::Commands(CommandDraws { shader, fragment: None, ..CommandDraws::default() })
+    }
+}
+
+/// WGSL by which a shader asks what share of a light reaches a place: from the shadow maps at a binding of `@group(2)`, or all
+/// of it where there are none.
+pub(super) fn shadow_shader(maps: Option<(u32, &crate::view::ShadowMaps)>) -> String {
+    match maps {
+        None => include_str!("no_shadow.wgsl").to_owned(),
+        Some((binding, maps)) => format!(
+            "@group(2) @binding({binding}) var shadow_maps: texture_depth_2d_array;\n\
+             const SHADOW_BIAS: f32 = {:?};\n\
+             const SHADOW_FILTER: i32 = {};\n{}",
+            maps.bias,
+            maps.filter,
+            include_str!("shadow.wgsl")
+        ),
+    }
+}

@@ -1,0 +1,31 @@
+// A pixel of an object, as its vertices say: what shaders that draw objects have in common.
+struct Surface {
+    @invariant @builtin(position) clip: vec4<f32>,
+    @location(0) relative: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) uv: vec2<f32>,
+    @location(3) @interpolate(flat) material: u32,
+}
+
+@vertex
+fn vertex(in: VertexInput) -> Surface {
+    let object = drawn_object(in.instance);
+    let relative = relative_position(object, in.position);
+    return Surface(clip_position(relative), relative, world_normal(object, in.normal), in.uv, object.material);
+}
+
+// The normal of the side that is seen. `across` is the triangle's own, of either sign.
+fn seen_normal(in: Surface, across: vec3<f32>, material: Material) -> vec3<f32> {
+    // Whichever way the triangle is wound, its visible side is the one that faces the camera.
+    let to_eye = direction_to_eye(in.relative);
+    let facing = unit_or(across * sign(dot(across, to_eye)), to_eye);
+    let normal = unit_or(in.normal, facing);
+    return select(normal, -normal, material.double_sided == 1u && dot(normal, facing) < 0.0);
+}
+
+// A vector brought to unit length, or another where it has no direction.
+fn unit_or(vector: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
+    let length_squared = dot(vector, vector);
+    let has_direction = length_squared > 0.0 && length_squared < 1e38;
+    return select(other, vector * inverseSqrt(length_squared), has_direction);
+}

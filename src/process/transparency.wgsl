@@ -1,0 +1,22 @@
+@fragment
+fn fragment(in: Surface) -> @location(0) vec4<f32> {
+    // Taken before the flow parts.
+    let gradient_x = dpdx(in.uv);
+    let gradient_y = dpdy(in.uv);
+    let across = cross(dpdx(in.relative), dpdy(in.relative));
+    let material = materials[in.material];
+
+    let normal = seen_normal(in, across, material);
+    let diffuse = diffuse_at(material, in.uv, gradient_x, gradient_y);
+    var illuminance = view.ambient * PI;
+    for (var index = 0u; index < view.light_count; index++) {
+        let light = lights[index];
+        let unobstructed = illuminance_from(light, in.relative, normal);
+        if any(unobstructed > vec3<f32>(0.0)) {
+            illuminance += unobstructed * lit_share(light, in.relative, normal);
+        }
+    }
+    let radiance = min(material.emission + diffuse.rgb / PI * illuminance, vec3<f32>(60000.0));
+    // Alpha blending multiplies by the opacity itself.
+    return vec4<f32>(select(radiance * diffuse.a, radiance, material.blend == ALPHA), diffuse.a);
+}

@@ -1,0 +1,369 @@
+//! Meshes in smaller triangles.
+
+use std::collections::HashMap;
+
+use super::mesh::has_three_places;
+use super::{Mesh, Topology, Vertex};
+
+impl Mesh {
+    /// The same surface as a triangle list in which no edge is longer than `longest`, in metres in object space.
+    ///
+    /// It is for projections that bend what is straight, such as the paraboloids of a shadow map for all directions (Brabec
+    /// et al., "Shadow Mapping for Hemispherical and Omnidirectional Light Sources", 2002). Only vertices are projected, and
+    /// edges are drawn straight between them, so an edge that is seen under the angle φ is off by up to 1 − cos(φ/2) of the
+    /// map's radius: in a map 1024 texels wide 39 texels at 45°, 1.9 at 10°, and 0.5 at 5°.
+    ///
+    /// Longer edges are split in the middle until none is left. Whether and where an edge is split depends on nothing but
+    /// the places of its two ends, so surfaces that meet along an edge still do, even if normals or texture coordinates
+    /// differ there. New vertices have the mean of both ends' normals and texture coordinates, which is what a triangle
+    /// shows at its edge's middle.
+    ///
+    /// All long edges are split at a time, and never into more than `triangle_limit` triangles, or more vertices than 32
+    /// bits number: before that it stops, and [`longest_edge`](Self::longest_edge) of the result is still above `longest`.
+    /// It also is where f32 has no place left between two ends. A `longest` that is NaN or not above 0 cannot be reached,
+    /// and stands for as short as the limit allows.
+    ///
+    /// Triangles with two corners at one place are left out, for they draw nothing. Where that leaves none, the result
+    /// is a single point.
+    ///
+    /// ```
+    /// use drawloom::scene::{Mesh, Topology, Vertex};
+    ///
+    /// # fn main() -> Result<(), drawloom::scene::SceneError> {
+    /// let corner = |x: f32, z: f32| Vertex { position: [x, 0.0, z], normal: [0.0, 1.0, 0.0], uv: [x, z] };
+    /// let corners = vec![corner(0.0, 0.0), corner(0.0, 8.0), corner(8.0, 0.0), corner(8.0, 8.0)];
+    /// let floor = Mesh::new("floor", Topology::TriangleStrip, corners, vec![0, 1, 2, 3])?;
+    /// assert_eq!(floor.subdivided(1.5, 10_000).triangle_count(), 128);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn subdivided(&self, longest: f32, triangle_limit: usize) -> Self {
+        // The other operand is the maximum where one is NaN.
+        let longest = f64::from(longest.max(0.0));
+        let mut surface = Surface { vertices: self.vertices().to_vec(), triangles: Vec::new() };
+        self.triangles().for_each(|corners| surface.add(corners));
+        loop {
+            let splits = surface.count_splits(longest * longest);
+            let triangle_room = triangle_limit.saturating_sub(surface.triangles.len());
+            let vertex_room = (u32::MAX as usize).saturating_sub(surface.vertices.len());
+            if splits == 0 || splits > triangle_room.min(vertex_room) {
+                break;
+            }
+            surface.split(longest * longest);
+        }
+        if surface.triangles.is_empty() {
+            surface.triangles.push([self.indices()[0]; 3]);
+        }
+        let indices = surface.triangles.into_flattened();
+        Self::measured(self.name().to_owned(), Topology::TriangleList, surface.vertices, indices)
+    }
+}
+
+/// What a mesh is in between.
+struct Surface {
+    vertices: Vec<Vertex>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Surface {
+    /// How many more triangles [`split`](Self::split) can make at most: one for each of a triangle's long edges. New
+    /// vertices are no more.
+    fn count_splits(&self, longest_squared: f64) -> usize {
+        let edges = self.triangles.iter().flat_map(|&triangle| edges_of(triangle));
+        edges.filter(|&edge| self.long_middle(edge, longest_squared).is_some()).count()
+    }
+
+    /// Splits every long edge once.
+    fn split(&mut self, longest_squared: f64) {
+        let mut middles = HashMap::new();
+        for triangle in std::mem::take(&mut self.triangles) {
+            let middles = edges_of(triangle).map(|edge| {
+                let middle = self.long_middle(edge, longest_squared)?;
+                let [one, other] = edge;
+                Some(*middles.entry([one.min(other), one.max(other)]).or_insert_with(|| {
+                    self.vertices.push(middle);
+                    self.vertices.len() as u32 - 1
+                }))
+            });
+            self.add_parts(triangle, middles);
+        }
+    }
+
+    /// Adds what becomes of a triangle when its edges from a to b, from b to c and from c to a get these middles.
+    fn add_parts(&mut self, [a, b, c]: [u32; 3], middles: [Option<u32>; 3]) {
+        match middles {
+            [None, None, None] => self.add([a, b, c]),
+            [Some(middle), None, None] => self.add_halves([a, b, c], middle),
+            [None, Some(middle), None] => self.add_halves([b, c, a], middle),
+            [None, None, Some(middle)] => self.add_halves([c, a, b], middle),
+            [Some(first), Some(second), None] => self.add_tip_and_rest([a, b, c], first, second),
+            [None, Some(first), Some(second)] => self.add_tip_and_rest([b, c, a], first, second),
+            [Some(second), None, Some(first)] => self.add_tip_and_rest([c, a, b], first, second),
+            [Some(ab), Some(bc), Some(ca)] => {
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].into_iter().for_each(|part| self.add(part));
+            }
+        }
+    }
+
+    /// `middle` is between a and b.
+    fn add_halves(&mut self, [a, b, c]: [u32; 3], middle: u32) {
+        self.add([a, middle, c]);
+        self.add([middle, b, c]);
+    }
+
+    /// `first` is between a and b, `second` between b and c.
+    fn add_tip_and_rest(&mut self, [a, b, c]: [u32; 3], first: u32, second: u32) {
+        self.add([first, b, second]);
+        // The shorter diagonal is below √¾ of either edge that was split, so all that is too long keeps shrinking.
+        if self.length_squared([a, second]) <= self.length_squared([first, c]) {
+            self.add([a, first, second]);
+            self.add([a, second, c]);
+        } else {
+            self.add([a, first, c]);
+            self.add([first, second, c]);
+        }
+    }
+
+    /// Leaving out a triangle with two corners at one place opens no crack: its other two edges lie upon each other.
+    fn add(&mut self, triangle: [u32; 3]) {
+        if has_three_places(&triangle.map(|corner| self.vertices[corner as usize])) {
+            self.triangles.push(triangle);
+        }
+    }
+
+    /// The middle of an edge that is too long; the same to the bit from either end.
+    fn long_middle(&self, edge: [u32; 2], longest_squared: f64) -> Option<Vertex> {
+        if self.length_squared(edge) <= longest_squared {
+            return None;
+        }
+        let [one, other] = edge.map(|end| self.vertices[end as usize]);
+        let middle = middle_of(one, other);
+        // Next to each other in f32, they would stay as they are for ever.
+        (middle.position != one.position && middle.position != other.position).then_some(middle)
+    }
+
+    fn length_squared(&self, edge: [u32; 2]) -> f64 {
+        let [one, other] = edge.map(|end| &self.vertices[end as usize]);
+        one.distance_squared(other)
+    }
+}
+
+fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+fn middle_of(one: Vertex, other: Vertex) -> Vertex {
+    let [one, other]: [[f32; 8]; 2] = [one, other].map(bytemuck::cast);
+    let middle: [f32; 8] = std::array::from_fn(|place| one[place].midpoint(other[place]));
+    bytemuck::cast(middle)
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::collections::{HashMap, HashSet};
+
+    use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+
+    /// A crooked box. Each side has four vertices of its own, so normals and texture coordinates differ along its edges.
+    fn crooked_box(size: Vec3, origin: Vec3, bends: [[f32; 3]; 8]) -> Mesh {
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        for normal in SIDES {
+            let right = normal.any_orthonormal_vector();
+            let up = normal.cross(right);
+            indices.extend([0, 1, 2, 0, 2, 3].map(|corner| vertices.len() as u32 + corner));
+            for [x, y] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
+                let place = normal + right * x + up * y;
+                let bend = usize::from(place.x > 0.0) + 2 * usize::from(place.y > 0.0) + 4 * usize::from(place.z > 0.0);
+                let position = (origin + size * (place + Vec3::from(bends[bend]))).to_array();
+                vertices.push(Vertex { position, normal: normal.to_array(), uv: [x, y] });
+            }
+        }
+        Mesh::new("box", Topology::TriangleList, vertices, indices).unwrap()
+    }
+
+    fn places(mesh: &Mesh) -> Vec<[DVec3; 3]> {
+        let place = |corner: u32| Vec3::from(mesh.vertices()[corner as usize].position).as_dvec3();
+        mesh.triangles().map(|triangle| triangle.map(place)).collect()
+    }
+
+    fn across([a, b, c]: [DVec3; 3]) -> DVec3 {
+        (b - a).cross(c - a)
+    }
+
+    fn area(mesh: &Mesh) -> f64 {
+        places(mesh).into_iter().map(|triangle| across(triangle).length() / 2.0).sum()
+    }
+
+    fn longest_of(mesh: &Mesh) -> f64 {
+        let edges = places(mesh).into_iter().flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]);
+        edges.fold(0.0, f64::max)
+    }
+
+    /// How often each edge is gone along, less how often it is gone back: nothing is left of a surface without a border.
+    fn border(mesh: &Mesh) -> usize {
+        let place = |corner: u32| mesh.vertices()[corner as usize].position.map(|value| (value + 0.0).to_bits());
+        let mut edges: HashMap<_, i32> = HashMap::new();
+        for [one, other] in mesh.triangles().flat_map(edges_of).map(|edge| edge.map(place)) {
+            *edges.entry([one, other]).or_default() += 1;
+            *edges.entry([other, one]).or_default() -= 1;
+        }
+        edges.into_values().filter(|&count| count != 0).count()
+    }
+
+    fn flat(topology: Topology, corners: &[[f32; 2]], indices: Vec<u32>) -> Mesh {
+        let vertex = |&[x, y]: &[f32; 2]| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [x, y] };
+        Mesh::new("flat", topology, corners.iter().map(vertex).collect(), indices).unwrap()
+    }
+
+    fn leaf(corners: [[f32; 2]; 3]) -> Mesh {
+        flat(Topology::TriangleList, &corners, vec![0, 1, 2])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        #[test]
+        fn a_closed_surface_stays_closed_and_the_same(
+            sizes in prop::array::uniform3(0.05..1.0_f32),
+            origin in prop::array::uniform3(-5.0..5.0_f32),
+            bends in prop::array::uniform8(prop::array::uniform3(-0.3..0.3_f32)),
+            exponent in -20..20_i32,
+            share in 0.06..2.0_f32,
+            limit in prop_oneof![Just(usize::MAX), 0..3000_usize],
+        ) {
+            let scale = 2_f32.powi(exponent);
+            let whole = crooked_box(Vec3::from(sizes) * scale, Vec3::from(origin) * scale, bends);
+            prop_assert_eq!(border(&whole), 0);
+            let longest = share * scale;
+            let fine = whole.subdivided(longest, limit);
+            prop_assert_eq!(fine.topology(), Topology::TriangleList);
+            prop_assert!(fine.triangle_count() <= limit.max(12));
+            prop_assert_eq!(border(&fine), 0);
+            if limit == usize::MAX {
+                prop_assert!(fine.longest_edge() <= longest);
+            }
+            prop_assert!(longest_of(&fine) <= f64::from(fine.longest_edge()));
+            prop_assert!((area(&fine) / area(&whole) - 1.0).abs() < 1e-4, "{} {}", area(&fine), area(&whole));
+            for (triangle, corners) in fine.triangles().zip(places(&fine)) {
+                let normals = triangle.map(|corner| Vec3::from(fine.vertices()[corner as usize].normal));
+                prop_assert!(SIDES.contains(&normals[0]) && normals == [normals[0]; 3]);
+                prop_assert!(across(corners).dot((normals[0] / Vec3::from(sizes)).as_dvec3()) > 0.0);
+            }
+        }
+
+        /// Every second triangle of a strip is wound the other way, and all of this one face +Z.
+        #[test]
+        fn a_strip_is_the_list_that_it_stands_for(
+            bends in prop::collection::vec(0.0..0.8_f32, 3..20),
+            longest in 0.2..3.0_f32,
+        ) {
+            let corner = |(place, &bend): (u8, &f32)| [f32::from(place) + bend, -f32::from(place % 2)];
+            let corners: Vec<_> = (0..).zip(&bends).map(corner).collect();
+            let count = corners.len() as u32;
+            let strip = flat(Topology::TriangleStrip, &corners, (0..count).collect());
+            let list = (0..count - 2).flat_map(|first| match first % 2 {
+                0 => [first, first + 1, first + 2],
+                _ => [first, first + 2, first + 1],
+            });
+            let list = flat(Topology::TriangleList, &corners, list.collect());
+            let fine = strip.subdivided(longest, 100_000);
+            prop_assert_eq!(&fine, &list.subdivided(longest, 100_000));
+            prop_assert!(fine.longest_edge() <= longest);
+            prop_assert!(places(&fine).into_iter().all(|triangle| across(triangle).z > 0.0));
+        }
+    }
+
+    #[test]
+    fn only_long_edges_are_split() {
+        let upright = [[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]];
+        for (longest, triangles) in [(6.0, 1), (5.0, 1), (4.5, 2), (4.0, 2), (3.5, 3), (2.5, 4), (2.4, 8)] {
+            let fine = leaf(upright).subdivided(longest, 100);
+            assert_eq!(fine.triangle_count(), triangles, "{longest}");
+            assert!(fine.longest_edge() <= longest);
+        }
+        let whole = leaf(upright);
+        assert_eq!(whole.subdivided(5.0, 100), whole);
+    }
+
+    #[test]
+    fn neighbours_share_new_vertices_and_these_lie_where_their_coordinates_say() {
+        let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0], [5.0, 0.5]];
+        let whole = flat(Topology::TriangleList, &corners, vec![0, 1, 2, 0, 2, 3, 1, 4, 2]);
+        let fine = whole.subdivided(0.3, usize::MAX);
+        let bits = |vertex: &Vertex| vertex.position.map(f32::to_bits);
+        let distinct: HashSet<_> = fine.vertices().iter().map(bits).collect();
+        assert_eq!(distinct.len(), fine.vertices().len());
+        // A disc has one more vertex and triangle than edges (Euler), and all but those at its rim have two triangles.
+        let rim = border(&fine) / 2;
+        assert_eq!(distinct.len() + fine.triangle_count(), (3 * fine.triangle_count() + rim) / 2 + 1);
+        for vertex in fine.vertices() {
+            let [x, y, _] = vertex.position;
+            assert!((x - vertex.uv[0]).abs() + (y - vertex.uv[1]).abs() < 1e-6, "{vertex:?}");
+        }
+    }
+
+    #[test]
+    fn it_stops_before_the_limit_and_says_so() {
+        let whole = leaf([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        for (limit, triangles, longest) in [(0, 1, 2.0), (3, 1, 2.0), (4, 4, 0.5), (15, 4, 0.5), (16, 16, 0.125)] {
+            let fine = whole.subdivided(1e-3, limit);
+            assert_eq!(fine.triangle_count(), triangles, "{limit}");
+            assert!((fine.longest_edge().powi(2) - longest).abs() < 1e-6, "{limit}: {}", fine.longest_edge());
+        }
+    }
+
+    #[test]
+    fn what_is_no_length_stands_for_as_short_as_can_be() {
+        let whole = leaf([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        let fine = whole.subdivided(0.0, 1024);
+        assert_eq!(fine.triangle_count(), 1024);
+        for longest in [-0.0, -1.0, f32::NAN, f32::NEG_INFINITY, f32::MIN_POSITIVE] {
+            assert_eq!(whole.subdivided(longest, 1024), fine, "{longest}");
+        }
+        assert_eq!(whole.subdivided(f32::INFINITY, 1024), whole);
+    }
+
+    #[test]
+    fn where_numbers_are_next_to_each_other_it_stops() {
+        for start in [0.0_f32, 1.0, 1e30] {
+            let next = |steps: u32| f32::from_bits(start.to_bits() + steps);
+            let whole = leaf([[start, start], [next(5), next(1)], [next(2), next(7)]]);
+            let fine = whole.subdivided(0.0, usize::MAX);
+            assert!(fine.longest_edge() > 0.0 && fine.longest_edge() < whole.longest_edge(), "{start}");
+            assert!(fine.triangle_count() < 100, "{start}: {}", fine.triangle_count());
+        }
+    }
+
+    #[test]
+    fn the_largest_numbers_stay_finite() {
+        let far = f32::MAX * 0.7;
+        let whole = leaf([[far, far], [-far, far], [far, -far]]);
+        assert_eq!(whole.longest_edge(), f32::INFINITY);
+        let fine = whole.subdivided(1.0, 1000);
+        assert_eq!(fine.triangle_count(), 256);
+        assert!((fine.longest_edge() / (far / 8.0) - 2_f32.sqrt()).abs() < 1e-6);
+        assert!(fine.bounds().is_valid());
+    }
+
+    #[test]
+    fn triangles_without_an_area_do_no_harm() {
+        let line = leaf([[0.0, 0.0], [8.0, 0.0], [3.0, 0.0]]).subdivided(1.0, 100);
+        assert!(line.longest_edge() <= 1.0 && area(&line) == 0.0);
+
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [50.0, 0.0], [50.0, 0.0], [51.0, 0.0], [50.0, 1.0]];
+        let two_strips = flat(Topology::TriangleStrip, &corners, vec![0, 1, 2, 2, 4, 3, 5, 6]);
+        let fine = two_strips.subdivided(1.0, 1000);
+        assert_eq!(fine.triangle_count(), 4, "the joint between two strips is not worth a triangle");
+
+        // The middle of the longest edge is the third corner.
+        for gone in [[[1.0, 1.0]; 3], [[0.0, 0.0], [9.0, 9.0], [9.0, 9.0]], [[0.0, 0.0], [8.0, 0.0], [4.0, 0.0]]] {
+            let fine = leaf(gone).subdivided(5.0, 1000);
+            assert_eq!((fine.triangle_count(), fine.longest_edge()), (1, 0.0), "{gone:?}");
+        }
+    }
+}

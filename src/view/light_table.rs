@@ -1,0 +1,199 @@
+//! The lights that reach a view, as shaders read them.
+
+use std::ops::Range;
+
+use glam::{DVec3, Quat, Vec3};
+
+use super::RenderView;
+use crate::scene::{Light, LightKind, Projection, ViewKind};
+
+/// The lights that reach one view, those of one class beside each other: so that all of a class are one instanced draw.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightTable {
+    records: Vec<LightRecord>,
+    /// By [`LightClass::index`].
+    ranges: [Range<u32>; LightClass::COUNT],
+}
+
+/// What lights are drawn together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LightClass {
+    /// What kind they are.
+    pub kind: LightKind,
+    /// Whether they have a shadow map.
+    pub shadowed: bool,
+}
+
+impl LightClass {
+    /// How many classes there can be: every [`LightClass::index`] is below it.
+    pub const COUNT: usize = 2 * LightKind::ALL.len();
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        LightKind::ALL.into_iter().flat_map(|kind| [false, true].map(|shadowed| Self { kind, shadowed }))
+    }
+
+    /// The class as a number to index by.
+    pub fn index(self) -> usize {
+        self.kind as usize * 2 + usize::from(self.shadowed)
+    }
+}
+
+impl LightTable {
+    /// The lights that `view` may see the light of, in the order of the scene within each class. A light is shadowed if one
+    /// of `views` is its shadow map. A shadow map itself is lit by nothing.
+    pub fn new(view: &RenderView, lights: &[Light], views: &[RenderView]) -> Self {
+        let mut table = Self::default();
+        if view.kind() == ViewKind::Shadow {
+            return table;
+        }
+        let mut maps = vec![None; lights.len()];
+        for map in views {
+            if let Some(place) = map.light.and_then(|light| maps.get_mut(light)) {
+                *place = Some(map);
+            }
+        }
+        let seen = |light: &Light| light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius));
+        let reaching: Vec<_> = lights.iter().zip(maps).filter(|(light, _)| seen(light)).collect();
+        for class in LightClass::all() {
+            let start = table.records.len() as u32;
+            let of_class = |(light, map): &&(&Light, Option<&RenderView>)| {
+                light.kind() == class.kind && map.is_some() == class.shadowed
+            };
+            let origin = view.camera.position;
+            let records = reaching.iter().filter(of_class).map(|(light, map)| LightRecord::new(light, origin, *map));
+            table.records.extend(records);
+            table.ranges[class.index()] = start..table.records.len() as u32;
+        }
+        table
+    }
+
+    /// All of them.
+    pub fn records(&self) -> &[LightRecord] {
+        &self.records
+    }
+
+    /// Where those of a class are among them.
+    pub fn range(&self, class: LightClass) -> Range<u32> {
+        self.ranges[class.index()].clone()
+    }
+}
+
+/// A light as shaders read it, relative to one view's camera: `Light` in `drawloom.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct LightRecord {
+    /// Where it is, relative to the camera, in metres; for a directional light, where its shadow map is seen from.
+    pub position: Vec3,
+    /// 0 directional, 1 point, 2 spot, 3 hemispherical.
+    pub kind: u32,
+    /// The way it travels.
+    pub direction: Vec3,
+    /// Where it ends, in metres; for a directional light, where its shadow map does.
+    pub range: f32,
+    /// At 1 m, or on a surface that faces a directional light.
+    pub intensity: Vec3,
+    /// The cosine at which a spot light begins to fade.
+    pub cone_begin: f32,
+    /// The cosine at which a spot light is gone; 0 for a hemispherical one.
+    pub cone_end: f32,
+    /// The layer of its shadow map; [`LightRecord::NO_SHADOW_MAP`] without one.
+    pub shadow_layer: u32,
+    /// Half as wide as the shadow map: at 1 m for a spot light, in metres for a directional one.
+    pub shadow_half: f32,
+    /// Where the shadow map begins, in metres.
+    pub shadow_near: f32,
+    /// From the axes of the shadow map's camera to the world's.
+    pub shadow_orientation: Quat,
+}
+
+impl LightRecord {
+    /// The [`LightRecord::shadow_layer`] of a light without a shadow map.
+    pub const NO_SHADOW_MAP: u32 = u32::MAX;
+
+    /// The record of `light` for a camera at `origin`, with the view that draws its shadow map if there is one.
+    pub fn new(light: &Light, origin: DVec3, shadow_map: Option<&RenderView>) -> Self {
+        let relative = |position: DVec3| (position - origin).as_vec3();
+        let mut record = Self {
+            kind: light.kind() as u32,
+            shadow_layer: Self::NO_SHADOW_MAP,
+            shadow_orientation: Quat::IDENTITY,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        match *light {
+            Light::Directional { direction, illuminance, .. } => {
+                (record.direction, record.intensity) = (direction.normalize(), illuminance);
+            }
+            Light::Point { position, intensity, range } => {
+                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
+            }
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
+                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
+                record.direction = direction.normalize();
+                (record.cone_begin, record.cone_end) = (inner_angle.cos(), outer_angle.cos());
+            }
+            Light::Hemispherical { position, direction, intensity, range, .. } => {
+                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
+                record.direction = direction.normalize();
+            }
+        }
+        if let Some(map) = shadow_map {
+            record.shadow_layer = map.layer;
+            record.shadow_near = map.camera.near;
+            record.shadow_orientation = map.camera.orientation;
+            record.shadow_half = map.picture_axes()[1].length();
+            if let Projection::Orthographic { .. } = map.camera.projection {
+                (record.position, record.range) = (relative(map.camera.position), map.camera.far);
+            }
+        }
+        record
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    fn point(z: f64) -> Light {
+        Light::Point { position: DVec3::Z * z, intensity: Vec3::splat(z.abs() as f32), range: 2.0 }
+    }
+
+    fn spot(z: f64, casts_shadow: bool) -> Light {
+        Light::Spot {
+            position: DVec3::Z * z,
+            direction: Vec3::NEG_Y,
+            intensity: Vec3::ONE,
+            range: 1.5,
+            inner_angle: 0.2,
+            outer_angle: 0.4,
+            casts_shadow,
+        }
+    }
+
+    #[test]
+    fn lights_are_grouped_by_class_and_those_out_of_sight_left_out() {
+        let view = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+        let lights = [spot(-3.0, true), point(-4.0), point(9.0), spot(-5.0, false), point(-6.0)];
+        let map = RenderView {
+            light: Some(0),
+            layer: 7,
+            ..RenderView::new(&Camera::looking_at("map", DVec3::ZERO, DVec3::Y))
+        };
+        let table = LightTable::new(&view, &lights, &[view.clone(), map]);
+        let class = |kind, shadowed| table.range(LightClass { kind, shadowed });
+        assert_eq!(class(LightKind::Point, false), 0..2);
+        assert_eq!(class(LightKind::Spot, false), 2..3);
+        assert_eq!(class(LightKind::Spot, true), 3..4);
+        assert!(class(LightKind::Directional, false).is_empty() && class(LightKind::Hemispherical, true).is_empty());
+        let depths: Vec<_> = table.records().iter().map(|record| record.position.z).collect();
+        assert_eq!(depths, [-4.0, -6.0, -5.0, -3.0]);
+        assert_eq!(table.records()[3].shadow_layer, 7);
+    }
+
+    #[test]
+    fn every_class_has_an_index_of_its_own() {
+        let indices: Vec<_> = LightClass::all().map(LightClass::index).collect();
+        assert_eq!(indices, (0..LightClass::COUNT).collect::<Vec<_>>());
+    }
+}

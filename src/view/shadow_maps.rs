@@ -1,0 +1,218 @@
+//! Shadow maps: what a light sees is a view like any other (M 10.4, L 4.2.2).
+
+use glam::{DQuat, DVec3, Quat, Vec3};
+
+use crate::scene::{Camera, Light, Projection, ViewKind};
+
+/// How shadow maps are drawn and read. The maps of all lights are as large, and are the layers of one texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadowMaps {
+    /// Width and height of a map in pixels. At a distance of d metres a pixel is about 4·d/side metres wide for a hemispherical
+    /// light, 2·d·tan(angle)/side for a spot light, and somewhat more than 2·`reach`/side, at any distance, for a directional one.
+    pub side: u32,
+    /// How much of the main cameras' view a directional light's map covers, in metres from the camera. Beyond that, objects
+    /// are lit.
+    pub reach: f32,
+    /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope
+    /// ask for. Less than 1 makes lit surfaces shadow themselves in stripes; more lets light through under objects.
+    pub bias: f32,
+    /// Shadows fade over 2·`filter` + 1 pixels of the map; 0 still blends each pixel with its neighbour. At most
+    /// [`ShadowMaps::WIDEST_FILTER`].
+    pub filter: u32,
+}
+
+impl ShadowMaps {
+    /// The widest [`ShadowMaps::filter`]: 81 pixels of the map are read for one of the picture.
+    pub const WIDEST_FILTER: u32 = 4;
+
+    /// Says what is wrong with them, if anything.
+    pub(crate) fn problem(&self) -> Option<&'static str> {
+        if self.side == 0 {
+            Some("a side of 0 pixels")
+        } else if !(self.reach > 0.0 && self.reach.is_finite()) {
+            Some("a reach that is not a positive distance")
+        } else if !(self.bias >= 0.0 && self.bias.is_finite()) {
+            Some("a bias that is negative or not finite")
+        } else if self.filter > Self::WIDEST_FILTER {
+            Some("a filter wider than there is")
+        } else {
+            None
+        }
+    }
+
+    /// The camera that sees what `light` lights: a perspective one for a spot light, an orthographic one around what the main
+    /// cameras among `cameras` see for a directional light, a paraboloid for a hemispherical one. `None` for a light that
+    /// casts no shadow, and for a directional one where no main camera looks.
+    pub fn camera(&self, name: String, light: &Light, cameras: &[Camera]) -> Option<Camera> {
+        if !light.casts_shadow() {
+            return None;
+        }
+        let (position, direction, projection, reach) = match *light {
+            Light::Point { .. } => return None,
+            Light::Spot { position, direction, range, outer_angle, .. } => {
+                let field_of_view = (2.0 * outer_angle).min(WIDEST_SPOT);
+                (position, direction, Projection::Perspective { field_of_view }, [range * NEAREST, range])
+            }
+            Light::Hemispherical { position, direction, range, .. } => {
+                (position, direction, Projection::Paraboloid, [range * NEAREST, range])
+            }
+            Light::Directional { direction, .. } => {
+                let (center, radius) = self.seen_by(cameras)?;
+                // A pixel more on every side makes up for the snapping.
+                let radius = radius * (1.0 + 4.0 / f64::from(self.side));
+                let orientation = looking_along(direction);
+                let center = self.snapped(center, radius, orientation.as_dquat().normalize());
+                let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * (2.0 * radius);
+                let radius = radius as f32;
+                (position, direction, Projection::Orthographic { height: 2.0 * radius }, [radius, 3.0 * radius])
+            }
+        };
+        Some(Camera {
+            name,
+            position,
+            orientation: looking_along(direction),
+            projection,
+            near: reach[0].max(f32::MIN_POSITIVE),
+            far: reach[1].max(f32::MIN_POSITIVE * 2.0),
+            size: [self.side; 2],
+            kind: ViewKind::Shadow,
+        })
+    }
+
+    /// A ball around all that main cameras see within the reach: it stays as large when a camera turns.
+    fn seen_by(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
+        let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
+        main.map(|camera| {
+            let reach = f64::from(self.reach.min(camera.far));
+            let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
+            let aspect = f64::from(camera.aspect());
+            match camera.projection {
+                Projection::Perspective { field_of_view } => {
+                    let up = (f64::from(field_of_view) * 0.5).tan();
+                    // The ball through the camera and the far corners; where those are wider than that, around them.
+                    let spread = up * up * (1.0 + aspect * aspect);
+                    let along = if spread < 1.0 { reach * (1.0 + spread) * 0.5 } else { reach };
+                    let radius = if spread < 1.0 { along } else { reach * spread.sqrt() };
+                    (camera.position + forward * along, radius)
+                }
+                Projection::Orthographic { height } => {
+                    let half = f64::from(height) * 0.5;
+                    let radius = (half * half * (1.0 + aspect * aspect) + reach * reach * 0.25).sqrt();
+                    (camera.position + forward * (reach * 0.5), radius)
+                }
+                Projection::Paraboloid => (camera.position, reach),
+            }
+        })
+        .reduce(around_both)
+    }
+
+    /// Moved by less than a pixel, so that the map's pixels lie at the same places of the world from frame to frame, and
+    /// shadows do not crawl when the camera moves.
+    fn snapped(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
+        let pixel = 2.0 * radius / f64::from(self.side);
+        let local = orientation.inverse() * center;
+        let whole = |value: f64| (value / pixel).floor() * pixel;
+        orientation * DVec3::new(whole(local.x), whole(local.y), local.z)
+    }
+}
+
+impl Default for ShadowMaps {
+    fn default() -> Self {
+        Self { side: 1024, reach: 60.0, bias: 1.0, filter: 1 }
+    }
+}
+
+/// Where a light's map begins, as a share of its range.
+const NEAREST: f32 = 1e-3;
+
+/// In radians. Towards 180° the middle of a perspective picture shrinks to nothing.
+const WIDEST_SPOT: f32 = 2.967;
+
+/// A camera's orientation that looks along `direction`.
+fn looking_along(direction: Vec3) -> Quat {
+    Camera::looking_at("", DVec3::ZERO, direction.as_dvec3()).orientation
+}
+
+/// The smallest ball around two.
+fn around_both((one, one_radius): (DVec3, f64), (other, other_radius): (DVec3, f64)) -> (DVec3, f64) {
+    let distance = one.distance(other);
+    if distance + other_radius <= one_radius {
+        (one, one_radius)
+    } else if distance + one_radius <= other_radius {
+        (other, other_radius)
+    } else {
+        let radius = (distance + one_radius + other_radius) * 0.5;
+        (one.lerp(other, (radius - one_radius) / distance), radius)
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::Vec2;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::view::RenderView;
+
+    fn sun() -> Light {
+        let direction = Vec3::new(0.3, -0.8, -0.5).normalize();
+        Light::Directional { direction, illuminance: Vec3::ONE, casts_shadow: true }
+    }
+
+    proptest! {
+        /// Whatever a main camera sees within the reach lies in the sun's map, and before its far plane.
+        #[test]
+        fn a_directional_map_covers_what_main_cameras_see(
+            places in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
+            pixel in prop::array::uniform2(-1.0..1.0_f32),
+            share in 0.0..1.0_f32,
+        ) {
+            let maps = ShadowMaps::default();
+            let cameras: Vec<_> = places
+                .into_iter()
+                .map(|(place, degrees)| Camera {
+                    projection: Projection::Perspective { field_of_view: degrees.to_radians() },
+                    ..Camera::looking_at("main", DVec3::from(place), DVec3::ZERO)
+                })
+                .collect();
+            let map = RenderView::new(&maps.camera("sun".into(), &sun(), &cameras).unwrap());
+            for camera in &cameras {
+                let [right, up, forward] = RenderView::new(camera).picture_axes();
+                let seen = (right * pixel[0] + up * pixel[1] + forward) * (share * maps.reach);
+                let place = camera.position + seen.as_dvec3() - map.camera.position;
+                let clip = map.clip_from_relative() * place.as_vec3().extend(1.0);
+                prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 + 1e-4, "{clip}");
+                prop_assert!((-1e-4..=1.0 + 1e-4).contains(&clip.z), "{clip}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_directional_map_moves_by_whole_pixels() {
+        let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
+        let pixel_of_origin = |x: f64| {
+            let camera = Camera::looking_at("main", DVec3::new(x, 1.0, 2.0), DVec3::new(x, 1.0, -9.0));
+            let map = RenderView::new(&maps.camera("sun".into(), &sun(), &[camera]).unwrap());
+            let clip = map.clip_from_relative() * (-map.camera.position).as_vec3().extend(1.0);
+            Vec2::new(clip.x, clip.y) * 32.0
+        };
+        let first = pixel_of_origin(0.0);
+        for step in 1..20 {
+            let moved = pixel_of_origin(f64::from(step) * 0.37) - first;
+            assert!((moved - moved.round()).abs().max_element() < 1e-3, "{moved}");
+        }
+    }
+
+    #[test]
+    fn who_casts_no_shadow_has_no_map() {
+        let maps = ShadowMaps::default();
+        let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+        let map = |light: Light, cameras: &[Camera]| maps.camera("map".into(), &light, cameras);
+        let point = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0 };
+        assert_eq!(map(point, std::slice::from_ref(&main)), None);
+        assert_eq!(map(sun(), &[]), None);
+        let Light::Directional { direction, illuminance, .. } = sun() else { unreachable!() };
+        let moon = Light::Directional { direction, illuminance, casts_shadow: false };
+        assert_eq!(map(moon, &[main]), None);
+    }
+}
