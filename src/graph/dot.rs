@@ -2,6 +2,10 @@
 
 use std::fmt::Write;
 
+use petgraph::adj::UnweightedList;
+use petgraph::algo::tred::dag_transitive_reduction_closure;
+use petgraph::visit::{EdgeRef, IntoEdgeReferences};
+
 use super::{
     builder::FrameGraph,
     edges::{self, Roles},
@@ -54,9 +58,14 @@ impl<P> FrameGraph<P> {
 }
 
 impl<P> Schedule<P> {
-    /// The schedule as Graphviz draws it: a box for each process, an arrow from each to what waits for it, and what was
-    /// dropped, dashed and apart.
+    /// The schedule as Graphviz draws it: a box for each process, an arrow from each to what waits for it and for nothing that
+    /// waits for it too, and what was dropped, dashed and apart.
     pub fn to_dot(&self) -> String {
+        self.to_labelled_dot(|_, _| String::new())
+    }
+
+    /// The same, with a label for each arrow that `label` finds one for: from the index of one process to that of another.
+    pub(crate) fn to_labelled_dot(&self, label: impl Fn(usize, usize) -> String) -> String {
         let mut dot = Dot::new();
         for (index, name) in self.names.iter().enumerate() {
             dot.line(format_args!("process{index} [shape=box, label={}];", Quoted(name)));
@@ -64,12 +73,31 @@ impl<P> Schedule<P> {
         for (index, name) in self.dropped().iter().enumerate() {
             dot.line(format_args!("dropped{index} [shape=box, label={}, style=dashed];", Quoted(name)));
         }
-        for index in 0..self.len() {
-            for dependent in self.dependents(index) {
+        for (index, dependent) in self.direct_dependencies() {
+            let label = label(index, dependent);
+            if label.is_empty() {
                 dot.line(format_args!("process{index} -> process{dependent};"));
+            } else {
+                dot.line(format_args!("process{index} -> process{dependent} [label={}];", Quoted(&label)));
             }
         }
         dot.finish()
+    }
+
+    /// Who waits for whom, without what follows from others.
+    fn direct_dependencies(&self) -> Vec<(usize, usize)> {
+        let mut all = UnweightedList::<usize>::with_capacity(self.len());
+        for _ in 0..self.len() {
+            all.add_node();
+        }
+        for index in 0..self.len() {
+            for &dependent in self.dependents(index) {
+                all.add_edge(index, dependent, ());
+            }
+        }
+        // Indices are in an order in which each comes after all it depends on, as this wants them.
+        let (direct, _) = dag_transitive_reduction_closure(&all);
+        direct.edge_references().map(|edge| (edge.source(), edge.target())).collect()
     }
 }
 

@@ -76,7 +76,9 @@ impl FramePlan {
         }
 
         let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
-        let (dropped, dot) = (schedule.dropped().to_vec(), schedule.to_dot());
+        let declarations: Vec<_> = schedule.processes().map(|(_, planned)| &planned.declaration).collect();
+        let dot = schedule.to_labelled_dot(|before, after| shared(declarations[before], declarations[after]));
+        let dropped = schedule.dropped().to_vec();
         let processes: Vec<_> = schedule.into_processes().map(|(_, process)| process).collect();
         if processes.is_empty() {
             return Err(PlanError::Empty);
@@ -120,7 +122,7 @@ impl FramePlan {
         &self.dropped
     }
 
-    /// The processes and their targets as a graph in the DOT language.
+    /// The processes as a graph in the DOT language, with the targets that one leaves to the next.
     pub fn to_dot(&self) -> &str {
         &self.dot
     }
@@ -245,6 +247,22 @@ fn declared(process: Arc<dyn RenderProcess>) -> Result<PlannedProcess, PlanError
         return Err(PlanError::TwoDepths { process: process.name().to_owned() });
     }
     Ok(PlannedProcess { process, declaration })
+}
+
+/// The targets that one process writes and another then uses, in the words of a drawing.
+fn shared(before: &Declaration, after: &Declaration) -> String {
+    let mut names: Vec<_> = after
+        .accesses
+        .iter()
+        .filter_map(|(target, access)| {
+            let same_views = access.views(after.views) == before.views;
+            (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
+        })
+        .collect();
+    // A target may be tested and sampled at once.
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
 }
 
 /// Views of different kinds have different targets, even where their names are the same.

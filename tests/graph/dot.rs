@@ -1,5 +1,7 @@
 //! The drawings: what they show, and that any name gives a drawing that can be read.
 
+use std::collections::BTreeSet;
+
 use drawloom::graph::FrameGraph;
 use proptest::prelude::*;
 
@@ -176,12 +178,33 @@ proptest! {
     }
 
     #[test]
-    fn a_schedule_draws_every_dependency(sketch in sound_sketch()) {
+    fn a_schedule_draws_who_waits_for_whom_and_nothing_that_follows_from_it(sketch in sound_sketch()) {
         let schedule = sketch.graph(|process| process).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         let dot = schedule.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
-        let edges = statements.iter().filter(|(ends, _)| ends.len() == 2).count();
-        let dependencies: usize = (0..schedule.len()).map(|index| schedule.dependencies(index).len()).sum();
-        prop_assert_eq!(edges, dependencies);
+        let index = |end: &str| end.trim_start_matches("process").parse::<usize>().expect("processes are numbered");
+        let arrows = statements.iter().filter(|(ends, _)| ends.len() == 2);
+        let drawn: Vec<_> = arrows.map(|(ends, _)| (index(&ends[0]), index(&ends[1]))).collect();
+        let all = (0..schedule.len()).flat_map(|index| schedule.dependents(index).iter().map(move |&other| (index, other)));
+        let all: Vec<_> = all.collect();
+        prop_assert_eq!(reachable(&drawn, schedule.len()), reachable(&all, schedule.len()));
+        for left_out in 0..drawn.len() {
+            let mut fewer = drawn.clone();
+            fewer.remove(left_out);
+            prop_assert_ne!(reachable(&fewer, schedule.len()), reachable(&drawn, schedule.len()));
+        }
     }
+}
+
+/// Who comes after whom, by way of others too. Arrows lead to higher indices.
+fn reachable(arrows: &[(usize, usize)], count: usize) -> Vec<BTreeSet<usize>> {
+    let mut after = vec![BTreeSet::new(); count];
+    for index in (0..count).rev() {
+        for &(_, next) in arrows.iter().filter(|(from, _)| *from == index) {
+            let further = after[next].clone();
+            after[index].insert(next);
+            after[index].extend(further);
+        }
+    }
+    after
 }

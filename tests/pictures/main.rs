@@ -11,6 +11,7 @@ mod devices;
 mod judge;
 mod lighting;
 mod placement;
+mod post;
 mod processes;
 mod references;
 mod same_bytes;
@@ -33,6 +34,7 @@ fn main() {
         (changes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
+        (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),

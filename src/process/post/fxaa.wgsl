@@ -24,7 +24,7 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let brightest = max(middle, max(max(above, below), max(left, right)));
     let darkest = min(middle, min(min(above, below), min(left, right)));
     let contrast = brightest - darkest;
-    if contrast <= brightest * parameters.contrast_threshold {
+    if contrast <= max(parameters.dark_threshold, brightest * parameters.contrast_threshold) {
         return color;
     }
 
