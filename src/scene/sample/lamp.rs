@@ -13,7 +13,7 @@ pub(super) const CANDLESTICK: f32 = 1.4;
 const LAMP: Vec3 = Vec3::new(-0.2, 3.75, 4.1);
 
 /// What it gives off along its axis at 1 m.
-const INTENSITY: Vec3 = Vec3::new(30.0, 22.5, 14.0);
+const INTENSITY: Vec3 = Vec3::new(64.0, 48.0, 30.0);
 
 impl Site {
     /// A shade that hangs from a beam across the nave, lit below, and candlesticks on the floor around it.

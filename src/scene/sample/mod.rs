@@ -24,10 +24,12 @@ const ROWS: [f32; 2] = [5.6, 5.6 + BAY];
 const COLUMNS: usize = 11;
 /// The first column stands here, the others at lower z.
 const FIRST: f32 = 7.6;
+/// The side of a piece of lawn.
+const LAWN: f32 = 30.0;
 /// The height of the podium that the box stands on.
 const PODIUM: f32 = 0.6;
 
-/// A Cornell box on a podium in a colonnade at dusk, some 950 objects of 26 meshes: slabs of checkered floor, fluted columns
+/// A Cornell box on a podium in a colonnade at dusk, some 1,040 objects of 26 meshes: slabs of checkered floor, fluted columns
 /// with bases, capitals and arches, roof beams, banners, urns, candlesticks and cypresses. Its camera `main` looks down the
 /// nave into the box.
 ///
@@ -77,7 +79,7 @@ pub fn colonnade() -> Result<Scene, SceneError> {
     site.glass()?;
     site.fires()?;
     let mut scene = site.scene;
-    let camera = Camera::looking_at("main", DVec3::new(1.7, 2.6, 11.8), DVec3::new(-0.3, 3.3, -4.0));
+    let camera = Camera::looking_at("main", DVec3::new(1.5, 3.3, 12.4), DVec3::new(-0.2, 2.0, -3.0));
     scene.cameras.push(Camera { projection: Projection::Perspective { field_of_view: 58_f32.to_radians() }, ..camera });
     Ok(scene)
 }
@@ -91,7 +93,11 @@ struct Site {
 impl Site {
     fn ground(&mut self) -> Result<(), SceneError> {
         let Props { block, slab, lawn, checker, .. } = self.props;
-        self.scaled(block, lawn, Vec3::new(0.0, -0.5, -20.0), Vec3::new(400.0, 0.3, 400.0))?;
+        // In pieces, so that a lamp's paraboloid can show those near to it without bending their edges too far.
+        for (x, z) in (-5..5).flat_map(|x| (-5..5).map(move |z| (x as f32 + 0.5, z as f32 + 0.5))) {
+            let place = Vec3::new(x * LAWN, -0.5, z * LAWN - 20.0);
+            self.scaled(block, lawn, place, Vec3::new(LAWN, 0.3, LAWN))?;
+        }
         for x in -3..3_i32 {
             for z in -9..4 {
                 let place = Vec3::new((x as f32 + 0.5) * BAY, 0.0, (z as f32 + 0.5) * BAY);
