@@ -39,6 +39,8 @@ pub struct NullPass {
     pub objects: usize,
     /// How many triangles.
     pub triangles: usize,
+    /// How many lights, for a process that draws lights.
+    pub lights: usize,
 }
 
 /// A frame on its way.
@@ -173,6 +175,10 @@ impl Backend for NullBackend {
             batches: bundles.iter().map(|bundle| bundle.batches).sum(),
             objects: end,
             triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
+            lights: match &request.draws[pass.process] {
+                Draws::Lights(lights) => request.lights[pass.view].range(lights.class).len(),
+                _ => 0,
+            },
         })
     }
 

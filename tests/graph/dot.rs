@@ -184,7 +184,7 @@ proptest! {
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
         let index = |end: &str| end.trim_start_matches("process").parse::<usize>().expect("processes are numbered");
         let arrows = statements.iter().filter(|(ends, _)| ends.len() == 2);
-        let drawn: Vec<_> = arrows.map(|(ends, _)| (index(&ends[0]), index(&ends[1]))).collect();
+        let drawn: Vec<_> = arrows.map(|(ends, _)| (index(ends[0]), index(ends[1]))).collect();
         let all = (0..schedule.len()).flat_map(|index| schedule.dependents(index).iter().map(move |&other| (index, other)));
         let all: Vec<_> = all.collect();
         prop_assert_eq!(reachable(&drawn, schedule.len()), reachable(&all, schedule.len()));

@@ -94,7 +94,7 @@ impl TargetCache {
                 }
                 let shared = next.layered.iter().find(|shared| *shared.planned == *planned);
                 let lost = || BackendError::BrokenRule { rule: "every shared target is made first".to_owned() };
-                Ok(layer_of(shared.ok_or_else(lost)?, view.layer))
+                Ok(self.layer(shared.ok_or_else(lost)?, index, view.layer))
             });
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push(targets);
@@ -125,6 +125,20 @@ impl TargetCache {
         Ok(Target { planned: Arc::new(planned.clone()), texture, view, layer: 0 })
     }
 
+    fn layer(&self, shared: &LayeredTarget, view: usize, layer: u32) -> Target {
+        let kept = self.current.find(view, &shared.planned.name);
+        if let Some(kept) = kept.filter(|kept| kept.texture == shared.texture && kept.layer == layer) {
+            return kept.clone();
+        }
+        let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2),
+            base_array_layer: layer,
+            array_layer_count: Some(1),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        Target { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, layer }
+    }
+
     fn layered(
         &self,
         device: &wgpu::Device,
@@ -145,16 +159,6 @@ impl TargetCache {
         let array = texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
         Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
     }
-}
-
-fn layer_of(shared: &LayeredTarget, layer: u32) -> Target {
-    let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2),
-        base_array_layer: layer,
-        array_layer_count: Some(1),
-        ..wgpu::TextureViewDescriptor::default()
-    });
-    Target { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, layer }
 }
 
 fn new_texture(
