@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // One scheduler for the engine's own jobs and for Drawloom's.
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue)?)
-        .deferred(Deferred::new().post(ToneMapping { exposure: 1.2 }).replace("transparency", Glow))
+        .deferred(Deferred::new().post(ToneMapping::new(1.2)).replace("transparency", Glow))
         .process(Present { surface: Arc::clone(&surface) })
         .build(Arc::clone(&scheduler))?;
 

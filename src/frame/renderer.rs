@@ -82,7 +82,10 @@ impl<B: Backend> Renderer<B> {
         let jobs = self.jobs.find(&plan, &draws, &views)?;
         jobs.reset(scene.object_count());
         self.tables.reset(views.len());
-        let light_tables: Vec<_> = views.iter().map(|view| LightTable::new(view, scene.lights, &views)).collect();
+        let clock = StageClock::default();
+        let light_tables: Vec<_> = clock.measure(Stage::Visibility, || {
+            views.iter().map(|view| LightTable::new(view, scene.lights, &views)).collect()
+        });
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
@@ -93,7 +96,6 @@ impl<B: Backend> Renderer<B> {
             rejections: self.tables.objects.rejections(),
         };
 
-        let clock = StageClock::default();
         let frame = clock.measure(Stage::Record, || self.backend.begin(&request))?;
         let recordings: Vec<Recording<B>> = request.passes.iter().map(|_| Recording::new()).collect();
         let context = FrameContext {

@@ -43,7 +43,7 @@ pub struct ViewStatistics {
 /// Thread time of each stage, summed over workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageTimes {
-    /// Checking objects, and finding those that each view sees.
+    /// Checking objects, and finding those that each view sees, and the lights that reach it.
     pub visibility: Duration,
     /// Making commands.
     pub fill: Duration,

@@ -26,7 +26,7 @@ use crate::view::{LightClass, ShadowMaps};
 ///
 /// let deferred = Deferred::new()
 ///     .depth_pre_pass(true)
-///     .post(ToneMapping { exposure: 0.5 })
+///     .post(ToneMapping::new(0.5))
 ///     .post(Fxaa::default());
 /// assert_eq!(deferred.output(), "picture");
 /// ```

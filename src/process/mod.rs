@@ -33,7 +33,7 @@ pub use light_volume::{LightVolume, cone_corner};
 pub use light_volumes::LightVolumes;
 pub use plan::{FramePlan, Pass, Place, PlannedProcess};
 pub use planned_target::PlannedTarget;
-pub use post::{Fxaa, PostStep, ToneMapping};
+pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, Resolved};
 pub use render_process::{RenderProcess, SHADER_PRELUDE};

@@ -3,7 +3,8 @@
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, Declare, Draws, Format, FullScreen, Fxaa, GeometryBuffer, PostStep, RenderProcess, ToneMapping,
+    ClearColor, Declare, Draws, Format, FullScreen, Fxaa, GeometryBuffer, GeometryFormats, PostStep, RenderProcess,
+    ToneMapping,
 };
 use drawloom::scene::{Camera, Scene};
 use image::{Rgb, RgbImage};
@@ -284,7 +285,7 @@ fn after_steps(background: Vec3, steps: &[&dyn PostStep]) -> Result<[u8; 3], Fai
     let mut scene = empty_scene([8, 8]);
     scene.background = background;
     let mut studio = Studio::with(2, |builder| {
-        let mut builder = builder.process(GeometryBuffer).output("picture");
+        let mut builder = builder.process(GeometryBuffer::new(GeometryFormats::default())).output("picture");
         let mut source = "radiance".to_owned();
         for (index, step) in steps.iter().enumerate() {
             let last = index + 1 == steps.len();
@@ -306,7 +307,7 @@ fn own_step() -> Result<(), Failed> {
     };
     let background = [0.02, 0.2, 0.6];
     let seen = Vec3::from_array(background.map(|radiance| radiance as f32));
-    let (tone_mapping, fxaa) = (ToneMapping { exposure: 2.0 }, Fxaa::default());
+    let (tone_mapping, fxaa) = (ToneMapping::new(2.0), Fxaa::default());
 
     let mapped = background
         .map(|radiance| 2.0 * radiance)
@@ -345,7 +346,7 @@ fn extreme_radiance() -> Result<(), Failed> {
         // Beside something ordinary, which is to stay so.
         let numbers = [radiance, 0.25, radiance, 1.0];
         let pattern = Step::pattern("radiance", Format::Rgba16Float, "return numbers;", numbers);
-        let tone_mapping = ToneMapping { exposure };
+        let tone_mapping = ToneMapping::new(exposure);
         let mut studio = Studio::with(2, |builder| builder.process(pattern).process(tone_mapping).output("picture"))?;
         let [red, green, blue] = pixel(&studio.draw(&empty_scene([4, 4]))?, 1, 1);
         let exposed = if exposure > 0.0 { f64::from(exposure.min(1e9)) * 0.25 } else { 0.0 };

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, GeometryBuffer, GeometryFormats, RawPass,
-    RenderProcess, Resolved, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Exposure, Format, FullScreen, GeometryBuffer, GeometryFormats,
+    RawPass, RenderProcess, Resolved, ToneMapping,
 };
 use drawloom::queue::Selection;
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
@@ -323,13 +323,18 @@ fn blended_leaves_depth() -> Result<(), Failed> {
 fn exposure() -> Result<(), Failed> {
     let mut scene = panes(&[])?;
     scene.background = Vec3::splat(0.1);
-    for exposure in [0.5, 1.0, 4.0] {
-        let tone_mapping = ToneMapping { exposure };
-        let mut studio = Studio::with(2, |builder| {
-            builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
-        })?;
-        let radiance = 0.1 * f64::from(exposure);
-        assert_color(pixel(&studio.draw(&scene)?, 3, 3), tone_mapped([radiance; 3]))?;
+    let exposure = Exposure::new(1.0);
+    let tone_mapping = ToneMapping::new(exposure.clone());
+    let mut alone = Studio::with(2, |builder| {
+        builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
+    })?;
+    let step = ToneMapping::new(exposure.clone());
+    let mut placed = Studio::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
+    for value in [0.5, 1.0, 4.0] {
+        exposure.set(value);
+        let expected = tone_mapped([0.1 * f64::from(value); 3]);
+        assert_color(pixel(&alone.draw(&scene)?, 3, 3), expected)?;
+        assert_color(pixel(&placed.draw(&scene)?, 3, 3), expected)?;
     }
     Ok(())
 }

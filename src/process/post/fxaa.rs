@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{FullScreenStep, PostStep};
+use super::{Placed, PlacedStep, PostStep};
 use crate::process::{FullScreen, RenderProcess};
 
 /// Smooths the steps that edges have where a pixel shows one surface or the other, from the picture alone (Lottes, "FXAA",
@@ -37,13 +37,20 @@ impl Default for Fxaa {
 
 impl PostStep for Fxaa {
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
+        Placed::between(source, target, *self)
+    }
+}
+
+impl PlacedStep for Fxaa {
+    const NAME: &str = "fxaa";
+
+    fn full_screen(&self) -> FullScreen<'static> {
         let settings = [self.contrast_threshold, self.dark_threshold, self.sub_pixel, 0.0];
         let parameters = settings.map(|setting| if setting > 0.0 { setting.min(1.0) } else { 0.0 });
-        let full_screen = FullScreen {
+        FullScreen {
             shader: include_str!("fxaa.wgsl"),
             parameters: bytemuck::cast_slice(&parameters).to_vec().into(),
             ..FullScreen::default()
-        };
-        FullScreenStep::between(source, target, "fxaa", full_screen)
+        }
     }
 }

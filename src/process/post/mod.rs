@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
 
 pub use fxaa::Fxaa;
-pub use tone_mapping::ToneMapping;
+pub use tone_mapping::{Exposure, ToneMapping};
 
 /// A step of post-processing that does not know yet where in the chain it stands.
 ///
@@ -71,23 +71,29 @@ where
     }
 }
 
-/// A shipped step that knows where it stands.
-struct FullScreenStep {
-    name: &'static str,
-    source: String,
-    target: String,
-    full_screen: FullScreen<'static>,
+/// A shipped step.
+trait PlacedStep: Send + Sync + 'static {
+    const NAME: &str;
+
+    fn full_screen(&self) -> FullScreen<'static>;
 }
 
-impl FullScreenStep {
-    fn between(source: &str, target: &str, name: &'static str, full_screen: FullScreen<'static>) -> Arc<Self> {
-        Arc::new(Self { name, source: source.to_owned(), target: target.to_owned(), full_screen })
+/// A shipped step that knows where it stands.
+struct Placed<S> {
+    source: String,
+    target: String,
+    step: S,
+}
+
+impl<S: PlacedStep> Placed<S> {
+    fn between(source: &str, target: &str, step: S) -> Arc<Self> {
+        Arc::new(Self { source: source.to_owned(), target: target.to_owned(), step })
     }
 }
 
-impl RenderProcess for FullScreenStep {
+impl<S: PlacedStep> RenderProcess for Placed<S> {
     fn name(&self) -> &str {
-        self.name
+        S::NAME
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -95,7 +101,7 @@ impl RenderProcess for FullScreenStep {
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(self.full_screen.clone())
+        Draws::FullScreen(self.step.full_screen())
     }
 }
 
