@@ -69,6 +69,14 @@ impl Plans {
         self.current.draws_views(ViewKind::Shadow).then_some(&self.shadow_maps)
     }
 
+    /// Whether lights that cast shadows are drawn by processes of their own, with maps or without.
+    pub(super) fn tells_shadowed_apart(&self) -> bool {
+        match &self.deferred {
+            Some(deferred) => deferred.maps().is_some(),
+            None => self.current.draws_views(ViewKind::Shadow),
+        }
+    }
+
     /// How many plans are kept.
     pub(super) fn count(&self) -> usize {
         self.compiled.len()

@@ -84,7 +84,8 @@ impl<B: Backend> Renderer<B> {
         self.tables.reset(views.len());
         let clock = StageClock::default();
         let light_tables: Vec<_> = clock.measure(Stage::Visibility, || {
-            views.iter().map(|view| LightTable::new(view, scene.lights, &views)).collect()
+            let shadows = self.plans.tells_shadowed_apart();
+            views.iter().map(|view| LightTable::new(view, scene.lights, &views, shadows)).collect()
         });
         let request = FrameRequest {
             plan: &plan,

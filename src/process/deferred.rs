@@ -86,9 +86,12 @@ impl Deferred {
         self
     }
 
-    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there.
+    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there. Of two for one
+    /// place the later counts.
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
-        self.replaced.push((name.into(), Arc::new(process)));
+        let name = name.into();
+        self.replaced.retain(|(other, _)| *other != name);
+        self.replaced.push((name, Arc::new(process)));
         self
     }
 

@@ -4,6 +4,8 @@ use super::{CommandDraws, Declare, Draws, Format, RenderProcess};
 
 /// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once instead
 /// of once for each surface that is nearer than those drawn before it. It pays where pixels cost more than vertices.
+///
+/// Where two surfaces lie at exactly one depth, the one drawn last is seen, rather than the one drawn first.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DepthPrePass;
 

@@ -205,6 +205,18 @@ fn orders(places: &[String], added: &[Added]) -> Result<Vec<(ProcessId, ProcessI
             orders.extend(known.map_err(|place| place.unknown(own, after))?.map(|after| (own.id, after)));
         }
     }
+    // Who comes before a place comes before who comes after it, even if nobody stands there to be between them.
+    let empty = |name: &String| {
+        let place = places.iter().position(|place| place == name)?;
+        added.iter().all(|other| other.place != Some(place) && other.name != *name).then_some(place)
+    };
+    for earlier in added {
+        let Some(before) = earlier.declaration.before.iter().filter_map(empty).min() else { continue };
+        let comes_after =
+            |later: &&Added| later.declaration.after.iter().filter_map(empty).any(|after| before <= after);
+        let later = added.iter().filter(|later| later.id != earlier.id).filter(comes_after);
+        orders.extend(later.map(|later| (earlier.id, later.id)));
+    }
     Ok(orders)
 }
 

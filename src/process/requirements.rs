@@ -1,6 +1,6 @@
 //! What a scene requires of the processes that draw it.
 
-use crate::scene::{Blend, Material, SceneRef};
+use crate::scene::{Blend, LightKind, Material, SceneRef};
 use crate::view::LightClass;
 
 /// What a scene requires. A frame is made of the processes that this asks for and of no others.
@@ -27,9 +27,14 @@ impl Requirements {
         requirements
     }
 
-    /// Everything there is.
+    /// Everything that a scene can require.
     pub fn all() -> Self {
-        Self { lights: u8::MAX, transparency: true }
+        let mut requirements = Self { lights: 0, transparency: true };
+        // Point lights cast no shadows.
+        for class in LightClass::all().filter(|class| !class.shadowed || class.kind != LightKind::Point) {
+            requirements.lights |= 1 << class.index();
+        }
+        requirements
     }
 
     /// Whether the scene has lights of this class.

@@ -20,7 +20,7 @@ pub struct LightTable {
 pub struct LightClass {
     /// What kind they are.
     pub kind: LightKind,
-    /// Whether they have a shadow map.
+    /// Whether objects keep them from what is behind.
     pub shadowed: bool,
 }
 
@@ -40,9 +40,9 @@ impl LightClass {
 }
 
 impl LightTable {
-    /// The lights that `view` may see the light of, in the order of the scene within each class. A light is shadowed if one
-    /// of `views` is its shadow map. A shadow map itself is lit by nothing.
-    pub fn new(view: &RenderView, lights: &[Light], views: &[RenderView]) -> Self {
+    /// The lights that `view` may see the light of, in the order of the scene within each class. With `shadows`, those that
+    /// cast some are classes of their own, and have their map if one of `views` is it. A shadow map itself is lit by nothing.
+    pub fn new(view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) -> Self {
         let mut table = Self::default();
         if view.kind() == ViewKind::Shadow {
             return table;
@@ -53,17 +53,23 @@ impl LightTable {
                 *place = Some(map);
             }
         }
-        let seen = |light: &Light| light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius));
-        let reaching: Vec<_> = lights.iter().zip(maps).filter(|(light, _)| seen(light)).collect();
-        for class in LightClass::all() {
+        let mut counts = [0; LightClass::COUNT];
+        let mut reaching: Vec<(usize, &Light, Option<&RenderView>)> = Vec::with_capacity(lights.len());
+        for (light, map) in lights.iter().zip(maps) {
+            if light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius)) {
+                let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() };
+                counts[class.index()] += 1;
+                reaching.push((class.index(), light, map));
+            }
+        }
+        let origin = view.camera.position;
+        table.records.reserve_exact(reaching.len());
+        // Scenes have lights of few classes, and the others are not worth a look at every light.
+        for (index, _) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
             let start = table.records.len() as u32;
-            let of_class = |(light, map): &&(&Light, Option<&RenderView>)| {
-                light.kind() == class.kind && map.is_some() == class.shadowed
-            };
-            let origin = view.camera.position;
-            let records = reaching.iter().filter(of_class).map(|(light, map)| LightRecord::new(light, origin, *map));
-            table.records.extend(records);
-            table.ranges[class.index()] = start..table.records.len() as u32;
+            let of_class = reaching.iter().filter(|(class, ..)| *class == index);
+            table.records.extend(of_class.map(|(_, light, map)| LightRecord::new(light, origin, *map)));
+            table.ranges[index] = start..table.records.len() as u32;
         }
         table
     }
@@ -180,7 +186,7 @@ mod tests {
             layer: 7,
             ..RenderView::new(&Camera::looking_at("map", DVec3::ZERO, DVec3::Y))
         };
-        let table = LightTable::new(&view, &lights, &[view.clone(), map]);
+        let table = LightTable::new(&view, &lights, &[view.clone(), map], true);
         let class = |kind, shadowed| table.range(LightClass { kind, shadowed });
         assert_eq!(class(LightKind::Point, false), 0..2);
         assert_eq!(class(LightKind::Spot, false), 2..3);

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use drawloom::backend::{BackendError, WgpuBackend};
+use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
+use drawloom::scene::Light;
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason};
-use drawloom::{Granularity, Renderer, wgpu};
+use drawloom::view::{Rejection, RejectionReason, ShadowMaps};
+use drawloom::{FrameError, Granularity, Renderer, wgpu};
 use libtest_mimic::Failed;
 
 use crate::scenes::{field, textured};
@@ -17,6 +19,7 @@ pub const CASES: &[Case] = &[
     ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
     ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
+    ("more_shadow_maps_than_a_texture_has_layers_are_refused_and_fewer_drawn_again", many_shadow_maps),
     ("a_lost_device_is_an_error", lost_device),
     ("textures_beyond_the_devices_layers_are_counted", many_textures),
 ];
@@ -57,7 +60,7 @@ fn large_picture() -> Result<(), Failed> {
     let mut scene = field(10);
     scene.cameras[0].size = [5000, 10];
     match renderer.record(scene.as_scene_ref()).err() {
-        Some(drawloom::FrameError::Backend(BackendError::Limit { needed: 5000, .. })) => Ok(()),
+        Some(FrameError::Backend(BackendError::Limit { needed: 5000, .. })) => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }
@@ -75,7 +78,7 @@ fn many_objects() -> Result<(), Failed> {
                 submitter.submit(recorded)?;
                 false
             }
-            Err(drawloom::FrameError::Backend(BackendError::Limit { limit, .. })) => limit.contains("storage_buffer"),
+            Err(FrameError::Backend(BackendError::Limit { limit, .. })) => limit.contains("storage_buffer"),
             Err(other) => return Err(other.into()),
         };
         if refused != (scene.object_count() > 1000) {
@@ -84,6 +87,39 @@ fn many_objects() -> Result<(), Failed> {
     }
     Ok(())
 }
+
+fn many_shadow_maps() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    let layers = device.limits().max_texture_array_layers as usize;
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let maps = ShadowMaps { side: 1, ..ShadowMaps::default() };
+    let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+    let (mut renderer, submitter) =
+        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(deferred).build(scheduler)?;
+    let mut scene = field(3);
+    for lights in [layers, layers + 1, layers + 1, layers] {
+        scene.lights = vec![SPOT; lights];
+        match renderer.record(scene.as_scene_ref()) {
+            Ok(recorded) if lights == layers => {
+                submitter.submit(recorded)?;
+            }
+            Err(FrameError::Backend(BackendError::Limit { limit: "max_texture_array_layers", allowed, needed }))
+                if (allowed, needed) == (layers as u64, layers as u64 + 1) && lights > layers => {}
+            other => return Err(format!("{lights} lights: {:?}", other.err()).into()),
+        }
+    }
+    Ok(())
+}
+
+const SPOT: Light = Light::Spot {
+    position: DVec3::new(0.0, 10.0, 0.0),
+    direction: Vec3::NEG_Y,
+    intensity: Vec3::ONE,
+    range: 20.0,
+    inner_angle: 0.3,
+    outer_angle: 0.4,
+    casts_shadow: true,
+};
 
 fn many_textures() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
@@ -114,7 +150,7 @@ fn lost_device() -> Result<(), Failed> {
         }
     }
     match renderer.record(scene.as_scene_ref()) {
-        Err(drawloom::FrameError::Panicked { phase, message }) => Err(format!("{phase} panicked: {message}").into()),
+        Err(FrameError::Panicked { phase, message }) => Err(format!("{phase} panicked: {message}").into()),
         Err(_) => Ok(()),
         Ok(_) => Err("a frame was recorded on a lost device".into()),
     }

@@ -8,16 +8,19 @@
 mod adapter;
 mod changes;
 mod devices;
+mod geometry;
 mod judge;
 mod lighting;
 mod placement;
 mod post;
 mod processes;
 mod references;
+mod requirements;
 mod same_bytes;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 mod studio;
+mod transparency;
 
 use std::path::PathBuf;
 
@@ -32,14 +35,17 @@ fn main() {
     let mut trials = Vec::new();
     let cases = [
         (changes::CASES, Needs::Adapter),
+        (geometry::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (requirements::CASES, Needs::Adapter),
         (same_bytes::CASES, Needs::Adapter),
         (same_bytes::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (transparency::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];
     for (cases, needs) in cases {

@@ -1,0 +1,390 @@
+//! The deferred pipeline: what an engine changes of it, and what a scene requires of it.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Fxaa, PlanError, RenderProcess, ToneMapping,
+};
+use drawloom::scene::{Blend, Camera, Light, Material, Scene, ViewKind};
+use drawloom::task::Scheduler;
+use drawloom::view::{RejectionReason, ShadowMaps};
+use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
+
+use crate::scenes::everything::{dark, everything};
+use crate::scenes::sized;
+
+/// A process of an engine's own, which draws over `radiance` where it is told.
+struct Own<F> {
+    name: &'static str,
+    declare: F,
+}
+
+impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for Own<F> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (self.declare)(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+fn own(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> impl RenderProcess + 'static {
+    Own { name, declare }
+}
+
+fn builder(deferred: Deferred) -> RendererBuilder<NullBackend> {
+    Renderer::builder(NullBackend).deferred(deferred)
+}
+
+fn build(builder: RendererBuilder<NullBackend>) -> Result<Renderer<NullBackend>, BuildError> {
+    Ok(builder.build(Arc::new(Scheduler::new(1).unwrap()))?.0)
+}
+
+fn build_error(builder: RendererBuilder<NullBackend>) -> PlanError {
+    match build(builder).err().expect("it should be refused") {
+        BuildError::Plan(error) => error,
+        other => panic!("{other}"),
+    }
+}
+
+/// The names of the processes that draw a scene, in order.
+fn processes(renderer: &mut Renderer<NullBackend>, scene: &Scene) -> Vec<String> {
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned()).collect()
+}
+
+fn empty() -> Scene {
+    let mut scene = Scene::new();
+    scene.cameras = everything().cameras;
+    scene
+}
+
+fn spot() -> Light {
+    Light::Spot {
+        position: DVec3::Y * 5.0,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::ONE,
+        range: 10.0,
+        inner_angle: 0.3,
+        outer_angle: 0.5,
+        casts_shadow: true,
+    }
+}
+
+#[test]
+fn everything_goes_through_every_process_in_order() {
+    let deferred = Deferred::to_picture().depth_pre_pass(true).geometry_shares(2).post(Fxaa::default());
+    let expected = [
+        "shadow casters",
+        "depth pre-pass",
+        "geometry buffer 1 of 2",
+        "geometry buffer 2 of 2",
+        "directional lights",
+        "shadowed directional lights",
+        "point lights",
+        "spot lights",
+        "shadowed spot lights",
+        "hemispherical lights",
+        "shadowed hemispherical lights",
+        "transparency",
+        "tone mapping",
+        "fxaa",
+    ];
+    assert_eq!(deferred.names(), expected);
+    let mut renderer = build(builder(deferred)).unwrap();
+    assert_eq!(processes(&mut renderer, &everything()), expected);
+    assert_eq!(renderer.plan().dropped(), [""; 0]);
+}
+
+#[test]
+fn an_empty_scene_goes_through_what_it_needs() {
+    let mut renderer = build(builder(Deferred::to_picture())).unwrap();
+    let expected = ["geometry buffer", "tone mapping"];
+    // Before the first frame too.
+    let planned: Vec<_> = renderer.plan().processes().iter().map(|planned| planned.process.name()).collect();
+    assert_eq!(planned, expected);
+    assert_eq!(processes(&mut renderer, &empty()), expected);
+    assert_eq!(renderer.plan_count(), 1);
+}
+
+#[test]
+fn each_class_of_lights_gets_its_own_process() {
+    let mut renderer = build(builder(Deferred::to_picture())).unwrap();
+    let names = [
+        "directional lights",
+        "shadowed directional lights",
+        "point lights",
+        "spot lights",
+        "shadowed spot lights",
+        "hemispherical lights",
+        "shadowed hemispherical lights",
+    ];
+    let lights = everything().lights;
+    assert_eq!(lights.len(), names.len());
+    for (light, name) in lights.into_iter().zip(names) {
+        let mut scene = empty();
+        scene.lights = vec![light];
+        let mut expected = vec!["geometry buffer", name, "tone mapping"];
+        if name.starts_with("shadowed") {
+            expected.insert(0, "shadow casters");
+        }
+        assert_eq!(processes(&mut renderer, &scene), expected);
+    }
+    let mut scene = empty();
+    scene.add(Material { blend: Blend::Additive, ..Material::default() }).unwrap();
+    assert_eq!(processes(&mut renderer, &scene), ["geometry buffer", "transparency", "tone mapping"]);
+}
+
+#[test]
+fn shadow_maps_that_cannot_be_are_refused() {
+    let good = ShadowMaps::default();
+    let bad = [
+        (ShadowMaps { side: 0, ..good }, "side"),
+        (ShadowMaps { reach: f32::NAN, ..good }, "reach"),
+        (ShadowMaps { reach: f32::INFINITY, ..good }, "reach"),
+        (ShadowMaps { reach: 0.0, ..good }, "reach"),
+        (ShadowMaps { bias: -0.1, ..good }, "bias"),
+        (ShadowMaps { bias: f32::NAN, ..good }, "bias"),
+        (ShadowMaps { filter: ShadowMaps::WIDEST_FILTER + 1, ..good }, "filter"),
+    ];
+    for (maps, named) in bad {
+        let by_deferred = build_error(builder(Deferred::to_picture().shadow_maps(Some(maps))));
+        let by_builder = build_error(builder(Deferred::to_picture()).shadow_maps(maps));
+        for error in [by_deferred, by_builder] {
+            let PlanError::ShadowMaps { problem } = error else { panic!("{error}") };
+            assert!(problem.contains(named), "{problem}");
+        }
+    }
+    let widest = ShadowMaps { filter: ShadowMaps::WIDEST_FILTER, bias: 0.0, side: 1, ..good };
+    assert!(build(builder(Deferred::to_picture().shadow_maps(Some(widest)))).is_ok());
+}
+
+#[test]
+fn names_that_are_nobodys_are_refused_and_those_there_are_listed() {
+    let replaced = Deferred::to_picture().replace("fog", own("mist", |_| {}));
+    // There are none of these without what makes them.
+    let no_maps = Deferred::to_picture().shadow_maps(None).leave_out("shadow casters");
+    let no_pre_pass = Deferred::to_picture().leave_out("depth pre-pass");
+    for (deferred, wrong) in [
+        (Deferred::to_picture().leave_out("Transparency"), "Transparency"),
+        (replaced, "fog"),
+        (no_maps, "shadow casters"),
+        (no_pre_pass, "depth pre-pass"),
+    ] {
+        let names = deferred.names();
+        let PlanError::NoSuchProcess { name, known } = build_error(builder(deferred)) else { panic!("{wrong}") };
+        assert_eq!((name.as_str(), known), (wrong, names.join(", ")));
+    }
+}
+
+#[test]
+fn another_process_stands_in_the_place_of_the_one_it_replaces() {
+    let glow = own("glow", |declare| declare.draws_over("radiance"));
+    let curve = own("curve", |declare| {
+        declare.samples("radiance");
+        declare.clears_color("picture", Format::Rgba8Srgb, ClearColor::Background);
+    });
+    let deferred = Deferred::to_picture().replace("point lights", glow).replace("tone mapping", curve);
+    // Who comes after a process comes after what stands in its place.
+    let fog = own("fog", |declare| {
+        declare.draws_over("radiance");
+        declare.after("point lights");
+        declare.before("spot lights");
+    });
+    let mut renderer = build(builder(deferred).process(fog)).unwrap();
+    let names = processes(&mut renderer, &everything());
+    let expected = [
+        "shadow casters",
+        "geometry buffer",
+        "directional lights",
+        "shadowed directional lights",
+        "glow",
+        "fog",
+        "spot lights",
+        "shadowed spot lights",
+        "hemispherical lights",
+        "shadowed hemispherical lights",
+        "transparency",
+        "curve",
+    ];
+    assert_eq!(names, expected);
+    // Where the scene does not require the place, nobody stands in it.
+    assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "fog", "curve"]);
+}
+
+#[test]
+fn what_is_left_out_is_never_there() {
+    let deferred = Deferred::to_picture().leave_out("point lights").leave_out("transparency");
+    let mut renderer = build(builder(deferred)).unwrap();
+    let names = processes(&mut renderer, &everything());
+    assert_eq!(names.len(), 9);
+    assert!(names.iter().all(|name| name != "point lights" && name != "transparency"), "{names:?}");
+    // What others read cannot be.
+    let error = build_error(builder(Deferred::to_picture().leave_out("geometry buffer"))).to_string();
+    assert!(error.contains("nothing writes") && error.contains("lights"), "{error}");
+}
+
+#[test]
+fn processes_find_their_place_beside_one_that_is_not_there() {
+    let after = own("rain", |declare| {
+        declare.draws_over("radiance");
+        declare.after("transparency");
+    });
+    let before = own("fog", |declare| {
+        declare.draws_over("radiance");
+        declare.before("transparency");
+        declare.after("shadowed hemispherical lights");
+    });
+    let mut renderer = build(builder(Deferred::to_picture()).process(after).process(before)).unwrap();
+    let names = processes(&mut renderer, &everything());
+    assert_eq!(names[8..], ["shadowed hemispherical lights", "fog", "transparency", "rain", "tone mapping"][..]);
+
+    let mut scene = empty();
+    scene.lights = vec![spot()];
+    let expected = ["shadow casters", "geometry buffer", "shadowed spot lights", "fog", "rain", "tone mapping"];
+    assert_eq!(processes(&mut renderer, &scene), expected);
+    assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "fog", "rain", "tone mapping"]);
+}
+
+#[test]
+fn an_order_that_is_missing_or_names_nobody_is_refused() {
+    let after = |name: &'static str, other: &'static str| {
+        own(name, move |declare| {
+            declare.draws_over("radiance");
+            declare.after(other);
+        })
+    };
+    let error = build_error(builder(Deferred::to_picture()).process(after("rain", "clouds")));
+    assert_eq!(error, PlanError::UnknownProcess { process: "rain".into(), other: "clouds".into() });
+
+    let two =
+        builder(Deferred::to_picture()).process(after("rain", "transparency")).process(after("snow", "transparency"));
+    let error = build_error(two).to_string();
+    for part in ["\"rain\"", "\"snow\"", "\"radiance\"", "put them in order"] {
+        assert!(error.contains(part), "{error}");
+    }
+    // To be in the pipeline's order is for the pipeline's own processes: this one says nothing about lights.
+    let error = build_error(builder(Deferred::to_picture()).process(after("rain", "geometry buffer"))).to_string();
+    assert!(error.contains("\"rain\"") && error.contains("put them in order"), "{error}");
+}
+
+#[test]
+fn shadow_views_come_behind_the_cameras_and_are_named_by_their_light() {
+    let mut scene = everything();
+    scene.cameras.push(sized(Camera::looking_at("side", DVec3::X * 9.0, DVec3::ZERO), [20, 30]));
+    let invalid = Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 };
+    // What is left out keeps its number.
+    scene.lights.insert(0, invalid);
+    let mut renderer = build(builder(Deferred::to_picture())).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let views = &recorded.statistics().views;
+    let found: Vec<_> = views.iter().map(|view| (view.name.as_str(), view.kind, view.lights)).collect();
+    let expected = [
+        ("main", ViewKind::Main, 7),
+        ("side", ViewKind::Main, 7),
+        ("shadow of light 2", ViewKind::Shadow, 0),
+        ("shadow of light 5", ViewKind::Shadow, 0),
+        ("shadow of light 7", ViewKind::Shadow, 0),
+    ];
+    assert_eq!(found, expected);
+    let queues: Vec<_> = recorded.queues().iter().map(|queue| (queue.view, queue.passes.len())).collect();
+    assert_eq!(queues, [(0, 10), (1, 10), (2, 1), (3, 1), (4, 1)]);
+}
+
+#[test]
+fn an_engines_own_camera_shares_the_maps_if_it_is_as_large() {
+    let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
+    let deferred = || Deferred::to_picture().shadow_maps(Some(maps));
+    let mut scene = empty();
+    scene.lights = vec![spot()];
+    let own = Camera { kind: ViewKind::Shadow, ..Camera::looking_at("own", DVec3::Y * 9.0, DVec3::ZERO) };
+    scene.cameras.push(sized(own, [64; 2]));
+    let mut renderer = build(builder(deferred())).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let names: Vec<_> = recorded.statistics().views.iter().map(|view| view.name.clone()).collect();
+    assert_eq!(names, ["main", "own", "shadow of light 0"]);
+    drop(recorded);
+
+    scene.cameras[1].size = [64, 32];
+    match renderer.record(scene.as_scene_ref()).err() {
+        Some(FrameError::UnequalLayers { target, views }) => {
+            assert_eq!((target.as_str(), views), ("shadow map", ["own".to_owned(), "shadow of light 0".to_owned()]));
+        }
+        other => panic!("{:?}", other.map(|error| error.to_string())),
+    }
+    // Without a light that casts shadows nobody draws such a view.
+    scene.lights.clear();
+    let error = renderer.record(scene.as_scene_ref()).err().unwrap();
+    assert!(matches!(&error, FrameError::NoProcess { view, kind: ViewKind::Shadow } if view == "own"), "{error}");
+}
+
+#[test]
+fn lights_that_are_dark_or_cannot_be_require_nothing() {
+    let mut scene = empty();
+    scene.lights = everything().lights.into_iter().map(dark).collect();
+    let broken = [f32::NAN, f32::INFINITY, -1.0].map(|range| match spot() {
+        Light::Spot { position, direction, intensity, inner_angle, outer_angle, casts_shadow, .. } => {
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow }
+        }
+        other => other,
+    });
+    scene.lights.extend(broken);
+    scene.lights.push(Light::Directional { direction: Vec3::NAN, illuminance: Vec3::ONE, casts_shadow: true });
+    let mut renderer = build(builder(Deferred::to_picture())).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let statistics = recorded.statistics();
+    let told: Vec<_> = statistics.rejections.iter().map(|told| (told.reason, told.count, told.first)).collect();
+    let mut expected = [(RejectionReason::DarkLight, 7, 0), (RejectionReason::InvalidLight, 4, 7)];
+    expected.sort_by_key(|(reason, ..)| *reason as usize);
+    assert_eq!(told, expected);
+    assert_eq!((statistics.lights, statistics.views.len(), statistics.views[0].lights), (0, 1, 0));
+    drop(recorded);
+    assert_eq!(processes(&mut renderer, &scene), ["geometry buffer", "tone mapping"]);
+    assert_eq!(renderer.plan_count(), 1);
+}
+
+#[test]
+fn plans_are_kept_for_what_scenes_require() {
+    let mut renderer =
+        build(builder(Deferred::to_picture().post(ToneMapping::default()).leave_out("transparency"))).err();
+    // Two steps of one name are one too many.
+    assert!(renderer.take().unwrap().to_string().contains("\"tone mapping\""));
+
+    let mut renderer = build(builder(Deferred::to_picture())).unwrap();
+    let mut scene = empty();
+    let mut identities = Vec::new();
+    for lights in [vec![], vec![spot()], vec![spot(); 3], vec![], vec![spot()]] {
+        scene.lights = lights;
+        drop(renderer.record(scene.as_scene_ref()).unwrap());
+        identities.push(renderer.plan().identity());
+    }
+    assert_eq!(identities[1..3], [identities[1]; 2]);
+    assert_eq!((identities[3], identities[4]), (identities[0], identities[1]));
+    assert_eq!(renderer.plan_count(), 2);
+}
+
+#[test]
+fn a_class_that_is_left_out_is_not_lit_by_another() {
+    let mut scene = empty();
+    let unshadowed = match spot() {
+        Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow: false }
+        }
+        other => other,
+    };
+    scene.lights = vec![spot(), unshadowed];
+    // Nothing reads the shadow map, so it is not drawn; that makes the light no other than it is.
+    let deferred = Deferred::to_picture().leave_out("shadowed spot lights");
+    let (mut renderer, submitter) = builder(deferred).build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let passes = submitter.submit(recorded).unwrap().submission.passes;
+    let lit: Vec<_> = passes.iter().map(|pass| (pass.process.as_str(), pass.lights)).collect();
+    assert_eq!(lit, [("geometry buffer", 0), ("spot lights", 1), ("tone mapping", 0)]);
+}

@@ -1,0 +1,382 @@
+//! The deferred pipeline models what a scene requires: all of it, and nothing else.
+
+use drawloom::backend::{Picture, WgpuResources};
+use drawloom::process::{Deferred, Fxaa, LightVolumes};
+use drawloom::scene::{Blend, Light, LightKind, Material, Scene, ViewKind};
+use drawloom::view::{LightClass, ShadowMaps};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
+use crate::studio::Studio;
+
+pub const CASES: &[Case] = &[
+    ("lights_of_a_class_that_is_not_there_cost_nothing", || no_light_of_a_class(false)),
+    ("shadowed_lights_of_a_class_that_is_not_there_cost_nothing", || no_light_of_a_class(true)),
+    ("lights_that_are_switched_off_cost_nothing", dark_lights),
+    ("without_a_light_that_casts_shadows_there_is_no_shadow_map", no_casters),
+    ("without_glass_there_is_no_transparency", no_glass),
+    ("without_a_light_nothing_is_lit", no_light),
+    ("an_empty_scene_is_cleared_and_mapped", nothing_at_all),
+    ("without_a_step_of_post_processing_there_is_none", no_post),
+    ("without_a_depth_pre_pass_there_is_none", no_depth_pre_pass),
+    ("every_process_is_needed_by_another_or_changes_the_picture", every_process_counts),
+    ("processes_follow_what_a_scene_requires_and_are_kept", processes_follow),
+];
+
+const MAPS: ShadowMaps = ShadowMaps { side: 128, reach: 20.0, bias: 1.0, filter: 1 };
+const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
+/// A list, a mirrored list, and a double-sided strip, which subdivision turns into a list.
+const OPAQUE_STATES: i64 = 3;
+const OPAQUE_STATES_IN_MAPS: i64 = 4;
+const GLASS_STATES: i64 = 3;
+
+fn deferred() -> Deferred {
+    Deferred::to_picture().shadow_maps(Some(MAPS))
+}
+
+/// What one frame of a new renderer is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Cost {
+    passes: i64,
+    pipelines: i64,
+    targets: i64,
+    target_bytes: i64,
+    shadow_views: i64,
+    lights: i64,
+}
+
+impl Cost {
+    fn minus(self, other: Self) -> Self {
+        Self {
+            passes: self.passes - other.passes,
+            pipelines: self.pipelines - other.pipelines,
+            targets: self.targets - other.targets,
+            target_bytes: self.target_bytes - other.target_bytes,
+            shadow_views: self.shadow_views - other.shadow_views,
+            lights: self.lights - other.lights,
+        }
+    }
+}
+
+/// What a new renderer draws of a scene, and what that costs.
+fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
+    let output = deferred.output();
+    let mut studio = Studio::with(2, |builder| builder.deferred(deferred))?;
+    let recorded = studio.record(scene)?;
+    let views = &recorded.statistics().views;
+    let mut cost = Cost {
+        passes: recorded.queues().iter().map(|queue| queue.passes.len() as i64).sum(),
+        shadow_views: views.iter().filter(|view| view.kind == ViewKind::Shadow).count() as i64,
+        lights: views.iter().map(|view| view.lights as i64).sum(),
+        ..Cost::default()
+    };
+    let picture = studio.submit(recorded)?.read(0, output)?;
+    let WgpuResources { pipelines, targets, target_bytes, .. } = studio.renderer.backend().resources();
+    (cost.pipelines, cost.targets, cost.target_bytes) = (pipelines as i64, targets as i64, target_bytes as i64);
+    Ok((cost, picture))
+}
+
+/// Fails unless a scene without something costs as much, and looks the same to the last byte, as with a pipeline that never
+/// had a process for it; and costs less than the scene of everything by what is saved.
+fn expect_saved(
+    full: &(Cost, Picture),
+    what: &str,
+    scene: &Scene,
+    never_had: Deferred,
+    saved: Cost,
+) -> Result<(), Failed> {
+    let (cost, picture) = drawn(deferred(), scene)?;
+    let (bare_cost, bare_picture) = drawn(never_had, scene)?;
+    if cost != bare_cost {
+        return Err(format!("{what}: {cost:?}, where a pipeline without it has {bare_cost:?}").into());
+    }
+    if picture != bare_picture {
+        return Err(format!("{what}: a pipeline without it draws another picture").into());
+    }
+    if full.0.minus(cost) != saved {
+        return Err(format!("{what}: {:?} is saved, and should be {saved:?}", full.0.minus(cost)).into());
+    }
+    expect_changed(what, &full.1, &picture)
+}
+
+/// Fails where two pictures differ by no more than rounding.
+fn expect_changed(what: &str, one: &Picture, other: &Picture) -> Result<(), Failed> {
+    let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
+    let differ = |one: &[u8], other: &[u8]| one.iter().zip(other).any(|(one, other)| one.abs_diff(*other) > 8);
+    let changed = pixels.filter(|(one, other)| differ(one, other)).count();
+    if changed >= 20 { Ok(()) } else { Err(format!("{what}: only {changed} pixels change").into()) }
+}
+
+fn expect_same(what: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Result<(), Failed> {
+    if one.0 != other.0 {
+        return Err(format!("{what}: {:?} should be {:?}", one.0, other.0).into());
+    }
+    if one.1 == other.1 { Ok(()) } else { Err(format!("{what}: the picture is another").into()) }
+}
+
+/// Every class that there can be lights of.
+fn classes() -> impl Iterator<Item = LightClass> {
+    LightClass::all().filter(|class| class.kind != LightKind::Point || !class.shadowed)
+}
+
+fn scene_without(class: LightClass) -> Scene {
+    let mut scene = everything();
+    scene.lights.retain(|light| class_of(light) != class);
+    scene
+}
+
+fn full() -> Result<(Cost, Picture), Failed> {
+    drawn(deferred(), &everything())
+}
+
+fn no_light_of_a_class(shadowed: bool) -> Result<(), Failed> {
+    let full = full()?;
+    for class in classes().filter(|class| class.shadowed == shadowed) {
+        let name = LightVolumes::name_of(class);
+        let mut saved = Cost { passes: 1, pipelines: 1, lights: 1, ..Cost::default() };
+        if class.shadowed {
+            saved = Cost { passes: 2, target_bytes: BYTES_OF_A_MAP, shadow_views: 1, ..saved };
+            // Only hemispherical lights see the strip subdivided.
+            saved.pipelines += i64::from(class.kind == LightKind::Hemispherical);
+        }
+        expect_saved(&full, &name, &scene_without(class), deferred().leave_out(&name), saved)?;
+    }
+    Ok(())
+}
+
+fn dark_lights() -> Result<(), Failed> {
+    for class in classes() {
+        let mut scene = everything();
+        for light in scene.lights.iter_mut().filter(|light| class_of(light) == class) {
+            *light = dark(*light);
+        }
+        let expected = drawn(deferred(), &scene_without(class))?;
+        expect_same(&LightVolumes::name_of(class), &drawn(deferred(), &scene)?, &expected)?;
+    }
+    Ok(())
+}
+
+fn no_casters() -> Result<(), Failed> {
+    let mut scene = everything();
+    let casters = scene.lights.iter().filter(|light| light.casts_shadow()).count() as i64;
+    for light in &mut scene.lights {
+        *light = without_shadow(*light);
+    }
+    let saved = Cost {
+        passes: casters + casters,
+        pipelines: casters + OPAQUE_STATES_IN_MAPS,
+        targets: 1,
+        target_bytes: casters * BYTES_OF_A_MAP,
+        shadow_views: casters,
+        lights: 0,
+    };
+    let never_had = || Deferred::to_picture().shadow_maps(None);
+    expect_saved(&full()?, "shadows", &scene, never_had(), saved)?;
+    // With `None`, lights are taken to cast none; also where no others are there.
+    expect_same("no shadow maps", &drawn(never_had(), &everything())?, &drawn(deferred(), &scene)?)?;
+    let mut casting = everything();
+    casting.lights.retain(Light::casts_shadow);
+    scene.lights = casting.lights.iter().copied().map(without_shadow).collect();
+    expect_same("no shadow maps, shadowed lights alone", &drawn(never_had(), &casting)?, &drawn(deferred(), &scene)?)
+}
+
+fn no_glass() -> Result<(), Failed> {
+    let mut scene = everything();
+    let glasses = glasses(&scene);
+    for handle in scene.objects().collect::<Vec<_>>() {
+        let material = scene.object(handle)?.material;
+        if glasses.iter().any(|(glass, _)| *glass == material) {
+            scene.remove_object(handle)?;
+        }
+    }
+    for (glass, _) in glasses {
+        scene.remove(glass)?;
+    }
+    let saved = Cost { passes: 1, pipelines: GLASS_STATES, ..Cost::default() };
+    expect_saved(&full()?, "transparency", &scene, deferred().leave_out("transparency"), saved)
+}
+
+fn no_light() -> Result<(), Failed> {
+    let mut scene = everything();
+    let lights = scene.lights.len() as i64;
+    let casters = scene.lights.iter().filter(|light| light.casts_shadow()).count() as i64;
+    scene.lights.clear();
+    let saved = Cost {
+        passes: lights + casters,
+        pipelines: lights + OPAQUE_STATES_IN_MAPS,
+        targets: 1,
+        target_bytes: casters * BYTES_OF_A_MAP,
+        shadow_views: casters,
+        lights,
+    };
+    let kinds = LightKind::ALL.map(|kind| LightVolumes::name_of(LightClass { kind, shadowed: false }));
+    let never_had = kinds.into_iter().fold(Deferred::to_picture().shadow_maps(None), Deferred::leave_out);
+    expect_saved(&full()?, "lights", &scene, never_had, saved)
+}
+
+fn nothing_at_all() -> Result<(), Failed> {
+    let mut scene = Scene::new();
+    scene.cameras = everything().cameras;
+    let (cost, _) = drawn(deferred(), &scene)?;
+    let pixels = i64::from(SIZE[0] * SIZE[1]);
+    // Depth, normal, diffuse and radiance, and the picture.
+    let expected = Cost { passes: 2, pipelines: 1, targets: 5, target_bytes: pixels * 24, ..Cost::default() };
+    if cost == expected { Ok(()) } else { Err(format!("{cost:?} should be {expected:?}").into()) }
+}
+
+fn no_post() -> Result<(), Failed> {
+    let without = drawn(Deferred::new().shadow_maps(Some(MAPS)), &everything())?;
+    let pixels = i64::from(SIZE[0] * SIZE[1]);
+    let step = Cost { passes: 1, pipelines: 1, targets: 1, target_bytes: pixels * 4, ..Cost::default() };
+    let (one, one_picture) = drawn(deferred(), &everything())?;
+    let (two, two_picture) = drawn(deferred().post(Fxaa::default()), &everything())?;
+    for saved in [one.minus(without.0), two.minus(one)] {
+        if saved != step {
+            return Err(format!("a step costs {saved:?}, and should cost {step:?}").into());
+        }
+    }
+    expect_changed("fxaa", &one_picture, &two_picture)?;
+    let mut studio = Studio::with(2, |builder| builder.deferred(deferred()))?;
+    let recorded = studio.record(&everything())?;
+    let radiance = studio.submit(recorded)?.read(0, "radiance")?;
+    if radiance == without.1 { Ok(()) } else { Err("without tone mapping, radiance is another".into()) }
+}
+
+fn no_depth_pre_pass() -> Result<(), Failed> {
+    let (with, with_picture) = drawn(deferred().depth_pre_pass(true), &everything())?;
+    let (without, picture) = drawn(deferred(), &everything())?;
+    let saved = Cost { passes: 1, pipelines: OPAQUE_STATES, ..Cost::default() };
+    if with.minus(without) != saved {
+        return Err(format!("{:?} is saved, and should be {saved:?}", with.minus(without)).into());
+    }
+    if with_picture == picture { Ok(()) } else { Err("it changes the picture".into()) }
+}
+
+fn every_process_counts() -> Result<(), Failed> {
+    let all = || deferred().depth_pre_pass(true).post(Fxaa::default());
+    let mut studio = Studio::with(2, |builder| builder.deferred(all()))?;
+    let picture = studio.draw(&everything())?;
+    let names = studio.renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
+    let mut needed_by_others = Vec::new();
+    let (mut count, mut changed) = (0, 0);
+    for name in names {
+        count += 1;
+        let without = all().leave_out(&name);
+        match Studio::with(2, |builder| builder.deferred(without)) {
+            Ok(mut studio) => {
+                expect_changed(&name, &picture, &studio.draw(&everything())?)?;
+                changed += 1;
+            }
+            Err(error) => needed_by_others.push((name, error.message().unwrap_or_default().to_owned())),
+        }
+    }
+    let expected = [
+        ("shadow casters", "\"shadow: shadow map\""),
+        ("depth pre-pass", "\"depth\""),
+        ("geometry buffer", "\"normal\""),
+        ("tone mapping", "\"post-processed 1\""),
+        ("fxaa", "\"picture\""),
+    ];
+    let named = needed_by_others.iter().zip(expected);
+    if needed_by_others.len() != expected.len()
+        || !named.clone().all(|((name, error), (other, target))| name == other && error.contains(target))
+    {
+        return Err(format!("{needed_by_others:?} should be {expected:?}").into());
+    }
+    // A process a class of lights, and transparency.
+    if (changed, count) == (8, 13) { Ok(()) } else { Err(format!("{changed} of {count} change the picture").into()) }
+}
+
+/// A change of the scene; for how many requirements plans are kept when it is drawn for the first time, and how many
+/// pipelines are new then.
+type Step = (&'static str, usize, usize, fn(&mut Scene) -> Result<(), Failed>);
+
+const STEPS: &[Step] = &[
+    // The plan of an empty scene is always there.
+    ("everything", 2, EVERY_PIPELINE, |_| Ok(())),
+    ("the last spot light with a shadow goes", 3, 0, |scene| {
+        scene.lights.retain(|light| light.kind() != LightKind::Spot || !light.casts_shadow());
+        Ok(())
+    }),
+    ("it comes back", 3, 0, |scene| {
+        scene.lights = everything().lights;
+        Ok(())
+    }),
+    // Glass is lit by a shader that reads no maps.
+    ("all shadows go", 4, GLASS_STATES as usize, |scene| {
+        scene.lights = everything().lights.into_iter().map(without_shadow).collect();
+        Ok(())
+    }),
+    ("they come back", 4, 0, |scene| {
+        scene.lights = everything().lights;
+        Ok(())
+    }),
+    ("most glass goes", 4, 0, |scene| make_opaque(scene, 2)),
+    ("the last glass goes", 5, 0, |scene| make_opaque(scene, 3)),
+    ("most lights go", 6, 0, |scene| {
+        scene.lights.retain(|light| matches!(light, Light::Directional { casts_shadow: false, .. }));
+        Ok(())
+    }),
+    // What is left requires no more than an empty scene.
+    ("all lights go", 6, 0, |scene| {
+        scene.lights.clear();
+        Ok(())
+    }),
+    ("everything comes back", 6, 0, |scene| {
+        scene.lights = everything().lights;
+        make_opaque(scene, 0)
+    }),
+];
+
+/// Of objects in maps, of opaque objects and of glass; of seven classes of lights, and of tone mapping.
+const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 7 + 1;
+
+/// Lets so many of the glasses hide what is behind them, and the others be as they were.
+fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
+    let handles = scene.assets().iter::<Material>().map(|(handle, _)| handle);
+    let originals = everything();
+    let originals = originals.assets().iter::<Material>().map(|(_, material)| material.clone());
+    let glasses = handles.zip(originals).filter(|(_, material)| material.blend != Blend::None);
+    for (index, (glass, material)) in glasses.collect::<Vec<_>>().into_iter().enumerate() {
+        let blend = if index < count { Blend::None } else { material.blend };
+        scene.replace(glass, Material { blend, ..material })?;
+    }
+    Ok(())
+}
+
+fn processes_follow() -> Result<(), Failed> {
+    let mut studio = Studio::with(2, |builder| builder.deferred(deferred()))?;
+    let mut scene = everything();
+    let mut pictures = Vec::new();
+    let mut pipelines = 0;
+    for (what, plans, new_pipelines, change) in STEPS {
+        change(&mut scene)?;
+        let picture = studio.draw(&scene)?;
+        if studio.renderer.plan_count() != *plans {
+            return Err(format!("{what}: {} plans should be {plans}", studio.renderer.plan_count()).into());
+        }
+        let kept = studio.renderer.backend().resources();
+        pipelines += new_pipelines;
+        if kept.pipelines != pipelines {
+            return Err(format!("{what}: {} pipelines should be {pipelines}", kept.pipelines).into());
+        }
+        let (fresh, fresh_picture) = drawn(deferred(), &scene)?;
+        if picture != fresh_picture {
+            return Err(format!("{what}: a new renderer draws another picture").into());
+        }
+        if (kept.targets as i64, kept.target_bytes as i64) != (fresh.targets, fresh.target_bytes) {
+            return Err(format!("{what}: {kept:?}, where a new renderer has {fresh:?}").into());
+        }
+        pictures.push(picture);
+    }
+    let kept = |studio: &Studio| (studio.renderer.plan_count(), studio.renderer.backend().resources().pipelines);
+    let before = kept(&studio);
+    for ((what, .., change), before) in STEPS.iter().zip(&pictures) {
+        change(&mut scene)?;
+        if studio.draw(&scene)? != *before {
+            return Err(format!("{what}: the second time, the picture is another").into());
+        }
+    }
+    if kept(&studio) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&studio)).into()) }
+}

@@ -1,0 +1,309 @@
+//! Glass: sorted, lit and mixed as it should be.
+
+use std::f64::consts::PI;
+
+use drawloom::backend::Picture;
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::process::Deferred;
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
+use drawloom::view::ShadowMaps;
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::judge::{assert_color, tone_mapped};
+use crate::scenes::{cube, sized, square};
+use crate::studio::{Studio, pixel};
+
+pub const CASES: &[Case] = &[
+    ("panes_look_the_same_in_every_order_of_submission", every_order),
+    ("glass_is_hidden_by_what_is_before_it", behind_a_wall),
+    ("glass_that_hides_everything_looks_opaque_in_every_light", lit_like_opaque),
+    ("what_is_added_or_taken_scales_with_opacity", scales_with_opacity),
+    ("panes_at_one_depth_keep_the_order_of_objects", equal_depths),
+    ("what_is_taken_away_leaves_black_at_worst", black_at_worst),
+    ("a_double_sided_pane_is_lit_on_the_side_that_is_seen", lit_on_the_seen_side),
+    ("more_panes_than_a_bundle_holds_stay_in_order", many_batches),
+];
+
+const BACKGROUND: Vec3 = Vec3::new(0.5, 0.3, 0.2);
+const AMBIENT: Vec3 = Vec3::new(0.4, 0.6, 0.8);
+const SIDE: u32 = 9;
+
+/// Squares that face the camera at +Z, which sees nothing else, in the order in which they are submitted.
+fn panes(panes: &[(f64, Material)]) -> Result<Scene, Failed> {
+    let mut scene = Scene::new();
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [SIDE; 2])];
+    let mesh = scene.add(square(Topology::TriangleList))?;
+    for (z, material) in panes {
+        let material = scene.add(material.clone())?;
+        scene.add_object(RenderObject::new(mesh, material, DVec3::Z * *z))?;
+    }
+    scene.background = BACKGROUND;
+    scene.ambient = AMBIENT;
+    Ok(scene)
+}
+
+fn glass(blend: Blend, diffuse: Vec3, opacity: f32) -> Material {
+    Material { blend, diffuse, opacity, ..Material::default() }
+}
+
+/// What a pane leaves of what is behind it, by its definition, where no light but the ambient one reaches it.
+fn behind(radiance: [f64; 3], pane: &Material) -> [f64; 3] {
+    let opacity = f64::from(pane.opacity);
+    let own = (pane.emission.as_dvec3() + pane.diffuse.as_dvec3() * AMBIENT.as_dvec3()).to_array();
+    std::array::from_fn(|channel| match pane.blend {
+        Blend::None => own[channel],
+        Blend::Alpha => radiance[channel] * (1.0 - opacity) + own[channel] * opacity,
+        Blend::Additive => radiance[channel] + own[channel] * opacity,
+        Blend::Subtractive => radiance[channel] - own[channel] * opacity,
+    })
+}
+
+/// The radiance and the picture that a scene gives.
+fn drawn(studio: &mut Studio, scene: &Scene) -> Result<(Picture, Picture), Failed> {
+    let recorded = studio.record(scene)?;
+    let submission = studio.submit(recorded)?;
+    Ok((submission.read(0, "radiance")?, submission.read(0, "picture")?))
+}
+
+/// Red, green and blue of the middle pixel of a target of half floats.
+fn middle(radiance: &Picture) -> [f64; 3] {
+    let pixel = (radiance.height / 2 * radiance.width + radiance.width / 2) as usize;
+    let channel = |index: usize| {
+        let start = pixel * 8 + index * 2;
+        from_half(u16::from_le_bytes([radiance.bytes[start], radiance.bytes[start + 1]]))
+    };
+    [channel(0), channel(1), channel(2)]
+}
+
+/// A half float (IEEE 754 binary16).
+fn from_half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
+    sign * match exponent {
+        0 => fraction * 2_f64.powi(-14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction) * 2_f64.powi(exponent - 15),
+    }
+}
+
+/// Fails where the middle of the picture is not what a radiance, worked out in f64, makes of it.
+fn expect(what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
+    // A half float is off by 2⁻¹⁰ of itself at most, and the last of a few count.
+    expect_within(2e-3, what, drawn, expected)
+}
+
+/// The same with how far off radiance may be, as a share of what it should be or of one quarter.
+fn expect_within(share: f64, what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
+    let found = middle(&drawn.0);
+    let close = |(found, expected): (&f64, f64)| (found - expected).abs() <= share * expected.abs().max(0.25);
+    if !found.iter().zip(expected).all(close) {
+        return Err(format!("{what}: radiance {found:?} should be {expected:?}").into());
+    }
+    let shown = expected.map(|radiance| radiance.max(0.0));
+    assert_color(pixel(&drawn.1, SIDE / 2, SIDE / 2), tone_mapped(shown))
+        .map_err(|failed| format!("{what}: {}", failed.message().unwrap_or_default()).into())
+}
+
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+fn every_order() -> Result<(), Failed> {
+    let glasses = [
+        Material { emission: Vec3::new(0.1, 0.0, 0.5), ..glass(Blend::Alpha, Vec3::new(0.2, 0.9, 0.3), 0.4) },
+        Material { emission: Vec3::new(0.0, 0.2, 0.0), ..glass(Blend::Additive, Vec3::new(0.6, 0.1, 0.2), 0.5) },
+        Material { emission: Vec3::new(0.1, 0.0, 0.0), ..glass(Blend::Subtractive, Vec3::new(0.1, 0.2, 0.1), 0.7) },
+    ];
+    let mut studio = Studio::new()?;
+    let mut colors = Vec::new();
+    for far_to_near in ORDERS {
+        let expected = far_to_near
+            .iter()
+            .fold(BACKGROUND.as_dvec3().to_array(), |radiance, &pane| behind(radiance, &glasses[pane]));
+        let depth_of = |pane: usize| far_to_near.iter().position(|&other| other == pane).unwrap_or(0) as f64 - 1.0;
+        let mut first = None;
+        for submitted in ORDERS {
+            let scene = panes(&submitted.map(|pane| (depth_of(pane), glasses[pane].clone())))?;
+            let found = drawn(&mut studio, &scene)?;
+            expect(&format!("{far_to_near:?}, submitted as {submitted:?}"), &found, expected)?;
+            if *first.get_or_insert_with(|| found.clone()) != found {
+                return Err(format!("{far_to_near:?}, submitted as {submitted:?}: other bytes").into());
+            }
+        }
+        colors.push(tone_mapped(expected));
+    }
+    colors.sort_unstable();
+    colors.dedup();
+    // What is added and what is taken commutes, so only the place of the pane that covers counts.
+    if colors.len() >= 3 { Ok(()) } else { Err("the order of the panes should be seen".into()) }
+}
+
+fn behind_a_wall() -> Result<(), Failed> {
+    let wall = Material { diffuse: Vec3::new(0.3, 0.7, 0.5), ..Material::default() };
+    let of_wall = behind(BACKGROUND.as_dvec3().to_array(), &wall);
+    let mut studio = Studio::new()?;
+    for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
+        let pane = glass(blend, Vec3::new(0.4, 0.1, 0.2), 0.6);
+        let alone = drawn(&mut studio, &panes(&[(0.0, wall.clone())])?)?;
+        expect("the wall", &alone, of_wall)?;
+        if drawn(&mut studio, &panes(&[(-1.0, pane.clone()), (0.0, wall.clone())])?)? != alone {
+            return Err(format!("{blend:?} is seen through a wall").into());
+        }
+        let before = drawn(&mut studio, &panes(&[(1.0, pane.clone()), (0.0, wall.clone())])?)?;
+        expect(&format!("{blend:?} before a wall"), &before, behind(of_wall, &pane))?;
+    }
+    Ok(())
+}
+
+/// A light of every class before the pane, from a little above.
+fn lights() -> Vec<Light> {
+    let (position, intensity, range) = (DVec3::new(0.5, 1.5, 4.0), Vec3::new(9.0, 7.0, 5.0), 12.0);
+    let direction = -position.as_vec3().normalize();
+    let mut lights = vec![Light::Point { position, intensity, range }];
+    for casts_shadow in [false, true] {
+        let (inner_angle, outer_angle) = (0.3, 0.5);
+        lights.extend([
+            Light::Directional { direction, illuminance: intensity * 0.1, casts_shadow },
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
+            Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+        ]);
+    }
+    lights
+}
+
+fn lit_like_opaque() -> Result<(), Failed> {
+    let maps = ShadowMaps { side: 256, reach: 12.0, ..ShadowMaps::default() };
+    let picture = |light: Light, blend| -> Result<Picture, Failed> {
+        let mut scene = panes(&[])?;
+        scene.cameras[0].size = [48; 2];
+        scene.lights = vec![light];
+        scene.ambient = Vec3::splat(0.02);
+        let (plane, block) = (scene.add(square(Topology::TriangleList))?, scene.add(cube())?);
+        // 188 of 255 sRGB encoded, which the diffuse target holds exactly.
+        let diffuse = Vec3::splat(((188.0 / 255.0 + 0.055) / 1.055_f32).powf(2.4));
+        let pane = scene.add(Material { blend, diffuse, ..Material::default() })?;
+        let stone = scene.add(Material::default())?;
+        let orientation = Quat::from_rotation_y(0.3);
+        scene.add_object(RenderObject {
+            orientation,
+            scale: Vec3::splat(6.0),
+            ..RenderObject::new(plane, pane, DVec3::ZERO)
+        })?;
+        let place = DVec3::new(0.0, 0.4, 1.0);
+        scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..RenderObject::new(block, stone, place) })?;
+        Studio::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
+    };
+    let mut before = Vec::new();
+    for light in lights() {
+        let (opaque, glass) = (picture(light, Blend::None)?, picture(light, Blend::Alpha)?);
+        let farthest = opaque.bytes.iter().zip(&glass.bytes).map(|(one, other)| one.abs_diff(*other)).max();
+        // The geometry buffer rounds normals and depth, which shows most where a shadow fades.
+        if farthest > Some(4) {
+            return Err(format!("{light:?}: glass is off by {farthest:?}").into());
+        }
+        if before.contains(&opaque.bytes) {
+            return Err(format!("{light:?}: it gives the light of another, or no shadow").into());
+        }
+        before.push(opaque.bytes);
+    }
+    Ok(())
+}
+
+fn scales_with_opacity() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
+        for opacity in [0.0, 0.25, 0.5, 1.0] {
+            let pane = glass(blend, Vec3::new(0.5, 0.2, 0.1), opacity);
+            let pane = Material { emission: Vec3::new(0.1, 0.0, 0.05), ..pane };
+            let expected = behind(BACKGROUND.as_dvec3().to_array(), &pane);
+            expect(&format!("{blend:?} at {opacity}"), &drawn(&mut studio, &panes(&[(0.0, pane)])?)?, expected)?;
+        }
+    }
+    Ok(())
+}
+
+fn equal_depths() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let (red, green) = (glass(Blend::Alpha, Vec3::X, 0.7), glass(Blend::Alpha, Vec3::Y, 0.6));
+    let added = glass(Blend::Additive, Vec3::Z, 1.0);
+    for order in [[&red, &green, &added], [&green, &red, &added], [&added, &green, &red], [&red, &added, &green]] {
+        let expected = order.iter().fold(BACKGROUND.as_dvec3().to_array(), |radiance, pane| behind(radiance, pane));
+        let scene = panes(&order.map(|pane| (0.5, pane.clone())))?;
+        expect(&format!("{order:?}"), &drawn(&mut studio, &scene)?, expected)?;
+    }
+    Ok(())
+}
+
+fn black_at_worst() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    for taken in [0.6, 3.0, 60_000.0, 1e30] {
+        let pane = Material { emission: Vec3::splat(taken), ..glass(Blend::Subtractive, Vec3::ONE, 1.0) };
+        let found = drawn(&mut studio, &panes(&[(0.0, pane.clone()), (1.0, pane.clone())])?)?;
+        if middle(&found.0).iter().any(|channel| channel.is_nan() || *channel >= 0.0) {
+            return Err(format!("{taken} twice leaves {:?}", middle(&found.0)).into());
+        }
+        assert_color(pixel(&found.1, SIDE / 2, SIDE / 2), [0; 3])?;
+    }
+    // What is less than nothing lacks in what is drawn over it.
+    let taken = glass(Blend::Subtractive, Vec3::ONE, 1.0);
+    let added = Material { emission: Vec3::ONE, ..glass(Blend::Additive, Vec3::ZERO, 1.0) };
+    let expected = behind(behind(BACKGROUND.as_dvec3().to_array(), &taken), &added);
+    expect("added to what lacks", &drawn(&mut studio, &panes(&[(0.0, taken), (1.0, added)])?)?, expected)
+}
+
+fn lit_on_the_seen_side() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    // The diffuse colour is not stored anywhere, so it is exact.
+    let lit = 4.0 * (1.0 - (2.0_f64 / 8.0).powi(4)).powi(2) / 4.0 * 0.5 / PI;
+    for (eye, lamp, double_sided, expected) in [
+        (1.0, 1.0, false, Some(lit)),
+        (1.0, -1.0, false, Some(0.0)),
+        (-1.0, -1.0, false, None),
+        (1.0, 1.0, true, Some(lit)),
+        (1.0, -1.0, true, Some(0.0)),
+        (-1.0, -1.0, true, Some(lit)),
+        (-1.0, 1.0, true, Some(0.0)),
+    ] {
+        let mut scene = panes(&[(0.0, Material { double_sided, ..glass(Blend::Alpha, Vec3::splat(0.5), 1.0) })])?;
+        scene.ambient = Vec3::ZERO;
+        scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0 * eye, DVec3::ZERO), [SIDE; 2])];
+        scene.lights = vec![Light::Point { position: DVec3::Z * 2.0 * lamp, intensity: Vec3::splat(4.0), range: 8.0 }];
+        let expected = expected.map_or(BACKGROUND.as_dvec3().to_array(), |radiance| [radiance; 3]);
+        let what = format!("seen from {eye}, lit from {lamp}, double-sided: {double_sided}");
+        expect(&what, &drawn(&mut studio, &scene)?, expected)?;
+    }
+    Ok(())
+}
+
+fn many_batches() -> Result<(), Failed> {
+    // Bundles end at 256, 512 and 699: each after another colour, so that the last one drawn shows.
+    const COUNT: usize = 699;
+    let mut studio = Studio::new()?;
+    let colors = [Vec3::X, Vec3::Y, Vec3::Z].map(|diffuse| glass(Blend::Alpha, diffuse, 0.1));
+    let mut pictures = Vec::new();
+    for meshes in [1, 2] {
+        let mut scene = panes(&[])?;
+        let meshes: Vec<_> =
+            (0..meshes).map(|_| scene.add(square(Topology::TriangleList))).collect::<Result<_, _>>()?;
+        let materials = colors.each_ref().map(|color| scene.add(color.clone()));
+        for submitted in 0..COUNT {
+            // 699 and 251 have no divisor in common, so each depth comes once.
+            let pane = submitted * 251 % COUNT;
+            let material = materials[pane % 3].clone()?;
+            let place = DVec3::Z * (-2.0 + pane as f64 * 0.004);
+            scene.add_object(RenderObject::new(meshes[pane % meshes.len()], material, place))?;
+        }
+        let recorded = studio.record(&scene)?;
+        let (batches, bundles) = (recorded.statistics().views[0].batches, recorded.statistics().views[0].bundles);
+        if (batches, bundles) != if meshes.len() == 1 { (1, 1) } else { (COUNT, 3) } {
+            return Err(format!("{} meshes make {batches} batches in {bundles} bundles", meshes.len()).into());
+        }
+        let submission = studio.submit(recorded)?;
+        pictures.push((submission.read(0, "radiance")?, submission.read(0, "picture")?));
+    }
+    let expected =
+        (0..COUNT).fold(BACKGROUND.as_dvec3().to_array(), |radiance, pane| behind(radiance, &colors[pane % 3]));
+    // Each pane takes a tenth of what rounding has left behind, so ten times 2⁻¹⁰ is the most.
+    expect_within(0.01, "two meshes", &pictures[1], expected)?;
+    if pictures[0] == pictures[1] { Ok(()) } else { Err("one mesh gives another picture than two".into()) }
+}

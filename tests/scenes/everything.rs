@@ -1,0 +1,123 @@
+//! A small scene that requires every process there is.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::handle::Handle;
+use drawloom::scene::{Blend, Camera, Light, LightKind, Material, Mesh, RenderObject, Scene, Topology};
+use drawloom::view::LightClass;
+
+use super::{cube, sized, square};
+
+/// Width and height of its picture.
+pub const SIZE: [u32; 2] = [96, 64];
+
+/// Boxes on a floor before a wall, some of them behind a pane of each kind of glass; and a light of every class, each of
+/// which reaches what the camera sees. What is opaque comes in three states: a list, a mirrored list, and a double-sided
+/// strip.
+pub fn everything() -> Scene {
+    let mut scene = Scene::new();
+    let list = scene.add(square(Topology::TriangleList)).unwrap();
+    let strip = scene.add(square(Topology::TriangleStrip)).unwrap();
+    let block = scene.add(cube()).unwrap();
+    let stone = scene.add(Material { diffuse: Vec3::splat(0.7), ..Material::default() }).unwrap();
+    let plaster = Material { diffuse: Vec3::new(0.5, 0.6, 0.7), double_sided: true, ..Material::default() };
+    let plaster = scene.add(plaster).unwrap();
+
+    add(&mut scene, list, stone, DVec3::ZERO, Vec3::splat(6.0), Quat::from_rotation_x(-FRAC_PI_2));
+    add(&mut scene, strip, plaster, DVec3::new(0.0, 2.0, -4.0), Vec3::splat(6.0), Quat::IDENTITY);
+    for (index, x) in [-2.4, -0.8, 0.8, 2.4].into_iter().enumerate() {
+        let mirrored = if index == 2 { -1.0 } else { 1.0 };
+        let place = DVec3::new(x, 0.5, -0.5 * index as f64);
+        add(&mut scene, block, stone, place, Vec3::new(0.4 * mirrored, 0.5, 0.4), Quat::from_rotation_y(index as f32));
+    }
+    for (x, blend) in [(-2.0, Blend::Alpha), (0.0, Blend::Additive), (2.0, Blend::Subtractive)] {
+        let diffuse = Vec3::new(0.3, 0.5, 0.2);
+        let glass = scene.add(Material { diffuse, blend, opacity: 0.6, ..Material::default() }).unwrap();
+        add(&mut scene, list, glass, DVec3::new(x, 1.2, 2.5), Vec3::splat(0.8), Quat::IDENTITY);
+    }
+    scene.lights = LightClass::all().filter_map(light_of).collect();
+    scene.ambient = Vec3::splat(0.05);
+    scene.background = Vec3::new(0.1, 0.15, 0.3);
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 3.0, 8.0), DVec3::Y), SIZE)];
+    scene
+}
+
+fn add(
+    scene: &mut Scene,
+    mesh: Handle<Mesh>,
+    material: Handle<Material>,
+    place: DVec3,
+    scale: Vec3,
+    orientation: Quat,
+) {
+    scene.add_object(RenderObject { scale, orientation, ..RenderObject::new(mesh, material, place) }).unwrap();
+}
+
+/// `None` for the class that no light is of: point lights cast no shadows.
+fn light_of(class: LightClass) -> Option<Light> {
+    let casts_shadow = class.shadowed;
+    let side = if casts_shadow { 1.0 } else { -1.0 };
+    let position = DVec3::new(f64::from(side) * 3.0, 5.0, 4.0);
+    let direction = (Vec3::new(0.0, 0.0, -1.0) - position.as_vec3()).normalize();
+    let color = Vec3::new(0.9, 0.7 + 0.2 * side, 0.7);
+    Some(match class.kind {
+        LightKind::Directional => Light::Directional { direction, illuminance: color * 0.8, casts_shadow },
+        LightKind::Point if casts_shadow => return None,
+        LightKind::Point => Light::Point { position: DVec3::new(0.0, 2.0, 0.5), intensity: color * 2.0, range: 8.0 },
+        LightKind::Spot => Light::Spot {
+            position,
+            direction,
+            intensity: color * 20.0,
+            range: 20.0,
+            inner_angle: 0.3,
+            outer_angle: PI / 4.0,
+            casts_shadow,
+        },
+        LightKind::Hemispherical => Light::Hemispherical {
+            position: DVec3::new(f64::from(side), 4.0, 1.0),
+            direction: Vec3::NEG_Y,
+            intensity: color * 8.0,
+            range: 20.0,
+            casts_shadow,
+        },
+        other => unreachable!("no light of kind {other:?}"),
+    })
+}
+
+/// What class a light of the scene is of, where it may cast shadows.
+pub fn class_of(light: &Light) -> LightClass {
+    LightClass { kind: light.kind(), shadowed: light.casts_shadow() }
+}
+
+/// The same light without a shadow.
+pub fn without_shadow(mut light: Light) -> Light {
+    if let Light::Directional { casts_shadow, .. }
+    | Light::Spot { casts_shadow, .. }
+    | Light::Hemispherical { casts_shadow, .. } = &mut light
+    {
+        *casts_shadow = false;
+    }
+    light
+}
+
+/// The same light switched off.
+pub fn dark(mut light: Light) -> Light {
+    if let Light::Directional { illuminance: color, .. }
+    | Light::Point { intensity: color, .. }
+    | Light::Spot { intensity: color, .. }
+    | Light::Hemispherical { intensity: color, .. } = &mut light
+    {
+        *color = Vec3::ZERO;
+    }
+    light
+}
+
+/// Every material that mixes with what is behind it, in slot order.
+pub fn glasses(scene: &Scene) -> Vec<(Handle<Material>, Material)> {
+    let materials = scene.assets().iter::<Material>();
+    materials
+        .filter(|(_, material)| material.blend != Blend::None)
+        .map(|(handle, glass)| (handle, glass.clone()))
+        .collect()
+}
