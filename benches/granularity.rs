@@ -9,23 +9,33 @@
 #[path = "../examples/frame/adapter.rs"]
 #[expect(dead_code, reason = "the other half is for the frame example")]
 mod adapter;
+#[path = "shared/boxes.rs"]
+mod boxes;
+#[path = "shared/random.rs"]
+mod random;
+#[path = "shared/stopwatch.rs"]
+#[expect(dead_code, reason = "the device's time is for the bench of the deferred pipeline")]
+mod stopwatch;
 
 use std::error::Error;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::Parser;
 use drawloom::backend::{Backend, BackendError, NullBackend, WgpuBackend, WgpuSubmission};
-use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::glam::{DVec3, Quat};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError, Topology, Vertex};
+use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer, Submitter};
 use indicatif::{ProgressBar, ProgressStyle};
 
-const SEED: u64 = 0x5eed_d1a3_0000_0001;
+use boxes::new_box;
+use random::Random;
+use stopwatch::{WARM_UP, median, timed_frame};
+
 const MESHES: u32 = 64;
 /// So many that a view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
 const MATERIALS: u32 = 16;
@@ -77,9 +87,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     print_table(&table, rounds, quick);
     Ok(())
 }
-
-/// Frames of each setting that are drawn first and not counted: tables grow and pipelines are made in them.
-const WARM_UP: usize = 2;
 
 struct Case {
     name: &'static str,
@@ -144,7 +151,7 @@ impl Turns<'_> {
                 self.progress.inc(1);
             }
         }
-        let medians: Vec<_> = settings.iter_mut().map(|setting| median(&mut setting.times)).collect();
+        let medians: Vec<_> = settings.iter().map(|setting| median(setting.times.iter().copied())).collect();
         let line = |(setting, &median): (&Setting<B>, &Duration)| Line {
             scene: self.case.name,
             backend: self.backend,
@@ -164,22 +171,14 @@ impl Turns<'_> {
         setting: &mut Setting<B>,
         wait: impl Fn(&B::Submission) -> Result<(), BackendError>,
     ) -> Result<Duration, Box<dyn Error>> {
-        let start = Instant::now();
-        let recorded = setting.renderer.record(self.case.scene.as_scene_ref())?;
-        let submitted = setting.submitter.submit(recorded)?;
-        let time = start.elapsed();
-        wait(&submitted.submission)?;
+        let Setting { renderer, submitter, .. } = setting;
+        let (submitted, time) = timed_frame(renderer, submitter, &self.case.scene, wait)?;
         let seen: Vec<_> = submitted.statistics.views.iter().map(|view| view.visible).collect();
         if seen != self.case.seen {
             return Err(format!("{}: cameras see {seen:?} objects, not {:?}", self.case.name, self.case.seen).into());
         }
-        Ok(time)
+        Ok(time.processor)
     }
-}
-
-fn median(times: &mut [Duration]) -> Duration {
-    times.sort();
-    times[times.len() / 2]
 }
 
 fn print_table(table: &[Line], rounds: usize, quick: bool) {
@@ -228,7 +227,7 @@ fn camera(name: &str, position: DVec3, target: DVec3) -> Camera {
 
 /// Boxes scattered in clouds, given by centre and number of boxes.
 fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<Scene, SceneError> {
-    let mut random = Random(SEED);
+    let mut random = Random::new();
     let mut scene = Scene::new();
     let (mut meshes, mut materials) = (Vec::new(), Vec::new());
     for index in 0..MESHES {
@@ -248,48 +247,4 @@ fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<S
         }
     }
     Ok(scene)
-}
-
-fn new_box(name: String, half: Vec3) -> Result<Mesh, SceneError> {
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-        let first = vertices.len() as u32;
-        let (right, up) = normal.any_orthonormal_pair();
-        for [across, along] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
-            let position = ((normal + right * across + up * along) * half).to_array();
-            let uv = [(across + 1.0) / 2.0, (1.0 - along) / 2.0];
-            vertices.push(Vertex { position, normal: normal.to_array(), uv });
-        }
-        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
-    }
-    Mesh::new(name, Topology::TriangleList, vertices, indices)
-}
-
-/// A Weyl sequence, mixed: enough to scatter boxes, and the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
-        mixed ^ (mixed >> 29)
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() % count as u64) as usize
-    }
-
-    fn vector(&mut self, low: f64, high: f64) -> Vec3 {
-        DVec3::from_array([(); 3].map(|()| self.between(low, high))).as_vec3()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let (height, turn) = (self.between(-1.0, 1.0), self.between(0.0, TAU));
-        let across = (1.0 - height * height).sqrt();
-        DVec3::new(across * turn.cos(), height, across * turn.sin())
-    }
 }

@@ -12,7 +12,7 @@ use crate::command::RenderCommand;
 use crate::graph::{Node, NodeError};
 use crate::queue::{DrawList, Fill, Selection, instance, sort};
 use crate::task::Worker;
-use crate::view::{ObjectRecord, ObjectTable, VisibleSet};
+use crate::view::{LightTable, ObjectRecord, ObjectTable, VisibleSet};
 
 /// A node of the frame's job graph: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,12 +52,14 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) clock: &'a StageClock,
 }
 
-/// What phases leave for each other, whatever the passes; kept from frame to frame so that its memory is reused.
+/// What a frame's parts leave for each other, whatever the passes; kept from frame to frame so that its memory is reused.
 #[derive(Debug, Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
     /// One for each view.
     pub(super) visible: Vec<VisibleSet>,
+    /// One for each view.
+    pub(super) lights: Vec<LightTable>,
 }
 
 /// What one pass draws, on its way from slots to batches.
@@ -74,6 +76,7 @@ impl FrameTables {
     pub(super) fn reset(&mut self, views: usize) {
         let objects = self.objects.len();
         self.visible.resize_with(views, VisibleSet::default);
+        self.lights.resize_with(views, LightTable::default);
         for visible in &mut self.visible {
             visible.reset(objects);
         }

@@ -16,7 +16,7 @@ use crate::process::{FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
-use crate::view::{LightTable, Rejection, RejectionReason, RenderView};
+use crate::view::{Rejection, RejectionReason, RenderView};
 
 /// Produces frames: records a scene on all workers, and gives it back when that is done.
 ///
@@ -83,15 +83,17 @@ impl<B: Backend> Renderer<B> {
         jobs.reset(scene.object_count());
         self.tables.reset(views.len());
         let clock = StageClock::default();
-        let light_tables: Vec<_> = clock.measure(Stage::Visibility, || {
+        clock.measure(Stage::Visibility, || {
             let shadows = self.plans.tells_shadowed_apart();
-            views.iter().map(|view| LightTable::new(view, scene.lights, &views, shadows)).collect()
+            for (view, lights) in views.iter().zip(&mut self.tables.lights) {
+                lights.fill(view, scene.lights, &views, shadows);
+            }
         });
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
             views: &views,
-            lights: &light_tables,
+            lights: &self.tables.lights,
             passes: &jobs.passes,
             scene: &scene,
             rejections: self.tables.objects.rejections(),

@@ -11,6 +11,8 @@ use crate::scene::{Light, LightKind, Projection, ViewKind};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTable {
     records: Vec<LightRecord>,
+    /// The class and the index of each light that reaches the view, on the way to its record.
+    reaching: Vec<(usize, usize)>,
     /// By [`LightClass::index`].
     ranges: [Range<u32>; LightClass::COUNT],
 }
@@ -40,38 +42,41 @@ impl LightClass {
 }
 
 impl LightTable {
-    /// The lights that `view` may see the light of, in the order of the scene within each class. With `shadows`, those that
-    /// cast some are classes of their own, and have their map if one of `views` is it. A shadow map itself is lit by nothing.
-    pub fn new(view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) -> Self {
-        let mut table = Self::default();
+    /// Fills in the lights that `view` may see the light of, in the order of the scene within each class. With `shadows`,
+    /// those that cast some are classes of their own, and have their map if one of `views` is it. A shadow map itself is lit
+    /// by nothing.
+    pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
+        self.records.clear();
+        self.ranges = Default::default();
         if view.kind() == ViewKind::Shadow {
-            return table;
+            return;
         }
-        let mut maps = vec![None; lights.len()];
+        let mut maps = vec![None; if shadows { lights.len() } else { 0 }];
         for map in views {
             if let Some(place) = map.light.and_then(|light| maps.get_mut(light)) {
                 *place = Some(map);
             }
         }
         let mut counts = [0; LightClass::COUNT];
-        let mut reaching: Vec<(usize, &Light, Option<&RenderView>)> = Vec::with_capacity(lights.len());
-        for (light, map) in lights.iter().zip(maps) {
+        self.reaching.clear();
+        for (index, light) in lights.iter().enumerate() {
             if light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius)) {
-                let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() };
-                counts[class.index()] += 1;
-                reaching.push((class.index(), light, map));
+                let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() }.index();
+                counts[class] += 1;
+                self.reaching.push((class, index));
             }
         }
         let origin = view.camera.position;
-        table.records.reserve_exact(reaching.len());
         // Scenes have lights of few classes, and the others are not worth a look at every light.
-        for (index, _) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
-            let start = table.records.len() as u32;
-            let of_class = reaching.iter().filter(|(class, ..)| *class == index);
-            table.records.extend(of_class.map(|(_, light, map)| LightRecord::new(light, origin, *map)));
-            table.ranges[index] = start..table.records.len() as u32;
+        for (class, _) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
+            let start = self.records.len() as u32;
+            let of_class = self.reaching.iter().filter(|(other, _)| *other == class);
+            let record = |&(_, light): &(usize, usize)| {
+                LightRecord::new(&lights[light], origin, maps.get(light).copied().flatten())
+            };
+            self.records.extend(of_class.map(record));
+            self.ranges[class] = start..self.records.len() as u32;
         }
-        table
     }
 
     /// All of them.
@@ -186,7 +191,8 @@ mod tests {
             layer: 7,
             ..RenderView::new(&Camera::looking_at("map", DVec3::ZERO, DVec3::Y))
         };
-        let table = LightTable::new(&view, &lights, &[view.clone(), map], true);
+        let mut table = LightTable::default();
+        table.fill(&view, &lights, &[view.clone(), map], true);
         let class = |kind, shadowed| table.range(LightClass { kind, shadowed });
         assert_eq!(class(LightKind::Point, false), 0..2);
         assert_eq!(class(LightKind::Spot, false), 2..3);

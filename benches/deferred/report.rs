@@ -1,0 +1,114 @@
+//! What was measured, as tables and as JSON.
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::{Extent, lights, pre_pass, shadows};
+
+/// What was measured.
+#[derive(Serialize)]
+pub struct Report {
+    extent: &'static str,
+    /// On `noop`, and on the adapter.
+    rounds: [usize; 2],
+    picture: [u32; 2],
+    boxes: usize,
+    adapter: Option<String>,
+    pub lights: Vec<lights::Line>,
+    pub shadows: Vec<shadows::Line>,
+    pub depth_pre_pass: Vec<pre_pass::Line>,
+}
+
+impl Report {
+    pub fn new(extent: &Extent, adapter: Option<String>) -> Self {
+        Self {
+            extent: extent.name,
+            rounds: extent.rounds,
+            picture: extent.picture,
+            boxes: extent.boxes,
+            adapter,
+            lights: Vec::new(),
+            shadows: Vec::new(),
+            depth_pre_pass: Vec::new(),
+        }
+    }
+
+    pub fn print(&self) {
+        let Self { extent, rounds: [noop, adapter_rounds], picture: [width, height], boxes, adapter, .. } = self;
+        println!(
+            "{extent} run: medians of {noop} frames on noop and {adapter_rounds} on the adapter, {width} × {height} pixels"
+        );
+        println!(
+            "{boxes} boxes in the field{}",
+            if *extent == "trial" { "; a trial, whose figures mean nothing" } else { "" }
+        );
+        println!("adapter: {}", adapter.as_deref().unwrap_or("none"));
+        println!(
+            "CPU ms: from the scene's hand-over to the return of submit; device ms: from the call of submit until drawn\n"
+        );
+        lights::print(&self.lights);
+        shadows::print(&self.shadows);
+        pre_pass::print(&self.depth_pre_pass);
+    }
+
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self) -> Result<(), Box<dyn Error>> {
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("the target folder has no name")?;
+        let folder = target.join("drawloom");
+        let path = folder.join("deferred.json");
+        fs::create_dir_all(&folder)?;
+        fs::write(&path, serde_json::to_string_pretty(self)? + "\n")?;
+        println!("{} written", path.display());
+        Ok(())
+    }
+}
+
+pub fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+/// A table whose columns are as wide as what is in them. Columns of numbers are aligned to the right.
+pub struct Table {
+    lines: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub fn new(headings: &[&str]) -> Self {
+        Self { lines: vec![headings.iter().map(|&heading| heading.to_owned()).collect()] }
+    }
+
+    pub fn line<const COLUMNS: usize>(&mut self, cells: [String; COLUMNS]) {
+        self.lines.push(cells.into());
+    }
+
+    pub fn print(&self) {
+        let columns = 0..self.lines[0].len();
+        let width_of = |column: usize| self.lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+        let is_number =
+            |cell: &String| cell.is_empty() || cell.starts_with(|first: char| "-0123456789".contains(first));
+        let numeric =
+            |column: usize| self.lines[1..].iter().all(|line| is_number(&line[column]) && !line[column].contains(' '));
+        let columns: Vec<_> = columns.map(|column| (width_of(column).max(3), numeric(column))).collect();
+        for (index, line) in self.lines.iter().enumerate() {
+            let aligned = line.iter().zip(&columns).map(|(cell, &(width, right))| {
+                if right { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+            });
+            println!("| {} |", aligned.collect::<Vec<_>>().join(" | "));
+            if index == 0 {
+                let ruled =
+                    columns.iter().map(
+                        |&(width, right)| {
+                            if right { format!("{}:", "-".repeat(width - 1)) } else { "-".repeat(width) }
+                        },
+                    );
+                println!("| {} |", ruled.collect::<Vec<_>>().join(" | "));
+            }
+        }
+        println!();
+    }
+}

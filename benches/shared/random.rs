@@ -1,0 +1,42 @@
+//! Numbers that are the same on every machine.
+
+use std::f64::consts::TAU;
+
+use drawloom::glam::{DVec3, Vec3};
+
+/// A Weyl sequence, mixed: enough to scatter things.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new() -> Self {
+        Self(0x5eed_d1a3_0000_0001)
+    }
+
+    /// From `low` to `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// A number below `count`.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+
+    /// Each coordinate from `low` to `high`.
+    pub fn vector(&mut self, low: f64, high: f64) -> Vec3 {
+        DVec3::from_array([(); 3].map(|()| self.between(low, high))).as_vec3()
+    }
+
+    /// Of unit length.
+    pub fn direction(&mut self) -> DVec3 {
+        let (height, turn) = (self.between(-1.0, 1.0), self.between(0.0, TAU));
+        let across = (1.0 - height * height).sqrt();
+        DVec3::new(across * turn.cos(), height, across * turn.sin())
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ (self.0 >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+        mixed ^ (mixed >> 29)
+    }
+}
