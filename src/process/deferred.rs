@@ -7,6 +7,7 @@ use super::{
     Requirements, ShadowCasters, ToneMapping, Transparency,
 };
 use crate::queue::MaterialShare;
+use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 
 /// The deferred pipeline of L 4: its settings, its post-processing, and what an engine replaces or leaves out. What it adds
@@ -152,7 +153,8 @@ impl Deferred {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
         let maps = self.shadow_maps.as_ref().filter(|_| requirements.shadows());
         if maps.is_some() {
-            processes.push(Arc::new(ShadowCasters));
+            let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
+            processes.push(Arc::new(ShadowCasters { hemispheres }));
         }
         if self.depth_pre_pass {
             processes.push(Arc::new(DepthPrePass));

@@ -10,7 +10,7 @@ use crate::queue::{Blending, MaterialShare, Selection};
 /// | target | what | format, unless set otherwise |
 /// | --- | --- | --- |
 /// | `depth` | reversed depth, 0 where nothing is | [`Format::Depth32Float`] |
-/// | `normal` | in the world, octahedral (Cigolle et al. 2014), at most 0.02° off | [`Format::Rg16Float`] |
+/// | `normal` | in the world, octahedral (Cigolle et al. 2014), at most 0.06° off if the device rounds | [`Format::Rg16Float`] |
 /// | `diffuse` | the share of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
 /// | `radiance` | what the surface gives off by itself and reflects of the ambient light, and the scene's background | [`Format::Rgba16Float`] |
 ///

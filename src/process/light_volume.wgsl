@@ -12,7 +12,13 @@ fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instanc
     if light.kind != POINT {
         local = around_axis(light.direction, cone_corner(corner, light.cone_end, range));
     }
-    return LightPixel(clip_position(light.position + local), instance);
+    var clip = clip_position(light.position + local);
+    if view.projection == ORTHOGRAPHIC && dot(light.position, view.forward) + 2.0 * range > view.far {
+        // The far plane would cut the far side off, and what lies before it would stay dark. All corners of a light take the
+        // same way, since a side with one of its corners moved would be tilted.
+        clip.z = 0.0;
+    }
+    return LightPixel(clip, instance);
 }
 
 // How large a light volume is beyond the light, as a share of its range: the same as in `light_volume.rs`.

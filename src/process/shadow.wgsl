@@ -16,11 +16,8 @@ fn lit_share(light: Light, place: vec3<f32>, normal: vec3<f32>) -> f32 {
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - place);
     }
-    // The surface lies within a pixel of the map at a slope, and within the pixels that the filter reads at as many times that.
-    let cosine = clamp(dot(normal, towards), 0.05, 1.0);
-    let slope = sqrt(1.0 - cosine * cosine) / cosine;
-    let pixel = map_place(light, place).pixel;
-    let offset = SHADOW_BIAS * pixel * (0.1 + (0.7 + f32(SHADOW_FILTER)) * slope);
+    // Within the pixels that the filter reads, the surface comes nearer to the light by as much as this.
+    let offset = SHADOW_BIAS * map_place(light, place).pixel * (0.1 + f32(SHADOW_FILTER + 1) * map_slope(light, normal, towards));
 
     // Towards the light, so that it stays at its place of the map.
     let moved = map_place(light, place + towards * min(offset, length(light.position - place)));
@@ -28,6 +25,19 @@ fn lit_share(light: Light, place: vec3<f32>, normal: vec3<f32>) -> f32 {
         return 1.0;
     }
     return filtered(light.shadow_layer, moved);
+}
+
+// How much nearer a surface comes to a light, at most, over a pixel of its map along both of the map's axes: in widths of a
+// pixel, along the way to the light.
+fn map_slope(light: Light, normal: vec3<f32>, towards: vec3<f32>) -> f32 {
+    let cosine = clamp(dot(normal, towards), 1e-3, 1.0);
+    if light.kind == HEMISPHERICAL {
+        // A pixel's diagonal, and a little more because pixels differ.
+        return 1.5 * sqrt(1.0 - cosine * cosine) / cosine;
+    }
+    // The map is flat: what faces the light, but not along its axis, has a slope in it too.
+    let local = rotate(vec4<f32>(-light.shadow_orientation.xyz, light.shadow_orientation.w), normal);
+    return (abs(local.x) + abs(local.y)) / cosine;
 }
 
 fn map_place(light: Light, place: vec3<f32>) -> MapPlace {

@@ -10,8 +10,12 @@ use crate::scene::ViewKind;
 /// (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the rasterizer
 /// state; clear the depth; draw all objects that cast shadows. The last three are those of
 /// [`LightVolumes`](super::LightVolumes).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ShadowCasters;
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowCasters {
+    /// Whether there are hemispherical lights, whose maps must not show what is behind the light. It costs a look at each
+    /// pixel, which other maps do without.
+    pub hemispheres: bool,
+}
 
 impl ShadowCasters {
     /// The target's name.
@@ -30,7 +34,11 @@ impl RenderProcess for ShadowCasters {
 
     fn draws(&self) -> Draws<'_> {
         let shader = include_str!("shadow_map.wgsl");
-        Draws::Commands(CommandDraws { shader, fragment: None, ..CommandDraws::default() })
+        Draws::Commands(CommandDraws {
+            shader,
+            fragment: self.hemispheres.then_some("fragment"),
+            ..CommandDraws::default()
+        })
     }
 }
 

@@ -62,9 +62,10 @@ impl ShadowMaps {
                 let radius = radius * (1.0 + 4.0 / f64::from(self.side));
                 let orientation = looking_along(direction);
                 let center = self.snapped(center, radius, orientation.as_dquat().normalize());
-                let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * (2.0 * radius);
-                let radius = radius as f32;
-                (position, direction, Projection::Orthographic { height: 2.0 * radius }, [radius, 3.0 * radius])
+                let height = radius * (TOWARDS_THE_SUN + 2.0);
+                let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * height;
+                let (radius, height) = (radius as f32, height as f32);
+                (position, direction, Projection::Orthographic { height: 2.0 * radius }, [radius, height + radius])
             }
         };
         Some(Camera {
@@ -124,6 +125,11 @@ impl Default for ShadowMaps {
 
 /// Where a light's map begins, as a share of its range.
 const NEAREST: f32 = 1e-3;
+
+/// How far before what is seen a directional light's map begins, in radii of that. A triangle with a corner even before it is
+/// drawn at a slope that it has not, since that corner is moved. The farther it is, the more f32 rounds: here to within a
+/// hundredth of a pixel of 1024.
+const TOWARDS_THE_SUN: f64 = 16.0;
 
 /// In radians. Towards 180° the middle of a perspective picture shrinks to nothing.
 const WIDEST_SPOT: f32 = 2.967;

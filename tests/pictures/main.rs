@@ -10,13 +10,18 @@ mod changes;
 mod devices;
 mod geometry;
 mod judge;
+mod light_volumes;
 mod lighting;
 mod placement;
 mod post;
 mod processes;
+mod rays;
 mod references;
 mod requirements;
 mod same_bytes;
+mod shadow_bias;
+mod shadow_casters;
+mod shadows;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 mod studio;
@@ -36,6 +41,7 @@ fn main() {
     let cases = [
         (changes::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
+        (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
@@ -46,6 +52,9 @@ fn main() {
         (same_bytes::CASES, Needs::Adapter),
         (same_bytes::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (transparency::CASES, Needs::Adapter),
+        (shadow_bias::CASES, Needs::Adapter),
+        (shadow_casters::CASES, Needs::Adapter),
+        (shadows::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];
     for (cases, needs) in cases {

@@ -1,0 +1,360 @@
+//! The geometry that lights are drawn as cuts off nothing that they reach.
+
+use drawloom::glam::{DQuat, DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::scene::{Camera, Light, Projection};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::rays::{Counts, Panel, Stage};
+use crate::scenes::sized;
+use crate::studio::{Studio, radiance};
+
+pub const CASES: &[Case] = &[
+    ("lights_reach_to_the_end_of_their_range", end_of_range),
+    ("cones_of_every_width_light_all_they_reach", cones),
+    ("hemispheres_light_all_they_reach", hemispheres),
+    ("spheres_light_all_they_reach", spheres),
+    ("lights_are_right_from_within", from_within),
+    ("the_near_plane_may_cut_what_a_light_reaches", near_plane),
+    ("a_hundred_lights_add_up", hundred),
+    ("lights_are_hidden_and_hide_nothing", depth_is_left_alone),
+    ("parallel_rays_see_the_same_light", orthographic),
+    ("light_far_from_the_origin_is_as_near_it", far_away),
+];
+
+const RANGE: f64 = 4.0;
+
+fn point(position: DVec3) -> Light {
+    Light::Point { position, intensity: Vec3::new(50.0, 40.0, 30.0), range: RANGE as f32 }
+}
+
+/// It is bright right up to its edge, so that an edge that is cut off shows.
+fn spot(position: DVec3, direction: DVec3, degrees: f32) -> Light {
+    let outer_angle = degrees.to_radians();
+    Light::Spot {
+        position,
+        direction: direction.as_vec3().normalize(),
+        intensity: Vec3::new(50.0, 40.0, 30.0),
+        range: RANGE as f32,
+        inner_angle: outer_angle * 0.9,
+        outer_angle,
+        casts_shadow: false,
+    }
+}
+
+fn hemisphere(position: DVec3, direction: DVec3) -> Light {
+    Light::Hemispherical {
+        position,
+        direction: direction.as_vec3().normalize(),
+        intensity: Vec3::new(50.0, 40.0, 30.0),
+        range: RANGE as f32,
+        casts_shadow: false,
+    }
+}
+
+fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
+    let field_of_view = degrees.to_radians() as f32;
+    let camera = Camera::looking_at("main", position, target);
+    sized(Camera { projection: Projection::Perspective { field_of_view }, ..camera }, [64, 64])
+}
+
+/// The six axes, and four ways between them.
+fn directions() -> impl Iterator<Item = DVec3> {
+    let between = [[1.0, 0.3, 0.3], [-0.3, 0.9, 0.2], [0.4, -0.1, -0.9], [1e-4, 1e-4, -1.0]].map(DVec3::from);
+    DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).chain(between).map(DVec3::normalize)
+}
+
+fn end_of_range() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let place = DVec3::new(0.3, -0.2, 0.5);
+    for light in [point(place), spot(place, DVec3::NEG_Z, 45.0), hemisphere(place, DVec3::NEG_Z)] {
+        for (share, is_lit) in [(0.02, true), (0.5, true), (0.97, true), (0.999, true), (1.0, false), (1.2, false)] {
+            let wall = Panel::facing(place + DVec3::NEG_Z * (share * RANGE), DVec3::Z, 40.0);
+            let stage = Stage::new(vec![wall], vec![light]);
+            // A light close to the wall lights little of it.
+            let target = wall.center;
+            let views = [
+                camera(place + DVec3::new(0.01, 0.02, 1.0), target, 90.0),
+                camera(place + DVec3::new(1.5, 0.3, 0.3), target, 3.0),
+                camera(place + DVec3::new(1.5, 0.3, 0.3), target, 120.0),
+            ];
+            let counts = stage.expect(&mut studio, &views)?;
+            if (counts.lit > 0) != is_lit {
+                return Err(format!("{light:?} at {share} of its range: {counts:?}").into());
+            }
+        }
+    }
+    // One without a place lights what is as far as can be.
+    for distance in [1.0, 1e3, 1e6] {
+        let sun = Light::Directional {
+            direction: Vec3::new(0.48, -0.6, -0.64),
+            illuminance: Vec3::new(3.0, 2.0, 1.0),
+            casts_shadow: false,
+        };
+        let stage = Stage::new(vec![Panel::facing(DVec3::NEG_Z * distance, DVec3::Z, distance)], vec![sun]);
+        let counts = stage.expect(&mut studio, &[camera(DVec3::ZERO, DVec3::NEG_Z, 80.0)])?;
+        expect_lit(counts, 1.0)?;
+    }
+    Ok(())
+}
+
+/// Fails unless about this share of the pixels that are sure is lit.
+fn expect_lit(counts: Counts, least: f64) -> Result<(), Failed> {
+    let Counts { lit, dark, fading, edges } = counts;
+    let all = (lit + dark + fading + edges) as f64;
+    let sure = fading as f64 <= 0.05 * all && edges as f64 <= 0.05 * all;
+    if sure && lit as f64 >= least * all { Ok(()) } else { Err(format!("too little to judge: {counts:?}").into()) }
+}
+
+/// A room around a light: it reaches the middles of the walls, but not the corners.
+fn room(light: Light) -> Stage {
+    Stage::new(Panel::room(DVec3::ZERO, 0.8 * RANGE), vec![light])
+}
+
+fn cones() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    for degrees in [1.0_f32, 10.0, 45.0, 80.0, 90.0] {
+        for direction in directions() {
+            // Askew, so that the axis meets no corner.
+            let place = DVec3::new(0.11, -0.23, 0.17);
+            let stage = room(spot(place, direction, degrees));
+            let aside = direction.any_orthonormal_vector();
+            let ahead = place + direction * (0.6 * RANGE);
+            let wide = (f64::from(degrees) * 2.6).min(110.0);
+            let views = [
+                camera(place - direction * 0.2 + aside * 0.3, place + direction * RANGE, wide),
+                camera(place + aside * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
+                camera(place + (direction + aside) * 0.4, place - direction, 100.0),
+            ];
+            let counts = stage.expect(&mut studio, &views).map_err(|failed| told(failed, degrees, direction))?;
+            expect_lit(counts, 0.05).map_err(|failed| told(failed, degrees, direction))?;
+        }
+    }
+    Ok(())
+}
+
+fn told(failed: Failed, degrees: f32, direction: DVec3) -> Failed {
+    format!("{degrees} degrees around {direction}: {}", failed.message().unwrap_or("")).into()
+}
+
+fn hemispheres() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    for direction in directions() {
+        let place = DVec3::new(0.11, -0.23, 0.17);
+        let aside = direction.any_orthonormal_vector();
+        let views = [
+            camera(place - direction * 0.3, place + direction, 110.0),
+            camera(place + direction * 2.0, place + aside, 100.0),
+            camera(place - aside, place - direction + aside * 4.0, 100.0),
+        ];
+        let counts = room(hemisphere(place, direction)).expect(&mut studio, &views)?;
+        expect_lit(counts, 0.15).map_err(|failed| told(failed, 90.0, direction))?;
+    }
+    Ok(())
+}
+
+fn spheres() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    // Walls that cut a ball in half, seen from all sides: its outline is that of what it reaches.
+    for direction in directions() {
+        let place = DVec3::new(0.3, 0.1, -0.2);
+        let wall = Panel::facing(place - direction * 0.05, direction, 3.0 * RANGE);
+        let stage = Stage::new(vec![wall], vec![point(place)]);
+        let aside = direction.any_orthonormal_vector();
+        let views = [
+            camera(place + direction * 12.0, place, 45.0),
+            camera(place + (direction + aside * 2.0) * 3.0, place, 70.0),
+            camera(place + (direction * 0.1 - aside) * 3.0, place, 100.0),
+        ];
+        expect_lit(stage.expect(&mut studio, &views)?, 0.2)?;
+    }
+    Ok(())
+}
+
+fn from_within() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let place = DVec3::new(0.11, -0.23, 0.17);
+    let direction = DVec3::new(0.6, 0.0, -0.8);
+    let half_angle = 30.0_f32;
+    // On the cone's edge at half of its height.
+    let turn = DQuat::from_rotation_y(f64::from(half_angle).to_radians());
+    let edge = turn * direction * (0.5 * RANGE);
+    for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
+        let stage = Stage::new(Panel::room(DVec3::ZERO, 1.5 * RANGE), vec![light]);
+        let eyes = [
+            DVec3::ZERO,
+            direction * 1e-3,
+            direction * (RANGE * 0.5),
+            direction * (RANGE * 0.9999),
+            direction * (RANGE * 1.0001),
+            direction * (RANGE * 1.2),
+            -direction * 1e-3,
+            -direction * 0.1,
+            -direction * (RANGE * 0.999),
+            edge * 0.999,
+            edge,
+            edge * 1.001,
+            DVec3::Y * 0.05,
+            DVec3::Y * (RANGE * 0.9999),
+        ];
+        let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
+        for eye in eyes {
+            let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
+            stage.expect(&mut studio, &views).map_err(|failed| told(failed, half_angle, eye))?;
+        }
+    }
+    // The room above is beyond the range of much; in this one walls are lit all around.
+    for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
+        for eye in [DVec3::ZERO, direction * 1.5, -direction, edge] {
+            let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
+            let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
+            let counts = room(light).expect(&mut studio, &views).map_err(|failed| told(failed, half_angle, eye))?;
+            expect_lit(counts, 0.01)?;
+        }
+    }
+    Ok(())
+}
+
+fn near_plane() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let place = DVec3::new(0.11, -0.23, 0.17);
+    let direction = DVec3::new(0.0, 0.6, -0.8);
+    for light in [point(place), spot(place, direction, 40.0), hemisphere(place, direction)] {
+        for near in [0.5, 2.0, 3.0, 3.9] {
+            let eyes = [place, place - direction, place + DVec3::new(1.5, 0.2, 1.0), place + DVec3::X * 1.2];
+            let views = eyes.map(|eye| {
+                let view = camera(eye, place + direction * 2.0 + DVec3::X * 0.1, 90.0);
+                Camera { near, ..view }
+            });
+            stage_of_near_plane(light).expect(&mut studio, &views).map_err(|failed| told(failed, near, direction))?;
+        }
+    }
+    Ok(())
+}
+
+fn stage_of_near_plane(light: Light) -> Stage {
+    let mut stage = room(light);
+    // Something within the light, some of it before the near plane.
+    stage.panels.extend(Panel::closed_box(DVec3::new(0.3, 0.9, -1.6), DVec3::new(0.5, 0.1, 0.4)));
+    stage
+}
+
+fn hundred() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 8.0);
+    let light = |index: u32| {
+        let [column, row] = [index % 10, index / 10].map(f64::from);
+        let position = DVec3::new(column - 4.5, row - 4.5, 0.3 + 0.05 * ((column * 3.0 + row * 7.0) % 5.0));
+        let intensity = Vec3::new(1.0 + (index % 3) as f32, (index % 5) as f32, 0.25 * (index % 7) as f32);
+        Light::Point { position, intensity, range: 1.0 + 0.5 * (index % 4) as f32 }
+    };
+    let stage = Stage::new(vec![wall], (0..100).map(light).collect());
+    let view = camera(DVec3::new(0.5, -1.0, 9.0), DVec3::ZERO, 65.0);
+    expect_lit(stage.expect(&mut studio, std::slice::from_ref(&view))?, 0.7)?;
+
+    let recorded = studio.record(&stage.scene(&[view])?)?;
+    let processes = studio.renderer.plan().processes().iter();
+    let names: Vec<_> = processes.map(|planned| planned.process.name().to_owned()).collect();
+    if names != ["geometry buffer", "point lights", "tone mapping"] || recorded.statistics().views[0].lights != 100 {
+        return Err(format!("{names:?} draw {} lights", recorded.statistics().views[0].lights).into());
+    }
+    Ok(())
+}
+
+fn depth_is_left_alone() -> Result<(), Failed> {
+    let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 2.0);
+    let behind = DVec3::NEG_Z;
+    let small = |light: Light| match light {
+        Light::Point { position, intensity, .. } => Light::Point { position, intensity, range: 0.9 },
+        other => other,
+    };
+    let lights = [small(point(behind)), spot(behind, DVec3::NEG_Z, 60.0), hemisphere(behind, DVec3::NEG_Z)];
+    let mut studio = Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).output("depth"))?;
+    let view = camera(DVec3::new(1.0, 0.5, 4.0), DVec3::ZERO, 60.0);
+    let mut depths = Vec::new();
+    // Behind the wall; at both of its sides; before it.
+    let before = lights.map(|light| shifted(light, DVec3::Z * 2.0));
+    for lights in [vec![], lights.to_vec(), lights.into_iter().chain(before).collect(), before.to_vec()] {
+        let stage = Stage::new(vec![wall, Panel::facing(DVec3::NEG_Z * 2.5, DVec3::Z, 1.0)], lights);
+        stage.expect(&mut studio, std::slice::from_ref(&view))?;
+        let recorded = studio.record(&stage.scene(std::slice::from_ref(&view))?)?;
+        depths.push(studio.submit(recorded)?.read(0, "depth")?);
+    }
+    if depths.iter().any(|depth| *depth != depths[0]) {
+        return Err("lights change the depth".into());
+    }
+    Ok(())
+}
+
+fn shifted(light: Light, shift: DVec3) -> Light {
+    let mut light = light;
+    if let Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } =
+        &mut light
+    {
+        *position += shift;
+    }
+    light
+}
+
+fn orthographic() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let place = DVec3::new(0.11, -0.23, 0.17);
+    let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
+    let sun = Light::Directional {
+        direction: Vec3::new(0.48, -0.6, -0.64),
+        illuminance: Vec3::new(3.0, 2.0, 1.0),
+        casts_shadow: false,
+    };
+    for light in [point(place), spot(place, direction, 35.0), hemisphere(place, direction), sun] {
+        for (from, near, far) in [
+            (DVec3::new(1.0, 2.0, 2.5), 0.1, 50.0),
+            // The light reaches beyond where the camera ends, and before where it begins.
+            (DVec3::new(0.5, 1.0, 2.5), 0.1, 7.0),
+            (DVec3::new(0.0, 0.0, 2.0), 2.5, 5.3),
+            (DVec3::new(0.0, 0.0, 2.0), 0.5, 5.3),
+            (DVec3::new(0.0, 0.0, -2.0), 0.01, 1.3),
+        ] {
+            let looking = Camera::looking_at("plan", from, from + DVec3::new(-0.1, -0.1, -1.0));
+            let projection = Projection::Orthographic { height: 5.0 };
+            let view = sized(Camera { projection, near, far, ..looking }, [64, 64]);
+            let counts = room(light).expect(&mut studio, &[view]).map_err(|failed| told(failed, far, from))?;
+            if counts.lit == 0 {
+                return Err(format!("{light:?} from {from}: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn far_away() -> Result<(), Failed> {
+    let mut studio = Studio::new()?;
+    let shift = DVec3::new(1e6, -5e5, 2.5e5);
+    let place = DVec3::new(0.11, -0.23, 0.17);
+    let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
+    for light in [point(place), spot(place, direction, 35.0), hemisphere(place, direction)] {
+        let mut stage = room(shifted(light, shift));
+        stage.panels.iter_mut().for_each(|panel| panel.center += shift);
+        let eye = shift + DVec3::new(-1.0, 0.5, 2.0);
+        let view = camera(eye, eye + direction, 100.0);
+        expect_lit(stage.expect(&mut studio, std::slice::from_ref(&view))?, 0.04)?;
+
+        // To all bits that half floats have, it is the picture that is drawn near the origin.
+        let near = Camera { position: view.position - shift, ..view.clone() };
+        let pictures = [(room(light), near), (stage, view)].map(|(stage, view)| {
+            let recorded = studio.record(&stage.scene(&[view])?)?;
+            radiance(&studio.submit(recorded)?, 0)
+        });
+        let [one, other] = pictures;
+        let differ = one?
+            .as_flattened()
+            .iter()
+            .zip(other?.as_flattened())
+            .map(|(one, other)| (one - other).abs() / one.max(1.0))
+            .fold(0.0, f64::max);
+        if differ > 2e-3 {
+            return Err(format!("far away it is off by {differ}").into());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,476 @@
+//! What a picture of flat panels should be, found by rays in f64: an answer that shares nothing with the renderer.
+
+use std::f64::consts::{PI, TAU};
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex};
+use drawloom::view::ShadowMaps;
+use libtest_mimic::Failed;
+
+use crate::studio::{Studio, radiance};
+
+/// A flat parallelogram of white that reflects all light, and is seen from the side that right × up points to.
+#[derive(Clone, Copy, Debug)]
+pub struct Panel {
+    /// In the world, in metres.
+    pub center: DVec3,
+    /// From the centre to the middle of an edge.
+    pub right: DVec3,
+    /// From the centre to the middle of the next edge.
+    pub up: DVec3,
+    /// Whether it is seen from both sides, and keeps light from either side.
+    pub double_sided: bool,
+}
+
+impl Panel {
+    /// One that is seen from the side it faces alone.
+    pub fn new(center: DVec3, right: DVec3, up: DVec3) -> Self {
+        Self { center, right, up, double_sided: false }
+    }
+
+    /// A square of this half width around a centre.
+    pub fn facing(center: DVec3, normal: DVec3, half: f64) -> Self {
+        let right = normal.any_orthonormal_vector();
+        Self::new(center, right * half, normal.cross(right) * half)
+    }
+
+    /// The same, seen from both sides.
+    pub fn double_sided(self) -> Self {
+        Self { double_sided: true, ..self }
+    }
+
+    pub fn normal(&self) -> DVec3 {
+        self.right.cross(self.up).normalize()
+    }
+
+    /// Six that face inwards: a room.
+    pub fn room(center: DVec3, half: f64) -> Vec<Self> {
+        DVec3::AXES
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .map(|axis| Self::facing(center + axis * half, -axis, half))
+            .collect()
+    }
+
+    /// Six that face outwards: a box.
+    pub fn closed_box(center: DVec3, half: DVec3) -> Vec<Self> {
+        let side = |axis: DVec3, right: DVec3| {
+            let up = axis.cross(right);
+            Self::new(center + axis * half, right * half, up * half)
+        };
+        let axes = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
+        axes.into_iter().flat_map(|(axis, right)| [side(axis, right), side(-axis, right)]).collect()
+    }
+
+    fn mesh(&self) -> Result<Mesh, Failed> {
+        let normal = self.normal().as_vec3().to_array();
+        let corner = |x: f64, y: f64| Vertex {
+            position: (self.right * x + self.up * y).as_vec3().to_array(),
+            normal,
+            uv: [0.0; 2],
+        };
+        let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
+        Ok(Mesh::new("panel", Topology::TriangleList, corners, vec![0, 1, 2, 2, 1, 3])?)
+    }
+}
+
+/// A panel as rays meet it.
+struct Face {
+    center: DVec3,
+    normal: DVec3,
+    /// What a place's distance from the centre is multiplied by for 1 at the end of `right`, and of `up`.
+    right: DVec3,
+    up: DVec3,
+    double_sided: bool,
+}
+
+impl Face {
+    fn new(panel: &Panel) -> Self {
+        let across = panel.right.cross(panel.up);
+        let size = across.length_squared();
+        let (right, up) = (panel.up.cross(across) / size, across.cross(panel.right) / size);
+        let (center, normal) = (panel.center, across.normalize());
+        Self { center, normal, right, up, double_sided: panel.double_sided }
+    }
+
+    /// Where its plane is met, as a multiple of `along`; infinite where it is parallel.
+    fn plane_share(&self, from: DVec3, along: DVec3) -> f64 {
+        (self.center - from).dot(self.normal) / along.dot(self.normal)
+    }
+
+    fn hit(&self, from: DVec3, along: DVec3) -> Option<f64> {
+        let towards = along.dot(self.normal);
+        if towards == 0.0 || (towards > 0.0 && !self.double_sided) {
+            return None;
+        }
+        let share = (self.center - from).dot(self.normal) / towards;
+        if share <= 0.0 {
+            return None;
+        }
+        let local = from + along * share - self.center;
+        (local.dot(self.right).abs() <= 1.0 && local.dot(self.up).abs() <= 1.0).then_some(share)
+    }
+}
+
+/// Panels, and the lights that shine on them.
+#[derive(Clone, Debug, Default)]
+pub struct Stage {
+    pub panels: Vec<Panel>,
+    pub lights: Vec<Light>,
+    /// How shadows are drawn.
+    pub maps: ShadowMaps,
+}
+
+/// Between what a radiance must be, one channel a component.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub low: DVec3,
+    pub high: DVec3,
+}
+
+impl Stage {
+    pub fn new(panels: Vec<Panel>, lights: Vec<Light>) -> Self {
+        Self { panels, lights, maps: ShadowMaps::default() }
+    }
+
+    /// What the renderer draws of it.
+    pub fn scene(&self, cameras: &[Camera]) -> Result<Scene, Failed> {
+        let mut scene = Scene::new();
+        scene.cameras = cameras.to_vec();
+        scene.lights.clone_from(&self.lights);
+        let material = |double_sided| Material { diffuse: Vec3::ONE, double_sided, ..Material::default() };
+        let [one, both] = [scene.add(material(false))?, scene.add(material(true))?];
+        for panel in &self.panels {
+            let mesh = scene.add(panel.mesh()?)?;
+            let material = if panel.double_sided { both } else { one };
+            scene.add_object(RenderObject::new(mesh, material, panel.center))?;
+        }
+        Ok(scene)
+    }
+}
+
+/// How many pixels of a picture must be what.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    pub lit: usize,
+    pub dark: usize,
+    /// Anything between the two, where a shadow fades.
+    pub fading: usize,
+    /// Anything, at the edges of panels.
+    pub edges: usize,
+}
+
+impl Stage {
+    /// Draws the stage, and fails where a pixel of any camera is not what rays say.
+    pub fn expect(&self, studio: &mut Studio, cameras: &[Camera]) -> Result<Counts, Failed> {
+        self.expect_of(studio, &self.scene(cameras)?)
+    }
+
+    /// Draws a scene, and fails where a pixel of any camera is not what rays say of the stage.
+    pub fn expect_of(&self, studio: &mut Studio, scene: &Scene) -> Result<Counts, Failed> {
+        let recorded = studio.record(scene)?;
+        let submission = studio.submit(recorded)?;
+        let mut counts = Counts::default();
+        for (view, camera) in scene.cameras.iter().enumerate() {
+            let found = radiance(&submission, view)?;
+            self.compare(&found, camera, &scene.cameras, &mut counts)
+                .map_err(|problem| format!("view {view}: {problem}"))?;
+        }
+        Ok(counts)
+    }
+
+    /// The distance to the nearest panel that a ray meets, in lengths of `along`, and which it is.
+    pub fn nearest(&self, from: DVec3, along: DVec3) -> Option<(f64, usize)> {
+        let faces = self.panels.iter().map(Face::new).enumerate();
+        let hits = faces.filter_map(|(index, face)| Some((face.hit(from, along)?, index)));
+        hits.min_by(|one, other| one.0.total_cmp(&other.0))
+    }
+
+    fn compare(
+        &self,
+        found: &[[f64; 3]],
+        camera: &Camera,
+        cameras: &[Camera],
+        counts: &mut Counts,
+    ) -> Result<(), String> {
+        let rays = Rays {
+            eye: Eye::new(camera),
+            camera,
+            faces: self.panels.iter().map(Face::new).collect(),
+            lights: &self.lights,
+            map_pixels: self.lights.iter().map(|light| map_pixel(light, &self.maps, cameras)).collect(),
+            filter: self.maps.filter,
+        };
+        let [width, height] = camera.size;
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let (mut wrong, mut worst) = (0, None::<(f64, u32, u32, DVec3, DVec3, DVec3)>);
+        for ((x, y), &found) in pixels.zip(found) {
+            let Some(Bounds { low, high }) = rays.radiance(x, y) else {
+                counts.edges += 1;
+                continue;
+            };
+            let found = DVec3::from(found);
+            if low.max_element() > 0.0 {
+                counts.lit += 1;
+            } else if high.max_element() < 1e-6 {
+                counts.dark += 1;
+            } else {
+                counts.fading += 1;
+            }
+            if !(found.cmpge(low).all() && found.cmple(high).all()) {
+                wrong += 1;
+                let off = (low - found).max(found - high).max_element() / high.max_element().max(1e-6);
+                if worst.is_none_or(|(most, ..)| off > most || off.is_nan()) {
+                    worst = Some((off, x, y, found, low, high));
+                }
+            }
+        }
+        match worst {
+            None => Ok(()),
+            Some((_, x, y, found, low, high)) => Err(format!(
+                "{wrong} of {} pixels are wrong; at ({x}, {y}) it is {found}, and should be from {low} to {high}",
+                width * height
+            )),
+        }
+    }
+}
+
+/// What rays of one camera find.
+struct Rays<'a> {
+    eye: Eye,
+    camera: &'a Camera,
+    faces: Vec<Face>,
+    lights: &'a [Light],
+    /// One for each light.
+    map_pixels: Vec<f64>,
+    filter: u32,
+}
+
+impl Rays<'_> {
+    /// The nearest face that the camera sees along a ray.
+    fn met(&self, from: DVec3, along: DVec3) -> Option<usize> {
+        let mut nearest = (f64::from(self.camera.far), None);
+        for (index, face) in self.faces.iter().enumerate() {
+            if let Some(share) = face.hit(from, along)
+                && share >= f64::from(self.camera.near)
+                && share <= nearest.0
+            {
+                nearest = (share, Some(index));
+            }
+        }
+        nearest.1
+    }
+
+    /// What a pixel must be; `None` where it lies so close to an edge that rounding decides.
+    fn radiance(&self, x: u32, y: u32) -> Option<Bounds> {
+        let ray = |right: f64, down: f64| self.eye.ray(f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down);
+        let met = |right: f64, down: f64| {
+            let (from, along) = ray(right, down);
+            self.met(from, along)
+        };
+        let index = met(0.0, 0.0);
+        let offset = 0.02;
+        let around = [(offset, offset), (-offset, offset), (offset, -offset), (-offset, -offset)];
+        if around.iter().any(|&(right, down)| met(right, down) != index) {
+            return None;
+        }
+        let Some(index) = index else {
+            return Some(Bounds { low: DVec3::ZERO, high: DVec3::ZERO });
+        };
+        let face = &self.faces[index];
+        let place = |right: f64, down: f64| {
+            let (from, along) = ray(right, down);
+            from + along * face.plane_share(from, along)
+        };
+        let (from, along) = ray(0.0, 0.0);
+        let normal = if along.dot(face.normal) > 0.0 { -face.normal } else { face.normal };
+        let center = place(0.0, 0.0);
+        // A rasterizer puts corners onto a grid of 1/256 of a pixel, and the surface moves as much.
+        let footprint = center.distance(place(1.0, 0.0)).max(center.distance(place(0.0, 1.0)));
+        let error = footprint / 256.0 + from.distance(center) * 1e-5;
+        let mut sum = Bounds { low: DVec3::ZERO, high: DVec3::ZERO };
+        for (light, &pixel) in self.lights.iter().zip(&self.map_pixels) {
+            let [low, high] = illuminance(light, center, normal, error);
+            let [least, most] = if high > 0.0 { self.lit(light, pixel, index, center, normal) } else { [0.0; 2] };
+            let color = color(light) / PI;
+            sum.low += color * (low * least);
+            sum.high += color * (high * most);
+        }
+        // Half floats, rounded once for each light.
+        let rounding = (0.5_f64).powi(11) * (1.0 + self.lights.len() as f64);
+        let smallest = (0.5_f64).powi(22);
+        Some(Bounds { low: sum.low * (1.0 - rounding) - smallest, high: sum.high * (1.0 + rounding) + smallest })
+    }
+
+    /// The least and the most that a light's shadows may leave: all or nothing, but anything in between where the filter
+    /// meets an edge, and close behind what casts the shadow.
+    fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
+        if !light.casts_shadow() {
+            return [1.0; 2];
+        }
+        let width = edge_width(light, pixel, self.filter, place, normal);
+        let right = normal.any_orthonormal_vector();
+        let up = normal.cross(right);
+        let ring = |corners: u32, radius: f64| {
+            (0..corners).map(move |corner| {
+                let (sine, cosine) = (TAU * f64::from(corner) / f64::from(corners)).sin_cos();
+                place + (right * cosine + up * sine) * radius
+            })
+        };
+        let [mut least, mut most] = [1.0, 0.0];
+        for place in ring(24, width * 1.02).chain(ring(6, width * 0.5)).chain([place]) {
+            match self.distance_behind(light, index, place) {
+                None => most = 1.0,
+                Some(distance) if distance < width * 1.1 => (least, most) = (0.0, 1.0),
+                Some(_) => least = 0.0,
+            }
+            if least < most {
+                break;
+            }
+        }
+        [least, most]
+    }
+
+    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place lies on.
+    fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
+        let (from, along) = match *light {
+            Light::Directional { direction, .. } => {
+                let along = direction.as_dvec3().normalize() * 1e4;
+                (place - along, along)
+            }
+            Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
+                (position, place - position)
+            }
+            _ => return None,
+        };
+        let others = self.faces.iter().enumerate().filter(|(other, _)| *other != index);
+        let shares = others.filter_map(|(_, face)| face.hit(from, along)).filter(|share| *share < 1.0 - 1e-9);
+        shares.min_by(f64::total_cmp).map(|share| (1.0 - share) * along.length())
+    }
+}
+
+/// How wide a pixel of a light's map is: in metres for a directional light, and at a distance of 1 m for others, as the
+/// documentation of [`ShadowMaps`] says.
+fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
+    let side = f64::from(maps.side);
+    match *light {
+        Light::Spot { outer_angle, .. } => 2.0 * f64::from(outer_angle.min(1.4835)).tan() / side,
+        // Edges of 5° that are drawn straight are off by half a pixel of 1024.
+        Light::Hemispherical { .. } => 4.0 / side + 1.0 / 1024.0,
+        // The pixel of a map for several cameras depends on all of them.
+        Light::Directional { .. } => {
+            maps.camera(String::new(), light, cameras).map_or(0.0, |map| match map.projection {
+                Projection::Orthographic { height } => f64::from(height) / side,
+                _ => f64::NAN,
+            })
+        }
+        _ => 0.0,
+    }
+}
+
+/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width and
+/// half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope, as much
+/// more. A pixel is what [`map_pixel`] says.
+fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
+    let (pixel, towards) = match *light {
+        Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
+        Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
+            (pixel * place.distance(position), (position - place).normalize())
+        }
+        _ => (pixel, normal),
+    };
+    let cosine = normal.dot(towards).max(1e-3);
+    2_f64.sqrt() * (f64::from(filter) + 1.0) * pixel / cosine
+}
+
+fn color(light: &Light) -> DVec3 {
+    match *light {
+        Light::Directional { illuminance, .. } => illuminance.as_dvec3(),
+        Light::Point { intensity, .. } | Light::Spot { intensity, .. } | Light::Hemispherical { intensity, .. } => {
+            intensity.as_dvec3()
+        }
+        _ => DVec3::ZERO,
+    }
+}
+
+/// The least and the most that a light of intensity 1 brings to a place that is known to within `error` metres.
+fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
+    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are exact, and f32 leaves a little.
+    let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
+    let (position, range) = match *light {
+        Light::Directional { direction, .. } => {
+            let facing = -normal.dot(direction.as_dvec3().normalize());
+            return [-of_normal, of_normal].map(|error| (facing + error).max(0.0));
+        }
+        Light::Point { position, range, .. }
+        | Light::Spot { position, range, .. }
+        | Light::Hemispherical { position, range, .. } => (position, f64::from(range)),
+        _ => return [0.0; 2],
+    };
+    let away = position - place;
+    let distance = away.length();
+    if distance <= error {
+        return [0.0, f64::INFINITY];
+    }
+    let of_angle = error / distance;
+    let ends = [-1.0, 1.0].map(|sign| {
+        let distance = distance - sign * error;
+        let facing = (normal.dot(away.normalize()) + sign * (of_normal + of_angle)).max(0.0);
+        let window = (1.0 - (distance / range).powi(4)).max(0.0);
+        window * window * facing / (distance * distance)
+    });
+    // Cosines carry a few roundings of f32 each.
+    let shape = [-1.0, 1.0].map(|sign| shape(light, -away.normalize(), sign * (of_angle + 4e-7)));
+    [ends[0] * shape[0], ends[1] * shape[1]]
+}
+
+/// How much of a light goes along a direction, were the cosine from its axis this much more.
+fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
+    match *light {
+        Light::Spot { direction, inner_angle, outer_angle, .. } => {
+            let cosine = along.dot(direction.as_dvec3().normalize()) + more;
+            let [begin, end] = [inner_angle, outer_angle].map(|angle| f64::from(angle).cos());
+            let step = ((cosine - end) / (begin - end)).clamp(0.0, 1.0);
+            step * step * (3.0 - 2.0 * step)
+        }
+        Light::Hemispherical { direction, .. } => (along.dot(direction.as_dvec3().normalize()) + more).max(0.0),
+        _ => 1.0,
+    }
+}
+
+/// Where the pixels of a camera's picture look.
+pub struct Eye {
+    position: DVec3,
+    axes: [DVec3; 3],
+    size: [f64; 2],
+    /// Half as high as the picture: in perspective at 1 m.
+    half: f64,
+    perspective: bool,
+}
+
+impl Eye {
+    pub fn new(camera: &Camera) -> Self {
+        let orientation = camera.orientation.as_dquat().normalize();
+        let (half, perspective) = match camera.projection {
+            Projection::Perspective { field_of_view } => ((f64::from(field_of_view) / 2.0).tan(), true),
+            Projection::Orthographic { height } => (f64::from(height) / 2.0, false),
+            _ => (f64::NAN, false),
+        };
+        Self {
+            position: camera.position,
+            axes: [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(|axis| orientation * axis),
+            size: camera.size.map(f64::from),
+            half,
+            perspective,
+        }
+    }
+
+    /// Where a ray begins, and how far it goes for 1 m forward; `x` and `y` in pixels from the upper left.
+    pub fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+        let [right, up, forward] = self.axes;
+        let [width, height] = self.size;
+        let across = right * ((x / width * 2.0 - 1.0) * self.half * width / height)
+            + up * ((1.0 - y / height * 2.0) * self.half);
+        if self.perspective { (self.position, across + forward) } else { (self.position + across, forward) }
+    }
+}

@@ -1,0 +1,278 @@
+//! What casts shadows, what does not, and what a shadow map holds.
+
+use drawloom::glam::{DVec2, DVec3, Quat, Vec3};
+use drawloom::handle::Handle;
+use drawloom::scene::{Blend, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, Topology};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::rays::{Panel, Stage};
+use crate::scenes::{cube, square};
+use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told};
+
+pub const CASES: &[Case] = &[
+    ("boxes_cast_their_shadow_mirrored_or_not", boxes),
+    ("squares_cast_their_shadow_as_lists_and_as_strips", squares),
+    ("what_is_blended_casts_no_shadow", blended_casts_none),
+    ("what_is_blended_is_darker_in_shadow", blended_receives),
+    ("no_scale_spoils_a_shadow_map", extreme_scales),
+    ("a_shadow_map_holds_the_depth_of_what_is_nearest", depths),
+];
+
+fn lights() -> [Light; 3] {
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    let place = DVec3::new(-0.4, 3.0, 0.9);
+    [sun(down), spot(place, down, 45.0), hemisphere(place, down)]
+}
+
+fn floor() -> Panel {
+    Panel::facing(DVec3::ZERO, DVec3::Y, 6.0)
+}
+
+/// A floor in one light, seen from above, and from just over it; and what makes it up.
+struct Set {
+    floor: Stage,
+    scene: Scene,
+}
+
+impl Set {
+    fn new(light: Light) -> Result<Self, Failed> {
+        let views = [
+            camera(DVec3::new(2.0, 3.5, 3.0), DVec3::new(0.3, 0.5, -0.2), 50.0),
+            camera(DVec3::new(1.2, 0.6, 0.8), DVec3::new(0.2, 0.0, -0.2), 80.0),
+        ];
+        let floor = Stage { panels: vec![floor()], lights: vec![light], maps: MAPS };
+        let scene = floor.scene(&views)?;
+        Ok(Self { floor, scene })
+    }
+
+    fn add(
+        &mut self,
+        mesh: Handle<Mesh>,
+        material: Material,
+        change: impl FnOnce(&mut RenderObject),
+    ) -> Result<(), Failed> {
+        let material = self.scene.add(material)?;
+        let mut object = RenderObject::new(mesh, material, DVec3::Y);
+        change(&mut object);
+        self.scene.add_object(object)?;
+        Ok(())
+    }
+
+    /// What it should look like with these panels on top.
+    fn with(&self, panels: Vec<Panel>) -> Stage {
+        let mut stage = self.floor.clone();
+        stage.panels.extend(panels);
+        stage
+    }
+}
+
+fn white() -> Material {
+    Material { diffuse: Vec3::ONE, ..Material::default() }
+}
+
+fn boxes() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        for signs in [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, -1.0), Vec3::NEG_ONE] {
+            let half = Vec3::new(0.5, 0.15, 0.3);
+            let mut set = Set::new(light)?;
+            let mesh = set.scene.add(cube())?;
+            set.add(mesh, white(), |object| object.scale = half * signs)?;
+            let stage = set.with(Panel::closed_box(DVec3::Y, half.as_dvec3()));
+            let counts = stage.expect_of(&mut studio, &set.scene).map_err(|failed| told(failed, signs))?;
+            if counts.dark < 50 {
+                return Err(format!("too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn squares() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        for (topology, mirrored) in
+            [(Topology::TriangleList, 1.0), (Topology::TriangleStrip, 1.0), (Topology::TriangleStrip, -1.0)]
+        {
+            // Seen from both sides; from the light's side alone; from the other alone, and then it casts no shadow.
+            for (double_sided, turn) in [(true, -90.0_f32), (true, 90.0), (false, -90.0), (false, 90.0)] {
+                let mut set = Set::new(light)?;
+                let mesh = set.scene.add(square(topology))?;
+                set.add(mesh, Material { double_sided, ..white() }, |object| {
+                    object.orientation = Quat::from_rotation_x(turn.to_radians());
+                    object.scale = Vec3::new(0.5 * mirrored, 0.4, 0.7);
+                })?;
+                let up = -f64::from(turn).signum();
+                let panel = Panel { double_sided, ..Panel::new(DVec3::Y, DVec3::X * 0.5, DVec3::NEG_Z * (0.4 * up)) };
+                let counts = set.with(vec![panel]).expect_of(&mut studio, &set.scene);
+                let counts =
+                    counts.map_err(|failed| told(failed, format!("{topology:?} {mirrored} {double_sided} {turn}")))?;
+                if (counts.fading > 20) != (double_sided || up > 0.0) {
+                    return Err(format!("{double_sided} {turn}: {counts:?}").into());
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn blended_casts_none() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
+            let mut set = Set::new(light)?;
+            // From below the glass it is not in sight.
+            set.scene.cameras.remove(0);
+            let mesh = set.scene.add(cube())?;
+            set.add(mesh, Material { blend, opacity: 0.9, ..white() }, |object| {
+                object.scale = Vec3::new(0.6, 0.1, 0.6)
+            })?;
+            let counts = set.floor.expect_of(&mut studio, &set.scene)?;
+            if counts.lit < 2500 {
+                return Err(format!("too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A floor of glass that reflects half of the light, before nothing.
+fn blended_receives() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        for blend in [Blend::Alpha, Blend::Additive] {
+            let shade = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
+            let mut set = Set::new(light)?;
+            let mut scene = Stage { panels: vec![shade], ..set.floor.clone() }.scene(&set.scene.cameras[1..])?;
+            std::mem::swap(&mut set.scene, &mut scene);
+            let mesh = set.scene.add(square(Topology::TriangleList))?;
+            set.add(mesh, Material { blend, opacity: 0.5, ..white() }, |object| {
+                object.position = DVec3::ZERO;
+                object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
+                object.scale = Vec3::splat(6.0);
+            })?;
+            let mut stage = set.with(vec![shade]);
+            stage.lights = vec![halved(light)];
+            let counts =
+                stage.expect_of(&mut studio, &set.scene).map_err(|failed| told(failed, format!("{light:?}")))?;
+            if counts.lit < 1000 || counts.dark < 50 {
+                return Err(format!("too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn halved(light: Light) -> Light {
+    let mut light = light;
+    if let Light::Directional { illuminance: color, .. }
+    | Light::Spot { intensity: color, .. }
+    | Light::Hemispherical { intensity: color, .. } = &mut light
+    {
+        *color *= 0.5;
+    }
+    light
+}
+
+fn extreme_scales() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        for scale in [
+            Vec3::ZERO,
+            Vec3::splat(1e-20),
+            // The camera and the light are inside of these, and what faces away from a light casts no shadow.
+            Vec3::new(-1e6, 1e3, 1e5),
+            Vec3::splat(1e20),
+        ] {
+            let mut set = Set::new(light)?;
+            let [mesh, flat] = [set.scene.add(cube())?, set.scene.add(square(Topology::TriangleStrip))?];
+            // Where a lamp is, and about the middle of the scene.
+            set.add(mesh, white(), |object| (object.scale, object.position) = (scale, DVec3::new(-0.4, 3.0, 0.9)))?;
+            set.add(flat, Material { double_sided: true, ..white() }, |object| {
+                object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
+                object.scale = Vec3::splat(0.4);
+            })?;
+            let square = Panel::facing(DVec3::Y, DVec3::Y, 0.4).double_sided();
+            let counts = set.with(vec![square]).expect_of(&mut studio, &set.scene);
+            let counts = counts.map_err(|failed| told(failed, format!("{scale} {light:?}")))?;
+            if counts.dark < 50 {
+                return Err(format!("too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn depths() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for light in lights() {
+        let mut panels = Panel::room(DVec3::Y * 3.5, 3.5);
+        panels.extend(Panel::closed_box(DVec3::new(0.3, 1.2, -0.2), DVec3::new(0.5, 0.2, 0.6)));
+        let stage = Stage { panels, lights: vec![light], maps: MAPS };
+        let view = camera(DVec3::new(2.0, 3.0, 2.0), DVec3::ZERO, 60.0);
+        let map = MAPS.camera(String::new(), &light, std::slice::from_ref(&view)).ok_or("there is no map")?;
+        let recorded = studio.record(&stage.scene(&[view])?)?;
+        let picture = studio.submit(recorded)?.read(1, "shadow map")?;
+        if [picture.width, picture.height] != [MAPS.side; 2] {
+            return Err(format!("it is {} by {}", picture.width, picture.height).into());
+        }
+        let depth = |x: u32, y: u32| {
+            let start = (y * MAPS.side + x) as usize * 4;
+            let bytes = [0, 1, 2, 3].map(|byte| picture.bytes[start + byte]);
+            f64::from(f32::from_le_bytes(bytes))
+        };
+        compare_depths(&stage, &map, depth).map_err(|problem| format!("{light:?}: {problem}"))?;
+    }
+    Ok(())
+}
+
+/// Where a pixel of a map looks from and which way, `along` being as long as depth counts; `None` outside a disc.
+fn look(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
+    let side = f64::from(map.size[0]);
+    let clip = DVec2::new(x / side * 2.0 - 1.0, 1.0 - y / side * 2.0);
+    let orientation = map.orientation.as_dquat().normalize();
+    let (from, along) = match map.projection {
+        Projection::Perspective { field_of_view } => {
+            (DVec3::ZERO, (clip * (f64::from(field_of_view) / 2.0).tan()).extend(-1.0))
+        }
+        Projection::Orthographic { height } => ((clip * (f64::from(height) / 2.0)).extend(0.0), DVec3::NEG_Z),
+        // The half space as a disc: a way that leaves the axis by φ is at tan(φ/2).
+        _ => {
+            let angle = 2.0 * clip.length().atan();
+            let aside = clip.normalize_or(DVec2::X) * angle.sin();
+            (clip.length() < 1.0).then_some((DVec3::ZERO, aside.extend(-angle.cos())))?
+        }
+    };
+    Some((map.position + orientation * from, orientation * along))
+}
+
+fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) -> Result<(), String> {
+    let [near, far] = [map.near, map.far].map(f64::from);
+    let mut compared = 0;
+    for (x, y) in (0..map.size[1]).step_by(5).flat_map(|y| (0..map.size[0]).step_by(3).map(move |x| (x, y))) {
+        let nearest = |right: f64, down: f64| {
+            let (from, along) = look(map, f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down)?;
+            stage.nearest(from, along)
+        };
+        let around = [(0.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let Some(hits) = around.iter().map(|&(right, down)| nearest(right, down)).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
+        if hits.iter().any(|hit| hit.1 != hits[0].1) {
+            continue;
+        }
+        let found = match map.projection {
+            Projection::Perspective { .. } => near / depth(x, y),
+            _ => far - depth(x, y) * (far - near),
+        };
+        // Edges of 5° that are drawn straight are off by half a pixel of 1024, which is a quarter here; and in between, distances
+        // are longer by a thousandth.
+        let slope = hits.iter().map(|hit| (hit.0 - hits[0].0).abs()).fold(0.0, f64::max);
+        if (found - hits[0].0).abs() > 0.3 * slope + 1e-3 * hits[0].0 {
+            return Err(format!("at ({x}, {y}) it is {found} m away, and should be {}", hits[0].0));
+        }
+        compared += 1;
+    }
+    if compared > 2000 { Ok(()) } else { Err(format!("only {compared} pixels could be judged")) }
+}

@@ -1,0 +1,425 @@
+//! Shadows lie where geometry puts them, to within the filter and a pixel of the map.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::scene::{Camera, Light, Projection};
+use drawloom::view::ShadowMaps;
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::rays::{Counts, Panel, Stage};
+use crate::scenes::sized;
+use crate::studio::{Studio, radiance};
+
+pub const CASES: &[Case] = &[
+    ("a_square_casts_the_shadow_that_geometry_says", square_occluder),
+    ("shadows_are_right_in_the_middle_of_a_hemisphere_and_at_its_rim", around_a_hemisphere),
+    ("a_long_beam_casts_a_straight_shadow", long_beam),
+    ("what_passes_a_hemispheres_plane_casts_no_shadow_before_it", across_the_rim),
+    ("a_wall_close_behind_a_hemisphere_casts_no_shadow_before_it", close_behind),
+    ("a_directional_light_is_kept_away_from_however_far", far_towards_the_sun),
+    ("a_tower_keeps_the_sun_from_what_is_close_behind_it", tower),
+    ("beyond_the_reach_of_a_map_all_is_lit", beyond_the_reach),
+    ("each_light_has_its_own_shadow", several_lights),
+    ("maps_of_one_and_two_pixels_do_no_harm", smallest_maps),
+    ("a_spot_light_of_half_a_turn_casts_shadows", widest_spot),
+    ("parallel_rays_see_the_same_shadows", orthographic),
+    ("shadows_far_from_the_origin_are_as_near_it", far_away),
+];
+
+pub const MAPS: ShadowMaps = ShadowMaps { side: 512, reach: 12.0, bias: 1.0, filter: 1 };
+
+/// The shipped processes, with shadow maps like these.
+pub fn studio_with(maps: ShadowMaps) -> Result<Studio, Failed> {
+    Studio::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
+}
+
+pub fn sun(direction: DVec3) -> Light {
+    Light::Directional { direction: direction.as_vec3(), illuminance: Vec3::new(3.0, 2.0, 1.0), casts_shadow: true }
+}
+
+pub fn spot(position: DVec3, direction: DVec3, degrees: f32) -> Light {
+    let outer_angle = degrees.to_radians();
+    Light::Spot {
+        position,
+        direction: direction.as_vec3(),
+        intensity: Vec3::new(50.0, 40.0, 30.0),
+        range: 15.0,
+        inner_angle: outer_angle * 0.9,
+        outer_angle,
+        casts_shadow: true,
+    }
+}
+
+pub fn hemisphere(position: DVec3, direction: DVec3) -> Light {
+    Light::Hemispherical {
+        position,
+        direction: direction.as_vec3(),
+        intensity: Vec3::new(50.0, 40.0, 30.0),
+        range: 15.0,
+        casts_shadow: true,
+    }
+}
+
+pub fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
+    let projection = Projection::Perspective { field_of_view: degrees.to_radians() as f32 };
+    sized(Camera { projection, ..Camera::looking_at("main", position, target) }, [64, 64])
+}
+
+/// The same light, which nothing keeps away.
+pub fn without_shadow(light: Light) -> Light {
+    let mut light = light;
+    if let Light::Directional { casts_shadow, .. }
+    | Light::Spot { casts_shadow, .. }
+    | Light::Hemispherical { casts_shadow, .. } = &mut light
+    {
+        *casts_shadow = false;
+    }
+    light
+}
+
+fn stage(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> Stage {
+    Stage { panels, lights, maps }
+}
+
+/// Fails unless at least these shares of the pixels are surely lit and surely dark, and no more than a fifth is not sure.
+fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
+    let all = (counts.lit + counts.dark + counts.fading + counts.edges) as f64;
+    let enough = counts.lit as f64 >= lit * all && counts.dark as f64 >= dark * all;
+    let sure = (counts.fading + counts.edges) as f64 <= 0.2 * all;
+    if enough && sure { Ok(()) } else { Err(format!("too little to judge: {counts:?}").into()) }
+}
+
+pub fn told(failed: Failed, what: impl std::fmt::Display) -> Failed {
+    format!("{what}: {}", failed.message().unwrap_or("")).into()
+}
+
+/// The six axes, and two ways between them.
+fn directions() -> impl Iterator<Item = DVec3> {
+    let between = [[1.0, 0.3, 0.3], [-0.3, -0.9, 0.2]].map(DVec3::from);
+    DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).chain(between).map(DVec3::normalize)
+}
+
+fn square_occluder() -> Result<(), Failed> {
+    for filter in [0, 1, 4] {
+        let maps = ShadowMaps { filter, ..MAPS };
+        let mut studio = studio_with(maps)?;
+        // The filter is the same whatever the way.
+        for up in directions().skip(if filter == 1 { 0 } else { 7 }) {
+            let aside = up.any_orthonormal_vector();
+            let across = up.cross(aside);
+            let floor = Panel::facing(DVec3::ZERO, up, 6.0);
+            let mut square = Panel::facing(up * 1.2, up, 0.7).double_sided();
+            // Neither along the map's axes nor across them.
+            (square.right, square.up) = (square.right + square.up * 0.3, square.up - square.right * 0.3);
+            let place = up * 3.0 + aside * 0.7 + across * 0.4;
+            let down = (-up - aside * 0.2).normalize();
+            let eye = up * 4.0 - aside * 3.0 + across * 2.0;
+            for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
+                let stage = stage(vec![floor, square], vec![light], maps);
+                let view = camera(eye, aside * -0.5, 50.0);
+                let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, up))?;
+                if filter == 1 {
+                    expect(counts, 0.4, 0.01).map_err(|failed| told(failed, format!("{light:?}")))?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A way that leaves an axis at an angle.
+fn leaving(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
+    let right = axis.any_orthonormal_vector();
+    let aside = right * around.cos() + axis.cross(right) * around.sin();
+    axis * degrees.to_radians().cos() + aside * degrees.to_radians().sin()
+}
+
+fn around_a_hemisphere() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let place = DVec3::new(0.3, 1.0, -2.0);
+    for axis in directions() {
+        for degrees in [5.0, 45.0, 75.0, 85.0] {
+            let way = leaving(axis, degrees, degrees + axis.x);
+            let wall = Panel::facing(place + way * 2.5, -way, 1.5);
+            let square = Panel::facing(place + way, -way, 0.2).double_sided();
+            let stage = stage(vec![wall, square], vec![hemisphere(place, axis)], MAPS);
+            let aside = way.cross(axis).normalize_or(way.any_orthonormal_vector());
+            let view = camera(place + aside * 0.8, wall.center, 40.0);
+            let what = format!("{degrees} degrees from {axis}");
+            let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, &what))?;
+            expect(counts, 0.3, 0.05).map_err(|failed| told(failed, &what))?;
+        }
+    }
+    Ok(())
+}
+
+fn long_beam() -> Result<(), Failed> {
+    let maps = ShadowMaps { side: 1024, ..MAPS };
+    let mut studio = studio_with(maps)?;
+    let floor = Panel::facing(DVec3::Y * -4.0, DVec3::Y, 12.0);
+    let wall = Panel::facing(DVec3::Z * -6.0, DVec3::Z, 12.0);
+    // Below the light; aside; near the plane that it shines from. All are some 2.2 m away, and reach 10 m to either side.
+    for (y, z) in [(-2.2, 0.1), (-1.5, -1.6), (-0.3, -2.2)] {
+        let normal = DVec3::new(0.0, y, z).normalize();
+        let beam = Panel::new(DVec3::new(0.0, y, z), DVec3::X * 10.0, normal.cross(DVec3::X) * 0.1).double_sided();
+        for light in [hemisphere(DVec3::ZERO, DVec3::NEG_Y), sun(normal), spot(DVec3::ZERO, normal, 80.0)] {
+            // A map that sees as much as this would be too coarse for the beam.
+            let maps =
+                if matches!(light, Light::Directional { .. }) { ShadowMaps { reach: 20.0, ..maps } } else { maps };
+            let stage = stage(vec![floor, wall, beam], vec![light], maps);
+            let views = [
+                camera(DVec3::new(0.5, 1.0, 3.0), DVec3::new(0.0, -3.0, -3.0), 70.0),
+                camera(DVec3::new(1.0, 0.5, 1.0), DVec3::new(7.0, -3.0, -4.0), 80.0),
+            ];
+            let counts = if maps.reach == 20.0 {
+                stage.expect(&mut studio_with(maps)?, &views)
+            } else {
+                stage.expect(&mut studio, &views)
+            };
+            let counts = counts.map_err(|failed| told(failed, format!("({y}, {z}) {light:?}")))?;
+            if counts.lit < 3000 {
+                return Err(format!("too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A square before the light, and the wall that its shadow falls on.
+fn before(place: DVec3, axis: DVec3) -> [Panel; 2] {
+    let wall = Panel::facing(place + axis * 3.0, -axis, 3.5);
+    [wall, Panel::facing(place + leaving(axis, 20.0, 0.7) * 1.2, -axis, 0.3).double_sided()]
+}
+
+fn across_the_rim() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let place = DVec3::new(0.3, 1.0, -2.0);
+    for axis in directions().skip(4) {
+        for (turn, distance) in [(40.0, 1.0), (80.0, 0.5), (100.0, 1.0), (150.0, 0.6)] {
+            // From before the light to behind it, 12 m either way.
+            let away = leaving(axis, turn, turn);
+            let slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
+            let mut panels = before(place, axis).to_vec();
+            panels.push(slab);
+            let stage = stage(panels, vec![hemisphere(place, axis)], MAPS);
+            let views = [
+                camera(place - away * 0.2, place + axis * 3.0, 90.0),
+                camera(place - away * 2.0, place + axis + away, 90.0),
+            ];
+            let what = format!("{turn} degrees from {axis}, {distance} m away");
+            let counts = stage.expect(&mut studio, &views).map_err(|failed| told(failed, &what))?;
+            if counts.lit < 500 {
+                return Err(format!("{what}: too little to judge: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn close_behind() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let place = DVec3::new(0.3, 1.0, -2.0);
+    for axis in directions().skip(5) {
+        for turn in [170.0, 175.0, 180.0] {
+            for distance in [0.1, 0.02] {
+                let away = leaving(axis, turn, turn);
+                let mut slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
+                // A corner of one of the triangles that it is split into had better not be straight behind.
+                slab.center += slab.right.normalize() * 0.05 + slab.up.normalize() * 0.12;
+                let mut panels = before(place, axis).to_vec();
+                panels.push(slab);
+                let stage = stage(panels, vec![hemisphere(place, axis)], MAPS);
+                let view = camera(place + axis * 0.5, place + axis * 3.0, 90.0);
+                let what = format!("{turn} degrees from {axis}, {distance} m away");
+                let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, &what))?;
+                if counts.lit < 500 {
+                    return Err(format!("{what}: too little to judge: {counts:?}").into());
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn far_towards_the_sun() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    for height in [5.0, 50.0, 500.0, 5000.0] {
+        let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
+        let kite = Panel::facing(-down * height, DVec3::Y, 1.0).double_sided();
+        let stage = stage(vec![floor, kite], vec![sun(down)], MAPS);
+        let view = camera(DVec3::new(2.0, 3.0, 4.0), DVec3::ZERO, 50.0);
+        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, height))?;
+        expect(counts, 0.4, 0.1).map_err(|failed| told(failed, height))?;
+    }
+    Ok(())
+}
+
+/// Each of its triangles reaches from the ground to far above all that the camera sees.
+fn tower() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    for (height, lean) in [(20.0, 0.0), (100.0, 0.3), (200.0, 0.0)] {
+        let up = DVec3::new(0.0, height / 2.0, lean * height);
+        let tower = Panel::new(up, DVec3::Z * 3.0, up).double_sided();
+        let wall = Panel::new(DVec3::new(1.5, 3.0, 0.0), DVec3::Z * 4.0, DVec3::Y * 3.0).double_sided();
+        let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
+        let stage = stage(vec![tower, wall, floor], vec![sun(DVec3::new(0.6, -0.8, 0.0))], MAPS);
+        let view = camera(DVec3::new(0.3, 2.0, 5.0), DVec3::new(1.5, 3.0, -0.5), 70.0);
+        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, height))?;
+        expect(counts, 0.05, 0.1).map_err(|failed| told(failed, height))?;
+    }
+    Ok(())
+}
+
+fn beyond_the_reach() -> Result<(), Failed> {
+    let maps = ShadowMaps { reach: 5.0, ..MAPS };
+    let mut studio = studio_with(maps)?;
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    // What it would have cast its shadow on is seen from too far away, and so all of that is lit.
+    let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
+    let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
+    let view = camera(DVec3::new(20.0, 30.0, 40.0), DVec3::ZERO, 8.0);
+    let lit =
+        Light::Directional { direction: down.as_vec3(), illuminance: Vec3::new(3.0, 2.0, 1.0), casts_shadow: false };
+    let found = [sun(down), lit].map(|light| {
+        let scene = stage(vec![floor, square], vec![light], maps).scene(std::slice::from_ref(&view))?;
+        studio.draw(&scene)
+    });
+    let [shadowed, lit] = found;
+    if shadowed? != lit? {
+        return Err("there are shadows beyond the reach".into());
+    }
+    // As near as this they are there.
+    let near = camera(DVec3::new(1.0, 2.0, 2.0), DVec3::ZERO, 50.0);
+    expect(stage(vec![floor, square], vec![sun(down)], maps).expect(&mut studio, &[near])?, 0.3, 0.02)
+}
+
+fn several_lights() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
+    let square = Panel::facing(DVec3::new(0.1, 1.0, 0.2), DVec3::Y, 0.5).double_sided();
+    let tinted = |light: Light, tint: Vec3| match light {
+        Light::Spot { position, direction, range, inner_angle, outer_angle, casts_shadow, .. } => {
+            Light::Spot { position, direction, intensity: tint, range, inner_angle, outer_angle, casts_shadow }
+        }
+        Light::Hemispherical { position, direction, range, casts_shadow, .. } => {
+            Light::Hemispherical { position, direction, intensity: tint, range, casts_shadow }
+        }
+        Light::Directional { direction, casts_shadow, .. } => {
+            Light::Directional { direction, illuminance: tint * 0.1, casts_shadow }
+        }
+        other => other,
+    };
+    let [left, right, back] = [DVec3::new(-2.0, 3.0, 0.3), DVec3::new(2.0, 3.0, -0.2), DVec3::new(0.4, 3.0, -2.0)];
+    let red = tinted(spot(left, -left.normalize(), 50.0), Vec3::new(50.0, 0.0, 0.0));
+    let green = tinted(spot(right, -right.normalize(), 50.0), Vec3::new(0.0, 50.0, 0.0));
+    let blue = tinted(hemisphere(back, DVec3::NEG_Y), Vec3::new(0.0, 0.0, 50.0));
+    let sun = tinted(sun(DVec3::new(0.1, -0.8, -0.6).normalize()), Vec3::new(0.0, 0.0, 40.0));
+    let bare = Light::Spot {
+        position: left,
+        direction: -left.normalize().as_vec3(),
+        intensity: Vec3::new(7.0, 7.0, 0.0),
+        range: 15.0,
+        inner_angle: 0.3,
+        outer_angle: 0.9,
+        casts_shadow: false,
+    };
+    let lamp = Light::Point { position: right + DVec3::Y, intensity: Vec3::new(0.0, 0.0, 9.0), range: 12.0 };
+    let dark = tinted(red, Vec3::ZERO);
+    let orders = [
+        vec![red, green],
+        vec![green, red],
+        vec![bare, red, lamp, green, blue, sun],
+        vec![sun, blue, dark, green, bare],
+    ];
+    for lights in orders {
+        let views = [
+            camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0),
+            // Not every light reaches what this one sees.
+            camera(DVec3::new(-4.0, 1.0, 1.0), DVec3::new(-1.0, 0.0, 0.0), 50.0),
+        ];
+        stage(vec![floor, square], lights, MAPS).expect(&mut studio, &views)?;
+    }
+    Ok(())
+}
+
+fn smallest_maps() -> Result<(), Failed> {
+    for side in [1, 2] {
+        let maps = ShadowMaps { side, ..MAPS };
+        let mut studio = studio_with(maps)?;
+        let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
+        let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
+        let place = DVec3::Y * 3.0;
+        for light in [sun(DVec3::NEG_Y), spot(place, DVec3::NEG_Y, 50.0), hemisphere(place, DVec3::NEG_Y)] {
+            let view = camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0);
+            // Nobody can say where shadows are, but there is no light that should not be there, and no shadow of nothing.
+            let mut shots = Vec::new();
+            for (panels, light) in [
+                (vec![floor, square], without_shadow(light)),
+                (vec![floor, square], light),
+                (vec![floor], without_shadow(light)),
+                (vec![floor], light),
+            ] {
+                let recorded = studio.record(&stage(panels, vec![light], maps).scene(std::slice::from_ref(&view))?)?;
+                shots.push(radiance(&studio.submit(recorded)?, 0)?.into_flattened());
+            }
+            let [lit, shadowed, bare_lit, bare] = &shots[..] else { return Err("a picture is missing".into()) };
+            if lit.iter().zip(shadowed).any(|(lit, shadowed)| !(*shadowed >= 0.0 && shadowed <= lit))
+                || bare != bare_lit
+            {
+                return Err(format!("{side} pixels, {light:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn widest_spot() -> Result<(), Failed> {
+    let maps = ShadowMaps { side: 2048, ..MAPS };
+    let mut studio = studio_with(maps)?;
+    let place = DVec3::Y * 2.0;
+    for degrees in [80.0, 84.9] {
+        let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
+        let square = Panel::facing(DVec3::new(0.3, 1.0, 0.0), DVec3::Y, 0.6).double_sided();
+        let stage = stage(vec![floor, square], vec![spot(place, DVec3::NEG_Y, degrees)], maps);
+        let view = camera(DVec3::new(1.0, 4.0, 5.0), DVec3::ZERO, 60.0);
+        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, degrees))?;
+        if counts.dark < 10 || counts.lit < 1200 {
+            return Err(format!("{degrees}: too little to judge: {counts:?}").into());
+        }
+    }
+    Ok(())
+}
+
+fn orthographic() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
+    let square = Panel::facing(DVec3::Y, DVec3::Y, 0.6).double_sided();
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    let place = DVec3::new(0.5, 3.0, 0.2);
+    for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
+        for far in [8.0, 40.0] {
+            let looking = Camera::looking_at("plan", DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO);
+            let projection = Projection::Orthographic { height: 4.0 };
+            let view = sized(Camera { projection, far, ..looking }, [80, 80]);
+            let counts = stage(vec![floor, square], vec![light], MAPS).expect(&mut studio, &[view])?;
+            expect(counts, 0.4, 0.02)?;
+        }
+    }
+    Ok(())
+}
+
+fn far_away() -> Result<(), Failed> {
+    let mut studio = studio_with(MAPS)?;
+    let shift = DVec3::new(1e6, -5e5, 2.5e5);
+    let floor = Panel::facing(shift, DVec3::Y, 6.0);
+    let square = Panel::facing(shift + DVec3::Y, DVec3::Y, 0.6).double_sided();
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    let place = shift + DVec3::new(0.5, 3.0, 0.2);
+    for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
+        let view = camera(shift + DVec3::new(1.0, 4.0, 4.0), shift, 45.0);
+        expect(stage(vec![floor, square], vec![light], MAPS).expect(&mut studio, &[view])?, 0.4, 0.01)?;
+    }
+    Ok(())
+}
