@@ -40,9 +40,6 @@ impl<B: Backend> RendererBuilder<B> {
 
     /// Adds the processes of a deferred pipeline, which follow from frame to frame what the scene requires, and its output.
     pub fn deferred(mut self, deferred: Deferred) -> Self {
-        if let Some(maps) = deferred.maps() {
-            self.shadow_maps = *maps;
-        }
         self.deferred = Some(deferred);
         self
     }
@@ -54,7 +51,7 @@ impl<B: Backend> RendererBuilder<B> {
     }
 
     /// How lights that cast shadows are seen, for processes of the engine's own that draw in views of
-    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). A [`Deferred`] pipeline brings its own.
+    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). If a [`Deferred`] pipeline draws shadow maps, it says how instead.
     pub fn shadow_maps(mut self, maps: ShadowMaps) -> Self {
         self.shadow_maps = maps;
         self

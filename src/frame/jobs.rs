@@ -1,11 +1,13 @@
 //! The frame's job graph: which phase waits for which.
 
+use std::sync::Arc;
+
 use super::FrameError;
 use super::phase::{PassTable, Phase};
 use crate::command::RenderCommand;
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
-use crate::queue::Selection;
+use crate::queue::{DrawList, Selection};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -14,10 +16,8 @@ pub(super) struct FrameJobs {
     pub(super) schedule: Schedule<Phase>,
     /// In the order they are submitted: by process, then by view.
     pub(super) passes: Vec<Pass>,
-    /// One for each pass; kept from frame to frame so that its memory is reused.
-    pub(super) tables: Vec<PassTable>,
     /// What the jobs were drawn up for.
-    plan: u64,
+    pub(super) plan: Arc<FramePlan>,
     views: Vec<(String, ViewKind)>,
     selections: Vec<Option<Selection>>,
 }
@@ -28,7 +28,7 @@ impl FrameJobs {
     ///
     /// # Errors
     /// If a view is drawn by no process.
-    pub(super) fn new(plan: &FramePlan, draws: &[Draws<'_>], views: &[RenderView]) -> Result<Self, FrameError> {
+    pub(super) fn new(plan: &Arc<FramePlan>, draws: &[Draws<'_>], views: &[RenderView]) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
             if !passes.iter().any(|pass| pass.view == index) {
@@ -77,24 +77,28 @@ impl FrameJobs {
         }
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
         let views = views.iter().map(|view| (view.name().to_owned(), view.kind())).collect();
-        let selections: Vec<_> = draws.iter().map(Draws::selection).collect();
-        let table = |pass: &Pass| PassTable { selection: selections[pass.process], ..PassTable::default() };
-        let tables = passes.iter().map(table).collect();
-        Ok(Self { schedule, passes, tables, plan: plan.identity(), views, selections })
+        let selections = draws.iter().map(Draws::selection).collect();
+        Ok(Self { schedule, passes, plan: Arc::clone(plan), views, selections })
     }
 
     /// Whether they are what this plan, these draws and these views need.
     pub(super) fn fit(&self, plan: &FramePlan, draws: &[Draws<'_>], views: &[RenderView]) -> bool {
         let names = self.views.iter().map(|(name, kind)| (name.as_str(), *kind));
-        self.plan == plan.identity()
+        self.plan.identity() == plan.identity()
             && names.eq(views.iter().map(|view| (view.name(), view.kind())))
             && self.selections.iter().copied().eq(draws.iter().map(Draws::selection))
     }
 
-    /// Makes room for a frame of `objects` objects.
-    pub(super) fn reset(&mut self, objects: usize) {
-        for table in self.tables.iter_mut().filter(|table| table.selection.is_some()) {
-            table.commands.reserve(objects, RenderCommand::NOTHING);
+    /// Makes `tables` one for each pass, with room for a frame of `objects` objects.
+    pub(super) fn reset(&self, tables: &mut Vec<PassTable>, objects: usize) {
+        tables.resize_with(self.passes.len(), PassTable::default);
+        for (pass, table) in self.passes.iter().zip(tables) {
+            table.selection = self.selections[pass.process];
+            match table.selection {
+                Some(_) => table.commands.reserve(objects, RenderCommand::NOTHING),
+                // Another pass may have stood here in the frame before.
+                None => *table.list.get_mut() = DrawList::default(),
+            }
         }
     }
 }
@@ -115,7 +119,7 @@ impl JobsCache {
     /// As [`FrameJobs::new`].
     pub(super) fn find(
         &mut self,
-        plan: &FramePlan,
+        plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
         views: &[RenderView],
     ) -> Result<&mut FrameJobs, FrameError> {

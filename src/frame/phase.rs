@@ -43,8 +43,6 @@ pub(super) enum Phase {
 pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) request: &'a FrameRequest<'a>,
     pub(super) tables: &'a FrameTables,
-    /// One for each pass.
-    pub(super) passes: &'a [PassTable],
     pub(super) granularity: Granularity,
     pub(super) backend: &'a B,
     pub(super) frame: &'a B::Frame,
@@ -52,7 +50,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) clock: &'a StageClock,
 }
 
-/// What a frame's parts leave for each other, whatever the passes; kept from frame to frame so that its memory is reused.
+/// What a frame's parts leave for each other; kept from frame to frame so that its memory is reused.
 #[derive(Debug, Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
@@ -60,6 +58,8 @@ pub(super) struct FrameTables {
     pub(super) visible: Vec<VisibleSet>,
     /// One for each view.
     pub(super) lights: Vec<LightTable>,
+    /// One for each pass.
+    pub(super) passes: Vec<PassTable>,
 }
 
 /// What one pass draws, on its way from slots to batches.
@@ -111,7 +111,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.block_count(),
             Self::Fill { pass } => tables.visible[frame.request.passes[pass].view].count(),
-            Self::Record { pass } => frame.passes[pass].list.read().bundle_count(),
+            Self::Record { pass } => frame.tables.passes[pass].list.read().bundle_count(),
             Self::Compact { .. }
             | Self::Sort { .. }
             | Self::Instance { .. }
@@ -163,11 +163,11 @@ impl Phase {
             Self::Fill { pass } => fill(frame, pass, range),
             Self::Sort { pass } => {
                 let count = tables.visible[frame.request.passes[pass].view].count();
-                sort(&frame.passes[pass].commands, count, &mut frame.passes[pass].list.write().commands);
+                sort(&frame.tables.passes[pass].commands, count, &mut frame.tables.passes[pass].list.write().commands);
             }
-            Self::Instance { pass } => instance(&mut frame.passes[pass].list.write()),
+            Self::Instance { pass } => instance(&mut frame.tables.passes[pass].list.write()),
             Self::Prepare { pass } => {
-                let list = frame.passes[pass].list.read();
+                let list = frame.tables.passes[pass].list.read();
                 frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
                 return frame.backend.prepare(worker, frame.frame, frame.request, frame.request.passes[pass], &list);
             }
@@ -190,7 +190,7 @@ fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>
 }
 
 fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
-    let table = &frame.passes[pass];
+    let table = &frame.tables.passes[pass];
     let view = frame.request.passes[pass].view;
     let fill = Fill {
         table: &frame.tables.objects,
@@ -208,7 +208,7 @@ fn record<B: Backend>(
     bundles: Range<usize>,
     worker: &Worker,
 ) -> Result<(), BackendError> {
-    let list = frame.passes[pass].list.read();
+    let list = frame.tables.passes[pass].list.read();
     let recorded = frame.backend.record(worker, frame.frame, frame.request.passes[pass], &list, bundles.clone())?;
     let mut slots = frame.recordings[pass].bundles.lock();
     for (slot, bundle) in slots[bundles].iter_mut().zip(recorded) {

@@ -23,21 +23,29 @@ impl Plans {
     pub(super) fn new(
         deferred: Option<Deferred>,
         processes: Vec<Arc<dyn RenderProcess>>,
-        mut outputs: Vec<String>,
+        outputs: Vec<String>,
         shadow_maps: ShadowMaps,
     ) -> Result<Self, PlanError> {
         if let Some(problem) = shadow_maps.problem() {
             return Err(PlanError::ShadowMaps { problem });
         }
+        let all = Requirements::all();
         if let Some(deferred) = &deferred {
             deferred.check()?;
-            outputs.push(deferred.output().to_owned());
-            compile(Some(deferred), &processes, &outputs, &Requirements::all())?;
+            compile(Some(deferred), &processes, &outputs, &all)?;
         }
         let nothing = Requirements::default();
         let current = Arc::new(compile(deferred.as_ref(), &processes, &outputs, &nothing)?);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
         Ok(Self { deferred, processes, outputs, shadow_maps, compiled, current })
+    }
+
+    /// The same with another deferred pipeline.
+    ///
+    /// # Errors
+    /// As [`Plans::new`].
+    pub(super) fn with_deferred(&self, deferred: Deferred) -> Result<Self, PlanError> {
+        Self::new(Some(deferred), self.processes.clone(), self.outputs.clone(), self.shadow_maps)
     }
 
     /// The plan of the last frame; before the first one, of an empty scene.
@@ -66,7 +74,8 @@ impl Plans {
 
     /// How shadow maps are seen; `None` where the current plan draws none.
     pub(super) fn shadow_maps(&self) -> Option<&ShadowMaps> {
-        self.current.draws_views(ViewKind::Shadow).then_some(&self.shadow_maps)
+        let maps = self.deferred.as_ref().and_then(Deferred::maps).unwrap_or(&self.shadow_maps);
+        self.current.draws_views(ViewKind::Shadow).then_some(maps)
     }
 
     /// Whether lights that cast shadows are drawn by processes of their own, with maps or without.
@@ -90,5 +99,7 @@ fn compile(
     requirements: &Requirements,
 ) -> Result<FramePlan, PlanError> {
     let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
-    FramePlan::new(chain, processes.to_vec(), outputs)
+    let own = deferred.map(|deferred| deferred.output().to_owned());
+    let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
+    FramePlan::new(chain, processes.to_vec(), &outputs)
 }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use parking_lot::RwLockReadGuard;
 
 use super::jobs::JobsCache;
-use super::phase::{FrameContext, FrameTables, PassTable, Recording};
+use super::phase::{FrameContext, FrameTables, Recording};
 use super::plans::Plans;
 use super::recorded::{Recorded, ViewQueue};
 use super::statistics::{Stage, StageClock};
 use super::views::{ValidLights, views_of};
-use super::{FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
+use super::{BuildError, FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, BackendError, FrameRequest};
-use crate::process::{FramePlan, Pass};
+use crate::process::{Deferred, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
@@ -80,7 +80,7 @@ impl<B: Backend> Renderer<B> {
         let views = views_of(&scene, &lights, self.plans.shadow_maps(), &plan)?;
         let draws = plan.draws()?;
         let jobs = self.jobs.find(&plan, &draws, &views)?;
-        jobs.reset(scene.object_count());
+        jobs.reset(&mut self.tables.passes, scene.object_count());
         self.tables.reset(views.len());
         let clock = StageClock::default();
         clock.measure(Stage::Visibility, || {
@@ -104,7 +104,6 @@ impl<B: Backend> Renderer<B> {
         let context = FrameContext {
             request: &request,
             tables: &self.tables,
-            passes: &jobs.tables,
             granularity: self.granularity,
             backend: &*self.backend,
             frame: &frame,
@@ -114,16 +113,27 @@ impl<B: Backend> Renderer<B> {
         jobs.schedule.run(&self.scheduler, &context)?;
 
         let queues = queues_of(&request, recordings)?;
-        let statistics = statistics_of(&request, &self.tables, &jobs.tables, &clock);
+        let statistics = statistics_of(&request, &self.tables, &clock);
         warn_of_changes(&statistics.rejections, &mut self.told);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) })
     }
 
+    /// Draws with another deferred pipeline from the next frame on: with other settings, or other steps. Pipelines that both
+    /// have in common are kept.
+    ///
+    /// # Errors
+    /// If the processes do not make a frame; then nothing changes.
+    pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
+        self.plans = self.plans.with_deferred(deferred)?;
+        Ok(())
+    }
+
     /// What the last recorded frame drew in one view by one process; `None` where that process draws no commands there.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
-        let (jobs, plan) = (self.jobs.latest()?, self.plans.current());
-        let is_wanted = |pass: &Pass| pass.view == view && plan.processes()[pass.process].process.name() == process;
-        let table = &jobs.tables[jobs.passes.iter().position(is_wanted)?];
+        let jobs = self.jobs.latest()?;
+        let name = |pass: &Pass| jobs.plan.processes()[pass.process].process.name();
+        let is_wanted = |pass: &Pass| pass.view == view && name(pass) == process;
+        let table = self.tables.passes.get(jobs.passes.iter().position(is_wanted)?)?;
         table.selection.map(|_| table.list.read())
     }
 
@@ -161,12 +171,7 @@ fn queues_of<B: Backend>(
     Ok(queues)
 }
 
-fn statistics_of(
-    request: &FrameRequest<'_>,
-    tables: &FrameTables,
-    passes: &[PassTable],
-    clock: &StageClock,
-) -> FrameStatistics {
+fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &StageClock) -> FrameStatistics {
     let of_view = |(index, view): (usize, &RenderView)| {
         let mut statistics = ViewStatistics {
             name: view.name().to_owned(),
@@ -177,7 +182,7 @@ fn statistics_of(
             batches: 0,
             bundles: 0,
         };
-        for (table, _) in passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
+        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
             let list = table.list.read();
             statistics.commands += list.commands.len();
             statistics.batches += list.batches.len();

@@ -3,7 +3,7 @@
 use super::FrameError;
 use crate::process::FramePlan;
 use crate::scene::{Light, SceneRef, ViewKind};
-use crate::view::{RejectionReason, Rejections, RenderView, ShadowMaps};
+use crate::view::{FixedPosition, RejectionReason, Rejections, RenderView, ShadowMaps};
 
 /// A scene's lights that can be drawn, each with its index in the scene.
 pub(super) struct ValidLights {
@@ -19,6 +19,8 @@ impl ValidLights {
             if let Err(error) = light.check(index) {
                 tracing::debug!(target: "drawloom", %error, "light left out");
                 rejections.count(RejectionReason::InvalidLight, index);
+            } else if light.reach().is_some_and(|(position, _)| FixedPosition::new(position).is_none()) {
+                rejections.count(RejectionReason::LightOutOfReach, index);
             } else if light.is_dark() {
                 rejections.count(RejectionReason::DarkLight, index);
             } else {
@@ -30,7 +32,8 @@ impl ValidLights {
     }
 }
 
-/// A view for each camera, in their order, and behind them one for each light that casts shadows, where `maps` says how.
+/// A view for each camera, in their order, and behind them one for each light that casts shadows where a camera may see them,
+/// if `maps` says how.
 ///
 /// # Errors
 /// If views whose targets are layers of one texture differ in size.
@@ -42,7 +45,14 @@ pub(super) fn views_of(
 ) -> Result<Vec<RenderView>, FrameError> {
     let mut views: Vec<_> = scene.cameras.iter().map(RenderView::new).collect();
     if let Some(maps) = maps {
+        let lit = views.iter().filter(|view| view.kind() != ViewKind::Shadow);
+        let cameras: Vec<_> = lit.cloned().collect();
         for (light, (index, definition)) in lights.indices.iter().zip(&lights.lights).enumerate() {
+            let reaches =
+                |(center, radius)| cameras.iter().any(|view: &RenderView| view.frustum.may_see(center, radius));
+            if !definition.casts_shadow() || !definition.reach().is_none_or(reaches) {
+                continue;
+            }
             let name = format!("shadow of light {index}");
             let camera = maps.camera(name, definition, scene.cameras);
             views.extend(camera.map(|camera| RenderView { light: Some(light), ..RenderView::new(&camera) }));

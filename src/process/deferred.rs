@@ -66,7 +66,8 @@ impl Deferred {
         Self { depth_pre_pass, ..self }
     }
 
-    /// Into how many processes the geometry buffer is split, by material (L 5); 0 counts as 1.
+    /// Into how many processes the geometry buffer is split, by material (L 5): 1 to 64, and what is beyond counts as the nearest.
+    /// They are called "geometry buffer 1 of 2" and so on.
     pub fn geometry_shares(self, geometry_shares: u32) -> Self {
         Self { geometry_shares, ..self }
     }
@@ -96,7 +97,8 @@ impl Deferred {
         self
     }
 
-    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`.
+    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. Without a step of post-processing the
+    /// chain closes around it; without `"shadow casters"` no light casts shadows.
     pub fn leave_out(mut self, name: impl Into<String>) -> Self {
         self.left_out.push(name.into());
         self
@@ -104,7 +106,7 @@ impl Deferred {
 
     /// The target that the frame is for.
     pub fn output(&self) -> &'static str {
-        if self.post.is_empty() { RADIANCE } else { PICTURE }
+        if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
 
     /// The names of all processes there may be, whatever the scene, in their order.
@@ -114,7 +116,12 @@ impl Deferred {
 
     /// How shadow maps are drawn, if at all.
     pub(crate) fn maps(&self) -> Option<&ShadowMaps> {
-        self.shadow_maps.as_ref()
+        self.shadow_maps.as_ref().filter(|_| !self.left_out.iter().any(|name| name == ShadowCasters::NAME))
+    }
+
+    /// The steps of post-processing that are not left out.
+    fn steps(&self) -> impl Iterator<Item = &Arc<dyn PostStep>> {
+        self.post.iter().filter(|step| !self.left_out.iter().any(|name| name == step.process("", "").name()))
     }
 
     /// The processes that draw a scene, at the places where they stand.
@@ -140,7 +147,8 @@ impl Deferred {
         if let Some(problem) = self.shadow_maps.as_ref().and_then(ShadowMaps::problem) {
             return Err(PlanError::ShadowMaps { problem });
         }
-        let names = self.names();
+        let whole = Self { left_out: Vec::new(), ..self.clone() };
+        let names = whole.names();
         let mut wanted = self.replaced.iter().map(|(name, _)| name).chain(&self.left_out);
         match wanted.find(|name| !names.contains(name)) {
             Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
@@ -151,7 +159,7 @@ impl Deferred {
     /// As they come with the crate.
     fn built(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
-        let maps = self.shadow_maps.as_ref().filter(|_| requirements.shadows());
+        let maps = self.maps().filter(|_| requirements.shadows());
         if maps.is_some() {
             let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
             processes.push(Arc::new(ShadowCasters { hemispheres }));
@@ -159,7 +167,7 @@ impl Deferred {
         if self.depth_pre_pass {
             processes.push(Arc::new(DepthPrePass));
         }
-        let of = self.geometry_shares.max(1);
+        let of = self.geometry_shares.clamp(1, 64);
         for index in 0..of {
             let geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
             processes.push(if self.depth_pre_pass {
@@ -181,8 +189,9 @@ impl Deferred {
             processes.push(Arc::new(Transparency::new(maps)));
         }
         let mut source = RADIANCE.to_owned();
-        for (index, step) in self.post.iter().enumerate() {
-            let last = index + 1 == self.post.len();
+        let steps: Vec<_> = self.steps().collect();
+        for (index, step) in steps.iter().enumerate() {
+            let last = index + 1 == steps.len();
             let target = if last { PICTURE.to_owned() } else { format!("post-processed {}", index + 1) };
             processes.push(step.process(&source, &target));
             source = target;

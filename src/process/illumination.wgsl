@@ -1,9 +1,12 @@
 const PI: f32 = 3.14159265;
 
+// Past the range of f32 light would be infinite, and not a number where nothing of it is left.
+const BRIGHTEST: vec3<f32> = vec3<f32>(1e30);
+
 // What a light brings to a surface, were nothing in between.
 fn illuminance_from(light: Light, place: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     if light.kind == DIRECTIONAL {
-        return light.intensity * max(dot(normal, -light.direction), 0.0);
+        return min(light.intensity * max(dot(normal, -light.direction), 0.0), BRIGHTEST);
     }
     let to_light = light.position - place;
     let distance_squared = dot(to_light, to_light);
@@ -20,5 +23,6 @@ fn illuminance_from(light: Light, place: vec3<f32>, normal: vec3<f32>) -> vec3<f
     }
     let share = distance_squared / (light.range * light.range);
     let window = 1.0 - share * share;
-    return light.intensity * (shape * max(dot(normal, towards), 0.0) * window * window / distance_squared);
+    let factor = shape * max(dot(normal, towards), 0.0) * window * window / distance_squared;
+    return min(light.intensity * min(factor, 1e30), BRIGHTEST);
 }

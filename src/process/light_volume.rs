@@ -2,17 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::scene::LightKind;
 
 /// Geometry that holds all that a light can reach, so that lighting touches no other pixels: a sphere for a point light, a
 /// cone for a spot light, and the screen for what reaches everywhere (L 4.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum LightVolume {
+pub(crate) enum LightVolume {
     /// A ball that contains the unit sphere, to be scaled by the light's range.
     Sphere,
-    /// A cone on a blunt end of sixteen sides, whose corners [`cone_corner`] puts in their places. At 90° it is half a
+    /// A cone on a blunt end of sixteen sides, whose corners `cone_corner` puts in their places. At 90° it is half a
     /// cylinder as high as it is wide, which holds what a hemispherical light reaches too.
     Cone,
     /// One triangle that covers clip space.
@@ -21,7 +21,7 @@ pub enum LightVolume {
 
 impl LightVolume {
     /// What lights of a kind are drawn as.
-    pub fn of(kind: LightKind) -> Self {
+    pub(crate) fn of(kind: LightKind) -> Self {
         match kind {
             LightKind::Point => Self::Sphere,
             LightKind::Spot | LightKind::Hemispherical => Self::Cone,
@@ -31,9 +31,9 @@ impl LightVolume {
 
     /// Three corners for each triangle, counter-clockwise seen from outside. No volume has a hole.
     ///
-    /// A sphere's are places; a cone's are (x, y, tier), as [`cone_corner`] takes them; the screen's are (x, y) in clip space
+    /// A sphere's are places; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip space
     /// and 0.
-    pub fn corners(self) -> Vec<[f32; 3]> {
+    pub(crate) fn corners(self) -> Vec<[f32; 3]> {
         match self {
             Self::Sphere => sphere(),
             Self::Cone => cone(),
@@ -42,38 +42,8 @@ impl LightVolume {
     }
 }
 
-/// The place of a corner (x, y, tier) of [`LightVolume::Cone`], in metres, for a light at the origin that shines along +Z.
-///
-/// A light of half-angle α reaches, within its range r, no further out than r·sin α, and no further ahead than r. So the cone
-/// ends where it is r·sin α wide, at r·cos α, and goes on to r as a cylinder.
-///
-/// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. All is larger by a
-/// ten-thousandth of the range, the tip and its cone moved back by as much, since whoever draws it rounds too.
-///
-/// `cosine_of_half_angle` is that of the angle between the axis and where the light ends, from 0 to 1; beyond either end it
-/// counts as that end. `range` is in metres. The function of that name in `light_volume.wgsl` does the same.
-pub fn cone_corner(corner: [f32; 3], cosine_of_half_angle: f32, range: f32) -> Vec3 {
-    let [x, y, tier] = corner;
-    let along = cosine_of_half_angle.clamp(0.0, 1.0);
-    let sine = ((1.0 - along * along).max(0.0) + HIDDEN_BY_COSINE).sqrt();
-    let radius = (sine + GROWTH) / MIDDLE_OF_SIDE;
-    let height = match tier {
-        TIP => -GROWTH,
-        NEAR_RING => along - GROWTH,
-        _ => 1.0 + GROWTH,
-    };
-    Vec3::new(x * radius, y * radius, height) * range
-}
-
 /// As a share of the light's range.
 const GROWTH: f32 = 1e-4;
-
-/// How much the sine's square may be above what the cosine says. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and so is the
-/// one that a shader compares it with; at 0° that hides an angle of some 0.03°.
-const HIDDEN_BY_COSINE: f32 = 1.0 / (1 << 22) as f32;
-
-/// cos(π/16): the middle of each side is that much closer to the axis than its edges.
-const MIDDLE_OF_SIDE: f32 = 0.980_785_3;
 
 const SIDES: usize = 16;
 
@@ -139,9 +109,40 @@ mod tests {
     use std::collections::HashSet;
     use std::f64::consts::{FRAC_PI_2, PI};
 
+    use glam::Vec3;
     use proptest::prelude::*;
 
     use super::*;
+
+    /// The place of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines along +Z.
+    ///
+    /// A light of half-angle α reaches, within its range r, no further out than r·sin α, and no further ahead than r. So the cone
+    /// ends where it is r·sin α wide, at r·cos α, and goes on to r as a cylinder.
+    ///
+    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. All is larger by a
+    /// ten-thousandth of the range, the tip and its cone moved back by as much, since whoever draws it rounds too.
+    ///
+    /// `cosine_of_half_angle` is that of the angle between the axis and where the light ends, from 0 to 1; beyond either end it
+    /// counts as that end. `range` is in metres. It does the same as the function of that name in `light_volume.wgsl`.
+    fn cone_corner(corner: [f32; 3], cosine_of_half_angle: f32, range: f32) -> Vec3 {
+        let [x, y, tier] = corner;
+        let along = cosine_of_half_angle.clamp(0.0, 1.0);
+        let sine = ((1.0 - along * along).max(0.0) + HIDDEN_BY_COSINE).sqrt();
+        let radius = (sine + GROWTH) / MIDDLE_OF_SIDE;
+        let height = match tier {
+            TIP => -GROWTH,
+            NEAR_RING => along - GROWTH,
+            _ => 1.0 + GROWTH,
+        };
+        Vec3::new(x * radius, y * radius, height) * range
+    }
+
+    /// How much the sine's square may be above what the cosine says. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and so is the
+    /// one that a shader compares it with; at 0° that hides an angle of some 0.03°.
+    const HIDDEN_BY_COSINE: f32 = 1.0 / (1 << 22) as f32;
+
+    /// cos(π/16): the middle of each side is that much closer to the axis than its edges.
+    const MIDDLE_OF_SIDE: f32 = 0.980_785_3;
 
     type Triangle = [DVec3; 3];
 

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::shadow_casters::shadow_shader;
+use super::shadow::shadow_shader;
 use super::{Declare, Draws, GeometryFormats, LightDraws, RenderProcess, ShadowCasters};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};

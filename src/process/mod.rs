@@ -10,6 +10,7 @@ mod draws;
 mod error;
 mod format;
 mod geometry_buffer;
+#[cfg(feature = "wgpu")]
 mod light_volume;
 mod light_volumes;
 mod plan;
@@ -19,6 +20,7 @@ mod post;
 mod raw_pass;
 mod render_process;
 mod requirements;
+mod shadow;
 mod shadow_casters;
 mod transparency;
 
@@ -29,7 +31,6 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use error::{PlanError, ProcessError};
 pub use format::Format;
 pub use geometry_buffer::{GeometryBuffer, GeometryFormats};
-pub use light_volume::{LightVolume, cone_corner};
 pub use light_volumes::LightVolumes;
 pub use plan::{FramePlan, Pass, Place, PlannedProcess};
 pub use planned_target::PlannedTarget;
@@ -40,3 +41,6 @@ pub use render_process::{RenderProcess, SHADER_PRELUDE};
 pub use requirements::Requirements;
 pub use shadow_casters::ShadowCasters;
 pub use transparency::Transparency;
+
+#[cfg(feature = "wgpu")]
+pub(crate) use light_volume::LightVolume;

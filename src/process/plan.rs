@@ -1,10 +1,14 @@
 //! From a list of processes to what a frame does, in order.
 
 use std::sync::Arc;
+#[cfg(feature = "wgpu")]
+use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::planned_target::targets_of;
-use super::{Access, Declaration, Declare, Draws, PlanError, PlannedTarget, ProcessError, RenderProcess};
+use super::{
+    Access, Declaration, Declare, Draws, Format, PlanError, PlannedTarget, ProcessError, RenderProcess, ShadowCasters,
+};
 use crate::graph::{FrameGraph, ProcessId};
 use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
@@ -12,6 +16,8 @@ use crate::task::{JobPanic, catch};
 /// What every frame does: processes in the order they are submitted, and the targets they use.
 pub struct FramePlan {
     identity: u64,
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend keeps something for a plan"))]
+    alive: Arc<()>,
     processes: Vec<PlannedProcess>,
     targets: Vec<PlannedTarget>,
     dropped: Vec<String>,
@@ -60,6 +66,11 @@ impl FramePlan {
             }
             added.push(Added { place, name, id, declaration });
         }
+        let stand_in = stand_in(&places, &added);
+        if let Some(target) = &stand_in {
+            let resource = graph.resource(resource_name(target.views, &target.name));
+            graph.import(resource);
+        }
         for (before, after) in orders(&places, &added)? {
             graph.order(before, after);
         }
@@ -83,15 +94,22 @@ impl FramePlan {
         if processes.is_empty() {
             return Err(PlanError::Empty);
         }
-        let targets = targets_of(&processes)?;
+        let mut targets = targets_of(&processes)?;
+        targets.extend(stand_in);
         // Only told apart, never ordered by.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { identity, processes, targets, dropped, dot })
+        Ok(Self { identity, alive: Arc::default(), processes, targets, dropped, dot })
     }
 
     /// A number that no other plan of this program has.
     pub fn identity(&self) -> u64 {
         self.identity
+    }
+
+    /// Ends with the plan: for who keeps something only as long as there is the plan.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn alive(&self) -> Weak<()> {
+        Arc::downgrade(&self.alive)
     }
 
     /// The processes in the order they are submitted.
@@ -181,6 +199,27 @@ struct Added {
     name: String,
     id: ProcessId,
     declaration: Declaration,
+}
+
+/// The shadow map that somebody reads and nobody draws, because no light casts shadows: then there still is a texture to
+/// bind.
+fn stand_in(places: &[String], added: &[Added]) -> Option<PlannedTarget> {
+    let is_map = |(target, access): &(String, Access)| {
+        target == ShadowCasters::TARGET && *access == Access::SampleLayers(ViewKind::Shadow)
+    };
+    let is_read = added.iter().any(|other| other.declaration.accesses.iter().any(is_map));
+    let is_drawn = added.iter().any(|other| {
+        other.declaration.views == ViewKind::Shadow
+            && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
+    });
+    let may_be_drawn = places.iter().any(|place| place == ShadowCasters::NAME);
+    (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
+        name: ShadowCasters::TARGET.to_owned(),
+        views: ViewKind::Shadow,
+        format: Format::Depth32Float,
+        stored: false,
+        layered: true,
+    })
 }
 
 /// Who goes before whom: by the chain, and by what processes say themselves.

@@ -43,7 +43,8 @@ pub trait RenderProcess: Send + Sync {
     /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
     fn name(&self) -> &str;
 
-    /// Says which views it is for, and what it reads and writes. Asked once, when the renderer is built.
+    /// Says which views it is for, and what it reads and writes. Asked once for every plan that it becomes part of: when the renderer is
+    /// built, and when a scene requires other processes beside it.
     fn declare(&self, declare: &mut Declare);
 
     /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending makes

@@ -10,6 +10,10 @@ use crate::scene::ViewKind;
 /// (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the rasterizer
 /// state; clear the depth; draw all objects that cast shadows. The last three are those of
 /// [`LightVolumes`](super::LightVolumes).
+///
+/// A process of an engine's own may read the maps too, by
+/// [`Declare::samples_layers`](super::Declare::samples_layers): beside a [`Deferred`](super::Deferred) pipeline, where no light
+/// of the scene casts shadows, there is one of a single pixel, with nothing in it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowCasters {
     /// Whether there are hemispherical lights, whose maps must not show what is behind the light. It costs a look at each
@@ -20,11 +24,13 @@ pub struct ShadowCasters {
 impl ShadowCasters {
     /// The target's name.
     pub const TARGET: &str = "shadow map";
+
+    pub(super) const NAME: &str = "shadow casters";
 }
 
 impl RenderProcess for ShadowCasters {
     fn name(&self) -> &str {
-        "shadow casters"
+        Self::NAME
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -39,21 +45,5 @@ impl RenderProcess for ShadowCasters {
             fragment: self.hemispheres.then_some("fragment"),
             ..CommandDraws::default()
         })
-    }
-}
-
-/// WGSL by which a shader asks what share of a light reaches a place: from the shadow maps at a binding of `@group(2)`, or all
-/// of it where there are none.
-pub(super) fn shadow_shader(maps: Option<(u32, &crate::view::ShadowMaps)>) -> String {
-    match maps {
-        None => include_str!("no_shadow.wgsl").to_owned(),
-        Some((binding, maps)) => format!(
-            "@group(2) @binding({binding}) var shadow_maps: texture_depth_2d_array;\n\
-             const SHADOW_BIAS: f32 = {:?};\n\
-             const SHADOW_FILTER: i32 = {};\n{}",
-            maps.bias,
-            maps.filter,
-            include_str!("shadow.wgsl")
-        ),
     }
 }

@@ -1,6 +1,6 @@
 //! Transparency: what the geometry buffer cannot hold.
 
-use super::shadow_casters::shadow_shader;
+use super::shadow::shadow_shader;
 use super::{CommandDraws, Declare, Draws, RenderProcess, ShadowCasters};
 use crate::queue::Selection;
 use crate::scene::ViewKind;

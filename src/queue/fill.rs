@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::subdivision::halvings;
+use super::halvings::halvings;
 use crate::blocks::Blocks;
 use crate::command::{DrawState, RenderCommand, SortKey};
 use crate::scene::{Blend, Projection, SceneRef};
@@ -123,7 +123,7 @@ impl Fill<'_> {
             let Some(halvings) = halvings(self.view, self.scene, object) else { return RenderCommand::NOTHING };
             state = state.subdivided(halvings);
             if halvings > DrawState::FINEST {
-                self.table.rejections().count(RejectionReason::CoarseEdges, object);
+                self.table.rejections().count_once(RejectionReason::CoarseEdges, object);
             }
         }
         let depth = forward.dot((bounds.center - self.view.camera.position).as_vec3());

@@ -2,9 +2,9 @@
 
 mod draw_list;
 mod fill;
+mod halvings;
 mod instance;
 mod sort;
-mod subdivision;
 
 pub use draw_list::{Batch, DrawList};
 pub use fill::{Blending, Fill, MaterialShare, Selection};

@@ -1,14 +1,26 @@
 //! What a frame left out or could not draw as asked, counted and told.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU32, Ordering};
+
+use parking_lot::Mutex;
 
 /// Counts what a frame leaves out or cannot draw as asked. Any number of jobs may count at once.
 #[derive(Debug, Default)]
 pub struct Rejections {
     by_reason: [Rejected; RejectionReason::ALL.len()],
+    /// What was counted by [`Rejections::count_once`].
+    counted: Mutex<HashSet<(RejectionReason, usize)>>,
 }
 
 impl Rejections {
+    /// Counts one object, light or material for a reason that may be found more than once in a frame.
+    pub fn count_once(&self, reason: RejectionReason, index: usize) {
+        if self.counted.lock().insert((reason, index)) {
+            self.count(reason, index);
+        }
+    }
+
     /// Counts one object, light or material.
     pub fn count(&self, reason: RejectionReason, index: usize) {
         self.by_reason[reason as usize].count(index);
@@ -55,6 +67,8 @@ pub enum RejectionReason {
     CoarseEdges,
     /// A light gives no light: its intensity is 0.
     DarkLight,
+    /// A light is farther from the world's origin than [`FixedPosition::REACH`](super::FixedPosition::REACH).
+    LightOutOfReach,
     /// A light has an intensity, a place, a direction, a range or angles that cannot be.
     InvalidLight,
     /// A material's texture was removed; the plain colour stands in.
@@ -64,7 +78,7 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -72,6 +86,7 @@ impl RejectionReason {
         Self::StaleMaterial,
         Self::CoarseEdges,
         Self::DarkLight,
+        Self::LightOutOfReach,
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
@@ -87,6 +102,7 @@ impl RejectionReason {
             Self::StaleMaterial => "object with a removed material",
             Self::CoarseEdges => "object too near to a hemispherical light for its long edges",
             Self::DarkLight => "light without intensity",
+            Self::LightOutOfReach => "light too far from the origin",
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",

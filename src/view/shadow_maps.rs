@@ -2,16 +2,18 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
+use super::FixedPosition;
 use crate::scene::{Camera, Light, Projection, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights are as large, and are the layers of one texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
     /// Width and height of a map in pixels. At a distance of d metres a pixel is about 4·d/side metres wide for a hemispherical
-    /// light, 2·d·tan(angle)/side for a spot light, and somewhat more than 2·`reach`/side, at any distance, for a directional one.
+    /// light, 2·d·tan(angle)/side for a spot light, and as wide as the ball around what main cameras see is over `side` for a
+    /// directional one: at 60° and 16:9 some 2.3·`reach`/side.
     pub side: u32,
-    /// How much of the main cameras' view a directional light's map covers, in metres from the camera. Beyond that, objects
-    /// are lit.
+    /// How much of the main cameras' view a directional light's map covers, in metres from the camera, up to 1,000 km. Beyond
+    /// that, objects are lit. There is one map for all main cameras: the farther they are apart, the coarser it is.
     pub reach: f32,
     /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope
     /// ask for. Less than 1 makes lit surfaces shadow themselves in stripes; more lets light through under objects.
@@ -22,15 +24,15 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    /// The widest [`ShadowMaps::filter`]: 81 pixels of the map are read for one of the picture.
+    /// The widest [`ShadowMaps::filter`]: 100 pixels of the map are read for one of the picture.
     pub const WIDEST_FILTER: u32 = 4;
 
     /// Says what is wrong with them, if anything.
     pub(crate) fn problem(&self) -> Option<&'static str> {
         if self.side == 0 {
             Some("a side of 0 pixels")
-        } else if !(self.reach > 0.0 && self.reach.is_finite()) {
-            Some("a reach that is not a positive distance")
+        } else if !(self.reach > 0.0 && self.reach <= 1e6) {
+            Some("a reach that is not a positive distance of at most 1,000 km")
         } else if !(self.bias >= 0.0 && self.bias.is_finite()) {
             Some("a bias that is negative or not finite")
         } else if self.filter > Self::WIDEST_FILTER {
@@ -42,7 +44,7 @@ impl ShadowMaps {
 
     /// The camera that sees what `light` lights: a perspective one for a spot light, an orthographic one around what the main
     /// cameras among `cameras` see for a directional light, a paraboloid for a hemispherical one. `None` for a light that
-    /// casts no shadow, and for a directional one where no main camera looks.
+    /// casts no shadow, and for a directional one where no main camera looks, or whose map would be out of reach.
     pub fn camera(&self, name: String, light: &Light, cameras: &[Camera]) -> Option<Camera> {
         if !light.casts_shadow() {
             return None;
@@ -64,6 +66,7 @@ impl ShadowMaps {
                 let center = self.snapped(center, radius, orientation.as_dquat().normalize());
                 let height = radius * (TOWARDS_THE_SUN + 2.0);
                 let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * height;
+                FixedPosition::new(position)?;
                 let (radius, height) = (radius as f32, height as f32);
                 (position, direction, Projection::Orthographic { height: 2.0 * radius }, [radius, height + radius])
             }
@@ -124,7 +127,7 @@ impl Default for ShadowMaps {
 }
 
 /// Where a light's map begins, as a share of its range.
-const NEAREST: f32 = 1e-3;
+const NEAREST: f32 = 1e-5;
 
 /// How far before what is seen a directional light's map begins, in radii of that. A triangle with a corner even before it is
 /// drawn at a slope that it has not, since that corner is moved. The farther it is, the more f32 rounds: here to within a

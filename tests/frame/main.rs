@@ -1,6 +1,7 @@
 //! Frames down to the queue, on the backend that draws nothing and checks everything.
 
 mod bad_input;
+mod changes;
 mod deferred;
 mod failing_process;
 mod rules;

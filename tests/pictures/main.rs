@@ -8,6 +8,7 @@
 mod adapter;
 mod changes;
 mod devices;
+mod extremes;
 mod geometry;
 mod judge;
 mod light_volumes;
@@ -40,6 +41,7 @@ fn main() {
     let mut trials = Vec::new();
     let cases = [
         (changes::CASES, Needs::Adapter),
+        (extremes::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),

@@ -303,7 +303,7 @@ impl Rays<'_> {
     }
 
     /// The least and the most that a light's shadows may leave: all or nothing, but anything in between where the filter
-    /// meets an edge, and close behind what casts the shadow.
+    /// meets an edge; and close behind what casts the shadow.
     fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
         if !light.casts_shadow() {
             return [1.0; 2];
@@ -321,7 +321,7 @@ impl Rays<'_> {
         for place in ring(24, width * 1.02).chain(ring(6, width * 0.5)).chain([place]) {
             match self.distance_behind(light, index, place) {
                 None => most = 1.0,
-                Some(distance) if distance < width * 1.1 => (least, most) = (0.0, 1.0),
+                Some(distance) if distance < width * 1.5 => (least, most) = (0.0, 1.0),
                 Some(_) => least = 0.0,
             }
             if least < most {

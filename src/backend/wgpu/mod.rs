@@ -21,7 +21,7 @@ mod textures;
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use parking_lot::{Mutex, RwLock};
 
@@ -53,8 +53,8 @@ pub struct WgpuBackend {
     device: wgpu::Device,
     queue: wgpu::Queue,
     layouts: Layouts,
-    /// For each plan by its identity, one for each process.
-    pipelines: Mutex<HashMap<u64, Vec<Arc<ProcessPipelines>>>>,
+    /// For each plan by its identity.
+    pipelines: Mutex<HashMap<u64, PlanPipelines>>,
     /// Made when a plan draws lights for the first time.
     light_meshes: Mutex<Option<Arc<LightMeshes>>>,
     assets: Mutex<AssetCache>,
@@ -114,7 +114,7 @@ impl WgpuBackend {
     /// What is kept on the device from frame to frame, beside the scene's own meshes and textures.
     pub fn resources(&self) -> WgpuResources {
         let kept = self.pipelines.lock();
-        let mut distinct: Vec<_> = kept.values().flatten().collect();
+        let mut distinct: Vec<_> = kept.values().flat_map(|kept| &kept.of_processes).collect();
         distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
         let pipelines = distinct.into_iter().map(|pipelines| pipelines.prepared().len()).sum();
@@ -126,12 +126,13 @@ impl WgpuBackend {
     /// another way than it did.
     fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Vec<Arc<ProcessPipelines>>, BackendError> {
         let mut kept = self.pipelines.lock();
-        let mut of_plan = kept.get(&plan.identity()).cloned().unwrap_or_default();
+        let mut of_plan = kept.get(&plan.identity()).map_or_else(Vec::new, |kept| kept.of_processes.clone());
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
             if of_plan.get(index).is_some_and(|pipelines| pipelines.still_fit(draws)) {
                 continue;
             }
-            let fitting = kept.values().flatten().find(|pipelines| pipelines.fit(plan, planned, draws)).cloned();
+            let mut all = kept.values().flat_map(|kept| &kept.of_processes);
+            let fitting = all.find(|pipelines| pipelines.fit(plan, planned, draws)).cloned();
             let made = match fitting {
                 Some(fitting) => fitting,
                 None => {
@@ -146,7 +147,9 @@ impl WgpuBackend {
                 None => of_plan.push(made),
             }
         }
-        kept.insert(plan.identity(), of_plan.clone());
+        // What only plans that are gone had in common with this one was found above.
+        kept.retain(|_, kept| kept.plan.strong_count() > 0);
+        kept.insert(plan.identity(), PlanPipelines { plan: plan.alive(), of_processes: of_plan.clone() });
         Ok(of_plan)
     }
 
@@ -208,7 +211,7 @@ impl WgpuBackend {
             let mesh = self.subdivisions.find(&self.device, &self.queue, assets, batch.mesh, halvings)?;
             if mesh.is_coarse {
                 for rank in batch.first..batch.first + batch.count {
-                    request.rejections.count(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);
+                    request.rejections.count_once(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);
                 }
             }
             frame.subdivided.write().insert((batch.mesh, halvings), mesh);
@@ -225,6 +228,14 @@ impl WgpuBackend {
         *self.targets.lock() = TargetCache::default();
         self.buffers.forget();
     }
+}
+
+/// The pipelines of a plan.
+struct PlanPipelines {
+    /// Whether the plan still is.
+    plan: Weak<()>,
+    /// One for each process.
+    of_processes: Vec<Arc<ProcessPipelines>>,
 }
 
 /// What a [`WgpuBackend`] keeps on the device from frame to frame, beside the scene's own meshes and textures.
@@ -310,7 +321,10 @@ impl Backend for WgpuBackend {
             frame.buffers.write_drawn(&self.queue, index, &list.objects);
             self.subdivide(frame, request, list)?;
             Ok::<_, BackendError>(pipelines.make_missing(&self.device, &list.batches))
-        })??;
+        })
+        .flatten()
+        // Of what was made just now some may be unusable.
+        .inspect_err(|_| self.subdivisions.forget())?;
         pipelines.keep(made);
         Ok(())
     }

@@ -85,7 +85,8 @@ impl Subdivisions {
 
 impl SubdividedMesh {
     fn new(device: &wgpu::Device, queue: &wgpu::Queue, mesh: &Mesh, halvings: u32) -> Result<Self, BackendError> {
-        let longest = mesh.longest_edge() / (1_u64 << halvings) as f32;
+        // A little more, lest halves that were rounded up are halved again.
+        let longest = mesh.longest_edge() / (1_u64 << halvings) as f32 * 1.001;
         let subdivided = mesh.subdivided(longest, Subdivisions::MOST_TRIANGLES);
         let upload = |label, bytes: &[u8], usage| {
             let buffer = new_buffer(device, label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;

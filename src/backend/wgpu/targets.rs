@@ -150,8 +150,14 @@ impl TargetCache {
         let [width, height] = sharing().next().map_or([1, 1], |view| view.camera.size);
         let layers = sharing().count().max(1) as u32;
         let extent = wgpu::Extent3d { width, height, depth_or_array_layers: layers };
-        let kept = self.current.layered.iter().find(|kept| *kept.planned == *planned && kept.texture.size() == extent);
-        if let Some(kept) = kept {
+        // Up to twice the layers are kept, so that lights that come and go do not take new memory each time.
+        let fits = |size: wgpu::Extent3d| {
+            let layers = layers..=2 * layers;
+            wgpu::Extent3d { depth_or_array_layers: extent.depth_or_array_layers, ..size } == extent
+                && layers.contains(&size.depth_or_array_layers)
+        };
+        let mut kept = self.current.layered.iter().filter(|kept| *kept.planned == *planned);
+        if let Some(kept) = kept.find(|kept| fits(kept.texture.size())) {
             return Ok(kept.clone());
         }
         let texture = new_texture(device, planned, extent)?;

@@ -24,7 +24,7 @@ pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize) -
     if forward.dot(farthest - eye) <= 0.0 {
         return None;
     }
-    let distance = eye.distance(eye.clamp(low, high)).max(f64::from(view.camera.near));
+    let distance = eye.distance(eye.clamp(low, high)).max(f64::from(view.camera.far) * 1e-3);
     let edge = f64::from(mesh.longest_edge()) * f64::from(scale.abs().max_element());
     Some((edge / (WIDEST_ANGLE * distance)).log2().ceil().clamp(0.0, 64.0) as u32)
 }

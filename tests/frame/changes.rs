@@ -1,0 +1,212 @@
+//! What changes while a renderer draws: its pipeline, its lights, and frames that fail in between.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{
+    CommandDraws, Declare, Deferred, Draws, FullScreen, Fxaa, PlanError, RenderProcess, ShadowCasters, ToneMapping,
+};
+use drawloom::scene::{Light, Scene, ViewKind};
+use drawloom::task::Scheduler;
+use drawloom::view::{RejectionReason, ShadowMaps};
+use drawloom::{BuildError, FrameError, Renderer, RendererBuilder, Submitter};
+
+use crate::scenes::field;
+
+fn build(builder: RendererBuilder<NullBackend>) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap()
+}
+
+fn deferred(deferred: Deferred) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    build(Renderer::builder(NullBackend).deferred(deferred))
+}
+
+fn spot(position: DVec3) -> Light {
+    Light::Spot {
+        position,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(9.0),
+        range: 20.0,
+        inner_angle: 0.3,
+        outer_angle: 0.6,
+        casts_shadow: true,
+    }
+}
+
+/// One camera that looks at boxes, and nothing that lights them.
+fn dark_field() -> Scene {
+    let mut scene = field(50);
+    scene.cameras.truncate(1);
+    scene.lights.clear();
+    scene
+}
+
+fn processes(renderer: &Renderer<NullBackend>) -> Vec<&str> {
+    renderer.plan().processes().iter().map(|planned| planned.process.name()).collect()
+}
+
+#[test]
+fn another_pipeline_draws_from_the_next_frame_on() {
+    let scene = dark_field();
+    let (mut renderer, submitter) = deferred(Deferred::to_picture().leave_out("transparency"));
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    assert_eq!(processes(&renderer), ["geometry buffer", "tone mapping"]);
+
+    renderer
+        .set_deferred(Deferred::new().depth_pre_pass(true).post(ToneMapping::default()).post(Fxaa::default()))
+        .unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let drawn = submitter.submit(recorded).unwrap().submission.passes.len();
+    let expected = ["depth pre-pass", "geometry buffer", "transparency", "tone mapping", "fxaa"];
+    assert_eq!((processes(&renderer).as_slice(), drawn), (&expected[..], expected.len()));
+
+    let maps = ShadowMaps { side: 0, ..ShadowMaps::default() };
+    let refused = renderer.set_deferred(Deferred::new().shadow_maps(Some(maps)));
+    assert!(matches!(refused, Err(BuildError::Plan(PlanError::ShadowMaps { .. }))));
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    assert_eq!(processes(&renderer), expected);
+}
+
+#[test]
+fn after_a_frame_that_failed_the_last_one_can_still_be_looked_at() {
+    let mut scene = dark_field();
+    scene.lights = vec![spot(DVec3::Y * 5.0)];
+    let (mut renderer, _) = deferred(Deferred::to_picture());
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    let drawn = renderer.draw_list("geometry buffer", 0).unwrap().commands.len();
+
+    scene.lights.clear();
+    scene.cameras[0].kind = ViewKind::Reflection;
+    assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::NoProcess { .. })));
+    assert!(renderer.draw_list("nobody", 0).is_none());
+    assert_eq!(renderer.draw_list("geometry buffer", 0).unwrap().commands.len(), drawn);
+}
+
+#[test]
+fn a_light_out_of_reach_is_counted_and_no_reason_to_fail() {
+    let mut scene = dark_field();
+    scene.lights = vec![spot(DVec3::Y * 5.0), spot(DVec3::X * 5e9)];
+    let (mut renderer, _) = deferred(Deferred::to_picture());
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let statistics = recorded.statistics();
+    let told: Vec<_> = statistics.rejections.iter().map(|told| (told.reason, told.count, told.first)).collect();
+    assert_eq!(told, [(RejectionReason::LightOutOfReach, 1, 1)]);
+    assert_eq!(statistics.views.len(), 2);
+}
+
+#[test]
+fn a_light_that_no_camera_sees_has_no_map() {
+    let mut scene = dark_field();
+    let behind = scene.cameras[0].position + DVec3::Z * 50.0;
+    scene.lights = vec![spot(behind), spot(DVec3::Y * 5.0)];
+    let (mut renderer, _) = deferred(Deferred::to_picture());
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let views: Vec<_> = recorded.statistics().views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(views, ["front", "shadow of light 1"]);
+    assert_eq!(recorded.statistics().views[0].lights, 1);
+}
+
+#[test]
+fn tables_of_one_plan_leave_nothing_to_another() {
+    let mut scene = dark_field();
+    let (mut renderer, _) = deferred(Deferred::to_picture());
+    let mut first = None;
+    for frame in 0..6 {
+        scene.lights = if frame % 2 == 0 { Vec::new() } else { vec![spot(DVec3::Y * 5.0); 3] };
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let main = recorded.statistics().views[0].clone();
+        let commands = first.get_or_insert(main.commands);
+        assert_eq!(main.commands, *commands, "in frame {frame}");
+    }
+}
+
+/// Light in the air, which asks the shadow maps what reaches it.
+struct Fog;
+
+impl RenderProcess for Fog {
+    fn name(&self) -> &str {
+        "fog"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples("depth");
+        declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        declare.draws_over("radiance");
+        declare.after("transparency");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen::default())
+    }
+}
+
+#[test]
+fn an_engines_process_may_read_shadow_maps_also_where_there_are_none() {
+    let mut scene = dark_field();
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Fog);
+    let (mut renderer, _) = build(builder);
+    for lights in [vec![], vec![spot(DVec3::Y * 5.0)], vec![]] {
+        let drawn = !lights.is_empty();
+        scene.lights = lights;
+        drop(renderer.record(scene.as_scene_ref()).unwrap());
+        assert_eq!(processes(&renderer).contains(&"shadow casters"), drawn);
+        assert!(processes(&renderer).contains(&"fog"));
+        let maps = renderer.plan().targets().iter().filter(|target| target.name == ShadowCasters::TARGET);
+        assert_eq!(maps.map(|map| (map.layered, map.views)).collect::<Vec<_>>(), [(true, ViewKind::Shadow)]);
+    }
+    // Nobody draws another pipeline's maps.
+    let alone = Renderer::builder(NullBackend).process(Fog).output("radiance");
+    assert!(alone.build(Arc::new(Scheduler::new(1).unwrap())).is_err());
+}
+
+#[test]
+fn what_is_left_out_closes_the_chain_or_takes_its_shadows_along() {
+    let steps = || Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
+    let mut scene = dark_field();
+    scene.lights = vec![spot(DVec3::Y * 5.0)];
+    let drawn = |pipeline: Deferred| {
+        let (mut renderer, _) = deferred(pipeline.leave_out("transparency"));
+        drop(renderer.record(scene.as_scene_ref()).unwrap());
+        let names = processes(&renderer).into_iter().map(str::to_owned);
+        names.collect::<Vec<_>>()
+    };
+    let lit = ["geometry buffer", "shadowed spot lights"];
+    assert_eq!(drawn(steps().leave_out("fxaa"))[1..], [lit[0], lit[1], "tone mapping"]);
+    assert_eq!(drawn(steps().leave_out("tone mapping"))[1..], [lit[0], lit[1], "fxaa"]);
+    assert_eq!(drawn(steps().leave_out("fxaa").leave_out("tone mapping"))[1..], lit);
+    let unshadowed = drawn(steps().leave_out("shadow casters"));
+    assert_eq!(unshadowed, ["geometry buffer", "spot lights", "tone mapping", "fxaa"]);
+}
+
+/// Draws what lights see, as an engine does that has a use of its own for it.
+struct OwnMaps;
+
+impl RenderProcess for OwnMaps {
+    fn name(&self) -> &str {
+        "own maps"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Shadow);
+        declare.clears_depth_layer("own map", drawloom::process::Format::Depth32Float);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws { fragment: None, ..CommandDraws::default() })
+    }
+}
+
+#[test]
+fn without_shadows_lights_are_lit_also_beside_maps_of_the_engines_own() {
+    let mut scene = dark_field();
+    scene.lights = vec![spot(DVec3::Y * 5.0)];
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().shadow_maps(None)).process(OwnMaps);
+    let (mut renderer, submitter) = build(builder);
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let passes = submitter.submit(recorded).unwrap().submission.passes;
+    let lit: Vec<_> = passes.iter().filter(|pass| pass.lights > 0).map(|pass| pass.process.as_str()).collect();
+    assert_eq!(lit, ["spot lights"]);
+    assert_eq!(passes[0].process, "own maps");
+}
