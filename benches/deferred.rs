@@ -4,10 +4,10 @@
 //!     cargo bench --bench deferred
 //!     cargo bench --bench deferred -- --quick
 //!
-//! All settings of a block take turns, a frame each and in an order drawn anew each round, so that whatever else the machine
-//! does meets them alike. What is shown is the median. A block is one table on one backend: wgpu's `noop`, which is the processor alone, or the machine's
-//! adapter. Where there is no adapter its blocks are left out. What was measured is written to `drawloom/deferred.json` in
-//! the target folder too.
+//! All settings of a block take turns, a frame each and in an order drawn anew each round, so that whatever else the
+//! machine does meets them alike. What is shown is the median. A block is one table on one backend: wgpu's `noop`,
+//! which is the processor alone, or the machine's adapter. Where there is no adapter its blocks are left out. What was
+//! measured is written to `drawloom/deferred.json` in the target folder too.
 
 #[path = "../examples/frame/adapter.rs"]
 mod adapter;

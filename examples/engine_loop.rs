@@ -159,7 +159,8 @@ impl World {
     }
 }
 
-/// A pipeline of the engine's own over Drawloom's commands, in the place of Drawloom's transparency: objects of additive materials glow, brightest at their rims.
+/// A pipeline of the engine's own over Drawloom's commands, in the place of Drawloom's transparency: objects of
+/// additive materials glow, brightest at their rims.
 struct Glow;
 
 impl RenderProcess for Glow {

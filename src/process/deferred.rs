@@ -10,12 +10,12 @@ use crate::queue::MaterialShare;
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 
-/// The deferred pipeline of L 4: its settings, its post-processing, and what an engine replaces or leaves out. What it adds
-/// goes to the renderer's builder beside it.
+/// The deferred pipeline of L 4: its settings, its post-processing, and what an engine replaces or leaves out. What it
+/// adds goes to the renderer's builder beside it.
 ///
-/// It models only what a scene requires. Lights of a class that the scene has none of get no process; without a light that
-/// casts shadows there is no shadow map; without a material that mixes with what is behind it there is no transparency. When a
-/// scene changes what it requires, the processes follow.
+/// It models only what a scene requires. Lights of a class that the scene has none of get no process; without a light
+/// that casts shadows there is no shadow map; without a material that mixes with what is behind it there is no
+/// transparency. When a scene changes what it requires, the processes follow.
 ///
 /// ```text
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
@@ -66,8 +66,8 @@ impl Deferred {
         Self { depth_pre_pass, ..self }
     }
 
-    /// Into how many processes the geometry buffer is split, by material (L 5): 1 to 64, and what is beyond counts as the nearest.
-    /// They are called "geometry buffer 1 of 2" and so on.
+    /// Into how many processes the geometry buffer is split, by material (L 5): 1 to 64, and what is beyond counts as
+    /// the nearest. They are called "geometry buffer 1 of 2" and so on.
     pub fn geometry_shares(self, geometry_shares: u32) -> Self {
         Self { geometry_shares, ..self }
     }
@@ -88,8 +88,8 @@ impl Deferred {
         self
     }
 
-    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there. Of two for one
-    /// place the later counts.
+    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there. Of two
+    /// for one place the later counts.
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
         let name = name.into();
         self.replaced.retain(|(other, _)| *other != name);
@@ -97,8 +97,8 @@ impl Deferred {
         self
     }
 
-    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. Without a step of post-processing the
-    /// chain closes around it; without `"shadow casters"` no light casts shadows.
+    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. Without a step of
+    /// post-processing the chain closes around it; without `"shadow casters"` no light casts shadows.
     pub fn leave_out(mut self, name: impl Into<String>) -> Self {
         self.left_out.push(name.into());
         self

@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use crate::scene::LightKind;
 
-/// Geometry that holds all that a light can reach, so that lighting touches no other pixels: a sphere for a point light, a
-/// cone for a spot light, and the screen for what reaches everywhere (L 4.2.1).
+/// Geometry that holds all that a light can reach, so that lighting touches no other pixels: a sphere for a point
+/// light, a cone for a spot light, and the screen for what reaches everywhere (L 4.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum LightVolume {
     /// A ball that contains the unit sphere, to be scaled by the light's range.
@@ -31,8 +31,8 @@ impl LightVolume {
 
     /// Three corners for each triangle, counter-clockwise seen from outside. No volume has a hole.
     ///
-    /// A sphere's are places; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip space
-    /// and 0.
+    /// A sphere's are places; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip
+    /// space and 0.
     pub(crate) fn corners(self) -> Vec<[f32; 3]> {
         match self {
             Self::Sphere => sphere(),
@@ -114,16 +114,19 @@ mod tests {
 
     use super::*;
 
-    /// The place of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines along +Z.
+    /// The place of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines
+    /// along +Z.
     ///
-    /// A light of half-angle α reaches, within its range r, no further out than r·sin α, and no further ahead than r. So the cone
-    /// ends where it is r·sin α wide, at r·cos α, and goes on to r as a cylinder.
+    /// A light of half-angle α reaches, within its range r, no further out than r·sin α, and no further ahead than r.
+    /// So the cone ends where it is r·sin α wide, at r·cos α, and goes on to r as a cylinder.
     ///
-    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. All is larger by a
-    /// ten-thousandth of the range, the tip and its cone moved back by as much, since whoever draws it rounds too.
+    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. All is
+    /// larger by a ten-thousandth of the range, the tip and its cone moved back by as much, since whoever draws it
+    /// rounds too.
     ///
-    /// `cosine_of_half_angle` is that of the angle between the axis and where the light ends, from 0 to 1; beyond either end it
-    /// counts as that end. `range` is in metres. It does the same as the function of that name in `light_volume.wgsl`.
+    /// `cosine_of_half_angle` is that of the angle between the axis and where the light ends, from 0 to 1; beyond
+    /// either end it counts as that end. `range` is in metres. It does the same as the function of that name in
+    /// `light_volume.wgsl`.
     fn cone_corner(corner: [f32; 3], cosine_of_half_angle: f32, range: f32) -> Vec3 {
         let [x, y, tier] = corner;
         let along = cosine_of_half_angle.clamp(0.0, 1.0);
@@ -137,8 +140,8 @@ mod tests {
         Vec3::new(x * radius, y * radius, height) * range
     }
 
-    /// How much the sine's square may be above what the cosine says. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and so is the
-    /// one that a shader compares it with; at 0° that hides an angle of some 0.03°.
+    /// How much the sine's square may be above what the cosine says. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and
+    /// so is the one that a shader compares it with; at 0° that hides an angle of some 0.03°.
     const HIDDEN_BY_COSINE: f32 = 1.0 / (1 << 22) as f32;
 
     /// cos(π/16): the middle of each side is that much closer to the axis than its edges.

@@ -43,12 +43,12 @@ pub trait RenderProcess: Send + Sync {
     /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
     fn name(&self) -> &str;
 
-    /// Says which views it is for, and what it reads and writes. Asked once for every plan that it becomes part of: when the renderer is
-    /// built, and when a scene requires other processes beside it.
+    /// Says which views it is for, and what it reads and writes. Asked once for every plan that it becomes part of:
+    /// when the renderer is built, and when a scene requires other processes beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending makes
-    /// new pipelines.
+    /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending
+    /// makes new pipelines.
     fn draws(&self) -> Draws<'_>;
 }
 

@@ -5,8 +5,8 @@ use crate::command::RenderCommand;
 
 /// Merges the list's sorted commands into batches: neighbours with the same mesh and state become one instanced draw.
 ///
-/// Neighbours of different materials share a batch, because shaders find materials by object. Redundant state is filtered by the same stroke:
-/// what stays the same from one batch to the next is not set again when they are recorded.
+/// Neighbours of different materials share a batch, because shaders find materials by object. Redundant state is
+/// filtered by the same stroke: what stays the same from one batch to the next is not set again when they are recorded.
 pub fn instance(list: &mut DrawList) {
     list.batches.clear();
     list.objects.clear();

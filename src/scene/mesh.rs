@@ -111,7 +111,7 @@ impl Mesh {
     }
 
     /// The indices of each triangle's corners, counter-clockwise seen from its visible side.
-    pub(super) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let (step, turned) = match self.topology {
             Topology::TriangleList => (3, false),
             Topology::TriangleStrip => (1, true),

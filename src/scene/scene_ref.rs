@@ -12,7 +12,8 @@ use crate::handle::Handle;
 /// [`Renderer::record`](crate::Renderer::record) returns (L 3).
 #[derive(Clone, Copy, Debug)]
 pub struct SceneRef<'a> {
-    /// Where each object's origin is in the world, in metres. Anywhere up to 2³² m, 4.3 million kilometres, from the world's origin.
+    /// Where each object's origin is in the world, in metres. Anywhere up to 2³² m, 4.3 million kilometres, from the
+    /// world's origin.
     pub positions: &'a [DVec3],
     /// From object space to the world's axes; of unit length.
     pub orientations: &'a [Quat],

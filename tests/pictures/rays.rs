@@ -331,7 +331,8 @@ impl Rays<'_> {
         [least, most]
     }
 
-    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place lies on.
+    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place
+    /// lies on.
     fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
         let (from, along) = match *light {
             Light::Directional { direction, .. } => {
@@ -368,9 +369,9 @@ fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     }
 }
 
-/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width and
-/// half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope, as much
-/// more. A pixel is what [`map_pixel`] says.
+/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width
+/// and half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope,
+/// as much more. A pixel is what [`map_pixel`] says.
 fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
@@ -395,7 +396,8 @@ fn color(light: &Light) -> DVec3 {
 
 /// The least and the most that a light of intensity 1 brings to a place that is known to within `error` metres.
 fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
-    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are exact, and f32 leaves a little.
+    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are
+    // exact, and f32 leaves a little.
     let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
     let (position, range) = match *light {
         Light::Directional { direction, .. } => {

@@ -266,8 +266,8 @@ fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) 
             Projection::Perspective { .. } => near / depth(x, y),
             _ => far - depth(x, y) * (far - near),
         };
-        // Edges of 5° that are drawn straight are off by half a pixel of 1024, which is a quarter here; and in between, distances
-        // are longer by a thousandth.
+        // Edges of 5° that are drawn straight are off by half a pixel of 1024, which is a quarter here; and in between,
+        // distances are longer by a thousandth.
         let slope = hits.iter().map(|hit| (hit.0 - hits[0].0).abs()).fold(0.0, f64::max);
         if (found - hits[0].0).abs() > 0.3 * slope + 1e-3 * hits[0].0 {
             return Err(format!("at ({x}, {y}) it is {found} m away, and should be {}", hits[0].0));
