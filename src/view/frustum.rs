@@ -68,9 +68,9 @@ impl Frustum {
 
     /// Whether any of a sphere may be seen: never `false` for one that is, sometimes `true` for one just outside.
     ///
-    /// A plane's distance n·c + o is computed in f32 with n, c and o rounded to it. Each of the three products carries
-    /// at most four roundings of u = 2⁻²⁴ (n, c, the product, the sums), so the distance is off by no more than 4u(‖c‖₁
-    /// + r + |o|) to first order; twice that is allowed for. The bound is made of magnitudes from before any
+    /// A plane's distance n·c + o is computed in f32 with n, c and o rounded to it. Each of the three products carries at
+    /// most four roundings of u = 2⁻²⁴ (n, c, the product, the sums), so the distance is off by no more than
+    /// 4u(‖c‖₁ + r + |o|) to first order; twice that is allowed for. The bound is made of magnitudes from before any
     /// cancellation.
     pub fn may_see(&self, center: DVec3, radius: f32) -> bool {
         let center = (center - self.origin).as_vec3();
