@@ -122,10 +122,9 @@ pub struct Stage {
 }
 
 /// Between what a radiance must be, one channel a component.
-#[derive(Clone, Copy, Debug)]
-pub struct Bounds {
-    pub low: DVec3,
-    pub high: DVec3,
+struct Bounds {
+    low: DVec3,
+    high: DVec3,
 }
 
 impl Stage {
@@ -303,7 +302,7 @@ impl Rays<'_> {
     }
 
     /// The least and the most that a light's shadows may leave: all or nothing, but anything in between where the filter
-    /// meets an edge; and close behind what casts the shadow.
+    /// meets an edge, and so close behind what casts the shadow that the bias may reach past it.
     fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
         if !light.casts_shadow() {
             return [1.0; 2];
@@ -331,8 +330,7 @@ impl Rays<'_> {
         [least, most]
     }
 
-    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place
-    /// lies on.
+    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place lies on.
     fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
         let (from, along) = match *light {
             Light::Directional { direction, .. } => {
@@ -369,9 +367,9 @@ fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     }
 }
 
-/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width
-/// and half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope,
-/// as much more. A pixel is what [`map_pixel`] says.
+/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width and
+/// half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope, as much
+/// more. A pixel is what [`map_pixel`] says.
 fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
@@ -396,8 +394,8 @@ fn color(light: &Light) -> DVec3 {
 
 /// The least and the most that a light of intensity 1 brings to a place that is known to within `error` metres.
 fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
-    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are
-    // exact, and f32 leaves a little.
+    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are exact,
+    // and f32 leaves a little.
     let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
     let (position, range) = match *light {
         Light::Directional { direction, .. } => {
@@ -441,7 +439,7 @@ fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
 }
 
 /// Where the pixels of a camera's picture look.
-pub struct Eye {
+struct Eye {
     position: DVec3,
     axes: [DVec3; 3],
     size: [f64; 2],
@@ -451,7 +449,7 @@ pub struct Eye {
 }
 
 impl Eye {
-    pub fn new(camera: &Camera) -> Self {
+    fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
         let (half, perspective) = match camera.projection {
             Projection::Perspective { field_of_view } => ((f64::from(field_of_view) / 2.0).tan(), true),
@@ -468,7 +466,7 @@ impl Eye {
     }
 
     /// Where a ray begins, and how far it goes for 1 m forward; `x` and `y` in pixels from the upper left.
-    pub fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+    fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let [right, up, forward] = self.axes;
         let [width, height] = self.size;
         let across = right * ((x / width * 2.0 - 1.0) * self.half * width / height)

@@ -379,7 +379,7 @@ fn widest_spot() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 2048, ..MAPS };
     let mut studio = studio_with(maps)?;
     let place = DVec3::Y * 2.0;
-    for degrees in [80.0, 84.9] {
+    for degrees in [80.0, 84.9, 90.0] {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let square = Panel::facing(DVec3::new(0.3, 1.0, 0.0), DVec3::Y, 0.6).double_sided();
         let stage = stage(vec![floor, square], vec![spot(place, DVec3::NEG_Y, degrees)], maps);
