@@ -6,10 +6,9 @@ fn fragment(in: Surface) -> @location(0) vec4<f32> {
     // Taken before the flow parts.
     let gradient_x = dpdx(in.uv);
     let gradient_y = dpdy(in.uv);
-    let across = cross(dpdx(in.relative), dpdy(in.relative));
     let material = materials[in.material];
 
-    let illuminance = illuminance_from(lights[chosen.x], in.relative, seen_normal(in, across, material));
+    let illuminance = illuminance_from(lights[chosen.x], in.relative, seen_normal(in, material));
     // As the deferred pipeline does.
     if all(illuminance == vec3<f32>(0.0)) {
         discard;

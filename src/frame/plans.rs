@@ -59,7 +59,7 @@ impl Plans {
     /// If the processes do not make a frame.
     pub(super) fn follow(&mut self, scene: &SceneRef<'_>) -> Result<Arc<FramePlan>, PlanError> {
         if let Some(deferred) = &self.deferred {
-            let requirements = Requirements::of(scene, deferred.maps().is_some());
+            let requirements = Requirements::of(scene, self.tells_shadowed_apart());
             self.current = match self.compiled.get(&requirements) {
                 Some(plan) => Arc::clone(plan),
                 None => {

@@ -6,14 +6,9 @@ struct Targets {
 
 @fragment
 fn fragment(in: Surface) -> Targets {
-    // Taken before the flow parts.
-    let gradient_x = dpdx(in.uv);
-    let gradient_y = dpdy(in.uv);
-    let across = cross(dpdx(in.relative), dpdy(in.relative));
     let material = materials[in.material];
-
-    let normal = octahedral_from_direction(seen_normal(in, across, material));
-    let diffuse = diffuse_at(material, in.uv, gradient_x, gradient_y).rgb;
+    let normal = octahedral_from_direction(seen_normal(in, material));
+    let diffuse = seen_diffuse(in, material).rgb;
     let radiance = material.emission + diffuse * view.ambient;
     return Targets(
         vec4<f32>(select(normal, normal * 0.5 + 0.5, NORMALS_FROM_ZERO_TO_ONE), 0.0, 1.0),

@@ -19,8 +19,7 @@ impl Requirements {
     pub fn of(scene: &SceneRef<'_>, shadows: bool) -> Self {
         let mut requirements = Self::default();
         for light in scene.lights {
-            let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() };
-            requirements.lights |= 1 << class.index();
+            requirements.lights |= 1 << LightClass::of(light, shadows).index();
         }
         let mut materials = scene.assets.iter::<Material>();
         requirements.transparency = materials.any(|(_, material)| material.blend != Blend::None);

@@ -36,14 +36,18 @@ fn map_slope(light: Light, normal: vec3<f32>, towards: vec3<f32>) -> f32 {
         return 1.5 * sqrt(1.0 - cosine * cosine) / cosine;
     }
     // The map is flat: what faces the light, but not along its axis, has a slope in it too.
-    let local = rotate(vec4<f32>(-light.shadow_orientation.xyz, light.shadow_orientation.w), normal);
+    let local = along_map_axes(light, normal);
     return (abs(local.x) + abs(local.y)) / cosine;
+}
+
+// From the world's axes to those of the light's shadow map.
+fn along_map_axes(light: Light, direction: vec3<f32>) -> vec3<f32> {
+    return rotate(vec4<f32>(-light.shadow_orientation.xyz, light.shadow_orientation.w), direction);
 }
 
 fn map_place(light: Light, place: vec3<f32>) -> MapPlace {
     let side = f32(textureDimensions(shadow_maps).x);
-    let turned = vec4<f32>(-light.shadow_orientation.xyz, light.shadow_orientation.w);
-    let local = rotate(turned, place - light.position);
+    let local = along_map_axes(light, place - light.position);
     let reach = light.range - light.shadow_near;
     switch light.kind {
         case SPOT: {

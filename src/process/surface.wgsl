@@ -14,13 +14,20 @@ fn vertex(in: VertexInput) -> Surface {
     return Surface(clip_position(relative), relative, world_normal(object, in.normal), in.uv, object.material);
 }
 
-// The normal of the side that is seen. `across` is the triangle's own, of either sign.
-fn seen_normal(in: Surface, across: vec3<f32>, material: Material) -> vec3<f32> {
+// The normal of the side that is seen. To be called before the flow parts.
+fn seen_normal(in: Surface, material: Material) -> vec3<f32> {
+    // The triangle's own, of either sign.
+    let across = cross(dpdx(in.relative), dpdy(in.relative));
     // Whichever way the triangle is wound, its visible side is the one that faces the camera.
     let to_eye = direction_to_eye(in.relative);
     let facing = unit_or(across * sign(dot(across, to_eye)), to_eye);
     let normal = unit_or(in.normal, facing);
     return select(normal, -normal, material.double_sided == 1u && dot(normal, facing) < 0.0);
+}
+
+// The diffuse colour and opacity of what is seen. To be called before the flow parts.
+fn seen_diffuse(in: Surface, material: Material) -> vec4<f32> {
+    return diffuse_at(material, in.uv, dpdx(in.uv), dpdy(in.uv));
 }
 
 // A vector brought to unit length, or another where it has no direction.

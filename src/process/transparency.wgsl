@@ -1,13 +1,8 @@
 @fragment
 fn fragment(in: Surface) -> @location(0) vec4<f32> {
-    // Taken before the flow parts.
-    let gradient_x = dpdx(in.uv);
-    let gradient_y = dpdy(in.uv);
-    let across = cross(dpdx(in.relative), dpdy(in.relative));
     let material = materials[in.material];
-
-    let normal = seen_normal(in, across, material);
-    let diffuse = diffuse_at(material, in.uv, gradient_x, gradient_y);
+    let normal = seen_normal(in, material);
+    let diffuse = seen_diffuse(in, material);
     var illuminance = view.ambient * PI;
     for (var index = 0u; index < view.light_count; index++) {
         let light = lights[index];

@@ -30,6 +30,11 @@ impl LightClass {
     /// How many classes there can be: every [`LightClass::index`] is below it.
     pub const COUNT: usize = 2 * LightKind::ALL.len();
 
+    /// The class of a light. Without `shadows`, lights that cast some are as those that do not.
+    pub fn of(light: &Light, shadows: bool) -> Self {
+        Self { kind: light.kind(), shadowed: shadows && light.casts_shadow() }
+    }
+
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
         LightKind::ALL.into_iter().flat_map(|kind| [false, true].map(|shadowed| Self { kind, shadowed }))
@@ -61,7 +66,7 @@ impl LightTable {
         self.reaching.clear();
         for (index, light) in lights.iter().enumerate() {
             if light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius)) {
-                let class = LightClass { kind: light.kind(), shadowed: shadows && light.casts_shadow() }.index();
+                let class = LightClass::of(light, shadows).index();
                 counts[class] += 1;
                 self.reaching.push((class, index));
             }

@@ -70,3 +70,19 @@ pub(super) fn new_buffer(
     buffer.unmap();
     Ok(buffer)
 }
+
+/// A buffer of these bytes, and of no others.
+///
+/// # Errors
+/// If the device allows no buffer of that size.
+pub(super) fn filled_buffer(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    label: &'static str,
+    bytes: &[u8],
+    usage: wgpu::BufferUsages,
+) -> Result<wgpu::Buffer, BackendError> {
+    let buffer = new_buffer(device, label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
+    queue.write_buffer(&buffer, 0, bytes);
+    Ok(buffer)
+}

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::arena::{Arena, new_buffer};
+use super::arena::{Arena, filled_buffer};
 use super::frame_buffers::check_storage;
 use super::layouts::Layouts;
 use super::textures::{TextureArrays, TexturePlace};
@@ -159,9 +159,7 @@ impl AssetCache {
         }
         let bytes: &[u8] = bytemuck::cast_slice(&records);
         check_storage(device, bytes.len())?;
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let materials = new_buffer(device, "materials", bytes.len() as u64, usage)?;
-        queue.write_buffer(&materials, 0, bytes);
+        let materials = filled_buffer(device, queue, "materials", bytes, wgpu::BufferUsages::STORAGE)?;
 
         let views = self.textures.views(device);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {

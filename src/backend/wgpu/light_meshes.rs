@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::arena::new_buffer;
+use super::arena::filled_buffer;
 use crate::backend::BackendError;
 use crate::process::LightVolume;
 use crate::scene::LightKind;
@@ -25,11 +25,9 @@ impl LightMeshes {
             corners.extend(volume.corners());
             first..corners.len() as u32
         });
-        let bytes: &[u8] = bytemuck::cast_slice(&corners);
-        let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
-        let buffer = new_buffer(device, "light volumes", bytes.len() as u64, usage)?;
-        queue.write_buffer(&buffer, 0, bytes);
-        Ok(Self { corners: buffer, ranges })
+        let bytes = bytemuck::cast_slice(&corners);
+        let corners = filled_buffer(device, queue, "light volumes", bytes, wgpu::BufferUsages::VERTEX)?;
+        Ok(Self { corners, ranges })
     }
 
     /// Which corners a light of this kind is drawn with.

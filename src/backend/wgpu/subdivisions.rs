@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::Mutex;
 
-use super::arena::new_buffer;
+use super::arena::filled_buffer;
 use crate::backend::BackendError;
 use crate::scene::{Assets, Mesh};
 
@@ -88,11 +88,7 @@ impl SubdividedMesh {
         // A little more, lest halves that were rounded up are halved again.
         let longest = mesh.longest_edge() / (1_u64 << halvings) as f32 * 1.001;
         let subdivided = mesh.subdivided(longest, Subdivisions::MOST_TRIANGLES);
-        let upload = |label, bytes: &[u8], usage| {
-            let buffer = new_buffer(device, label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
-            queue.write_buffer(&buffer, 0, bytes);
-            Ok::<_, BackendError>(buffer)
-        };
+        let upload = |label, bytes, usage| filled_buffer(device, queue, label, bytes, usage);
         let vertices = bytemuck::cast_slice(subdivided.vertices());
         let indices = bytemuck::cast_slice(subdivided.indices());
         Ok(Self {
