@@ -29,6 +29,8 @@ mod report;
 mod shadows;
 #[path = "shared/stopwatch.rs"]
 mod stopwatch;
+#[path = "shared/table.rs"]
+mod table;
 #[path = "deferred/turns.rs"]
 mod turns;
 

@@ -18,7 +18,7 @@ pub(crate) use loom::{
     hint::spin_loop,
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicUsize, Ordering, fence},
+        atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering, fence},
     },
     thread, thread_local,
 };
@@ -27,7 +27,7 @@ pub(crate) use std::{
     hint::spin_loop,
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicUsize, Ordering, fence},
+        atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering, fence},
     },
     thread, thread_local,
 };
@@ -106,6 +106,10 @@ mod modelled {
 
         pub(crate) fn stealer(&self) -> Stealer<T> {
             Stealer(Arc::clone(&self.0))
+        }
+
+        pub(crate) fn len(&self) -> usize {
+            self.0.lock().len()
         }
 
         pub(crate) fn push(&self, value: T) {

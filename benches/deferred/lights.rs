@@ -11,7 +11,8 @@ use serde::Serialize;
 use crate::Extent;
 use crate::field::Field;
 use crate::forward::{a_loop_over_lights, a_pass_a_light};
-use crate::report::{Table, milliseconds};
+use crate::report::milliseconds;
+use crate::table::Table;
 use crate::turns::{BackendName, Setting, Turns};
 
 /// A line of the table.

@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use crate::Extent;
 use crate::boxes::new_box;
-use crate::report::{Table, milliseconds};
+use crate::report::milliseconds;
+use crate::table::Table;
 use crate::turns::{BackendName, Setting, Turns};
 
 /// A line of the table.

@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use crate::Extent;
 use crate::field::Field;
-use crate::report::{Table, milliseconds};
+use crate::report::milliseconds;
+use crate::table::Table;
 use crate::turns::{BackendName, Turns};
 
 /// A line of the table.

@@ -2,7 +2,6 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crossbeam_utils::CachePadded;
 use petgraph::{
     Direction,
     graph::{DiGraph, NodeIndex},
@@ -11,11 +10,14 @@ use petgraph::{
 
 use super::{
     builder::FrameGraph,
+    costs::Costs,
     edges::{self, Edges, Relation, Roles},
     error::{CompileError, GraphProblem},
+    flow::Flow,
     order::{Walk, circle, in_order, places},
     progress::Progress,
     schedule::{Adjacency, Schedule},
+    sharing::Sharing,
 };
 
 impl<P> FrameGraph<P> {
@@ -223,17 +225,19 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
         }
     }
     kept.sort_unstable_by_key(|(index, _)| *index);
+    let flow = Flow::new(&dependencies);
     let mut schedule = Schedule {
         names: Vec::with_capacity(kept.len()),
         processes: Vec::with_capacity(kept.len()),
         indices: HashMap::with_capacity(kept.len()),
-        roots: (0..kept.len()).filter(|&index| dependencies[index].is_empty()).collect(),
-        progress: dependencies.iter().map(|list| CachePadded::new(Progress::new(list.len()))).collect(),
+        progress: Progress::new(&flow),
+        costs: Costs::new(flow.len()),
+        sharing: Sharing::default(),
+        always_shares: false,
+        flow,
         dependencies: Adjacency::new(dependencies),
         dependents: Adjacency::new(dependents),
         dropped,
-        inside: Vec::new(),
-        armed: true,
     };
     for (index, process) in kept {
         schedule.names.push(process.name);

@@ -117,16 +117,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod alone;
 mod builder;
 mod compile;
+mod costs;
 mod dot;
 mod edges;
 mod error;
 mod execute;
+mod flow;
 mod node;
 mod order;
 mod progress;
 mod schedule;
+mod share;
+mod sharing;
+mod token;
 
 pub use self::{
     builder::{FrameGraph, ProcessId, ResourceId},

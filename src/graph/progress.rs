@@ -1,75 +1,98 @@
-//! Where one process stands in a run, and how its items are cut into chunks.
+//! Where the processes stand in a run that is shared between workers. It is kept from run to run, so that a run takes no
+//! memory, and left as it was found.
+//!
+//! # Memory ordering
+//!
+//! What one process wrote must be seen by all that depend on it. Whoever is done with one counts each dependent down with
+//! release and acquire; read-modify-writes continue a release sequence, so the worker that takes the last count off, or
+//! sees that its own is the only one left, has acquired from all others. A process is armed again when it starts: by then
+//! nobody else counts it down any more in this run, and in the next one only who has come after the end of this one.
 
-use std::ops::Range;
+use crossbeam_utils::CachePadded;
 
-use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+use crate::{
+    sync::{AtomicU32, AtomicUsize, Mutex, Ordering},
+    task::{Chunks, Tickets},
+};
 
-/// How far a process is in the current run.
+use super::flow::Flow;
+
+/// How far a run is.
 pub(super) struct Progress {
-    /// How many of its dependencies are not done.
-    pub(super) waits_for: AtomicUsize,
-    width: AtomicUsize,
-    chunk: AtomicUsize,
-    /// The next chunk to be taken.
-    pub(super) ticket: AtomicUsize,
-    /// How many chunks are done.
-    pub(super) done: AtomicUsize,
-    /// Whether a job lies in the deques through which another worker can join.
-    pub(super) invited: AtomicBool,
+    /// Per process, how many of its dependencies are not done.
+    waits_for: Box<[AtomicU32]>,
+    /// Where processes stand that are ready, on their way to a worker. Each process has places for its dependents, which
+    /// it fills once a run; behind those of all stand the roots.
+    ready: Box<[AtomicU32]>,
+    passes: Box<[CachePadded<OpenPass>]>,
 }
 
 impl Progress {
-    pub(super) fn new(dependencies: usize) -> Self {
+    pub(super) fn new(flow: &Flow) -> Self {
+        let processes = 0..flow.len() as u32;
         Self {
-            waits_for: AtomicUsize::new(dependencies),
-            width: AtomicUsize::new(0),
-            chunk: AtomicUsize::new(0),
-            ticket: AtomicUsize::new(0),
-            done: AtomicUsize::new(0),
-            invited: AtomicBool::new(false),
+            waits_for: processes.clone().map(|process| AtomicU32::new(flow.dependency_count(process))).collect(),
+            ready: (0..flow.edges() + flow.roots().len()).map(|_| AtomicU32::new(0)).collect(),
+            passes: processes.map(|_| CachePadded::new(OpenPass::new())).collect(),
         }
     }
 
-    /// Sets a new pass out, and arms the process for the next run.
-    pub(super) fn open(&self, pass: Pass, dependencies: usize) {
-        // Relaxed, all of them: nobody else looks at the process before this thread spawns an invitation, and nobody
-        // counts its dependencies down again before the next run.
-        self.waits_for.store(dependencies, Ordering::Relaxed);
-        self.width.store(pass.width, Ordering::Relaxed);
-        self.chunk.store(pass.chunk, Ordering::Relaxed);
-        self.ticket.store(0, Ordering::Relaxed);
-        self.done.store(0, Ordering::Relaxed);
-        self.invited.store(false, Ordering::Relaxed);
+    /// Makes the process wait for so many dependencies, in the next run or in what is left of this one.
+    pub(super) fn arm(&self, process: u32, dependencies: u32) {
+        // Relaxed: see above.
+        self.waits_for[process as usize].store(dependencies, Ordering::Relaxed);
     }
 
-    /// The pass that is open, as a worker finds it that joins.
-    pub(super) fn pass(&self) -> Pass {
-        // Relaxed: both were stored before the invitation was spawned through which the worker came here.
-        Pass { width: self.width.load(Ordering::Relaxed), chunk: self.chunk.load(Ordering::Relaxed) }
+    /// Takes off one of the dependencies that a process waits for, and says whether it was the last.
+    pub(super) fn release(&self, process: u32) -> bool {
+        let waits_for = &self.waits_for[process as usize];
+        // Every dependency takes its count off once, so the last one need not: nobody else is going to look. Acquire as
+        // with the subtraction.
+        waits_for.load(Ordering::Acquire) == 1 || waits_for.fetch_sub(1, Ordering::AcqRel) == 1
+    }
+
+    /// Puts a process at a place from which a worker is going to take it.
+    pub(super) fn set_ready(&self, place: u32, process: u32) {
+        // Relaxed, here and below: the token that says which places it is about orders them.
+        self.ready[place as usize].store(process, Ordering::Relaxed);
+    }
+
+    pub(super) fn ready(&self, place: u32) -> u32 {
+        self.ready[place as usize].load(Ordering::Relaxed)
+    }
+
+    pub(super) fn pass(&self, process: u32) -> &OpenPass {
+        &self.passes[process as usize]
     }
 }
 
-/// The items of a process, and how they are cut up.
-#[derive(Clone, Copy)]
-pub(super) struct Pass {
-    width: usize,
-    chunk: usize,
+/// The items of a process of more than one chunk, while workers are at it.
+pub(super) struct OpenPass {
+    chunks: Mutex<Chunks>,
+    pub(super) tickets: Tickets,
+    done: AtomicUsize,
 }
 
-impl Pass {
-    /// The most chunks: half of what a ticket counts to, since each worker that finds none left has counted on once more.
-    const MOST_CHUNKS: usize = usize::MAX / 2;
-
-    pub(super) fn new(width: usize, chunk: usize) -> Self {
-        Self { width, chunk: chunk.max(1).max(width.div_ceil(Self::MOST_CHUNKS)) }
+impl OpenPass {
+    fn new() -> Self {
+        Self { chunks: Mutex::new(Chunks::new(0, 1)), tickets: Tickets::new(), done: AtomicUsize::new(0) }
     }
 
-    pub(super) fn chunks(self) -> usize {
-        self.width.div_ceil(self.chunk)
+    /// Sets a pass out of which so many chunks are done. Nobody else knows of it.
+    pub(super) fn open(&self, chunks: Chunks, done: usize) {
+        *self.chunks.lock() = chunks;
+        self.tickets.reset(done);
+        // Relaxed: who counts on has come by a token that is pushed later.
+        self.done.store(done, Ordering::Relaxed);
     }
 
-    pub(super) fn range(self, index: usize) -> Range<usize> {
-        let start = index * self.chunk;
-        start..start.saturating_add(self.chunk).min(self.width)
+    pub(super) fn chunks(&self) -> Chunks {
+        *self.chunks.lock()
+    }
+
+    /// Counts chunks off, and says whether they were the last.
+    pub(super) fn finish(&self, finished: usize, chunks: &Chunks) -> bool {
+        // Release for what these chunks wrote, acquire for what all others did.
+        finished > 0 && self.done.fetch_add(finished, Ordering::AcqRel) + finished == chunks.count()
     }
 }

@@ -1,12 +1,8 @@
 //! The graph as it is run.
 
-use std::{collections::HashMap, fmt};
+use std::{collections::HashMap, fmt, time::Duration};
 
-use crossbeam_utils::CachePadded;
-
-use crate::sync::AtomicBool;
-
-use super::{builder::ProcessId, progress::Progress};
+use super::{builder::ProcessId, costs::Costs, flow::Flow, progress::Progress, sharing::Sharing};
 
 /// A graph in the order it runs in, checked, and flat: compiled once and [run](Self::run) every frame.
 ///
@@ -19,14 +15,12 @@ pub struct Schedule<P> {
     pub(super) indices: HashMap<ProcessId, usize>,
     pub(super) dependencies: Adjacency,
     pub(super) dependents: Adjacency,
-    /// The processes that depend on none.
-    pub(super) roots: Vec<usize>,
     pub(super) dropped: Vec<String>,
-    pub(super) progress: Vec<CachePadded<Progress>>,
-    /// Per worker, whether it is inside a chunk of this schedule.
-    pub(super) inside: Vec<CachePadded<AtomicBool>>,
-    /// Whether every process waits for all its dependencies again: so it is after a run that came to its end.
-    pub(super) armed: bool,
+    pub(super) flow: Flow,
+    pub(super) progress: Progress,
+    pub(super) costs: Costs,
+    pub(super) sharing: Sharing,
+    pub(super) always_shares: bool,
 }
 
 impl<P> Schedule<P> {
@@ -80,6 +74,27 @@ impl<P> Schedule<P> {
     /// The indices of what waits for the process of that index, ascending; none if there is no such process.
     pub fn dependents(&self, index: usize) -> &[usize] {
         self.dependents.of(index)
+    }
+
+    /// Shares every run between the workers, however little work it is: for processes that wait for one another while they
+    /// run, which one thread alone cannot do, and to see what sharing costs. It is off at first.
+    pub fn always_share(&mut self, always: bool) {
+        self.always_shares = always;
+    }
+
+    /// What the process of that index costs, from its start to its end: an average over those of the latest runs that were
+    /// measured. `None` if there was none, or if there is no such process.
+    ///
+    /// The first runs that several workers shared are measured, and later ones every now and then.
+    pub fn cost(&self, index: usize) -> Option<Duration> {
+        self.costs.of(index)
+    }
+
+    /// Whether the end of a run waits for the process of that index, as far as is known: by what the processes
+    /// [cost](Self::cost), no way through the graph is longer by more than a tenth than the longest through it. Workers
+    /// take up such processes before others.
+    pub fn is_critical(&self, index: usize) -> bool {
+        index < self.len() && self.flow.is_urgent(index as u32)
     }
 
     /// The names of the processes that no output needs, in the order they were added.

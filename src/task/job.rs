@@ -8,10 +8,9 @@ use std::{
 
 use thiserror::Error;
 
-use crate::sync::Arc;
-
 use super::{
-    scope::{Scope, ScopeState},
+    region::{Crew, Region},
+    scope::Scope,
     worker::Worker,
 };
 
@@ -23,6 +22,19 @@ pub struct JobPanic {
     /// What the panic said: its payload where that is a `&str` or a `String`, as with the `panic!` macro, and otherwise
     /// a fixed text.
     pub message: String,
+}
+
+impl JobPanic {
+    #[cold]
+    fn new(payload: Box<dyn Any + Send>) -> Self {
+        let text = match payload.downcast_ref::<&str>() {
+            Some(text) => Some(*text),
+            None => payload.downcast_ref::<String>().map(String::as_str),
+        };
+        let message = text.unwrap_or("a panic whose payload is not text").to_owned();
+        discard(payload);
+        Self { message }
+    }
 }
 
 /// Calls `call`, and makes an error of its panic.
@@ -41,52 +53,50 @@ pub struct JobPanic {
 /// let panic = catch(|| [1, 2, 3].iter().position(|&number| number == 4).expect("four is there")).unwrap_err();
 /// assert_eq!(format!("process \"count\": {}", panic.message), "process \"count\": four is there");
 /// ```
+#[inline]
 pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
-    catch_unwind(AssertUnwindSafe(call)).map_err(|payload| {
-        let message = text(payload.as_ref()).unwrap_or("a panic whose payload is not text").to_owned();
-        discard(payload);
-        JobPanic { message }
-    })
+    catch_unwind(AssertUnwindSafe(call)).map_err(JobPanic::new)
 }
 
 /// Drops what is a user's and may panic at that, which then has nobody left to hear it. The payload of that second
 /// panic is leaked, as dropping it might panic as well, and so on.
-pub(super) fn discard<T>(value: T) {
+pub(crate) fn discard<T>(value: T) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(value))) {
         mem::forget(payload);
     }
 }
 
-fn text(payload: &(dyn Any + Send)) -> Option<&str> {
-    match payload.downcast_ref::<&str>() {
-        Some(text) => Some(text),
-        None => payload.downcast_ref::<String>().map(String::as_str),
-    }
-}
-
-/// What a job runs. The lifetime of what it borrows has been taken away by [`Scope`], which vouches for it.
+/// What a spawned job runs. The lifetime of what it borrows has been taken away by [`Scope`], which vouches for it.
 pub(super) type Closure = Box<dyn FnOnce(&Scope<'static>, &Worker) + Send>;
 
-/// A closure on its way to a worker, and the scope that waits for it.
+/// What a job does.
+pub(super) enum Work {
+    /// Something of its own.
+    Closure(Closure),
+    /// What the region's [`Tokens`](super::region::Tokens) do with this number. It takes no memory but the deque's.
+    Token(u64),
+}
+
+/// Work on its way to a worker, and the region that waits for it. It is counted by the region from before it is made
+/// until after it has run.
 pub(super) struct Job {
-    closure: Closure,
-    scope: Arc<ScopeState>,
+    pub(super) work: Work,
+    pub(super) region: &'static Region,
+    /// How many regions were open on the worker that queued it, which tells a worker that waits for the innermost
+    /// which of its jobs belong there.
+    pub(super) depth: u32,
 }
 
 impl Job {
-    /// A job that is counted by its scope already.
-    pub(super) fn new(closure: Closure, scope: Arc<ScopeState>) -> Self {
-        Self { closure, scope }
-    }
-
-    /// Runs the closure, and then counts it off: by then the call has returned or unwound, and the closure and all it
-    /// had captured are gone, so the scope may end.
+    /// Does the work. By the time it returns the closure and all it had captured are gone.
     pub(super) fn run(self, worker: &Worker) {
-        let Self { closure, scope } = self;
-        let scope = Scope::new(scope);
-        if let Err(panic) = catch(|| closure(&scope, worker)) {
-            scope.state().fail(panic);
+        let Self { work, region, .. } = self;
+        let outcome = match work {
+            Work::Closure(closure) => catch(|| closure(&Scope::new(region), worker)),
+            Work::Token(token) => catch(|| region.tokens().run(token, &Crew::new(region, worker))),
+        };
+        if let Err(panic) = outcome {
+            region.fail(panic);
         }
-        scope.state().finish();
     }
 }

@@ -1,11 +1,11 @@
-//! The count of jobs a scope still waits for.
+//! The count of jobs a region still waits for.
 //!
 //! # Memory ordering
 //!
 //! - `add` is relaxed. Whoever adds is counted itself, so the count is at least one before and after, and nobody can
 //!   take the addition for a release. The job that was added reaches its worker through a deque or a lock, which order
 //!   it.
-//! - `finish` is a release: what a job did happens before its decrement. Every change of the count is a
+//! - `finish` is a release: what the jobs did happens before their decrement. Every change of the count is a
 //!   read-modify-write, so all decrements lie in one release sequence, and the load that reads zero synchronises with
 //!   every one of them, not only with the last.
 //! - `is_released` is the acquire that closes the pair. After it returned true the waiter sees the effects of all jobs,
@@ -13,7 +13,7 @@
 //!   touch what the jobs wrote.
 //!
 //! The latch wakes nobody. The worker whose `finish` returned true does that, through [`Sleep`](super::sleep::Sleep).
-//! From its decrement on the scope may end at any moment, so that worker holds a share of its own of all it still uses.
+//! From its decrement on the region may end at any moment, and the latch with it, so that worker touches neither after.
 
 use crate::sync::{AtomicUsize, Ordering};
 
@@ -23,19 +23,19 @@ pub(super) struct Latch {
 }
 
 impl Latch {
-    /// A latch that waits for `outstanding` calls of [`finish`](Self::finish).
+    /// A latch that waits for `outstanding` jobs.
     pub(super) fn new(outstanding: usize) -> Self {
         Self { outstanding: AtomicUsize::new(outstanding) }
     }
 
-    /// Waits for one more. Only for callers that are counted themselves and have not finished.
-    pub(super) fn add(&self) {
-        self.outstanding.fetch_add(1, Ordering::Relaxed);
+    /// Waits for so many more. Only for callers that are counted themselves and have not finished.
+    pub(super) fn add(&self, jobs: usize) {
+        self.outstanding.fetch_add(jobs, Ordering::Relaxed);
     }
 
-    /// Takes one off, and says whether it was the last.
-    pub(super) fn finish(&self) -> bool {
-        self.outstanding.fetch_sub(1, Ordering::Release) == 1
+    /// Takes so many off, and says whether they were the last.
+    pub(super) fn finish(&self, jobs: usize) -> bool {
+        self.outstanding.fetch_sub(jobs, Ordering::Release) == jobs
     }
 
     /// Whether the last one has been taken off.
@@ -51,10 +51,10 @@ mod tests {
     #[test]
     fn only_the_last_one_releases() {
         let latch = Latch::new(1);
-        latch.add();
-        assert!(!latch.finish());
+        latch.add(1);
+        assert!(!latch.finish(1));
         assert!(!latch.is_released());
-        assert!(latch.finish());
+        assert!(latch.finish(1));
         assert!(latch.is_released());
     }
 }
@@ -74,15 +74,15 @@ mod loom_tests {
         model(|| {
             let state = Arc::new((Latch::new(1), Cells([UnsafeCell::new(0), UnsafeCell::new(0)])));
             let jobs = [0, 1].map(|job| {
-                state.0.add();
+                state.0.add(1);
                 let state = Arc::clone(&state);
                 thread::spawn(move || {
                     // SAFETY: the cell is this job's alone until it has finished; loom checks that.
                     state.1.0[job].with_mut(|cell| unsafe { *cell = 1 });
-                    state.0.finish()
+                    state.0.finish(1)
                 })
             });
-            let last_here = state.0.finish();
+            let last_here = state.0.finish(1);
             if state.0.is_released() {
                 // SAFETY: all jobs have finished; loom checks that this is seen here.
                 let sum: usize = state.1.0.iter().map(|cell| cell.with(|cell| unsafe { *cell })).sum();
@@ -99,20 +99,20 @@ mod loom_tests {
     fn a_job_that_adds_another_keeps_the_latch_shut() {
         model(|| {
             let state = Arc::new((Latch::new(1), UnsafeCell::new(0)));
-            state.0.add();
+            state.0.add(1);
             let first = Arc::clone(&state);
             let job = thread::spawn(move || {
-                first.0.add();
+                first.0.add(1);
                 let second = Arc::clone(&first);
                 let child = thread::spawn(move || {
                     // SAFETY: nobody else writes, and the reader waits for the latch; loom checks that.
                     second.1.with_mut(|cell| unsafe { *cell = 1 });
-                    second.0.finish();
+                    second.0.finish(1);
                 });
-                first.0.finish();
+                first.0.finish(1);
                 child.join().unwrap();
             });
-            state.0.finish();
+            state.0.finish(1);
             if state.0.is_released() {
                 // SAFETY: both jobs have finished; loom checks that this is seen here.
                 assert_eq!(state.1.with(|cell| unsafe { *cell }), 1);

@@ -88,16 +88,35 @@
 //! A thread that waits for a scope runs other jobs meanwhile, on top of its stack. Jobs that open scopes in which jobs
 //! open scopes, without bound, need a stack without bound, as any recursion does.
 
+mod affinity;
+mod background;
+mod builder;
+mod chunks;
+mod idle;
 mod job;
 mod latch;
+mod mailbox;
 mod parallel_for;
+mod placement;
+mod queue;
+mod region;
 mod scheduler;
 mod scope;
 mod seat;
+mod shuffle;
 mod sleep;
+mod wake_price;
 mod worker;
 
+pub use affinity::AffinityMask;
+pub use background::BackgroundJob;
+pub use builder::{SchedulerBuilder, SchedulerError};
 pub use job::{JobPanic, catch};
-pub use scheduler::{Scheduler, SchedulerError};
+pub use scheduler::Scheduler;
 pub use scope::Scope;
 pub use worker::Worker;
+
+pub(crate) use chunks::{Chunks, Pace, Tickets};
+pub(crate) use job::discard;
+pub(crate) use queue::Band;
+pub(crate) use region::{Crew, Tokens, run_tokens};

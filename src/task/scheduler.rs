@@ -1,18 +1,27 @@
 //! The pool of workers, and the two ways to give it work.
 
-use std::{fmt, io, iter, mem, ops::Range, thread::available_parallelism};
+use std::{
+    fmt, mem,
+    ops::Range,
+    time::{Duration, Instant},
+};
 
-use thiserror::Error;
+use crossbeam_utils::CachePadded;
 
-use crate::sync::{Arc, AtomicBool, Deque, Ordering, Stealer, thread};
+use crate::sync::{Arc, AtomicBool, AtomicUsize, Ordering, thread};
 
 use super::{
-    job::{Job, JobPanic},
+    background::{BackgroundJob, BackgroundQueue},
+    builder::{SchedulerBuilder, SchedulerError},
+    job::JobPanic,
+    mailbox::Mailbox,
     parallel_for::Pass,
+    placement::Placement,
+    queue::{Loot, Queues},
     scope::{self, Scope},
     seat::{self, Seat},
     sleep::Sleep,
-    worker::{Until, Worker},
+    worker::Worker,
 };
 
 /// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it has to do with threads.
@@ -59,7 +68,7 @@ impl Scheduler {
     /// [`MOST_WORKERS`](Self::MOST_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those
     /// started by then have ended when this returns.
     pub fn new(workers: usize) -> Result<Self, SchedulerError> {
-        Self::start(workers, |builder, body| builder.spawn(body))
+        Self::builder().workers(workers).build()
     }
 
     /// A scheduler of as many workers as the process may run threads at once.
@@ -69,8 +78,12 @@ impl Scheduler {
     /// [`SchedulerError::UnknownParallelism`] if the system does not tell, and [`SchedulerError::Spawn`] as with
     /// [`new`](Self::new).
     pub fn with_available_parallelism() -> Result<Self, SchedulerError> {
-        let threads = available_parallelism().map_err(|source| SchedulerError::UnknownParallelism { source })?;
-        Self::new(threads.get().min(Self::MOST_WORKERS))
+        Self::builder().build()
+    }
+
+    /// A scheduler whose threads have names, places and hooks of the engine's choice.
+    pub fn builder() -> SchedulerBuilder {
+        SchedulerBuilder::default()
     }
 
     /// How many threads run jobs, the caller included.
@@ -78,9 +91,17 @@ impl Scheduler {
         self.shared.workers()
     }
 
+    /// How long it takes from a call of [`Scope::spawn`] until a worker that slept begins on the job: the median of a few
+    /// tries while the scheduler was built. A frame whose work takes no longer than this is not shared.
+    pub fn wake_price(&self) -> Duration {
+        self.shared.wake_price()
+    }
+
     /// Calls `body` with a scope, and returns what it returns when every job spawned in the scope has run and has been
-    /// dropped. Jobs may borrow all that outlives the call. While it waits, the thread runs jobs, not all of them its
-    /// own.
+    /// dropped. Jobs may borrow all that outlives the call.
+    ///
+    /// While it waits, the thread runs jobs. Called from within a job, those are the jobs of this scope and of what is
+    /// opened inside of them, and no others.
     ///
     /// # Errors
     ///
@@ -96,7 +117,7 @@ impl Scheduler {
     /// The ranges are `chunk` indices long, the last one may be shorter. A chunk of 0 is taken for 1, and a `length`
     /// beyond any slice, more than `isize::MAX`, may get chunks of up to 3. With a single worker or a single chunk
     /// everything happens on the calling thread. `body` is not entered on a worker that is in the midst of it for this
-    /// loop, even where it waits for a scope or a loop of its own; and until it has waited, no further worker may join.
+    /// loop, even where it waits for a scope or a loop of its own.
     ///
     /// # Errors
     ///
@@ -114,56 +135,76 @@ impl Scheduler {
         self.seated(|worker| pass.run(worker))
     }
 
-    fn start(
-        workers: usize,
-        mut spawn: impl FnMut(thread::Builder, Box<dyn FnOnce() + Send>) -> io::Result<thread::JoinHandle<()>>,
-    ) -> Result<Self, SchedulerError> {
-        if workers == 0 {
-            return Err(SchedulerError::NoWorkers);
-        }
-        if workers > Self::MOST_WORKERS {
-            return Err(SchedulerError::TooManyWorkers { workers });
-        }
-        let first = Deque::new_lifo();
-        let others: Vec<Deque<Job>> = (1..workers).map(|_| Deque::new_lifo()).collect();
-        let shared = Arc::new(Shared {
-            stealers: iter::once(&first).chain(&others).map(Deque::stealer).collect(),
-            sleep: Sleep::new(workers),
-            seat: Seat::new(first),
-            shut_down: AtomicBool::new(false),
-        });
-        // Where a thread cannot be started, the scheduler is dropped with those it has, and joins them.
-        let mut scheduler = Self { shared, threads: Vec::with_capacity(others.len()) };
-        for (index, deque) in (1..).zip(others) {
-            let shared = Arc::clone(&scheduler.shared);
-            let body = Box::new(move || {
-                seat::occupy(Worker::new(index, deque, shared), |worker| worker.work(Until::Shutdown));
-            });
-            let thread = spawn(thread::Builder::new().name(format!("drawloom-{index}")), body)
-                .map_err(|source| SchedulerError::Spawn { worker: index, source })?;
-            scheduler.threads.push(thread);
-        }
-        Ok(scheduler)
+    /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a worker
+    /// other than 0 when that has nothing else to do; or wherever [`run_background`](Self::run_background) is called, which
+    /// with a single worker is the only place; or where its end is [waited for](BackgroundJob::wait).
+    ///
+    /// What it spawns itself, in scopes and loops on this scheduler, is background work as well. Jobs that have not begun
+    /// when the scheduler is dropped run only if they are waited for.
+    ///
+    /// ```
+    /// # use std::time::Duration;
+    /// # use drawloom::task::Scheduler;
+    /// let scheduler = Scheduler::new(2)?;
+    /// let texture = scheduler.background(|| vec![255_u8; 1024 * 1024]);
+    /// // One frame after another, and in each of them a look at it.
+    /// while !texture.is_finished() {
+    ///     scheduler.parallel_for(100, 10, |_range, _worker| { /* draw without the texture */ })?;
+    ///     scheduler.run_background(Duration::from_micros(500));
+    /// }
+    /// assert_eq!(texture.wait()?.len(), 1024 * 1024);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
+        let (job, queued) = BackgroundJob::new(job);
+        self.shared.background().put(queued);
+        self.shared.sleep().wake_for_background();
+        job
+    }
+
+    /// Runs background jobs on the calling thread, the oldest first, and says how many. It begins none when `budget` has
+    /// passed, so it returns late by the length of a job at most.
+    pub fn run_background(&self, budget: Duration) -> usize {
+        let start = Instant::now();
+        self.seated(|worker| worker.work_in_background(|| start.elapsed() >= budget))
+    }
+
+    pub(super) fn without_threads(shared: Arc<Shared>) -> Self {
+        Self { shared, threads: Vec::new() }
+    }
+
+    pub(super) fn add_thread(&mut self, thread: thread::JoinHandle<()>) {
+        self.threads.push(thread);
+    }
+
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
     }
 
     /// Calls `body` as the worker this thread is already, or else from the seat. `body` must not unwind.
-    fn seated<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
-        if let Some(worker) = seat::current(&self.shared) {
-            return body(&worker);
-        }
-        let deque = self.shared.seat.take();
-        let (result, deque) = seat::occupy(Worker::new(0, deque, Arc::clone(&self.shared)), body);
-        self.shared.seat.give_back(deque);
-        result
+    pub(crate) fn seated<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
+        seat::with_current(&self.shared, |current| match current {
+            Some(worker) => body(worker),
+            None => {
+                let worker = Worker::new(0, self.shared.seat.take(), Arc::clone(&self.shared));
+                let result = seat::occupy(&worker, || body(&worker));
+                self.shared.seat.give_back(worker.into_queues());
+                result
+            }
+        })
     }
 }
 
 impl Drop for Scheduler {
     fn drop(&mut self) {
-        // Relaxed is enough, as the flag hands nothing over; that sleepers see it is up to the fences of `Sleep`.
         self.shared.shut_down.store(true, Ordering::Relaxed);
         self.shared.sleep.wake_all();
         for thread in mem::take(&mut self.threads) {
+            // A background job may own the last share of its own scheduler. Its thread cannot wait for itself, and ends
+            // after the job.
+            if thread.thread().id() == thread::current().id() {
+                continue;
+            }
             // A worker's thread has nothing to report: the panic of a job was caught with the job.
             let _ = thread.join();
         }
@@ -176,55 +217,86 @@ impl fmt::Debug for Scheduler {
     }
 }
 
-/// A scheduler could not be started.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum SchedulerError {
-    /// 0 workers were asked for.
-    #[error("a scheduler needs at least 1 worker, which is the thread that calls it")]
-    NoWorkers,
-    /// More than [`Scheduler::MOST_WORKERS`] were asked for.
-    #[error("a scheduler has at most {} workers, and {workers} were asked for", Scheduler::MOST_WORKERS)]
-    TooManyWorkers {
-        /// How many were asked for.
-        workers: usize,
-    },
-    /// The system refused to start a thread.
-    #[error("the thread of worker {worker} could not be started")]
-    Spawn {
-        /// The [index](Worker::index) of the worker it was for.
-        worker: usize,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// The system does not tell how many threads run at once.
-    #[error("how many threads run at once is unknown")]
-    UnknownParallelism {
-        /// The system's reason.
-        source: io::Error,
-    },
-}
-
 /// What all workers see of each other.
 pub(super) struct Shared {
-    /// The way into the deque of each worker.
-    stealers: Box<[Stealer<Job>]>,
+    /// The way into the queues of each worker.
+    loot: Box<[Loot]>,
+    mailboxes: Box<[CachePadded<Mailbox>]>,
+    background: BackgroundQueue,
     sleep: Sleep,
+    placement: Placement,
     seat: Seat,
+    is_shuffled: bool,
+    /// In nanoseconds.
+    wake_price: AtomicUsize,
+    is_live: AtomicBool,
     shut_down: AtomicBool,
 }
 
 impl Shared {
-    pub(super) fn workers(&self) -> usize {
-        self.stealers.len()
+    pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, is_shuffled: bool) -> Self {
+        Self {
+            mailboxes: loot.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
+            background: BackgroundQueue::new(),
+            sleep: Sleep::new(loot.len()),
+            placement: Placement::new(),
+            seat: Seat::new(first),
+            loot,
+            is_shuffled,
+            wake_price: AtomicUsize::new(0),
+            is_live: AtomicBool::new(false),
+            shut_down: AtomicBool::new(false),
+        }
     }
 
-    pub(super) fn stealers(&self) -> &[Stealer<Job>] {
-        &self.stealers
+    #[inline]
+    pub(super) fn workers(&self) -> usize {
+        self.loot.len()
+    }
+
+    pub(super) fn loot(&self) -> &[Loot] {
+        &self.loot
+    }
+
+    pub(super) fn mailbox(&self, worker: usize) -> &Mailbox {
+        &self.mailboxes[worker]
+    }
+
+    pub(super) fn background(&self) -> &BackgroundQueue {
+        &self.background
     }
 
     pub(super) fn sleep(&self) -> &Sleep {
         &self.sleep
+    }
+
+    pub(super) fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    #[inline]
+    pub(super) fn is_shuffled(&self) -> bool {
+        self.is_shuffled
+    }
+
+    // The rest are hints and a flag that hand nothing over, so relaxed is enough; that sleepers see the flag is up to the
+    // fences of `Sleep`.
+
+    pub(super) fn wake_price(&self) -> Duration {
+        Duration::from_nanos(self.wake_price.load(Ordering::Relaxed) as u64)
+    }
+
+    pub(super) fn set_wake_price(&self, price: Duration) {
+        self.wake_price.store(price.as_nanos().try_into().unwrap_or(usize::MAX), Ordering::Relaxed);
+    }
+
+    /// Whether a frame, or whatever a thread from outside has called for, is being worked on.
+    pub(super) fn is_live(&self) -> bool {
+        self.is_live.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_live(&self, is_live: bool) {
+        self.is_live.store(is_live, Ordering::Relaxed);
     }
 
     pub(super) fn is_shut_down(&self) -> bool {
@@ -234,9 +306,9 @@ impl Shared {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use std::{io, sync::mpsc, thread, time::Duration};
+    use std::{sync::mpsc, thread, time::Duration};
 
-    use super::{Scheduler, SchedulerError};
+    use super::Scheduler;
 
     /// Waits until so many workers sleep, for as long as the slowest machine may take, and says how many do.
     fn sleepers(scheduler: &Scheduler, expected: usize) -> usize {
@@ -272,26 +344,6 @@ mod tests {
             has_started.recv().unwrap();
         });
         assert_eq!(outcome, Ok(()));
-    }
-
-    #[test]
-    fn a_thread_that_cannot_be_started_is_an_error_and_the_others_end() {
-        let (ended, has_ended) = mpsc::channel();
-        let mut started = 0;
-        let outcome = Scheduler::start(5, |builder, body| {
-            if started == 2 {
-                return Err(io::Error::other("no more threads"));
-            }
-            started += 1;
-            let ended = ended.clone();
-            builder.spawn(move || {
-                body();
-                ended.send(()).unwrap();
-            })
-        });
-        let Err(SchedulerError::Spawn { worker, source }) = outcome else { panic!("the third thread was refused") };
-        assert_eq!((worker, source.to_string().as_str()), (3, "no more threads"));
-        assert_eq!(has_ended.try_iter().count(), 2, "the threads have been joined");
     }
 
     #[test]

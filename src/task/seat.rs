@@ -2,74 +2,87 @@
 //!
 //! The threads a scheduler starts are its workers from 1 up for as long as they live. Worker 0 is a *seat*: the thread
 //! that calls the scheduler takes it for the length of the call. A thread can be a worker of several schedulers at
-//! once, if a job of the one calls the other, so what it is forms a stack.
+//! once, if a job of the one calls the other, so what it is forms a list, from the newest to the oldest. The list goes
+//! through the workers themselves, which lie on the thread's stack, as every call of every frame comes through here and
+//! is to take no memory.
 
-use std::{cell::RefCell, mem::ManuallyDrop, rc::Rc};
+use std::{cell::Cell, ptr};
 
-use crate::sync::{Arc, Condvar, Deque, Mutex, thread_local};
+use crate::sync::{Arc, Condvar, Mutex, thread_local};
 
-use super::{job::Job, scheduler::Shared, worker::Worker};
+use super::{queue::Queues, scheduler::Shared, worker::Worker};
 
 thread_local! {
-    /// What this thread is, the newest last. Without a destructor, so that a scheduler can be called from the
-    /// destructor of some other thread-local.
-    static SEATS: Seats = Seats::default();
+    /// What this thread is, the newest, and null if it is nothing. It has no destructor, so that a scheduler can be
+    /// called from the destructor of some other thread-local.
+    static INNERMOST: Innermost = Innermost::default();
 }
 
-type Seats = ManuallyDrop<RefCell<Vec<Rc<Worker>>>>;
+struct Innermost(Cell<*const Worker>);
 
-/// The worker of that scheduler this thread is, if it is one. Not to be kept beyond the call it is asked for.
-pub(super) fn current(shared: &Arc<Shared>) -> Option<Rc<Worker>> {
-    SEATS.with(|seats| {
-        let seats = seats.borrow();
-        seats.iter().rev().find(|worker| Arc::ptr_eq(worker.shared(), shared)).cloned()
-    })
+impl Default for Innermost {
+    fn default() -> Self {
+        Self(Cell::new(ptr::null()))
+    }
 }
 
-/// Makes this thread the worker while `body` runs, and gives the deque back. `body` must not unwind: the deque would be
-/// lost with it.
-pub(super) fn occupy<R>(worker: Worker, body: impl FnOnce(&Worker) -> R) -> (R, Deque<Job>) {
-    let worker = Rc::new(worker);
-    SEATS.with(|seats| seats.borrow_mut().push(Rc::clone(&worker)));
-    let result = body(&worker);
-    SEATS.with(|seats| {
-        let mut seats = seats.borrow_mut();
-        seats.pop();
-        if seats.is_empty() {
-            // Nothing frees the memory at the end of the thread, so it is freed here.
-            *seats = Vec::new();
+/// Calls `body` with the worker of that scheduler this thread is, if it is one.
+pub(super) fn with_current<R>(shared: &Arc<Shared>, body: impl FnOnce(Option<&Worker>) -> R) -> R {
+    let mut next = INNERMOST.with(|innermost| innermost.0.get());
+    // SAFETY: What is in the list is a worker that `occupy` of this thread was given a reference to and has not returned
+    // from, as it takes the worker off again before it does, whichever way it is left. So it is there for the rest of
+    // this function, which is called inside of that `occupy`.
+    while let Some(worker) = unsafe { next.as_ref() } {
+        if Arc::ptr_eq(worker.shared(), shared) {
+            return body(Some(worker));
         }
-    });
-    let worker = Rc::into_inner(worker).expect("nobody keeps what `current` returned");
-    (result, worker.into_deque())
+        next = worker.outer.get();
+    }
+    body(None)
+}
+
+/// Makes this thread the worker while `body` runs.
+pub(super) fn occupy<R>(worker: &Worker, body: impl FnOnce() -> R) -> R {
+    worker.outer.set(INNERMOST.with(|innermost| innermost.0.replace(ptr::from_ref(worker))));
+    let _leave = Leave(worker);
+    body()
+}
+
+/// Takes a worker off the list when it is dropped.
+struct Leave<'worker>(&'worker Worker);
+
+impl Drop for Leave<'_> {
+    fn drop(&mut self) {
+        INNERMOST.with(|innermost| innermost.0.set(self.0.outer.get()));
+    }
 }
 
 /// The seat of worker 0.
 pub(super) struct Seat {
-    /// The deque of worker 0, while nobody is that worker.
-    deque: Mutex<Option<Deque<Job>>>,
+    /// The queues of worker 0, while nobody is that worker.
+    queues: Mutex<Option<Box<Queues>>>,
     freed: Condvar,
 }
 
 impl Seat {
-    pub(super) fn new(deque: Deque<Job>) -> Self {
-        Self { deque: Mutex::new(Some(deque)), freed: Condvar::new() }
+    pub(super) fn new(queues: Box<Queues>) -> Self {
+        Self { queues: Mutex::new(Some(queues)), freed: Condvar::new() }
     }
 
     /// Waits until the seat is free, and takes it.
-    pub(super) fn take(&self) -> Deque<Job> {
-        let mut seat = self.deque.lock();
+    pub(super) fn take(&self) -> Box<Queues> {
+        let mut seat = self.queues.lock();
         loop {
-            if let Some(deque) = seat.take() {
-                return deque;
+            if let Some(queues) = seat.take() {
+                return queues;
             }
             seat = self.freed.wait(seat);
         }
     }
 
     /// Frees the seat, for whoever has waited for it.
-    pub(super) fn give_back(&self, deque: Deque<Job>) {
-        *self.deque.lock() = Some(deque);
+    pub(super) fn give_back(&self, queues: Box<Queues>) {
+        *self.queues.lock() = Some(queues);
         self.freed.notify_one();
     }
 }

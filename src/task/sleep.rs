@@ -1,31 +1,45 @@
 //! Where workers sleep that find nothing to do, so that an idle scheduler costs no time, and how they are woken, so
-//! that no work waits for a worker that sleeps through it. Nobody pays a system call while nobody sleeps.
+//! that no work waits for a worker that sleeps through it. Nobody pays a system call while nobody sleeps, and one more
+//! worker is woken at a time: it wakes the next if there is more to do.
 //!
 //! # Protocol
 //!
-//! *Work* is whatever a worker may wait for: a job in somebody's deque, a pinned job, a released latch, the shutdown
-//! flag.
+//! *Work* is whatever a worker may wait for: a job in somebody's queue, a pinned job, a released latch, the shutdown
+//! flag. A *sleeper* takes any work, or none but its own: so does one that waits in the midst of a job. A *searcher* is
+//! awake, has nothing to do, and is going to look at everybody's queues once more before it ceases to be one.
 //!
 //! ```text
 //!  sleeper                                        waker
-//!  S1  lock: add itself to the list, set count    W1  publish the work
-//!  S2  fence                                      W2  fence
-//!  S3  look for work once more                    W3  read count; none: done
-//!  S4  work seen: lock, take itself off;          W4  lock: take one sleeper off, set count
-//!      it was still there: go on, awake           W5  call it
-//!  S5  otherwise wait until called
+//!  S1  lock: add itself to the list, count        W1  publish the work
+//!      itself in, and out as a searcher           W2  fence
+//!  S2  fence                                      W3  read counts; no sleeper, or, where anyone
+//!  S3  look for work once more                        will do, a searcher: done
+//!  S4  work seen: lock, take itself off           W4  lock: take one sleeper off, and, if it
+//!      as at W4; it was still there: go on            takes any work, count it in as a searcher
+//!  S5  otherwise wait until called                W5  call it
+//!
+//!  searcher that has found something to do
+//!  F1  count itself out                           F3  it was the last searcher: look for more work,
+//!  F2  fence                                          and wake one sleeper if there is some
 //! ```
 //!
 //! # Proof
 //!
-//! **No wake-up is lost.** Both fences are sequentially consistent, so one of them comes first. Is it W2, then S3 comes
-//! after W1 and sees the work. Is it S2, then W3 comes after S1 and reads a count that has the sleeper in it, unless
-//! the sleeper has been taken off since. If it was taken off by itself, it is awake. If another waker took it off, it
-//! has been called or will be, and is going to look for work, with a fence of its own, before it can wait again. In
-//! either case it passes S2 again *after* W2, and S3 sees the work. If it is still on the list, W4 finds it, or, where
-//! any sleeper will do, another one that looks for work as well. Two kinds of sleepers do
-//! not look, or not at once: the owner of a scope that ended while it was called for something else, and one that finds
-//! another job first, a pinned one, and is away with it. Both pass the call on (`Worker::pass_on`).
+//! **No wake-up is lost.** All fences are sequentially consistent, so of any two one comes first.
+//!
+//! *Where W3 meets a sleeper.* Is W2 before S2, then S3 comes after W1 and sees the work. Is S2 before W2, then W3 comes
+//! after S1 and reads a count that has the sleeper in it, unless the sleeper has been taken off since. If it was taken
+//! off by itself, it is awake. If another waker took it off, it has been called or will be, and is going to look for
+//! work, with a fence of its own, before it can wait again. In either case it passes S2 again *after* W2, and S3 sees
+//! the work. If it is still on the list, W4 finds it, or, where any sleeper will do, another one that takes any work.
+//!
+//! *Where W3 meets a searcher.* All changes of the counts are read-modify-writes of one variable, so they have one order,
+//! and W3 reads one of the values in it. Let X be the last of the searchers in that value to be counted out, at S1 or
+//! F1. That is later in the order than what W3 read. Were the fence that X passes next, S2 or F2, before W2, then W3 would
+//! have to read what X wrote or something later. So W2 comes first, and the look that follows X's fence, S3 or F3, sees
+//! the work. At S3 it becomes a searcher once more, and finds that work or some other, and comes to F3 in the end. At F3 it
+//! wakes a sleeper, unless there is none, or a searcher again, for whom the same holds. A searcher called at W4 is one like
+//! any other, whatever it was called for.
 //!
 //! **A call is neither lost nor left over.** Under the lock exactly one thread takes a sleeper off the list. Is that a
 //! waker, it calls once, and the sleeper waits for this one call even if it has seen work meanwhile. Is it the sleeper,
@@ -36,100 +50,169 @@
 //!
 //! # Memory ordering
 //!
-//! The fences carry the argument, so the count is written and read relaxed, and W1 and S3 may be relaxed too. Reading
-//! a stale count above zero costs a lock; a stale zero is excluded by the fences. What the work itself makes visible is
-//! for the deque, the mailbox's lock and the latch to order: to be woken is only a reason to look.
+//! The fences carry the argument, so the counts are changed and read relaxed, and W1 and S3 may be relaxed too. Reading
+//! a stale count of sleepers costs a lock; a stale zero is excluded by the fences. What the work itself makes visible is
+//! for the queues, the mailbox's lock and the latch to order: to be woken is only a reason to look.
 
 use crossbeam_utils::CachePadded;
 
 use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering, fence};
 
-/// The beds of all workers, and the list of those that sleep.
-pub(super) struct Sleep {
-    /// The length of `sleepers`, to be read without its lock.
-    count: CachePadded<AtomicUsize>,
-    /// Who sleeps or is about to. The last to lie down is called first, as its caches are the warmest.
-    sleepers: Mutex<Vec<usize>>,
-    beds: Box<[Bed]>,
+/// What work a sleeper is to be woken for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WakeFor {
+    /// Any that lies in a queue, and its own.
+    Any,
+    /// Its own: the end of its region, or a job handed to it.
+    ItsOwn,
 }
+
+/// The beds of all workers, the list of those that sleep, and the counts of sleepers and searchers.
+pub(super) struct Sleep {
+    /// A sum of [`SLEEPER`], [`ANY_SLEEPER`] and [`SEARCHER`], read without the lock.
+    counts: CachePadded<AtomicUsize>,
+    /// Who sleeps or is about to. The last to lie down is called first, as its caches are the warmest.
+    sleepers: Mutex<Vec<(usize, WakeFor)>>,
+    beds: Box<[CachePadded<Bed>]>,
+}
+
+/// Each count has bits of its own, more than there can be workers, so that one read tells all.
+const SLEEPER: usize = 1;
+const ANY_SLEEPER: usize = 1 << BITS;
+const SEARCHER: usize = 1 << (2 * BITS);
+const BITS: u32 = usize::BITS / 3;
+const MASK: usize = (1 << BITS) - 1;
 
 impl Sleep {
     /// A bed for each worker.
     pub(super) fn new(workers: usize) -> Self {
         Self {
-            count: CachePadded::new(AtomicUsize::new(0)),
+            counts: CachePadded::new(AtomicUsize::new(0)),
             sleepers: Mutex::new(Vec::with_capacity(workers)),
-            beds: (0..workers).map(|_| Bed::new()).collect(),
+            beds: (0..workers).map(|_| CachePadded::new(Bed::new())).collect(),
         }
     }
 
-    /// Sleeps until called, unless `sees_work`, which is asked when wakers can see the worker on the list.
-    pub(super) fn sleep(&self, worker: usize, sees_work: impl FnOnce() -> bool) {
-        self.lie_down(worker);
-        fence(Ordering::SeqCst);
-        if sees_work() && self.take_off(|sleepers| position(sleepers, worker)).is_some() {
+    /// Counts a worker in as a searcher.
+    pub(super) fn start_search(&self) {
+        self.counts.fetch_add(SEARCHER, Ordering::Relaxed);
+    }
+
+    /// Counts a searcher out that has found something to do. If it was the last one it wakes another if
+    /// `sees_more_work`.
+    pub(super) fn end_search(&self, sees_more_work: impl FnOnce() -> bool) {
+        let before = self.counts.fetch_sub(SEARCHER, Ordering::Relaxed);
+        if searchers(before) > 1 {
             return;
         }
-        self.beds[worker].wait();
+        fence(Ordering::SeqCst);
+        if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 && sees_more_work() {
+            self.wake_any();
+        }
     }
 
-    /// Wakes a worker, if one sleeps. The work it is woken for has been published.
+    /// Sleeps until called, unless `sees_work`, which is asked when wakers can see the worker on the list. Says whether
+    /// the worker, which may come as a searcher, leaves as one: so does everyone who takes any work.
+    pub(super) fn sleep(
+        &self,
+        worker: usize,
+        wake_for: WakeFor,
+        is_searcher: bool,
+        sees_work: impl FnOnce() -> bool,
+    ) -> bool {
+        self.lie_down(worker, wake_for, is_searcher);
+        fence(Ordering::SeqCst);
+        let is_it = |&(sleeper, _): &(usize, WakeFor)| sleeper == worker;
+        if !sees_work() || self.take_off(is_it).is_none() {
+            self.beds[worker].wait();
+        }
+        wake_for == WakeFor::Any
+    }
+
+    /// Wakes a worker that takes any work, if one sleeps and nobody searches. The work it is woken for has been
+    /// published.
     pub(super) fn wake_any(&self) {
-        self.wake(last);
+        fence(Ordering::SeqCst);
+        let counts = self.counts.load(Ordering::Relaxed);
+        if any_sleepers(counts) > 0 && searchers(counts) == 0 {
+            self.call(|&(_, wake_for)| wake_for == WakeFor::Any);
+        }
+    }
+
+    /// Wakes a worker that takes background jobs, if one sleeps. Searchers are no reason not to: worker 0 may be one, and
+    /// does not look for those. The job has been published.
+    pub(super) fn wake_for_background(&self) {
+        fence(Ordering::SeqCst);
+        if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
+            self.call(|&(sleeper, wake_for)| sleeper != 0 && wake_for == WakeFor::Any);
+        }
     }
 
     /// Wakes this worker, if it sleeps. What it is woken for has been published.
     pub(super) fn wake_worker(&self, worker: usize) {
-        self.wake(|sleepers| position(sleepers, worker));
+        fence(Ordering::SeqCst);
+        if sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
+            self.call(|&(sleeper, _)| sleeper == worker);
+        }
     }
 
     /// Wakes every worker that sleeps. What they are woken for has been published.
     pub(super) fn wake_all(&self) {
         // No fence: the lock is taken in any case, and whoever lies down after that sees what has been published
         // before.
-        while let Some(sleeper) = self.take_off(last) {
-            self.beds[sleeper].call();
-        }
+        while self.call(|_| true) {}
     }
 
     /// How many workers sleep or are about to.
-    #[cfg(test)]
     pub(super) fn sleepers(&self) -> usize {
-        self.count.load(Ordering::Relaxed)
+        sleepers(self.counts.load(Ordering::Relaxed))
     }
 
-    fn wake(&self, choose: impl FnOnce(&[usize]) -> Option<usize>) {
-        fence(Ordering::SeqCst);
-        if self.count.load(Ordering::Relaxed) == 0 {
-            return;
-        }
-        if let Some(sleeper) = self.take_off(choose) {
+    /// Calls the last sleeper of the kind, if there is one.
+    fn call(&self, is_wanted: impl Fn(&(usize, WakeFor)) -> bool) -> bool {
+        let sleeper = self.take_off(is_wanted);
+        if let Some(sleeper) = sleeper {
             self.beds[sleeper].call();
         }
+        sleeper.is_some()
     }
 
-    fn lie_down(&self, worker: usize) {
+    fn lie_down(&self, worker: usize, wake_for: WakeFor, is_searcher: bool) {
         let mut sleepers = self.sleepers.lock();
-        sleepers.push(worker);
-        self.count.store(sleepers.len(), Ordering::Relaxed);
+        sleepers.push((worker, wake_for));
+        // One operation, so that nobody sees the worker neither searching nor asleep.
+        let out = if is_searcher { SEARCHER } else { 0 };
+        self.counts.fetch_add(weight(wake_for).wrapping_sub(out), Ordering::Relaxed);
     }
 
-    /// Takes the chosen sleeper off the list, and says which worker it is.
-    fn take_off(&self, choose: impl FnOnce(&[usize]) -> Option<usize>) -> Option<usize> {
+    /// Takes the last sleeper of the kind off the list, and says which worker it is. One that takes any work is a searcher
+    /// from then on.
+    fn take_off(&self, is_wanted: impl Fn(&(usize, WakeFor)) -> bool) -> Option<usize> {
         let mut sleepers = self.sleepers.lock();
-        let chosen = choose(&sleepers)?;
-        let worker = sleepers.remove(chosen);
-        self.count.store(sleepers.len(), Ordering::Relaxed);
+        let (worker, wake_for) = sleepers.iter().rposition(is_wanted).map(|place| sleepers.remove(place))?;
+        let becomes = if wake_for == WakeFor::Any { SEARCHER } else { 0 };
+        self.counts.fetch_add(becomes.wrapping_sub(weight(wake_for)), Ordering::Relaxed);
         Some(worker)
     }
 }
 
-fn last(sleepers: &[usize]) -> Option<usize> {
-    sleepers.len().checked_sub(1)
+fn weight(wake_for: WakeFor) -> usize {
+    match wake_for {
+        WakeFor::Any => SLEEPER + ANY_SLEEPER,
+        WakeFor::ItsOwn => SLEEPER,
+    }
 }
 
-fn position(sleepers: &[usize], worker: usize) -> Option<usize> {
-    sleepers.iter().position(|&sleeper| sleeper == worker)
+fn sleepers(counts: usize) -> usize {
+    counts & MASK
+}
+
+fn any_sleepers(counts: usize) -> usize {
+    (counts >> BITS) & MASK
+}
+
+fn searchers(counts: usize) -> usize {
+    counts >> (2 * BITS)
 }
 
 /// Where one worker waits to be called.
@@ -159,182 +242,4 @@ impl Bed {
 }
 
 #[cfg(all(test, drawloom_loom))]
-mod loom_tests {
-    use loom::{model, model::Builder, thread};
-
-    use super::Sleep;
-    use crate::{
-        sync::{Arc, AtomicBool, AtomicUsize, Ordering},
-        task::latch::Latch,
-    };
-
-    /// Jobs are only counted here, and relaxed, so that nothing but the protocol's fences orders them.
-    struct Room {
-        sleep: Sleep,
-        jobs: AtomicUsize,
-        ran: AtomicBool,
-        latch: Latch,
-        shut_down: AtomicBool,
-    }
-
-    impl Room {
-        fn new(outstanding: usize) -> Arc<Self> {
-            Arc::new(Self {
-                sleep: Sleep::new(2),
-                jobs: AtomicUsize::new(0),
-                ran: AtomicBool::new(false),
-                latch: Latch::new(outstanding),
-                shut_down: AtomicBool::new(false),
-            })
-        }
-
-        fn produce(&self) {
-            self.jobs.fetch_add(1, Ordering::Relaxed);
-            self.sleep.wake_any();
-        }
-
-        /// Sleeps until there is a job, and takes it.
-        fn consume(&self, worker: usize) {
-            while !self.try_consume() {
-                self.sleep.sleep(worker, || self.jobs.load(Ordering::Relaxed) > 0);
-            }
-        }
-
-        fn try_consume(&self) -> bool {
-            self.jobs.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |jobs| jobs.checked_sub(1)).is_ok()
-        }
-
-        fn finish(&self) {
-            if self.latch.finish() {
-                self.sleep.wake_worker(0);
-            }
-        }
-    }
-
-    /// Runs the closure on a thread of the model that shares the room.
-    fn start(room: &Arc<Room>, run: impl FnOnce(&Room) + 'static) -> thread::JoinHandle<()> {
-        let room = Arc::clone(room);
-        thread::spawn(move || run(&room))
-    }
-
-    fn join(threads: [thread::JoinHandle<()>; 2]) {
-        threads.into_iter().for_each(|thread| thread.join().unwrap());
-    }
-
-    /// Explores all executions with at most that many preemptions, for models too large to explore whole.
-    fn bounded(preemptions: usize, run: impl Fn() + Sync + Send + 'static) {
-        let mut builder = Builder::new();
-        builder.preemption_bound = Some(preemptions);
-        builder.check(run);
-    }
-
-    #[test]
-    fn a_job_wakes_the_worker_that_waits_for_one() {
-        model(|| {
-            let room = Room::new(1);
-            let worker = start(&room, |room| room.consume(0));
-            room.produce();
-            worker.join().unwrap();
-            assert_eq!(room.sleep.sleepers(), 0);
-        });
-    }
-
-    #[test]
-    fn a_bed_can_be_slept_in_again() {
-        bounded(3, || {
-            let room = Room::new(1);
-            let worker = start(&room, |room| {
-                room.consume(0);
-                room.consume(0);
-            });
-            room.produce();
-            room.produce();
-            worker.join().unwrap();
-            assert_eq!(room.sleep.sleepers(), 0, "a call was left over, and cut the next sleep short");
-        });
-    }
-
-    #[test]
-    fn two_jobs_wake_two_workers() {
-        bounded(3, || {
-            let room = Room::new(1);
-            let workers = [0, 1].map(|worker| start(&room, move |room| room.consume(worker)));
-            room.produce();
-            room.produce();
-            join(workers);
-        });
-    }
-
-    #[test]
-    fn two_producers_wake_two_workers() {
-        bounded(2, || {
-            let room = Room::new(1);
-            let workers = [0, 1].map(|worker| start(&room, move |room| room.consume(worker)));
-            let producer = start(&room, Room::produce);
-            room.produce();
-            producer.join().unwrap();
-            join(workers);
-        });
-    }
-
-    #[test]
-    fn the_last_job_of_a_scope_wakes_its_owner() {
-        bounded(4, || {
-            let room = Room::new(2);
-            let workers = [(); 2].map(|()| start(&room, Room::finish));
-            while !room.latch.is_released() {
-                room.sleep.sleep(0, || room.latch.is_released());
-            }
-            join(workers);
-        });
-    }
-
-    #[test]
-    fn an_owner_called_for_a_job_as_its_scope_ends_passes_the_call_on() {
-        bounded(3, || {
-            let room = Room::new(1);
-            let thief = start(&room, |room| {
-                while !room.ran.load(Ordering::Relaxed) && !room.try_consume() {
-                    room.sleep.sleep(1, || room.ran.load(Ordering::Relaxed) || room.jobs.load(Ordering::Relaxed) > 0);
-                }
-            });
-            let producer = start(&room, |room| {
-                room.produce();
-                room.finish();
-            });
-            // What `Worker::work` does in worker 0. Whichever of the two takes the job ends the thief.
-            let mut called = false;
-            while !room.latch.is_released() {
-                called = false;
-                if room.try_consume() {
-                    room.ran.store(true, Ordering::Relaxed);
-                    room.sleep.wake_worker(1);
-                } else {
-                    room.sleep.sleep(0, || room.latch.is_released() || room.jobs.load(Ordering::Relaxed) > 0);
-                    called = true;
-                }
-            }
-            if called && room.jobs.load(Ordering::Relaxed) > 0 {
-                room.sleep.wake_any();
-            }
-            join([thief, producer]);
-        });
-    }
-
-    #[test]
-    fn the_end_of_the_scheduler_wakes_everyone() {
-        bounded(4, || {
-            let room = Room::new(1);
-            let workers = [0, 1].map(|worker| {
-                start(&room, move |room| {
-                    while !room.shut_down.load(Ordering::Relaxed) {
-                        room.sleep.sleep(worker, || room.shut_down.load(Ordering::Relaxed));
-                    }
-                })
-            });
-            room.shut_down.store(true, Ordering::Relaxed);
-            room.sleep.wake_all();
-            join(workers);
-        });
-    }
-}
+mod models;

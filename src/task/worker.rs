@@ -1,30 +1,28 @@
 //! What a worker does: run jobs, look for jobs, sleep.
 
-use std::{
-    cell::{Cell, RefCell},
-    fmt,
-    marker::PhantomData,
-    mem,
-    rc::Rc,
+use std::{cell::Cell, fmt, marker::PhantomData, ptr, rc::Rc, time::Duration};
+
+use crate::sync::Arc;
+
+use super::{
+    background::Queued,
+    idle::Idle,
+    job::{Job, JobPanic, Work, discard},
+    queue::{Band, Queues},
+    region::Region,
+    scheduler::Shared,
+    sleep::WakeFor,
 };
 
-use crate::sync::{Arc, Deque, Steal, spin_loop};
-
-use super::{job::Job, scheduler::Shared, scope::ScopeState};
-
-/// How often a worker looks for jobs in vain before it sleeps. With the pauses between, that is some microseconds, less
-/// than a sleep and a wake-up cost together.
-const IDLE_ROUNDS: usize = if cfg!(drawloom_loom) { 0 } else { 16 };
-
-/// How many pauses of the processor lie between two looks.
-const PAUSES: usize = 16;
+/// For how many jobs a worker counts in advance.
+const JOBS_COUNTED_AT_ONCE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 32 };
 
 /// The witness that code runs as a job of a scheduler: only there can a reference to it be had, and it stays on its
 /// thread.
 ///
 /// No two threads are the same worker at the same time, so what an engine keeps once per [`index`](Self::index) is
 /// never shared between threads. But a job that opens a scope or a loop and waits in it may find itself interrupted by
-/// another job on the same worker, so such a thing should not stay borrowed over a wait.
+/// a job of that scope on the same worker, so such a thing should not stay borrowed over a wait.
 ///
 /// ```compile_fail,E0277
 /// # let scheduler = drawloom::task::Scheduler::new(2)?;
@@ -36,29 +34,42 @@ const PAUSES: usize = 16;
 /// ```
 pub struct Worker {
     index: usize,
-    deque: Deque<Job>,
+    queues: Box<Queues>,
     shared: Arc<Shared>,
     /// Whom to steal from first: where there was something the last time.
     victim: Cell<usize>,
-    /// The passes this worker is inside of, the innermost last.
-    visits: RefCell<Vec<Visit>>,
+    /// How many regions are open on this worker, each inside a job of the one before.
+    depth: Cell<u32>,
+    /// Whether what runs is a background job.
+    is_in_background: Cell<bool>,
+    /// For how many jobs that are not there this worker is counted, and by which region. While there is credit, the
+    /// region waits for it to come back; where there is none, a job of the region is running here.
+    credit: Cell<usize>,
+    creditor: Cell<Option<&'static Region>>,
+    /// What else this thread is (see `seat`).
+    pub(super) outer: Cell<*const Worker>,
     on_this_thread: PhantomData<Rc<()>>,
 }
 
 impl Worker {
-    pub(super) fn new(index: usize, deque: Deque<Job>, shared: Arc<Shared>) -> Self {
+    pub(super) fn new(index: usize, queues: Box<Queues>, shared: Arc<Shared>) -> Self {
         Self {
             index,
-            deque,
+            queues,
             shared,
             victim: Cell::new(0),
-            visits: RefCell::new(Vec::new()),
+            depth: Cell::new(0),
+            is_in_background: Cell::new(false),
+            credit: Cell::new(0),
+            creditor: Cell::new(None),
+            outer: Cell::new(ptr::null()),
             on_this_thread: PhantomData,
         }
     }
 
     /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that
     /// called the scheduler.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index
     }
@@ -67,107 +78,228 @@ impl Worker {
         &self.shared
     }
 
-    pub(super) fn into_deque(self) -> Deque<Job> {
-        self.deque
+    /// How many workers there are.
+    #[inline]
+    pub(crate) fn workers(&self) -> usize {
+        self.shared.workers()
     }
 
-    /// Queues a job here, and wakes somebody for it.
-    pub(super) fn push(&self, job: Job) {
-        self.deque.push(job);
-        self.shared.sleep().wake_any();
+    /// What it costs to wake one of them.
+    #[inline]
+    pub(crate) fn wake_price(&self) -> Duration {
+        self.shared.wake_price()
     }
 
-    /// Runs jobs, and sleeps where there are none, until that time has come. Does not unwind.
-    pub(super) fn work(&self, until: Until<'_>) {
-        let mut idle_rounds = 0;
-        let mut called = false;
-        while !until.has_come(&self.shared) {
-            let was_called = mem::take(&mut called);
-            if let Some(job) = self.next_job(until) {
-                // It may have been called for another job than the one it found, a pinned one say.
-                self.pass_on(was_called);
-                job.run(self);
-                idle_rounds = 0;
-            } else if idle_rounds == IDLE_ROUNDS {
-                self.sleep(until);
-                called = true;
-                idle_rounds = 0;
-            } else {
-                (0..PAUSES).for_each(|_| spin_loop());
-                idle_rounds += 1;
-            }
-        }
-        // It may have been called for a job that it does not look for any more.
-        self.pass_on(called);
+    /// Whether jobs are to run in no particular order.
+    #[inline]
+    pub(crate) fn is_shuffled(&self) -> bool {
+        self.shared.is_shuffled()
     }
 
-    /// Passes a call on, if there was one and there is something that others could do.
-    fn pass_on(&self, was_called: bool) {
-        if was_called && self.sees_loot() {
+    /// Draws one of so many, if the scheduler is to [shuffle](super::SchedulerBuilder::shuffle).
+    pub(crate) fn draw(&self, count: usize) -> Option<usize> {
+        self.queues.draw(count)
+    }
+
+    pub(super) fn is_in_background(&self) -> bool {
+        self.is_in_background.get()
+    }
+
+    pub(super) fn into_queues(self) -> Box<Queues> {
+        self.queues
+    }
+
+    /// Queues a job here, and wakes somebody for it. Only from within a counted job of the region, or its body.
+    pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
+        self.spend(region);
+        let job = Job { work, region, depth: self.depth.get() };
+        if region.owner_starves() && region.owner() != self.index {
+            self.shared.mailbox(region.owner()).put(job);
+            self.shared.sleep().wake_worker(region.owner());
+        } else if region.is_background() {
+            self.queues.push(job, Band::Background);
+            self.shared.sleep().wake_for_background();
+        } else {
+            self.queues.push(job, band);
             self.shared.sleep().wake_any();
         }
     }
 
-    /// Pinned jobs come first, as nobody else can run them: while this worker does, others take those of its deque.
-    fn next_job(&self, until: Until<'_>) -> Option<Job> {
-        until.pinned_job().or_else(|| self.deque.pop()).or_else(|| self.steal())
+    /// Hands a job to the owner of the region. Only from within a counted job of the region, or its body.
+    pub(super) fn push_pinned(&self, region: &'static Region, work: Work) {
+        self.spend(region);
+        self.shared.mailbox(region.owner()).put(Job { work, region, depth: self.depth.get() });
+        if region.owner() != self.index {
+            self.shared.sleep().wake_worker(region.owner());
+        }
     }
 
-    /// One job of somebody else.
-    fn steal(&self) -> Option<Job> {
-        let stealers = self.shared.stealers();
-        let first = self.victim.get();
+    /// Calls `body`, whose jobs are those of the region, and then works until they have run. Neither may unwind.
+    pub(super) fn wait_inside<R>(
+        &self,
+        region: &'static Region,
+        body: impl FnOnce() -> Result<R, JobPanic>,
+    ) -> Result<R, JobPanic> {
+        let is_outermost = self.index == 0 && self.depth.get() == 0 && !self.is_in_background();
+        self.depth.set(self.depth.get() + 1);
+        if is_outermost {
+            self.shared.placement().make_room();
+            self.shared.set_live(true);
+        }
+        let result = body();
+        // The count that the latch began with.
+        self.earn(region);
+        self.work(Until::Finished { region, may_help: is_outermost });
+        if is_outermost {
+            self.shared.set_live(false);
+        }
+        self.depth.set(self.depth.get() - 1);
+        let Some(first) = region.take_panic() else { return result };
+        discard(result);
+        Err(first)
+    }
+
+    /// Runs jobs, and sleeps where there are none, until that time has come. Does not unwind.
+    pub(super) fn work(&self, until: Until) {
+        let mut idle = Idle::default();
         loop {
-            let mut interrupted = false;
-            for victim in (first..stealers.len()).chain(0..first).filter(|&victim| victim != self.index) {
-                match stealers[victim].steal() {
-                    Steal::Success(job) => {
-                        self.victim.set(victim);
-                        return Some(job);
-                    }
-                    // Another thief was faster, and there may be more.
-                    Steal::Retry => interrupted = true,
-                    Steal::Empty => {}
+            if let Some(job) = self.next_job(until) {
+                idle.end(self, until);
+                self.run(job);
+                continue;
+            }
+            self.settle();
+            if until.has_come(&self.shared) {
+                break;
+            }
+            if matches!(until, Until::Shutdown)
+                && let Some(job) = self.shared.background().take()
+            {
+                idle.end(self, until);
+                self.run_in_background(&*job);
+                continue;
+            }
+            idle.go_on(self, until);
+        }
+        idle.end(self, until);
+    }
+
+    /// Runs background jobs one after another, until there is none left or it is time to stop. Says how many have run.
+    pub(super) fn work_in_background(&self, mut stop: impl FnMut() -> bool) -> usize {
+        let mut jobs = 0;
+        while !stop() {
+            let Some(job) = self.shared.background().take() else { break };
+            jobs += usize::from(self.run_in_background(&*job));
+        }
+        jobs
+    }
+
+    /// Whether there is a job that this worker would take up.
+    pub(super) fn sees_work(&self, until: Until) -> bool {
+        until.has_come(&self.shared)
+            || match until {
+                Until::Shutdown => {
+                    self.sees_loot(&Band::ALL) || (self.index > 0 && !self.shared.background().is_empty())
+                }
+                Until::Finished { region, may_help } => {
+                    self.shared.mailbox(self.index).has(region) || (may_help && self.sees_loot(&Band::FRAME))
                 }
             }
-            if !interrupted {
-                return None;
+    }
+
+    /// Whether there is something in these bands to steal. Its own queues are empty when a worker asks, or hold nothing
+    /// for it, as nobody else puts anything in.
+    pub(super) fn sees_loot(&self, bands: &[Band]) -> bool {
+        let others = self.shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
+        others.map(|(_, loot)| loot).any(|loot| bands.iter().any(|&band| !loot.of(band).is_empty()))
+    }
+
+    /// Takes over the count of a job of the region that has run here.
+    fn earn(&self, region: &'static Region) {
+        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
+            self.settle();
+            self.creditor.set(Some(region));
+        }
+        self.credit.set(self.credit.get() + 1);
+    }
+
+    /// Sees to it that one more job of the region is counted.
+    fn spend(&self, region: &'static Region) {
+        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
+            self.settle();
+            self.creditor.set(Some(region));
+        }
+        if self.credit.get() == 0 {
+            region.latch().add(JOBS_COUNTED_AT_ONCE);
+            self.credit.set(JOBS_COUNTED_AT_ONCE);
+        }
+        self.credit.set(self.credit.get() - 1);
+    }
+
+    /// Gives all credit back, and wakes the owner of the region if it was the last to come back.
+    fn settle(&self) {
+        let credit = self.credit.take();
+        let Some(region) = self.creditor.take() else { return };
+        // From the moment that the latch is released the region may be gone, and only the latch, which is nothing but
+        // an atomic, may still be referred to.
+        let (latch, owner) = (region.latch(), region.owner());
+        if credit > 0 && latch.finish(credit) && owner != self.index {
+            self.shared.sleep().wake_worker(owner);
+        }
+    }
+
+    fn run(&self, job: Job) {
+        let region = job.region;
+        let was_in_background = self.is_in_background.replace(region.is_background());
+        job.run(self);
+        self.is_in_background.set(was_in_background);
+        self.earn(region);
+    }
+
+    /// Says whether the job had not been begun by somebody else.
+    fn run_in_background(&self, job: &dyn Queued) -> bool {
+        let was_in_background = self.is_in_background.replace(true);
+        let has_run = job.run();
+        self.is_in_background.set(was_in_background);
+        has_run
+    }
+
+    /// Pinned jobs come first, as nobody else can run them: while this worker does, others take those of its queues.
+    fn next_job(&self, until: Until) -> Option<Job> {
+        match until {
+            Until::Shutdown => self
+                .own_job(&Band::FRAME, 0)
+                .or_else(|| self.steal(&Band::FRAME))
+                .or_else(|| self.own_job(&[Band::Background], 0).or_else(|| self.steal(&[Band::Background]))),
+            Until::Finished { region, may_help } => {
+                let pinned = self.shared.mailbox(self.index).take(region);
+                pinned.or_else(|| {
+                    if may_help {
+                        self.own_job(&Band::FRAME, 0).or_else(|| self.steal(&Band::FRAME))
+                    } else {
+                        self.own_job(&Band::ALL, self.depth.get())
+                    }
+                })
             }
-            spin_loop();
         }
     }
 
-    fn sleep(&self, until: Until<'_>) {
-        let sees_work = || until.has_come(&self.shared) || until.has_pinned_job() || self.sees_loot();
-        self.shared.sleep().sleep(self.index, sees_work);
+    fn own_job(&self, bands: &[Band], depth: u32) -> Option<Job> {
+        bands.iter().find_map(|&band| self.queues.pop(band, depth))
     }
 
-    /// Whether there is something to steal. Its own deque is empty when a worker asks, as nobody else puts anything in.
-    fn sees_loot(&self) -> bool {
-        let others = self.shared.stealers().iter().enumerate().filter(|&(victim, _)| victim != self.index);
-        others.map(|(_, stealer)| stealer).any(|stealer| !stealer.is_empty())
-    }
-
-    /// Goes into the pass, and holds the token that it was brought. Is the worker inside already, further out, it stays
-    /// there, holds the token there, and this is false.
-    pub(super) fn enter(&self, pass: usize) -> bool {
-        let mut visits = self.visits.borrow_mut();
-        if let Some(visit) = visits.iter_mut().find(|visit| visit.pass == pass) {
-            visit.holds_token = true;
-            return false;
-        }
-        visits.push(Visit { pass, holds_token: true });
-        true
-    }
-
-    /// Takes the token of the innermost pass off the worker, if it holds that.
-    pub(super) fn take_token(&self) -> bool {
-        self.visits.borrow_mut().last_mut().is_some_and(|visit| mem::take(&mut visit.holds_token))
-    }
-
-    /// Leaves the innermost pass.
-    pub(super) fn leave(&self) {
-        self.visits.borrow_mut().pop();
+    /// One job of somebody else, the more urgent bands first.
+    fn steal(&self, bands: &[Band]) -> Option<Job> {
+        let loot = self.shared.loot();
+        let first = self.victim.get();
+        bands.iter().find_map(|&band| {
+            let mut victims = (first..loot.len()).chain(0..first).filter(|&victim| victim != self.index);
+            victims.find_map(|victim| {
+                let job = loot[victim].of(band).steal()?;
+                self.victim.set(victim);
+                Some(job)
+            })
+        })
     }
 }
 
@@ -177,41 +309,37 @@ impl fmt::Debug for Worker {
     }
 }
 
-/// A worker's stay inside a pass.
-struct Visit {
-    /// The address of the pass.
-    pass: usize,
-    holds_token: bool,
-}
-
 /// How long a worker works.
 #[derive(Clone, Copy)]
-pub(super) enum Until<'state> {
+pub(super) enum Until {
     /// Until the scheduler ends.
     Shutdown,
-    /// Until the jobs of the scope have run. The worker is the one that opened it, and runs its pinned jobs.
-    Finished(&'state ScopeState),
+    /// Until the jobs of the region have run. The worker is the one that opened it, and runs its pinned jobs. Unless it
+    /// may help, it is in the midst of some job, and takes up nothing else meanwhile than what belongs to the region: a
+    /// job of somebody else might take long, or want what this one has borrowed.
+    Finished { region: &'static Region, may_help: bool },
 }
 
-impl Until<'_> {
+impl Until {
     fn has_come(self, shared: &Shared) -> bool {
         match self {
             Self::Shutdown => shared.is_shut_down(),
-            Self::Finished(scope) => scope.is_finished(),
+            Self::Finished { region, .. } => region.latch().is_released(),
         }
     }
 
-    fn pinned_job(self) -> Option<Job> {
+    /// What a worker is woken for that sleeps meanwhile.
+    pub(super) fn wake_for(self) -> WakeFor {
         match self {
-            Self::Shutdown => None,
-            Self::Finished(scope) => scope.mailbox().take(),
+            Self::Finished { may_help: false, .. } => WakeFor::ItsOwn,
+            Self::Shutdown | Self::Finished { may_help: true, .. } => WakeFor::Any,
         }
     }
 
-    fn has_pinned_job(self) -> bool {
-        match self {
-            Self::Shutdown => false,
-            Self::Finished(scope) => !scope.mailbox().is_empty(),
+    /// Lets others know whether the worker has nothing to do and may not look for it elsewhere.
+    pub(super) fn set_starves(self, starves: bool) {
+        if let Self::Finished { region, may_help: false } = self {
+            region.set_owner_starves(starves);
         }
     }
 }

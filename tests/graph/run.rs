@@ -94,7 +94,8 @@ proptest! {
         });
         let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         for scheduler in SCHEDULERS.iter() {
-            for _ in 0..3 {
+            for always_shared in [true, true, false, false] {
+                schedule.always_share(always_shared);
                 let widths: Vec<usize> = (0..oracle.needed.len()).map(|process| shapes[process].0).collect();
                 let tally = tally(&widths);
                 schedule.run(scheduler, &tally).map_err(|error| TestCaseError::fail(error.to_string()))?;
@@ -116,7 +117,9 @@ pub fn alone<'a, C>(process: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
     graph.compile().expect("nothing is wrong")
 }
 
+/// Runs the schedule on all workers of the scheduler, however little work it is.
 pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Scheduler, context: &C) {
+    schedule.always_share(true);
     schedule.run(scheduler, context).expect("nothing fails");
 }
 

@@ -180,6 +180,7 @@ fn of_two_failures_the_one_that_stands_first_is_reported() {
         graph.keep(process);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
+    schedule.always_share(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
         assert_eq!(error.to_string(), r#"the process "one" failed: one"#);
@@ -196,6 +197,7 @@ fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
     let process = graph.add("wide", failing.with_width(|_| 2));
     graph.keep(process);
     let mut schedule = graph.compile().expect("nothing is wrong");
+    schedule.always_share(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
         assert_eq!(error.to_string(), r#"the process "wide" failed: chunk 0"#);
@@ -222,6 +224,7 @@ fn an_error_that_panics_when_dropped_does_not_reach_the_caller() {
         graph.keep(process);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
+    schedule.always_share(true);
     for _ in 0..50 {
         match schedule.run(&SCHEDULERS[1], &Barrier::new(2)) {
             Err(RunError::Failed { process, source }) => {

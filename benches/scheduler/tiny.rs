@@ -1,0 +1,28 @@
+//! Row `tiny`: so little that a plain loop may be the best of all.
+
+use std::time::Duration;
+
+use crate::passes::Shape;
+use crate::turns::{Contender, Row};
+use crate::work::Work;
+use crate::{Extent, Failure};
+
+/// A frame is 7 jobs of 1 µs.
+///
+/// # Errors
+/// If the graph cannot be compiled.
+pub fn row(extent: &Extent) -> Result<Row, Failure> {
+    let shape = Shape { passes: 1, jobs: 7 };
+    let mut contenders = vec![Contender::plain_loop(shape.all()), Contender::ideal(shape.all())];
+    contenders.extend(shape.contenders()?);
+    Ok(Row {
+        name: "tiny",
+        unit: "µs a frame",
+        scale: 1e6,
+        pace: extent.hot(),
+        work: Work::busy(Duration::from_micros(1)),
+        jobs: shape.all(),
+        order: shape.order(),
+        contenders,
+    })
+}

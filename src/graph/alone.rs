@@ -1,0 +1,76 @@
+//! A run on one thread: one process after another, as they stand. Nothing is counted, as each stands after all it depends
+//! on.
+
+use std::time::{Duration, Instant};
+
+use crate::task::{Chunks, Worker};
+
+use super::{error::NodeError, execute::Run, node::Node};
+
+/// Where a run stood when it took too long for one thread: all before this process is done.
+pub(super) struct Left {
+    pub(super) process: u32,
+    pub(super) chunks: Chunks,
+    /// How many of the process' chunks are done.
+    pub(super) done: usize,
+}
+
+impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
+    /// Runs everything, unless it takes longer than `at_most`; then it says where it stopped.
+    pub(super) fn go_alone(&self, worker: &Worker, start: Instant, at_most: Option<Duration>) -> Option<Left> {
+        let mut watch = at_most.map(|at_most| Watch { start, at_most, chunks: 0, next_look: 1 });
+        for process in 0..self.schedule.flow.len() as u32 {
+            let left = self.attempt(process, |item| self.run_alone(process, worker, watch.as_mut(), item))?;
+            if left.is_some() {
+                return left;
+            }
+        }
+        None
+    }
+
+    /// Runs one process, unless the time is over. Whoever may run a pinned one has begun it, and ends it.
+    #[inline]
+    fn run_alone(
+        &self,
+        process: u32,
+        worker: &Worker,
+        mut watch: Option<&mut Watch>,
+        item: &mut usize,
+    ) -> Result<Option<Left>, NodeError> {
+        let chunks = self.chunks(process, worker);
+        for place in 0..chunks.count() {
+            let done = place + 1;
+            self.run_chunks(process, &chunks, place..done, worker, item)?;
+            let is_over = watch.as_mut().is_some_and(|watch| watch.is_over());
+            if is_over && (done == chunks.count() || !self.node(process).pinned()) {
+                return Ok(Some(Left { process, chunks, done }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Tells when a run has taken too long, without asking the time at every chunk.
+struct Watch {
+    start: Instant,
+    at_most: Duration,
+    chunks: u32,
+    next_look: u32,
+}
+
+impl Watch {
+    /// How many chunks go by without a look at most. What a frame needs longer, once it is another one than before, is
+    /// that many chunks.
+    const MOST_CHUNKS: u32 = 16;
+
+    /// Another chunk is done. At the start of a run every look is twice as far from the one before.
+    fn is_over(&mut self) -> bool {
+        self.chunks += 1;
+        if self.chunks < self.next_look {
+            return false;
+        }
+        self.chunks = 0;
+        self.next_look = (self.next_look * 2).min(Self::MOST_CHUNKS);
+        self.start.elapsed() > self.at_most
+    }
+}

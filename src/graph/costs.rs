@@ -1,0 +1,100 @@
+//! What the processes of a schedule cost, measured in some of the runs.
+
+use std::time::{Duration, Instant};
+
+use crate::sync::{AtomicU32, AtomicUsize, Ordering};
+
+/// What has been measured so far. Durations are in nanoseconds.
+pub(super) struct Costs {
+    /// Per process, from its start to its end: an average of the latest measured runs, the latest counting most.
+    average: Box<[u64]>,
+    has_learnt: bool,
+    /// Per process, in the current run.
+    started: Box<[AtomicU32]>,
+    took: Box<[AtomicU32]>,
+    /// Of the current run, all workers' time together.
+    work: AtomicUsize,
+}
+
+/// The part of the latest run in the average.
+const WEIGHT: u64 = 4;
+
+impl Costs {
+    pub(super) fn new(processes: usize) -> Self {
+        let zeros = || (0..processes).map(|_| AtomicU32::new(0)).collect();
+        Self {
+            average: vec![0; processes].into(),
+            has_learnt: false,
+            started: zeros(),
+            took: zeros(),
+            work: AtomicUsize::new(0),
+        }
+    }
+
+    /// Nanoseconds per process; all are 0 before the first measured run.
+    pub(super) fn averages(&self) -> &[u64] {
+        &self.average
+    }
+
+    /// What the process costs, if that has been measured.
+    pub(super) fn of(&self, process: usize) -> Option<Duration> {
+        let average = self.average.get(process)?;
+        self.has_learnt.then(|| Duration::from_nanos(*average))
+    }
+
+    /// Takes in what the run that has ended cost, and says how much work it was.
+    pub(super) fn learn(&mut self) -> Duration {
+        for (average, took) in self.average.iter_mut().zip(&self.took) {
+            // Relaxed: the run is over.
+            let took = u64::from(took.load(Ordering::Relaxed));
+            *average = if self.has_learnt { (*average * (WEIGHT - 1) + took) / WEIGHT } else { took };
+        }
+        self.has_learnt = true;
+        let work = self.work.load(Ordering::Relaxed);
+        self.work.store(0, Ordering::Relaxed);
+        Duration::from_nanos(work as u64)
+    }
+}
+
+/// The clock of a run, which stands still in one that is not measured.
+#[derive(Clone, Copy)]
+pub(super) struct Clock<'run> {
+    start: Option<(Instant, &'run Costs)>,
+}
+
+impl<'run> Clock<'run> {
+    pub(super) fn new(costs: Option<&'run Costs>) -> Self {
+        Self { start: costs.map(|costs| (Instant::now(), costs)) }
+    }
+
+    /// A process starts.
+    pub(super) fn start(self, process: u32) {
+        if let Some((start, costs)) = self.start {
+            // Relaxed, here and below: who reads it has come after, as those do who depend on the process.
+            costs.started[process as usize].store(nanoseconds(start), Ordering::Relaxed);
+        }
+    }
+
+    /// A process ends.
+    pub(super) fn end(self, process: u32) {
+        if let Some((start, costs)) = self.start {
+            let process = process as usize;
+            let took = nanoseconds(start).saturating_sub(costs.started[process].load(Ordering::Relaxed));
+            costs.took[process].store(took, Ordering::Relaxed);
+        }
+    }
+
+    /// Calls what is work of the run.
+    pub(super) fn work<R>(self, call: impl FnOnce() -> R) -> R {
+        let Some((_, costs)) = self.start else { return call() };
+        let start = Instant::now();
+        let result = call();
+        costs.work.fetch_add(start.elapsed().as_nanos() as usize, Ordering::Relaxed);
+        result
+    }
+}
+
+/// Runs of more than four seconds are not told from those of four.
+fn nanoseconds(since: Instant) -> u32 {
+    since.elapsed().as_nanos().try_into().unwrap_or(u32::MAX)
+}

@@ -1,0 +1,261 @@
+//! A run on all workers.
+//!
+//! No job ever waits. A process with something left to wait for is nothing but a counter of dependencies; whoever brings
+//! that counter to zero has made the process *ready*. Who completes a process goes on with the first that became ready by
+//! that, and pushes the others, all of them as one token; who takes such a token pushes one half of it, and half of the rest,
+//! until one process is left, so that the largest part lies where thieves take it.
+//!
+//! A process asks its width when it starts. More than one chunk makes it a *pass*: chunks go by ticket, and a token is pushed
+//! through which another worker joins. Whoever finishes the last chunk completes the process.
+//!
+//! After a failure the run is *drained*: processes are completed without being run, so that all counters come to rest where
+//! they began.
+
+use std::ops::Range;
+
+use crate::task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens};
+
+use super::{alone::Left, execute::Run, node::Node, progress::OpenPass, schedule::Schedule, token::Token};
+
+impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
+    /// Runs everything.
+    ///
+    /// # Errors
+    ///
+    /// A panic outside of every process.
+    pub(super) fn share(&self, worker: &Worker) -> Result<(), JobPanic> {
+        run_tokens(worker, self, |crew| {
+            let flow = &self.schedule.flow;
+            let mut ready = Ready::new(self, flow.edges() as u32, crew);
+            for &root in flow.roots() {
+                ready.add(root);
+            }
+            if let Some(first) = ready.push_all_but_one() {
+                self.start(first, false, crew);
+            }
+        })
+    }
+
+    /// Runs what is left of a run that one thread has begun.
+    ///
+    /// # Errors
+    ///
+    /// As [`share`](Self::share).
+    pub(super) fn share_rest(&self, left: &Left, worker: &Worker) -> Result<(), JobPanic> {
+        let is_half_done = left.done < left.chunks.count();
+        let first_open = if is_half_done { left.process } else { left.process + 1 };
+        run_tokens(worker, self, |crew| {
+            // All are armed before the first of them can be counted down.
+            let rest = left.process + 1..self.schedule.flow.len() as u32;
+            for process in rest.clone() {
+                self.schedule.progress.arm(process, self.open_dependencies(process, first_open));
+            }
+            for process in rest.filter(|&process| self.open_dependencies(process, first_open) == 0) {
+                self.send(process, crew);
+            }
+            if is_half_done {
+                self.schedule.progress.pass(left.process).open(left.chunks, left.done);
+                if self.join(left.process, crew) {
+                    self.go_on_after(left.process, crew);
+                }
+            }
+        })
+    }
+
+    /// How many of the processes that one waits for stand at `first_open` or after it.
+    fn open_dependencies(&self, process: u32, first_open: u32) -> u32 {
+        let dependencies = self.schedule.dependencies(process as usize);
+        (dependencies.len() - dependencies.partition_point(|&dependency| dependency < first_open as usize)) as u32
+    }
+
+    /// Pushes a process that is ready.
+    fn send(&self, process: u32, crew: &Crew<'_>) {
+        if self.is_pinned(process) {
+            crew.push_pinned(Token::StartPinned(process).encode());
+        } else {
+            crew.push(Token::Start(process).encode(), self.band(process));
+        }
+    }
+
+    /// Starts one of these processes, and leaves the others to whoever comes.
+    fn start_one_of(&self, mut places: Range<u32>, crew: &Crew<'_>) {
+        while places.len() > 1 {
+            let middle = places.start + places.len() as u32 / 2;
+            self.push_ready(middle..places.end, crew);
+            places.end = middle;
+        }
+        self.start(self.schedule.progress.ready(places.start), false, crew);
+    }
+
+    fn push_ready(&self, places: Range<u32>, crew: &Crew<'_>) {
+        let band = self.band(self.schedule.progress.ready(places.start));
+        crew.push(Token::Ready(places).encode(), band);
+    }
+
+    /// Starts a process that is ready, and goes on from one to the next as long as there is one to go on with.
+    ///
+    /// It is a loop and no recursion, so that a chain of processes may be as long as memory lasts.
+    fn start(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) {
+        let mut next = Some((process, is_pinned));
+        while let Some((process, is_pinned)) = next {
+            self.schedule.progress.arm(process, self.schedule.flow.dependency_count(process));
+            self.clock.start(process);
+            if !self.work_on(process, is_pinned, crew) {
+                return;
+            }
+            next = self.complete(process, crew).map(|next| (next, false));
+        }
+    }
+
+    /// Goes on with what a completed process has made ready.
+    fn go_on_after(&self, process: u32, crew: &Crew<'_>) {
+        if let Some(next) = self.complete(process, crew) {
+            self.start(next, false, crew);
+        }
+    }
+
+    /// Runs a process that has just started. True if it is done, and false if whoever finishes its last chunk is to
+    /// complete it.
+    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
+        if self.is_stopped() {
+            return true;
+        }
+        let worker = crew.worker();
+        let pass = self.clock.work(|| {
+            self.attempt(process, |item| {
+                let chunks = self.chunks(process, worker);
+                if chunks.count() > 1 && !is_pinned {
+                    return Ok(Some(chunks));
+                }
+                self.run_chunks(process, &chunks, 0..chunks.count(), worker, item)?;
+                Ok(None)
+            })
+        });
+        let Some(Some(chunks)) = pass else { return true };
+        self.schedule.progress.pass(process).open(chunks, 0);
+        self.join(process, crew)
+    }
+
+    /// Takes part in a pass. True for the one worker that finished its last chunk.
+    fn join(&self, process: u32, crew: &Crew<'_>) -> bool {
+        let pass = self.schedule.progress.pass(process);
+        let chunks = pass.chunks();
+        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pass.tickets.join(), crew));
+        pass.finish(finished, &chunks)
+    }
+
+    /// Runs chunks until none is left, and says how many. After a failure they are only counted.
+    fn take_chunks(&self, process: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
+        let worker = crew.worker();
+        let mut finished = 0;
+        loop {
+            let places = if self.is_stopped() {
+                pass.tickets.take_rest(chunks)
+            } else {
+                pass.tickets.take(chunks, &mut pace, worker)
+            };
+            if places.is_empty() {
+                return finished;
+            }
+            finished += places.len();
+            if pass.tickets.invites(places.end, chunks, worker) {
+                crew.push(Token::Join(process).encode(), self.band(process));
+            }
+            self.attempt(process, |item| self.run_chunks(process, chunks, places, worker, item));
+        }
+    }
+
+    /// Counts down all that depend on the process. Those that became ready are pushed, but for one that can run anywhere:
+    /// it is given back, to be gone on with at once.
+    fn complete(&self, process: u32, crew: &Crew<'_>) -> Option<u32> {
+        self.clock.end(process);
+        let Schedule { flow, progress, .. } = self.schedule;
+        let mut ready = Ready::new(self, flow.first_place(process), crew);
+        for &dependent in flow.dependents(process) {
+            if progress.release(dependent) {
+                ready.add(dependent);
+            }
+        }
+        ready.push_all_but_one()
+    }
+
+    /// Whether the process is one for the calling thread. If that failed, nobody is to run it.
+    fn is_pinned(&self, process: u32) -> bool {
+        self.attempt(process, |_item| Ok(self.node(process).pinned())).unwrap_or(false)
+    }
+
+    fn band(&self, process: u32) -> Band {
+        if self.schedule.flow.is_urgent(process) { Band::Urgent } else { Band::Normal }
+    }
+}
+
+impl<P: Node<C>, C: Sync + ?Sized> Tokens for Run<'_, P, C> {
+    fn run(&self, token: u64, crew: &Crew<'_>) {
+        match Token::decode(token) {
+            Token::Ready(places) => self.start_one_of(places, crew),
+            Token::Start(process) => self.start(process, false, crew),
+            Token::StartPinned(process) => self.start(process, true, crew),
+            Token::Join(process) => {
+                if self.join(process, crew) {
+                    self.go_on_after(process, crew);
+                }
+            }
+        }
+    }
+}
+
+/// Processes that became ready by one and the same.
+struct Ready<'run, P, C: ?Sized> {
+    run: &'run Run<'run, P, C>,
+    crew: &'run Crew<'run>,
+    /// Where those stand that have not been pushed: all of one band.
+    places: Range<u32>,
+    /// The one that is not pushed.
+    kept: Option<u32>,
+    has_pinned: bool,
+}
+
+impl<'run, P: Node<C>, C: Sync + ?Sized> Ready<'run, P, C> {
+    /// None. They are to stand at the places from this one on.
+    fn new(run: &'run Run<'run, P, C>, place: u32, crew: &'run Crew<'run>) -> Self {
+        Self { run, crew, places: place..place, kept: None, has_pinned: false }
+    }
+
+    fn add(&mut self, process: u32) {
+        let run = self.run;
+        if run.is_pinned(process) {
+            self.crew.push_pinned(Token::StartPinned(process).encode());
+            self.has_pinned = true;
+        } else if self.crew.worker().is_shuffled() {
+            // Each by itself, so that any of them can come next.
+            self.crew.push(Token::Start(process).encode(), run.band(process));
+        } else if self.kept.is_none() {
+            self.kept = Some(process);
+        } else {
+            let progress = &run.schedule.progress;
+            if !self.places.is_empty() && run.band(progress.ready(self.places.start)) != run.band(process) {
+                self.push();
+            }
+            progress.set_ready(self.places.end, process);
+            self.places.end += 1;
+        }
+    }
+
+    /// Pushes those that have not been pushed, but for one, and gives that back. There is none for a worker that is the only
+    /// one to run another of them.
+    fn push_all_but_one(mut self) -> Option<u32> {
+        if !self.places.is_empty() {
+            self.push();
+        }
+        if self.has_pinned && self.crew.is_owner() {
+            let kept = self.kept.take()?;
+            self.crew.push(Token::Start(kept).encode(), self.run.band(kept));
+        }
+        self.kept
+    }
+
+    fn push(&mut self) {
+        self.run.push_ready(self.places.clone(), self.crew);
+        self.places.start = self.places.end;
+    }
+}

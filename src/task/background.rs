@@ -1,0 +1,149 @@
+//! Work that no frame waits for: streaming, baking, whatever may take longer than a frame.
+
+use std::{collections::VecDeque, fmt, sync::Arc};
+
+use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering};
+
+use super::job::{JobPanic, catch, discard};
+
+/// A job that runs when no frame needs its worker, and what comes of it; made by
+/// [`Scheduler::background`](super::Scheduler::background).
+///
+/// Who drops it lets go of the result, not of the job, which runs nevertheless. A panic that nobody has waited for is
+/// reported to [`tracing`] as an error.
+#[must_use = "who drops it lets go of the job's result"]
+pub struct BackgroundJob<T> {
+    ticket: Arc<Ticket<T>>,
+}
+
+impl<T: Send + 'static> BackgroundJob<T> {
+    /// A job, and what is to be queued of it.
+    pub(super) fn new(job: impl FnOnce() -> T + Send + 'static) -> (Self, Arc<dyn Queued>) {
+        let ticket = Arc::new(Ticket {
+            job: Mutex::new(Some(Box::new(job))),
+            outcome: Mutex::new(Outcome { result: None, is_abandoned: false }),
+            finished: Condvar::new(),
+        });
+        let queued: Arc<dyn Queued> = Arc::<Ticket<T>>::clone(&ticket);
+        (Self { ticket }, queued)
+    }
+
+    /// Whether the job has run, so that [`wait`](Self::wait) returns at once.
+    pub fn is_finished(&self) -> bool {
+        self.ticket.outcome.lock().result.is_some()
+    }
+
+    /// What the job returned. If it has not begun it is run here and now, on this thread, before all that were queued
+    /// earlier; otherwise the thread sleeps until it has run. This thread runs no other job meanwhile.
+    ///
+    /// # Errors
+    ///
+    /// The [`JobPanic`] if the job panicked.
+    pub fn wait(self) -> Result<T, JobPanic> {
+        self.ticket.run();
+        let mut outcome = self.ticket.outcome.lock();
+        loop {
+            if let Some(result) = outcome.result.take() {
+                return result;
+            }
+            outcome = self.ticket.finished.wait(outcome);
+        }
+    }
+}
+
+impl<T> Drop for BackgroundJob<T> {
+    fn drop(&mut self) {
+        let mut outcome = self.ticket.outcome.lock();
+        outcome.is_abandoned = true;
+        let result = outcome.result.take();
+        drop(outcome);
+        if let Some(result) = result {
+            abandon(result);
+        }
+    }
+}
+
+impl<T> fmt::Debug for BackgroundJob<T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_finished = self.ticket.outcome.lock().result.is_some();
+        formatter.debug_struct("BackgroundJob").field("is_finished", &is_finished).finish_non_exhaustive()
+    }
+}
+
+/// A background job as the queue knows it.
+pub(super) trait Queued: Send + Sync {
+    /// Runs the job, unless somebody else has begun it, and says whether it did. Does not unwind.
+    fn run(&self) -> bool;
+}
+
+/// What the queue and the handle share of a job.
+struct Ticket<T> {
+    /// Taken by whoever runs it.
+    job: Mutex<Option<Box<dyn FnOnce() -> T + Send>>>,
+    outcome: Mutex<Outcome<T>>,
+    finished: Condvar,
+}
+
+struct Outcome<T> {
+    result: Option<Result<T, JobPanic>>,
+    is_abandoned: bool,
+}
+
+impl<T: Send> Queued for Ticket<T> {
+    fn run(&self) -> bool {
+        let Some(job) = self.job.lock().take() else { return false };
+        let result = catch(job);
+        let mut outcome = self.outcome.lock();
+        if outcome.is_abandoned {
+            drop(outcome);
+            abandon(result);
+        } else {
+            outcome.result = Some(result);
+            drop(outcome);
+            self.finished.notify_one();
+        }
+        true
+    }
+}
+
+fn abandon<T>(result: Result<T, JobPanic>) {
+    match result {
+        Ok(value) => discard(value),
+        Err(panic) => tracing::error!(message = %panic, "a background job that nobody waits for"),
+    }
+}
+
+/// Background jobs that nobody has begun, first in, first out.
+///
+/// The count is a hint, so it is relaxed; that a sleeping worker learns of a job is up to the fences of
+/// [`Sleep`](super::sleep::Sleep).
+pub(super) struct BackgroundQueue {
+    count: AtomicUsize,
+    jobs: Mutex<VecDeque<Arc<dyn Queued>>>,
+}
+
+impl BackgroundQueue {
+    pub(super) fn new() -> Self {
+        Self { count: AtomicUsize::new(0), jobs: Mutex::new(VecDeque::new()) }
+    }
+
+    pub(super) fn put(&self, job: Arc<dyn Queued>) {
+        let mut jobs = self.jobs.lock();
+        jobs.push_back(job);
+        self.count.store(jobs.len(), Ordering::Relaxed);
+    }
+
+    pub(super) fn take(&self) -> Option<Arc<dyn Queued>> {
+        if self.is_empty() {
+            return None;
+        }
+        let mut jobs = self.jobs.lock();
+        let job = jobs.pop_front();
+        self.count.store(jobs.len(), Ordering::Relaxed);
+        job
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.count.load(Ordering::Relaxed) == 0
+    }
+}

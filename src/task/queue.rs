@@ -1,0 +1,219 @@
+//! Where the jobs of a worker wait: its own end of the queue, and the end that thieves see.
+//!
+//! A queue is crossbeam's deque as long as few jobs are in it. That deque allocates when it grows, and again when it
+//! shrinks, so it is never filled so far that it grows; what is beyond goes into an *overflow* behind a lock, whose memory
+//! stays. The overflow holds the newest jobs, so it is the owner's end, and thieves come to it last.
+//!
+//! # Memory ordering
+//!
+//! The count of the overflow is a hint, so it is relaxed: for the owner it is exact unless thieves took something, and
+//! a thief that misses a job finds it when it looks once more before it sleeps, after a fence. The jobs are ordered by
+//! the deque and the lock.
+
+use std::{cell::Cell, collections::VecDeque};
+
+use crossbeam_utils::CachePadded;
+
+use crate::sync::{Arc, AtomicUsize, Deque, Mutex, Ordering, Steal, Stealer};
+
+use super::{
+    job::{Job, Work},
+    shuffle::Shuffle,
+};
+
+/// How urgent a job is: workers take more urgent ones first, wherever they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Band {
+    /// What the end of the frame waits for.
+    Urgent,
+    /// Everything else of a frame.
+    Normal,
+    /// What no frame waits for. Worker 0 never takes it up of its own accord.
+    Background,
+}
+
+impl Band {
+    pub(super) const ALL: [Self; 3] = [Self::Urgent, Self::Normal, Self::Background];
+    /// What a frame consists of.
+    pub(super) const FRAME: [Self; 2] = [Self::Urgent, Self::Normal];
+}
+
+/// How many jobs lie in the deque at most. Crossbeam's has room for 64 at first, and grows when that is full.
+const MOST_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 48 };
+
+/// A worker's own end of its queues, one for each band.
+pub(super) struct Queues {
+    bands: [Queue; Band::ALL.len()],
+    /// What decides who is next instead of age.
+    shuffle: Option<Shuffle>,
+}
+
+impl Queues {
+    /// Empty queues, which give jobs out newest first, or in some other order that the shuffle decides.
+    pub(super) fn new(shuffle: Option<Shuffle>) -> Self {
+        Self { bands: Band::ALL.map(|_| Queue::new()), shuffle }
+    }
+
+    /// The end for thieves.
+    pub(super) fn loot(&self) -> Loot {
+        Loot { bands: self.bands.each_ref().map(Queue::loot) }
+    }
+
+    pub(super) fn push(&self, job: Job, band: Band) {
+        let queue = &self.bands[band as usize];
+        match self.shuffle {
+            None => queue.push(job),
+            Some(_) => queue.overflow.put(job),
+        }
+    }
+
+    /// The newest job that was queued at this depth or a deeper one; there is none if the newest of all is not.
+    pub(super) fn pop(&self, band: Band, depth: u32) -> Option<Job> {
+        let queue = &self.bands[band as usize];
+        match &self.shuffle {
+            None => queue.pop(depth),
+            Some(shuffle) => queue.overflow.take_any(shuffle, depth),
+        }
+    }
+
+    /// One of so many, if there is a shuffle.
+    pub(super) fn draw(&self, count: usize) -> Option<usize> {
+        self.shuffle.as_ref()?.below(count)
+    }
+}
+
+struct Queue {
+    deque: Deque<Job>,
+    /// How many more the deque has room for at least.
+    room: Cell<usize>,
+    overflow: Arc<CachePadded<Overflow>>,
+}
+
+impl Queue {
+    fn new() -> Self {
+        Self {
+            deque: Deque::new_lifo(),
+            room: Cell::new(MOST_IN_DEQUE),
+            overflow: Arc::new(CachePadded::new(Overflow::new())),
+        }
+    }
+
+    fn loot(&self) -> BandLoot {
+        BandLoot { stealer: self.deque.stealer(), overflow: Arc::clone(&self.overflow) }
+    }
+
+    fn push(&self, job: Job) {
+        // Who spawned a closure has allocated in any case.
+        let may_grow = matches!(job.work, Work::Closure(_));
+        if self.room.get() == 0 && !may_grow {
+            self.room.set(MOST_IN_DEQUE.saturating_sub(self.deque.len()));
+        }
+        // Jobs in the overflow are newer than those in the deque, so as long as there are any, more follow them.
+        if (self.room.get() == 0 && !may_grow) || !self.overflow.is_empty() {
+            self.overflow.put(job);
+        } else {
+            self.room.set(self.room.get().saturating_sub(1));
+            self.deque.push(job);
+        }
+    }
+
+    fn pop(&self, depth: u32) -> Option<Job> {
+        if !self.overflow.is_empty()
+            && let Some(newest) = self.overflow.take_newest()
+        {
+            return self.fitting(newest, depth);
+        }
+        let newest = self.deque.pop()?;
+        self.room.set((self.room.get() + 1).min(MOST_IN_DEQUE));
+        self.fitting(newest, depth)
+    }
+
+    /// Puts the job back if it was queued at a lesser depth.
+    fn fitting(&self, job: Job, depth: u32) -> Option<Job> {
+        if job.depth >= depth {
+            return Some(job);
+        }
+        self.push(job);
+        None
+    }
+}
+
+/// The end of a worker's queues that other workers see.
+pub(super) struct Loot {
+    bands: [BandLoot; Band::ALL.len()],
+}
+
+impl Loot {
+    pub(super) fn of(&self, band: Band) -> &BandLoot {
+        &self.bands[band as usize]
+    }
+}
+
+pub(super) struct BandLoot {
+    stealer: Stealer<Job>,
+    overflow: Arc<CachePadded<Overflow>>,
+}
+
+impl BandLoot {
+    /// The oldest job.
+    pub(super) fn steal(&self) -> Option<Job> {
+        while !self.stealer.is_empty() {
+            match self.stealer.steal() {
+                Steal::Success(job) => return Some(job),
+                Steal::Empty => break,
+                // Another thief was faster, or the owner, and there may be more.
+                Steal::Retry => {}
+            }
+        }
+        if self.overflow.is_empty() { None } else { self.overflow.take_oldest() }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.stealer.is_empty() && self.overflow.is_empty()
+    }
+}
+
+struct Overflow {
+    count: AtomicUsize,
+    /// The oldest first.
+    jobs: Mutex<VecDeque<Job>>,
+}
+
+impl Overflow {
+    fn new() -> Self {
+        Self { count: AtomicUsize::new(0), jobs: Mutex::new(VecDeque::new()) }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.count.load(Ordering::Relaxed) == 0
+    }
+
+    fn put(&self, job: Job) {
+        self.change(|jobs| jobs.push_back(job));
+    }
+
+    fn take_newest(&self) -> Option<Job> {
+        self.change(VecDeque::pop_back)
+    }
+
+    fn take_oldest(&self) -> Option<Job> {
+        self.change(VecDeque::pop_front)
+    }
+
+    /// Some job that was queued at this depth or a deeper one.
+    fn take_any(&self, shuffle: &Shuffle, depth: u32) -> Option<Job> {
+        self.change(|jobs| {
+            let fitting = jobs.iter().filter(|job| job.depth >= depth).count();
+            let chosen = shuffle.below(fitting)?;
+            let (place, _) = jobs.iter().enumerate().filter(|(_, job)| job.depth >= depth).nth(chosen)?;
+            jobs.remove(place)
+        })
+    }
+
+    fn change<R>(&self, change: impl FnOnce(&mut VecDeque<Job>) -> R) -> R {
+        let mut jobs = self.jobs.lock();
+        let result = change(&mut jobs);
+        self.count.store(jobs.len(), Ordering::Relaxed);
+        result
+    }
+}

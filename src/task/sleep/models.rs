@@ -1,0 +1,263 @@
+//! The protocol of sleep, walked through by loom.
+
+use std::mem;
+
+use loom::{model, model::Builder, thread};
+
+use super::{Sleep, WakeFor};
+use crate::{
+    sync::{Arc, AtomicBool, AtomicUsize, Ordering},
+    task::latch::Latch,
+};
+
+/// Jobs are only counted here, and relaxed, so that nothing but the protocol's fences orders them.
+struct Room {
+    sleep: Sleep,
+    jobs: AtomicUsize,
+    latch: Latch,
+    /// Whether the owner of the region has run a job.
+    ran: AtomicBool,
+    shut_down: AtomicBool,
+}
+
+impl Room {
+    fn new(outstanding: usize) -> Arc<Self> {
+        Arc::new(Self {
+            sleep: Sleep::new(3),
+            jobs: AtomicUsize::new(0),
+            latch: Latch::new(outstanding),
+            ran: AtomicBool::new(false),
+            shut_down: AtomicBool::new(false),
+        })
+    }
+
+    fn produce(&self) {
+        self.jobs.fetch_add(1, Ordering::Relaxed);
+        self.sleep.wake_any();
+    }
+
+    fn has_jobs(&self) -> bool {
+        self.jobs.load(Ordering::Relaxed) > 0
+    }
+
+    fn try_consume(&self) -> bool {
+        self.jobs.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |jobs| jobs.checked_sub(1)).is_ok()
+    }
+
+    /// What `Worker::work` and `Idle` do: looks for a job, and sleeps as long as there is none.
+    fn consume(&self, worker: usize) {
+        self.search(worker, false);
+    }
+
+    /// The same, by a worker that counts as a searcher before it sleeps.
+    fn search_and_consume(&self, worker: usize) {
+        if !self.try_consume() {
+            self.sleep.start_search();
+            self.search(worker, true);
+        }
+    }
+
+    fn search(&self, worker: usize, mut is_searcher: bool) {
+        while !self.try_consume() {
+            is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, || self.has_jobs());
+        }
+        if is_searcher {
+            self.sleep.end_search(|| self.has_jobs());
+        }
+    }
+
+    /// What the owner of a region does that runs no jobs.
+    fn wait(&self, worker: usize) {
+        while !self.latch.is_released() {
+            self.sleep.sleep(worker, WakeFor::ItsOwn, false, || self.latch.is_released());
+        }
+    }
+
+    /// What the owner of a region does that helps others: it looks for jobs, and for the end of its region only where there
+    /// is none.
+    fn wait_and_help(&self, worker: usize) {
+        let mut is_searcher = false;
+        loop {
+            if self.try_consume() {
+                if mem::take(&mut is_searcher) {
+                    self.sleep.end_search(|| self.has_jobs());
+                }
+                self.ran.store(true, Ordering::Relaxed);
+                self.sleep.wake_worker(1);
+            } else if self.latch.is_released() {
+                break;
+            } else {
+                let sees_work = || self.latch.is_released() || self.has_jobs();
+                is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, sees_work);
+            }
+        }
+        if is_searcher {
+            self.sleep.end_search(|| self.has_jobs());
+        }
+    }
+
+    fn finish(&self) {
+        if self.latch.finish(1) {
+            self.sleep.wake_worker(0);
+        }
+    }
+}
+
+/// Runs the closure on a thread of the model that shares the room.
+fn start(room: &Arc<Room>, run: impl FnOnce(&Room) + 'static) -> thread::JoinHandle<()> {
+    let room = Arc::clone(room);
+    thread::spawn(move || run(&room))
+}
+
+fn join(threads: [thread::JoinHandle<()>; 2]) {
+    threads.into_iter().for_each(|thread| thread.join().unwrap());
+}
+
+/// Explores all executions with at most that many preemptions, for models too large to explore whole.
+fn bounded(preemptions: usize, run: impl Fn() + Sync + Send + 'static) {
+    let mut builder = Builder::new();
+    builder.preemption_bound = Some(preemptions);
+    builder.check(run);
+}
+
+#[test]
+fn a_job_wakes_the_worker_that_waits_for_one() {
+    model(|| {
+        let room = Room::new(1);
+        let worker = start(&room, |room| room.consume(0));
+        room.produce();
+        worker.join().unwrap();
+        assert_eq!(room.sleep.sleepers(), 0);
+    });
+}
+
+#[test]
+fn a_job_is_seen_by_a_searcher_that_goes_to_sleep() {
+    bounded(4, || {
+        let room = Room::new(1);
+        let worker = start(&room, |room| room.search_and_consume(0));
+        room.produce();
+        worker.join().unwrap();
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
+    });
+}
+
+#[test]
+fn a_bed_can_be_slept_in_again() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let worker = start(&room, |room| {
+            room.consume(0);
+            room.consume(0);
+        });
+        room.produce();
+        room.produce();
+        worker.join().unwrap();
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "a call was left over, and cut the next sleep short");
+    });
+}
+
+#[test]
+fn two_jobs_reach_two_workers_though_one_is_woken() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let workers = [0, 1].map(|worker| start(&room, move |room| room.consume(worker)));
+        room.produce();
+        room.produce();
+        join(workers);
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+    });
+}
+
+#[test]
+fn a_searcher_that_finds_one_job_wakes_a_sleeper_for_the_next() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let workers = [start(&room, |room| room.search_and_consume(0)), start(&room, |room| room.consume(1))];
+        room.produce();
+        room.produce();
+        join(workers);
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+    });
+}
+
+#[test]
+fn two_producers_wake_two_workers() {
+    bounded(2, || {
+        let room = Room::new(1);
+        let workers = [0, 1].map(|worker| start(&room, move |room| room.search_and_consume(worker)));
+        let producer = start(&room, Room::produce);
+        room.produce();
+        producer.join().unwrap();
+        join(workers);
+    });
+}
+
+#[test]
+fn the_last_job_of_a_region_wakes_its_owner() {
+    for waits in [Room::wait, Room::wait_and_help] {
+        bounded(4, move || {
+            let room = Room::new(2);
+            let workers = [(); 2].map(|()| start(&room, Room::finish));
+            waits(&room, 0);
+            join(workers);
+            assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+        });
+    }
+}
+
+#[test]
+fn an_owner_called_for_a_job_as_its_region_ends_passes_the_call_on() {
+    for waits in [Room::wait, Room::wait_and_help] {
+        bounded(3, move || {
+            let room = Room::new(1);
+            // Whoever takes the job ends the thief.
+            let thief = start(&room, |room| {
+                let mut is_searcher = false;
+                while !room.ran.load(Ordering::Relaxed) && !room.try_consume() {
+                    let sees_work = || room.ran.load(Ordering::Relaxed) || room.has_jobs();
+                    is_searcher = room.sleep.sleep(1, WakeFor::Any, is_searcher, sees_work);
+                }
+            });
+            let producer = start(&room, |room| {
+                room.produce();
+                room.finish();
+            });
+            waits(&room, 0);
+            join([thief, producer]);
+        });
+    }
+}
+
+#[test]
+fn a_background_job_wakes_a_worker_though_worker_0_searches() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let worker = start(&room, |room| room.consume(1));
+        room.sleep.start_search();
+        room.jobs.fetch_add(1, Ordering::Relaxed);
+        room.sleep.wake_for_background();
+        // Worker 0 has no eyes for it.
+        room.sleep.end_search(|| false);
+        worker.join().unwrap();
+    });
+}
+
+#[test]
+fn the_end_of_the_scheduler_wakes_everyone() {
+    bounded(4, || {
+        let room = Room::new(1);
+        let workers = [1, 2].map(|worker| {
+            start(&room, move |room| {
+                let mut is_searcher = false;
+                while !room.shut_down.load(Ordering::Relaxed) {
+                    let is_over = || room.shut_down.load(Ordering::Relaxed);
+                    is_searcher = room.sleep.sleep(worker, WakeFor::Any, is_searcher, is_over);
+                }
+            })
+        });
+        room.shut_down.store(true, Ordering::Relaxed);
+        room.sleep.wake_all();
+        join(workers);
+    });
+}
