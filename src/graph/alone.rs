@@ -37,12 +37,14 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         mut watch: Option<&mut Watch>,
         item: &mut usize,
     ) -> Result<Option<Left>, NodeError> {
+        // Of no use here, unless the time is over; but what fails is to fail on one thread as on many.
+        let is_pinned = self.node(process).pinned();
         let chunks = self.chunks(process, worker);
         for place in 0..chunks.count() {
             let done = place + 1;
             self.run_chunks(process, &chunks, place..done, worker, item)?;
             let is_over = watch.as_mut().is_some_and(|watch| watch.is_over());
-            if is_over && (done == chunks.count() || !self.node(process).pinned()) {
+            if is_over && (done == chunks.count() || !is_pinned) {
                 return Ok(Some(Left { process, chunks, done }));
             }
         }

@@ -9,8 +9,8 @@ use std::{
 use thiserror::Error;
 
 use super::{
+    closure::Closure,
     region::{Crew, Region},
-    scope::Scope,
     worker::Worker,
 };
 
@@ -66,12 +66,9 @@ pub(crate) fn discard<T>(value: T) {
     }
 }
 
-/// What a spawned job runs. The lifetime of what it borrows has been taken away by [`Scope`], which vouches for it.
-pub(super) type Closure = Box<dyn FnOnce(&Scope<'static>, &Worker) + Send>;
-
 /// What a job does.
 pub(super) enum Work {
-    /// Something of its own.
+    /// Something of its own. What it borrows is [`Scope`](super::scope::Scope)'s to vouch for.
     Closure(Closure),
     /// What the region's [`Tokens`](super::region::Tokens) do with this number. It takes no memory but the deque's.
     Token(u64),
@@ -92,7 +89,7 @@ impl Job {
     pub(super) fn run(self, worker: &Worker) {
         let Self { work, region, .. } = self;
         let outcome = match work {
-            Work::Closure(closure) => catch(|| closure(&Scope::new(region), worker)),
+            Work::Closure(closure) => catch(|| closure.call(region, worker)),
             Work::Token(token) => catch(|| region.tokens().run(token, &Crew::new(region, worker))),
         };
         if let Err(panic) = outcome {

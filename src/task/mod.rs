@@ -92,6 +92,7 @@ mod affinity;
 mod background;
 mod builder;
 mod chunks;
+mod closure;
 mod idle;
 mod job;
 mod latch;

@@ -10,16 +10,13 @@
 //! a thief that misses a job finds it when it looks once more before it sleeps, after a fence. The jobs are ordered by
 //! the deque and the lock.
 
-use std::{cell::Cell, collections::VecDeque};
+use std::{array, cell::Cell, collections::VecDeque};
 
 use crossbeam_utils::CachePadded;
 
 use crate::sync::{Arc, AtomicUsize, Deque, Mutex, Ordering, Steal, Stealer};
 
-use super::{
-    job::{Job, Work},
-    shuffle::Shuffle,
-};
+use super::{job::Job, shuffle::Shuffle};
 
 /// How urgent a job is: workers take more urgent ones first, wherever they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +37,9 @@ impl Band {
 
 /// How many jobs lie in the deque at most. Crossbeam's has room for 64 at first, and grows when that is full.
 const MOST_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 48 };
+
+/// How many jobs a thief takes out of an overflow beside the one it runs.
+const MOST_AT_ONCE: usize = 31;
 
 /// A worker's own end of its queues, one for each band.
 pub(super) struct Queues {
@@ -65,6 +65,17 @@ impl Queues {
             None => queue.push(job),
             Some(_) => queue.overflow.put(job),
         }
+    }
+
+    /// Takes over the oldest jobs of somebody else, if there are any, as if they had been queued here at this depth, and
+    /// gives back the first.
+    pub(super) fn steal_from(&self, loot: &Loot, band: Band, depth: u32) -> Option<Job> {
+        let loot = &loot.bands[band as usize];
+        let stolen = loot.steal();
+        if stolen.is_some() || loot.overflow.is_empty() {
+            return stolen;
+        }
+        loot.overflow.take_oldest(|job| self.push(Job { depth, ..job }, band))
     }
 
     /// The newest job that was queued at this depth or a deeper one; there is none if the newest of all is not.
@@ -103,16 +114,14 @@ impl Queue {
     }
 
     fn push(&self, job: Job) {
-        // Who spawned a closure has allocated in any case.
-        let may_grow = matches!(job.work, Work::Closure(_));
-        if self.room.get() == 0 && !may_grow {
+        if self.room.get() == 0 {
             self.room.set(MOST_IN_DEQUE.saturating_sub(self.deque.len()));
         }
         // Jobs in the overflow are newer than those in the deque, so as long as there are any, more follow them.
-        if (self.room.get() == 0 && !may_grow) || !self.overflow.is_empty() {
+        if self.room.get() == 0 || !self.overflow.is_empty() {
             self.overflow.put(job);
         } else {
-            self.room.set(self.room.get().saturating_sub(1));
+            self.room.set(self.room.get() - 1);
             self.deque.push(job);
         }
     }
@@ -155,8 +164,8 @@ pub(super) struct BandLoot {
 }
 
 impl BandLoot {
-    /// The oldest job.
-    pub(super) fn steal(&self) -> Option<Job> {
+    /// The oldest job of those that are not in the overflow.
+    fn steal(&self) -> Option<Job> {
         while !self.stealer.is_empty() {
             match self.stealer.steal() {
                 Steal::Success(job) => return Some(job),
@@ -165,7 +174,7 @@ impl BandLoot {
                 Steal::Retry => {}
             }
         }
-        if self.overflow.is_empty() { None } else { self.overflow.take_oldest() }
+        None
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -196,8 +205,17 @@ impl Overflow {
         self.change(VecDeque::pop_back)
     }
 
-    fn take_oldest(&self) -> Option<Job> {
-        self.change(VecDeque::pop_front)
+    /// Takes the oldest jobs, to spare others the lock: gives back the first, and calls `keep` with the others.
+    fn take_oldest(&self, keep: impl FnMut(Job)) -> Option<Job> {
+        let (first, others) = self.change(|jobs| {
+            let count = (jobs.len() / 2).min(MOST_AT_ONCE);
+            let first = jobs.pop_front();
+            let others: [Option<Job>; MOST_AT_ONCE] =
+                array::from_fn(|place| if place < count { jobs.pop_front() } else { None });
+            (first, others)
+        });
+        others.into_iter().flatten().for_each(keep);
+        first
     }
 
     /// Some job that was queued at this depth or a deeper one.

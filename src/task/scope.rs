@@ -1,9 +1,10 @@
 //! Scopes: jobs that borrow, and a thread that waits for them.
 
-use std::{fmt, marker::PhantomData, mem};
+use std::{fmt, marker::PhantomData};
 
 use super::{
-    job::{Closure, JobPanic, Work},
+    closure::Closure,
+    job::{JobPanic, Work},
     queue::Band,
     region::{self, Crew, Region, Tokens},
     seat,
@@ -64,20 +65,15 @@ impl<'scope> Scope<'scope> {
 
     /// Takes the lifetime away from the closure.
     fn work(closure: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) -> Work {
-        type Borrowing<'scope> = Box<dyn FnOnce(&Scope<'scope>, &Worker) + Send + 'scope>;
-        let closure: Borrowing<'scope> = Box::new(closure);
-        // SAFETY: The two types differ in lifetimes only, so they have one layout, and the call through the one is the
-        // call through the other. That leaves two obligations.
+        // SAFETY:
         // 1. The closure is gone, run and dropped, before `'scope` ends. `'scope` outlives the call of `open` that opened
         //    the region, as it is a parameter of that function. `open` returns only when the latch is released, and
         //    cannot unwind before: the panic of its body is caught, and `Job::run` catches that of a job. The job is counted
         //    when it is queued, and taken off after the closure is gone; and whoever spawns is counted itself: the body
         //    until it has returned, a job until it has run, and nobody can keep the scope for longer, as both are lent it
         //    for a lifetime of their own. A job that were lost would keep `open` waiting, not let it return.
-        // 2. The closure is called with a `Scope<'static>` where it was made for a `Scope<'scope>`. It takes it for the
-        //    latter, and may, as a scope holds nothing of that lifetime. Nobody sees it as `Scope<'static>` but
-        //    `Job::run`, which spawns nothing.
-        Work::Closure(unsafe { mem::transmute::<Borrowing<'scope>, Closure>(closure) })
+        // 2. It is called with the region that its job was queued for, which is the one of this scope.
+        Work::Closure(unsafe { Closure::new(closure) })
     }
 }
 

@@ -295,7 +295,7 @@ impl Worker {
         bands.iter().find_map(|&band| {
             let mut victims = (first..loot.len()).chain(0..first).filter(|&victim| victim != self.index);
             victims.find_map(|victim| {
-                let job = loot[victim].of(band).steal()?;
+                let job = self.queues.steal_from(&loot[victim], band, self.depth.get())?;
                 self.victim.set(victim);
                 Some(job)
             })
