@@ -36,8 +36,9 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Result<Row, Fai
         contenders: vec![
             Contender::plain_loop(nodes),
             Contender::ideal(nodes),
-            drawloom(WORKERS, &graph)?,
-            drawloom(1, &graph)?,
+            drawloom("drawloom", WORKERS, &graph)?,
+            drawloom("drawloom", 1, &graph)?,
+            drawloom(ALWAYS_SHARED, WORKERS, &graph)?,
             rayon_inline(&graph),
             rayon(&graph),
             bevy_tasks(&graph),
@@ -146,7 +147,10 @@ impl Node<Work> for Empty {
     }
 }
 
-fn drawloom(workers: usize, graph: &Graph) -> Result<Contender, Failure> {
+/// A schedule of so little work is run by one thread, unless it is told otherwise.
+const ALWAYS_SHARED: &str = "drawloom always shared";
+
+fn drawloom(name: &'static str, workers: usize, graph: &Graph) -> Result<Contender, Failure> {
     let mut frame_graph = FrameGraph::new();
     let nodes: Vec<_> =
         (0..graph.nodes.len()).map(|index| frame_graph.add(index.to_string(), Empty { index })).collect();
@@ -157,7 +161,8 @@ fn drawloom(workers: usize, graph: &Graph) -> Result<Contender, Failure> {
         }
     }
     let mut schedule: Schedule<Empty> = frame_graph.compile()?;
-    let contender = Contender::new("drawloom", move |work, watch| {
+    schedule.always_share(name == ALWAYS_SHARED);
+    let contender = Contender::new(name, move |work, watch| {
         let scheduler = Scheduler::new(workers)?;
         watch.frames(|| Ok(schedule.run(&scheduler, work)?))
     });

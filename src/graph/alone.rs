@@ -5,7 +5,11 @@ use std::time::{Duration, Instant};
 
 use crate::task::{Chunks, Worker};
 
-use super::{error::NodeError, execute::Run, node::Node};
+use super::{
+    error::NodeError,
+    execute::{Position, Run},
+    node::Node,
+};
 
 /// Where a run stood when it took too long for one thread: all before this process is done.
 pub(super) struct Left {
@@ -19,30 +23,35 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// Runs everything, unless it takes longer than `at_most`; then it says where it stopped.
     pub(super) fn go_alone(&self, worker: &Worker, start: Instant, at_most: Option<Duration>) -> Option<Left> {
         let mut watch = at_most.map(|at_most| Watch { start, at_most, chunks: 0, next_look: 1 });
-        for process in 0..self.schedule.flow.len() as u32 {
-            let left = self.attempt(process, |item| self.run_alone(process, worker, watch.as_mut(), item))?;
-            if left.is_some() {
-                return left;
+        // One attempt for all: an attempt a process would cost more than the rest of what is done for it.
+        let left = self.attempt(0, |position| {
+            for process in 0..self.schedule.flow.len() as u32 {
+                *position = Position { process, item: 0 };
+                let left = self.run_alone(position, worker, watch.as_mut())?;
+                if left.is_some() {
+                    return Ok(left);
+                }
             }
-        }
-        None
+            Ok(None)
+        });
+        left.flatten()
     }
 
     /// Runs one process, unless the time is over. Whoever may run a pinned one has begun it, and ends it.
     #[inline]
     fn run_alone(
         &self,
-        process: u32,
+        position: &mut Position,
         worker: &Worker,
         mut watch: Option<&mut Watch>,
-        item: &mut usize,
     ) -> Result<Option<Left>, NodeError> {
+        let process = position.process;
         // Of no use here, unless the time is over; but what fails is to fail on one thread as on many.
         let is_pinned = self.node(process).pinned();
         let chunks = self.chunks(process, worker);
         for place in 0..chunks.count() {
             let done = place + 1;
-            self.run_chunks(process, &chunks, place..done, worker, item)?;
+            self.run_chunks(position, &chunks, place..done, worker)?;
             let is_over = watch.as_mut().is_some_and(|watch| watch.is_over());
             if is_over && (done == chunks.count() || !is_pinned) {
                 return Ok(Some(Left { process, chunks, done }));

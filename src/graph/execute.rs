@@ -117,22 +117,33 @@ pub(super) struct Run<'run, P, C: ?Sized> {
     failure: Mutex<Option<Failure>>,
 }
 
-/// A failure, and where it stands among others: the process' index, then the item at which its chunk starts.
+/// A failure, and where it stands among others.
 struct Failure {
-    place: (u32, usize),
+    position: Position,
     error: RunError,
 }
 
+/// Where a run is that does what is a user's: at a process, and the item at which a chunk of it starts.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Position {
+    pub(super) process: u32,
+    pub(super) item: usize,
+}
+
 impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
-    /// Calls what is a user's of a process, and stops the run if it fails: then there is no result. `call` is given a note
-    /// of the item at which it stands, to be kept up to date.
+    /// Calls what is a user's, beginning with this process, and stops the run if it fails: then there is no result. `call`
+    /// keeps its position up to date.
     #[inline]
-    pub(super) fn attempt<R>(&self, process: u32, call: impl FnOnce(&mut usize) -> Result<R, NodeError>) -> Option<R> {
-        let mut item = 0;
-        match catch(|| call(&mut item)) {
+    pub(super) fn attempt<R>(
+        &self,
+        process: u32,
+        call: impl FnOnce(&mut Position) -> Result<R, NodeError>,
+    ) -> Option<R> {
+        let mut position = Position { process, item: 0 };
+        match catch(|| call(&mut position)) {
             Ok(Ok(result)) => return Some(result),
-            Ok(Err(error)) => self.fail_with_error(process, item, error),
-            Err(panic) => self.fail_with_panic(process, item, panic),
+            Ok(Err(error)) => self.fail_with_error(position, error),
+            Err(panic) => self.fail_with_panic(position, panic),
         }
         None
     }
@@ -147,23 +158,22 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         if worker.is_shuffled() { chunks.shuffled(worker) } else { chunks }
     }
 
-    /// Runs these chunks of a process, as long as nothing fails.
+    /// Runs these chunks of the process at the position, as long as nothing fails.
     #[inline]
     pub(super) fn run_chunks(
         &self,
-        process: u32,
+        position: &mut Position,
         chunks: &Chunks,
         places: Range<usize>,
         worker: &Worker,
-        item: &mut usize,
     ) -> Result<(), NodeError> {
         for place in places {
             if self.is_stopped() {
                 break;
             }
             let range = chunks.range(place);
-            *item = range.start;
-            self.node(process).run(self.context, range, worker)?;
+            position.item = range.start;
+            self.node(position.process).run(self.context, range, worker)?;
         }
         Ok(())
     }
@@ -180,25 +190,25 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     }
 
     #[cold]
-    fn fail_with_error(&self, process: u32, start: usize, source: NodeError) {
-        self.fail((process, start), RunError::Failed { process: self.name(process), source });
+    fn fail_with_error(&self, position: Position, source: NodeError) {
+        self.fail(position, RunError::Failed { process: self.name(position), source });
     }
 
     #[cold]
-    fn fail_with_panic(&self, process: u32, start: usize, panic: JobPanic) {
-        self.fail((process, start), RunError::Panicked { process: self.name(process), message: panic.message });
+    fn fail_with_panic(&self, position: Position, panic: JobPanic) {
+        self.fail(position, RunError::Panicked { process: self.name(position), message: panic.message });
     }
 
-    fn name(&self, process: u32) -> String {
-        self.schedule.names[process as usize].clone()
+    fn name(&self, position: Position) -> String {
+        self.schedule.names[position.process as usize].clone()
     }
 
     /// Stops the run, and keeps the failure unless one is kept that stands before it.
-    fn fail(&self, place: (u32, usize), error: RunError) {
+    fn fail(&self, position: Position, error: RunError) {
         self.is_stopped.store(true, Ordering::Relaxed);
-        let mut failure = Some(Failure { place, error });
+        let mut failure = Some(Failure { position, error });
         let mut kept = self.failure.lock();
-        if kept.as_ref().is_none_or(|kept| place < kept.place) {
+        if kept.as_ref().is_none_or(|kept| position < kept.position) {
             mem::swap(&mut *kept, &mut failure);
         }
         drop(kept);

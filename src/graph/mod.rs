@@ -16,6 +16,9 @@
 //!   debug lines ──► (overlay)                   dropped: debug lines
 //! ```
 //!
+//! A run on several workers takes up first what its end waits for, as measured in runs before; and a schedule of so little
+//! work that sharing it would cost more is run by the calling thread alone ([`Schedule::run`]).
+//!
 //! The graph knows nothing of what a process does. It may carry anything, and be ordered only; or carry [`Node`]s, and be
 //! run. A node is a number of items that are worked off in chunks, and how many is asked only when all it depends on is
 //! done.

@@ -122,12 +122,12 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         }
         let worker = crew.worker();
         let pass = self.clock.work(|| {
-            self.attempt(process, |item| {
+            self.attempt(process, |position| {
                 let chunks = self.chunks(process, worker);
                 if chunks.count() > 1 && !is_pinned {
                     return Ok(Some(chunks));
                 }
-                self.run_chunks(process, &chunks, 0..chunks.count(), worker, item)?;
+                self.run_chunks(position, &chunks, 0..chunks.count(), worker)?;
                 Ok(None)
             })
         });
@@ -161,7 +161,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if pass.tickets.invites(places.end, chunks, worker) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
-            self.attempt(process, |item| self.run_chunks(process, chunks, places, worker, item));
+            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker));
         }
     }
 
@@ -181,7 +181,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
 
     /// Whether the process is one for the calling thread. If that failed, nobody is to run it.
     fn is_pinned(&self, process: u32) -> bool {
-        self.attempt(process, |_item| Ok(self.node(process).pinned())).unwrap_or(false)
+        self.attempt(process, |_position| Ok(self.node(process).pinned())).unwrap_or(false)
     }
 
     fn band(&self, process: u32) -> Band {

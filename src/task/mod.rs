@@ -16,7 +16,8 @@
 //!
 //! A [`Scheduler`] owns the threads. In a [`Scope`] jobs are spawned that borrow from the caller, and spawn more.
 //! [`Scheduler::parallel_for`] is the loop over a range. Every job is handed the [`Worker`] it runs on, whose index
-//! tells apart what an engine keeps per worker.
+//! tells apart what an engine keeps per worker. A graph of jobs, with an order between them, is a
+//! [`Schedule`](crate::graph::Schedule).
 //!
 //! # A loop
 //!
@@ -75,18 +76,59 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # A job for the background
+//!
+//! What may take longer than a frame goes to the [background](Scheduler::background). No thread that calls the scheduler for
+//! a frame ever picks it up, so a frame is not late by the length of somebody's loading; it runs on other workers while
+//! they have nothing else to do.
+//!
+//! ```
+//! use std::time::Duration;
+//! use drawloom::task::Scheduler;
+//!
+//! let scheduler = Scheduler::with_available_parallelism()?;
+//! let mut level = Some(scheduler.background(|| (1..=1_000_u64).map(|tile| tile * tile).collect::<Vec<_>>()));
+//! let mut tiles = Vec::new();
+//! for _frame in 0..3 {
+//!     if let Some(job) = level.take_if(|job| job.is_finished()) {
+//!         tiles = job.wait()?;
+//!     }
+//!     scheduler.parallel_for(100, 10, |_range, _worker| { /* the frame, with or without the tiles */ })?;
+//!     // What is left of the frame's time. With a single worker this is where background jobs run.
+//!     scheduler.run_background(Duration::from_micros(200));
+//! }
+//! if let Some(job) = level {
+//!     // It cannot be put off any longer: run here and now if nobody has begun it.
+//!     tiles = job.wait()?;
+//! }
+//! assert_eq!(tiles.len(), 1_000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # A failure, again
+//!
+//! With one worker and a [seed](SchedulerBuilder::shuffle) all jobs run on one thread in an order that the seed decides, the
+//! same every time; with several workers and a seed, results that depend on an order show themselves.
+//!
 //! # Panics in jobs
 //!
 //! The panic of a job, of a loop's body or of a scope's is caught. It harms no worker, and the call returns it as a
 //! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the
 //! process ends on the spot, and no error names anything.
 //!
+//! # Who helps whom
+//!
+//! A thread that calls the scheduler from outside runs whatever there is to run until its call returns. A job that waits, for
+//! a scope, a loop or a graph of its own, runs jobs of that meanwhile, on top of its stack, and nothing else: it is late
+//! by no work but its own, and finds nothing borrowed that it had not borrowed itself. Jobs that open scopes in which jobs open
+//! scopes, without bound, need a stack without bound, as any recursion does.
+//!
 //! # What it costs
 //!
-//! A spawned job is one allocation. A loop allocates per worker that joins it, not per chunk. Idle workers sleep and
-//! take no time from anybody; waking one costs the waker some microseconds, so a chunk should be worth more than that.
-//! A thread that waits for a scope runs other jobs meanwhile, on top of its stack. Jobs that open scopes in which jobs
-//! open scopes, without bound, need a stack without bound, as any recursion does.
+//! A job that captures up to four words is spawned without an allocation, others are one each. A loop allocates nothing.
+//! Workers look for work for some microseconds after the end of a frame, and as long as waking them would take within
+//! one; then they sleep and take no time from anybody. [What waking one costs](Scheduler::wake_price) is measured when
+//! the scheduler is built; a loop should be worth more than that, and a graph that is not is run by its caller alone.
 
 mod affinity;
 mod background;

@@ -141,20 +141,6 @@ impl Scheduler {
     ///
     /// What it spawns itself, in scopes and loops on this scheduler, is background work as well. Jobs that have not begun
     /// when the scheduler is dropped run only if they are waited for.
-    ///
-    /// ```
-    /// # use std::time::Duration;
-    /// # use drawloom::task::Scheduler;
-    /// let scheduler = Scheduler::new(2)?;
-    /// let texture = scheduler.background(|| vec![255_u8; 1024 * 1024]);
-    /// // One frame after another, and in each of them a look at it.
-    /// while !texture.is_finished() {
-    ///     scheduler.parallel_for(100, 10, |_range, _worker| { /* draw without the texture */ })?;
-    ///     scheduler.run_background(Duration::from_micros(500));
-    /// }
-    /// assert_eq!(texture.wait()?.len(), 1024 * 1024);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let (job, queued) = BackgroundJob::new(job);
         self.shared.background().put(queued);
