@@ -42,6 +42,11 @@ impl Costs {
         self.has_learnt.then(|| Duration::from_nanos(*average))
     }
 
+    /// Forgets the work of a run that was cancelled.
+    pub(super) fn forget_work(&self) {
+        self.work.store(0, Ordering::Relaxed);
+    }
+
     /// Takes in what the run that has ended cost, and says how much work it was.
     pub(super) fn learn(&mut self) -> Duration {
         for (average, took) in self.average.iter_mut().zip(&self.took) {

@@ -72,6 +72,9 @@ impl<P> Schedule<P> {
         };
         let failure = run.failure.lock().take();
         let took = start.elapsed();
+        if failure.is_some() {
+            self.costs.forget_work();
+        }
         // What a cancelled run took says nothing.
         if failure.is_none() {
             match way {

@@ -36,8 +36,9 @@ pub trait Node<C: ?Sized>: Send + Sync {
 
     /// Does the items of `range`, which starts at a multiple of the chunk and is one chunk long, the last one perhaps less.
     ///
-    /// Every item is in one range exactly. Ranges run in any order and at the same time, each on the thread that `worker`
-    /// stands for.
+    /// Every item is in one range exactly. Ranges run in any order, at the same time or one after another, each on the thread
+    /// that `worker` stands for. One that waits for another may wait for ever, as one thread may have both
+    /// ([`Schedule::always_share`](super::Schedule::always_share)).
     ///
     /// # Errors
     ///

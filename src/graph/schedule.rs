@@ -77,7 +77,8 @@ impl<P> Schedule<P> {
     }
 
     /// Shares every run between the workers, however little work it is: for processes that wait for one another while they
-    /// run, which one thread alone cannot do, and to see what sharing costs. It is off at first.
+    /// run, which one thread alone cannot do, and to see what sharing costs. It is off at first, and of no effect with a
+    /// single worker.
     pub fn always_share(&mut self, always: bool) {
         self.always_shares = always;
     }
@@ -85,14 +86,14 @@ impl<P> Schedule<P> {
     /// What the process of that index costs, from its start to its end: an average over those of the latest runs that were
     /// measured. `None` if there was none, or if there is no such process.
     ///
-    /// The first runs that several workers shared are measured, and later ones every now and then.
+    /// Some of the runs that several workers share are measured: the first few, and later ones every now and then.
     pub fn cost(&self, index: usize) -> Option<Duration> {
         self.costs.of(index)
     }
 
     /// Whether the end of a run waits for the process of that index, as far as is known: by what the processes
     /// [cost](Self::cost), no way through the graph is longer by more than a tenth than the longest through it. Workers
-    /// take up such processes before others.
+    /// that look for something to do take up such processes before others.
     pub fn is_critical(&self, index: usize) -> bool {
         index < self.len() && self.flow.is_urgent(index as u32)
     }

@@ -104,6 +104,13 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
                 return;
             }
             next = self.complete(process, crew).map(|next| (next, false));
+            // Nobody else can run what is pinned, and anybody can go on here.
+            if let Some((process, _)) = next
+                && crew.has_pinned()
+            {
+                crew.push(Token::Start(process).encode(), self.band(process));
+                return;
+            }
         }
     }
 
@@ -149,6 +156,13 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         let worker = crew.worker();
         let mut finished = 0;
         loop {
+            if finished > 0 && crew.has_pinned() {
+                // Nobody else can run that, and anybody can join in this.
+                if pass.tickets.leave(chunks) {
+                    crew.push(Token::Join(process).encode(), self.band(process));
+                }
+                return finished;
+            }
             let places = if self.is_stopped() {
                 pass.tickets.take_rest(chunks)
             } else {

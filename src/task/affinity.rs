@@ -9,7 +9,7 @@ pub struct AffinityMask {
 }
 
 impl AffinityMask {
-    /// These processors. None of them must be missing on the machine, but the others need not be there.
+    /// These processors. Those that the machine has not, or the process may not use, are left out; one has to remain.
     pub fn new(processors: impl IntoIterator<Item = usize>) -> Self {
         let mut processors: Vec<usize> = processors.into_iter().collect();
         processors.sort_unstable();
@@ -28,12 +28,10 @@ impl AffinityMask {
         use rustix::thread::{CpuSet, sched_setaffinity};
 
         let mut set = CpuSet::new();
-        for &processor in &self.processors {
-            if processor >= CpuSet::MAX_CPU {
-                return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("there is no processor {processor}")));
-            }
-            set.set(processor);
-        }
+        self.processors
+            .iter()
+            .filter(|&&processor| processor < CpuSet::MAX_CPU)
+            .for_each(|&processor| set.set(processor));
         Ok(sched_setaffinity(None, &set)?)
     }
 

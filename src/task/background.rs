@@ -4,7 +4,11 @@ use std::{collections::VecDeque, fmt, sync::Arc};
 
 use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering};
 
-use super::job::{JobPanic, catch, discard};
+use super::{
+    job::{JobPanic, catch, discard},
+    seat,
+    worker::Worker,
+};
 
 /// A job that runs when no frame needs its worker, and what comes of it; made by
 /// [`Scheduler::background`](super::Scheduler::background).
@@ -40,7 +44,10 @@ impl<T: Send + 'static> BackgroundJob<T> {
     ///
     /// The [`JobPanic`] if the job panicked.
     pub fn wait(self) -> Result<T, JobPanic> {
-        self.ticket.run();
+        if !self.ticket.run() {
+            // Somebody else is at it, and may wait for what lies in this thread's queues.
+            seat::with_all(Worker::part_with_background_jobs);
+        }
         let mut outcome = self.ticket.outcome.lock();
         loop {
             if let Some(result) = outcome.result.take() {

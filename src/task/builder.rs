@@ -9,6 +9,7 @@ use crate::sync::{Arc, thread};
 use super::{
     affinity::AffinityMask,
     job::{JobPanic, catch},
+    placement::Placement,
     queue::Queues,
     scheduler::{Scheduler, Shared},
     seat,
@@ -63,7 +64,8 @@ impl SchedulerBuilder {
     /// are. Only Linux and Android do this; for other systems there is [`on_start`](Self::on_start).
     ///
     /// Without this they run wherever the system puts them. Where that is the processor of the thread that wakes them, as on
-    /// some virtual machines, they are kept off there (on Linux and Android).
+    /// some virtual machines, they are kept off there (on Linux and Android), but for those that
+    /// [`on_start`](Self::on_start) has placed.
     pub fn affinity(mut self, affinity: impl Fn(usize) -> AffinityMask + 'static) -> Self {
         self.affinity = Some(Box::new(affinity));
         self
@@ -201,14 +203,19 @@ impl Life {
 
     fn prepare(&self) -> Result<(), SchedulerError> {
         let worker = self.index;
-        self.shared.placement().add_this_thread();
+        let at_first = Placement::of_this_thread();
         if let Some(affinity) = &self.affinity {
-            affinity.apply().map_err(|source| SchedulerError::Affinity { worker, source })?;
+            affinity.apply().map_err(|source| SchedulerError::Affinity {
+                worker,
+                affinity: affinity.clone(),
+                source,
+            })?;
         }
         let [on_start, _] = &self.hooks;
         if let Some(on_start) = on_start {
             catch(|| on_start(worker)).map_err(|panic| SchedulerError::StartHook { worker, panic })?;
         }
+        self.shared.placement().add_this_thread(at_first);
         Ok(())
     }
 }
@@ -249,10 +256,12 @@ pub enum SchedulerError {
         source: io::Error,
     },
     /// The system refused to keep a thread to its processors.
-    #[error("the thread of worker {worker} could not be kept to its processors")]
+    #[error("the thread of worker {worker} could not be kept to the processors {:?}", affinity.processors())]
     Affinity {
         /// The [index](Worker::index) of the worker.
         worker: usize,
+        /// The processors.
+        affinity: AffinityMask,
         /// The system's reason.
         source: io::Error,
     },

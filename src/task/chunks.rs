@@ -106,6 +106,13 @@ impl Tickets {
         Pace { most: self.pace.load(Ordering::Relaxed), since: None }
     }
 
+    /// Counts a worker out that does something else before all chunks are taken. Says whether it should queue a job through
+    /// which another can join.
+    pub(crate) fn leave(&self, chunks: &Chunks) -> bool {
+        self.joined.fetch_sub(1, Ordering::Relaxed);
+        self.taken.load(Ordering::Relaxed) < chunks.count && !self.is_open.swap(true, Ordering::Relaxed)
+    }
+
     /// The places of the next chunks for a worker to run. There are none if it is empty.
     pub(crate) fn take(&self, chunks: &Chunks, pace: &mut Pace, worker: &Worker) -> Range<usize> {
         let mut taken = self.taken.load(Ordering::Relaxed);
@@ -114,13 +121,17 @@ impl Tickets {
             let end = taken + pace.of(remaining, worker.workers());
             match self.taken.compare_exchange_weak(taken, end, Ordering::Relaxed, Ordering::Relaxed) {
                 Ok(_) => {
-                    if remaining > 2 * worker.workers() {
+                    if end - taken > 1 || remaining > 2 * worker.workers() {
                         pace.adapt(end - taken);
                     }
                     return taken..end;
                 }
                 Err(changed) => taken = changed,
             }
+        }
+        // How long the last ones took, too: there may have been no others.
+        if pace.since.is_some() {
+            pace.adapt(0);
         }
         if pace.most != self.pace.load(Ordering::Relaxed) {
             self.pace.store(pace.most, Ordering::Relaxed);

@@ -17,6 +17,9 @@ use super::{
 /// How long workers stay awake after the end of a frame.
 const HOT: Duration = Duration::from_micros(10);
 
+/// How long they look at most, whatever a wake-up is said to cost.
+const LONGEST: Duration = Duration::from_micros(100);
+
 /// The pauses of the processor between two looks, at most.
 const MOST_PAUSES: u32 = 8;
 
@@ -75,7 +78,7 @@ impl Idle {
             _ => now,
         };
         self.since = Some((since, is_live));
-        let most = if is_live { worker.shared().wake_price() } else { HOT };
+        let most = if is_live { worker.shared().wake_price().min(LONGEST) } else { HOT };
         now.duration_since(since) >= most
     }
 

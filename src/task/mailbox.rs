@@ -1,4 +1,4 @@
-//! Jobs for one worker alone.
+//! Jobs that must not lie in a worker's queues: those for one worker alone, and those that have strayed.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,8 @@ use crate::sync::{AtomicUsize, Mutex, Ordering};
 
 use super::{job::Job, region::Region};
 
-/// The jobs that only this worker runs, first in, first out. They belong to regions that it has opened.
+/// Jobs, first in, first out. Those in a worker's own mailbox belong to regions that it has opened, and nobody else runs
+/// them.
 ///
 /// The count is only a hint, so it is relaxed: it saves the worker the lock where there is nothing. That a sleeping
 /// worker learns of a job is up to the fences of [`Sleep`](super::sleep::Sleep), and the lock orders the job itself.
@@ -28,7 +29,7 @@ impl Mailbox {
 
     /// The first job of that region.
     pub(super) fn take(&self, region: &Region) -> Option<Job> {
-        if self.count.load(Ordering::Relaxed) == 0 {
+        if !self.has_any() {
             return None;
         }
         let mut jobs = self.jobs.lock();
@@ -38,8 +39,23 @@ impl Mailbox {
         job
     }
 
+    /// The first job of all.
+    pub(super) fn take_any(&self) -> Option<Job> {
+        if !self.has_any() {
+            return None;
+        }
+        let mut jobs = self.jobs.lock();
+        let job = jobs.pop_front();
+        self.count.store(jobs.len(), Ordering::Relaxed);
+        job
+    }
+
+    pub(super) fn has_any(&self) -> bool {
+        self.count.load(Ordering::Relaxed) > 0
+    }
+
     /// Whether there is a job of that region.
     pub(super) fn has(&self, region: &Region) -> bool {
-        self.count.load(Ordering::Relaxed) > 0 && self.jobs.lock().iter().any(|job| job.region.is(region))
+        self.has_any() && self.jobs.lock().iter().any(|job| job.region.is(region))
     }
 }

@@ -22,7 +22,8 @@ mod linux {
 
     /// Where the threads of a scheduler may run.
     pub(in crate::task) struct Placement {
-        threads: Mutex<Vec<Pid>>,
+        /// Each with where it may run by itself.
+        threads: Mutex<Vec<(Pid, CpuSet)>>,
         is_needed: AtomicBool,
         /// The processor they are kept off.
         avoided: AtomicUsize,
@@ -35,9 +36,19 @@ mod linux {
             Self { threads: Mutex::new(Vec::new()), is_needed: AtomicBool::new(false), avoided: AtomicUsize::new(NONE) }
         }
 
-        /// Takes note of the calling thread, which is one of the scheduler's.
-        pub(in crate::task) fn add_this_thread(&self) {
-            self.threads.lock().push(gettid());
+        /// Where the calling thread may run.
+        pub(in crate::task) fn of_this_thread() -> Option<CpuSet> {
+            sched_getaffinity(None).ok()
+        }
+
+        /// Takes note of the calling thread, which is one of the scheduler's, unless somebody has placed it since it was
+        /// to run there.
+        pub(in crate::task) fn add_this_thread(&self, at_first: Option<CpuSet>) {
+            if let Some(allowed) = at_first
+                && Self::of_this_thread() == at_first
+            {
+                self.threads.lock().push((gettid(), allowed));
+            }
         }
 
         /// The processor that the calling thread is on.
@@ -48,8 +59,8 @@ mod linux {
         /// Has [`make_room`](Self::make_room) do its work from now on, if each thread can have a processor of its own.
         /// Says whether it can.
         pub(in crate::task) fn enable(&self) -> bool {
-            let threads = self.threads.lock().len();
-            let is_room = sched_getaffinity(None).is_ok_and(|allowed| threads < allowed.count() as usize);
+            let threads = self.threads.lock();
+            let is_room = threads.iter().all(|(_, allowed)| threads.len() < allowed.count() as usize);
             // Relaxed, here and below: the flag and the number decide how fast something is, and hand nothing over.
             self.is_needed.store(is_room, Ordering::Relaxed);
             is_room
@@ -66,31 +77,31 @@ mod linux {
                 && let Err(error) = self.avoid(here)
             {
                 // The machine has changed. It costs time, and nothing else.
-                tracing::debug!(%error, "workers cannot be kept off the processor of their caller");
                 self.is_needed.store(false, Ordering::Relaxed);
+                self.let_run_anywhere();
+                tracing::debug!(%error, "workers cannot be kept off the processor of their caller");
             }
         }
 
         #[cold]
         fn avoid(&self, processor: usize) -> io::Result<()> {
-            let mut others = sched_getaffinity(None)?;
-            others.unset(processor);
-            if others.count() == 0 {
-                // The caller may run here only, which says nothing about where the others may.
-                others = every_processor_but(processor);
-            }
-            for &thread in self.threads.lock().iter() {
-                sched_setaffinity(Some(thread), &others)?;
+            for (thread, allowed) in self.threads.lock().iter() {
+                let mut others = *allowed;
+                if processor < CpuSet::MAX_CPU {
+                    others.unset(processor);
+                }
+                sched_setaffinity(Some(*thread), &others)?;
             }
             Ok(())
         }
-    }
 
-    /// The system takes those that there are.
-    fn every_processor_but(processor: usize) -> CpuSet {
-        let mut set = CpuSet::new();
-        (0..CpuSet::MAX_CPU).filter(|&other| other != processor).for_each(|other| set.set(other));
-        set
+        fn let_run_anywhere(&self) {
+            for (thread, allowed) in self.threads.lock().iter() {
+                if let Err(error) = sched_setaffinity(Some(*thread), allowed) {
+                    tracing::debug!(%error, "a worker cannot be let go from its processors");
+                }
+            }
+        }
     }
 }
 
@@ -104,7 +115,9 @@ mod other {
             Self
         }
 
-        pub(in crate::task) fn add_this_thread(&self) {}
+        pub(in crate::task) fn of_this_thread() {}
+
+        pub(in crate::task) fn add_this_thread(&self, _at_first: ()) {}
 
         pub(in crate::task) fn processor() -> Option<usize> {
             None

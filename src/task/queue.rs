@@ -46,12 +46,23 @@ pub(super) struct Queues {
     bands: [Queue; Band::ALL.len()],
     /// What decides who is next instead of age.
     shuffle: Option<Shuffle>,
+    /// Per band, how many jobs have been queued here since the innermost wait in the midst of a job began, and have not
+    /// been taken out here.
+    since_wait: [Cell<usize>; Band::ALL.len()],
+}
+
+/// What came of looking for a job.
+pub(super) enum Popped {
+    Job(Job),
+    Nothing,
+    /// A job was taken out and put back, as it was the wrong one.
+    PutBack,
 }
 
 impl Queues {
     /// Empty queues, which give jobs out newest first, or in some other order that the shuffle decides.
     pub(super) fn new(shuffle: Option<Shuffle>) -> Self {
-        Self { bands: Band::ALL.map(|_| Queue::new()), shuffle }
+        Self { bands: Band::ALL.map(|_| Queue::new()), shuffle, since_wait: Band::ALL.map(|_| Cell::new(0)) }
     }
 
     /// The end for thieves.
@@ -60,6 +71,8 @@ impl Queues {
     }
 
     pub(super) fn push(&self, job: Job, band: Band) {
+        let since_wait = &self.since_wait[band as usize];
+        since_wait.set(since_wait.get() + 1);
         let queue = &self.bands[band as usize];
         match self.shuffle {
             None => queue.push(job),
@@ -78,12 +91,52 @@ impl Queues {
         loot.overflow.take_oldest(|job| self.push(Job { depth, ..job }, band))
     }
 
-    /// The newest job that was queued at this depth or a deeper one; there is none if the newest of all is not.
-    pub(super) fn pop(&self, band: Band, depth: u32) -> Option<Job> {
+    /// The newest job.
+    pub(super) fn pop(&self, band: Band) -> Option<Job> {
         let queue = &self.bands[band as usize];
         match &self.shuffle {
-            None => queue.pop(depth),
-            Some(shuffle) => queue.overflow.take_any(shuffle, depth),
+            None => queue.pop(),
+            Some(shuffle) => queue.overflow.take_any(shuffle, 0),
+        }
+    }
+
+    /// The newest job, if it was queued at this depth, where a wait has begun.
+    pub(super) fn pop_awaited(&self, band: Band, depth: u32) -> Popped {
+        let queue = &self.bands[band as usize];
+        if let Some(shuffle) = &self.shuffle {
+            return queue.overflow.take_any(shuffle, depth).map_or(Popped::Nothing, Popped::Job);
+        }
+        let since_wait = &self.since_wait[band as usize];
+        // Without this count every look would take a job out that is not looked for, and hide it from others.
+        if since_wait.get() == 0 {
+            return Popped::Nothing;
+        }
+        match queue.pop() {
+            Some(job) if job.depth >= depth => {
+                since_wait.set(since_wait.get() - 1);
+                Popped::Job(job)
+            }
+            Some(job) => {
+                since_wait.set(0);
+                queue.push(job);
+                Popped::PutBack
+            }
+            None => {
+                since_wait.set(0);
+                Popped::Nothing
+            }
+        }
+    }
+
+    /// A wait begins in the midst of a job. Gives back what the end of the wait is to be told.
+    pub(super) fn start_wait(&self) -> [usize; Band::ALL.len()] {
+        self.since_wait.each_ref().map(Cell::take)
+    }
+
+    /// A wait ends, and the one goes on that it was inside of.
+    pub(super) fn end_wait(&self, before: [usize; Band::ALL.len()]) {
+        for (since_wait, before) in self.since_wait.iter().zip(before) {
+            since_wait.set(before);
         }
     }
 
@@ -126,24 +179,15 @@ impl Queue {
         }
     }
 
-    fn pop(&self, depth: u32) -> Option<Job> {
+    fn pop(&self) -> Option<Job> {
         if !self.overflow.is_empty()
             && let Some(newest) = self.overflow.take_newest()
         {
-            return self.fitting(newest, depth);
+            return Some(newest);
         }
         let newest = self.deque.pop()?;
         self.room.set((self.room.get() + 1).min(MOST_IN_DEQUE));
-        self.fitting(newest, depth)
-    }
-
-    /// Puts the job back if it was queued at a lesser depth.
-    fn fitting(&self, job: Job, depth: u32) -> Option<Job> {
-        if job.depth >= depth {
-            return Some(job);
-        }
-        self.push(job);
-        None
+        Some(newest)
     }
 }
 

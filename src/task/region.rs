@@ -53,6 +53,11 @@ impl<'worker> Crew<'worker> {
         self.region.owner == self.worker.index()
     }
 
+    /// Whether a pinned token waits for this worker, which nobody else can run.
+    pub(crate) fn has_pinned(&self) -> bool {
+        self.is_owner() && self.worker.shared().mailbox(self.worker.index()).has(self.region)
+    }
+
     /// Keeps the panic for whoever waits for the region, unless there was one before.
     pub(super) fn fail(&self, panic: JobPanic) {
         self.region.fail(panic);
@@ -149,10 +154,12 @@ impl Region {
         self.panic.lock().take()
     }
 
-    /// Whether a job does better to go to the owner at once. A hint, so it is relaxed: a job that is handed over is
-    /// found in the mailbox in any case, and one that is not is found by whoever steals.
-    pub(super) fn owner_starves(&self) -> bool {
-        self.owner_starves.load(Ordering::Relaxed)
+    /// Whether the next job does better to go to the owner at once. One does, as nobody can take it off the owner again. It is
+    /// a hint, so it is relaxed: a job that is handed over is found in the mailbox in any case, and one that is not is
+    /// found by whoever steals.
+    pub(super) fn feed_owner(&self) -> bool {
+        // The look before the swap spares others the cache line.
+        self.owner_starves.load(Ordering::Relaxed) && self.owner_starves.swap(false, Ordering::Relaxed)
     }
 
     pub(super) fn set_owner_starves(&self, starves: bool) {

@@ -1,8 +1,9 @@
-//! The pool of workers, and the two ways to give it work.
+//! The pool of workers, and the ways to give it work.
 
 use std::{
     fmt, mem,
     ops::Range,
+    panic::{self, AssertUnwindSafe},
     time::{Duration, Instant},
 };
 
@@ -17,7 +18,7 @@ use super::{
     mailbox::Mailbox,
     parallel_for::Pass,
     placement::Placement,
-    queue::{Loot, Queues},
+    queue::{Band, Loot, Queues},
     scope::{self, Scope},
     seat::{self, Seat},
     sleep::Sleep,
@@ -57,7 +58,7 @@ pub struct Scheduler {
 
 impl Scheduler {
     /// The most workers a scheduler can have.
-    pub const MOST_WORKERS: usize = 1024;
+    pub const MOST_WORKERS: usize = 1000;
 
     /// A scheduler of that many workers, the calling thread included: 1 starts no thread. There may be more workers
     /// than the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
@@ -91,8 +92,8 @@ impl Scheduler {
         self.shared.workers()
     }
 
-    /// How long it takes from a call of [`Scope::spawn`] until a worker that slept begins on the job: the median of a few
-    /// tries while the scheduler was built. A frame whose work takes no longer than this is not shared.
+    /// How long it takes from a call of [`Scope::spawn`] until a worker that slept begins on the job, as found in a few tries
+    /// while the scheduler was built; 0 with a single worker. A graph whose work takes no longer than this is not shared.
     pub fn wake_price(&self) -> Duration {
         self.shared.wake_price()
     }
@@ -144,15 +145,20 @@ impl Scheduler {
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let (job, queued) = BackgroundJob::new(job);
         self.shared.background().put(queued);
-        self.shared.sleep().wake_for_background();
+        self.shared.sleep().wake_beside(Band::Background);
         job
     }
 
     /// Runs background jobs on the calling thread, the oldest first, and says how many. It begins none when `budget` has
-    /// passed, so it returns late by the length of a job at most.
+    /// passed, so it returns late by the length of a job at most. While another thread from outside is being served it
+    /// runs none.
     pub fn run_background(&self, budget: Duration) -> usize {
         let start = Instant::now();
-        self.seated(|worker| worker.work_in_background(|| start.elapsed() >= budget))
+        let work = |worker: &Worker| worker.work_in_background(|| start.elapsed() >= budget);
+        seat::with_current(&self.shared, |current| match current {
+            Some(worker) => work(worker),
+            None => self.shared.seat.try_take().map_or(0, |queues| self.work_seated(queues, work)),
+        })
     }
 
     pub(super) fn without_threads(shared: Arc<Shared>) -> Self {
@@ -171,13 +177,17 @@ impl Scheduler {
     pub(crate) fn seated<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
         seat::with_current(&self.shared, |current| match current {
             Some(worker) => body(worker),
-            None => {
-                let worker = Worker::new(0, self.shared.seat.take(), Arc::clone(&self.shared));
-                let result = seat::occupy(&worker, || body(&worker));
-                self.shared.seat.give_back(worker.into_queues());
-                result
-            }
+            None => self.work_seated(self.shared.seat.take(), body),
         })
+    }
+
+    /// Calls `body` as worker 0, whose queues these are, and gives them back.
+    fn work_seated<R>(&self, queues: Box<Queues>, body: impl FnOnce(&Worker) -> R) -> R {
+        let worker = Worker::new(0, queues, Arc::clone(&self.shared));
+        // What is a user's is caught where it is called, but a subscriber of spans is a user's as well.
+        let result = panic::catch_unwind(AssertUnwindSafe(|| seat::occupy(&worker, || body(&worker))));
+        self.shared.seat.give_back(worker.into_queues());
+        result.unwrap_or_else(|payload| panic::resume_unwind(payload))
     }
 }
 
@@ -208,6 +218,8 @@ pub(super) struct Shared {
     /// The way into the queues of each worker.
     loot: Box<[Loot]>,
     mailboxes: Box<[CachePadded<Mailbox>]>,
+    /// Jobs that were spawned into a region from inside of another one, on a worker that waits for that.
+    strays: CachePadded<Mailbox>,
     background: BackgroundQueue,
     sleep: Sleep,
     placement: Placement,
@@ -223,6 +235,7 @@ impl Shared {
     pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, is_shuffled: bool) -> Self {
         Self {
             mailboxes: loot.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
+            strays: CachePadded::new(Mailbox::new()),
             background: BackgroundQueue::new(),
             sleep: Sleep::new(loot.len()),
             placement: Placement::new(),
@@ -246,6 +259,10 @@ impl Shared {
 
     pub(super) fn mailbox(&self, worker: usize) -> &Mailbox {
         &self.mailboxes[worker]
+    }
+
+    pub(super) fn strays(&self) -> &Mailbox {
+        &self.strays
     }
 
     pub(super) fn background(&self) -> &BackgroundQueue {

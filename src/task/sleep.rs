@@ -41,6 +41,10 @@
 //! wakes a sleeper, unless there is none, or a searcher again, for whom the same holds. A searcher called at W4 is one like
 //! any other, whatever it was called for.
 //!
+//! *Where work moves.* A thief that takes several jobs at once, or puts one back that it had taken out, hides them for a
+//! moment from S3 and F3. When they can be seen again it passes W2 and W4 anew, without asking for searchers
+//! (`wake_beside`).
+//!
 //! **A call is neither lost nor left over.** Under the lock exactly one thread takes a sleeper off the list. Is that a
 //! waker, it calls once, and the sleeper waits for this one call even if it has seen work meanwhile. Is it the sleeper,
 //! nobody calls. So between two sleeps no call is pending.
@@ -57,6 +61,8 @@
 use crossbeam_utils::CachePadded;
 
 use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering, fence};
+
+use super::{queue::Band, scheduler::Scheduler};
 
 /// What work a sleeper is to be woken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +88,7 @@ const ANY_SLEEPER: usize = 1 << BITS;
 const SEARCHER: usize = 1 << (2 * BITS);
 const BITS: u32 = usize::BITS / 3;
 const MASK: usize = (1 << BITS) - 1;
+const _: () = assert!(Scheduler::MOST_WORKERS <= MASK, "a count runs over into the next");
 
 impl Sleep {
     /// A bed for each worker.
@@ -139,12 +146,12 @@ impl Sleep {
         }
     }
 
-    /// Wakes a worker that takes background jobs, if one sleeps. Searchers are no reason not to: worker 0 may be one, and
-    /// does not look for those. The job has been published.
-    pub(super) fn wake_for_background(&self) {
+    /// Wakes a worker that takes jobs of this band, if one sleeps. Searchers are no reason not to: the caller may be one
+    /// itself, and worker 0 may be one, which does not look for background jobs. The job has been published.
+    pub(super) fn wake_beside(&self, band: Band) {
         fence(Ordering::SeqCst);
         if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
-            self.call(|&(sleeper, wake_for)| sleeper != 0 && wake_for == WakeFor::Any);
+            self.call(|&(sleeper, wake_for)| wake_for == WakeFor::Any && (sleeper != 0 || band != Band::Background));
         }
     }
 

@@ -8,7 +8,7 @@ use super::{
     background::Queued,
     idle::Idle,
     job::{Job, JobPanic, Work, discard},
-    queue::{Band, Queues},
+    queue::{Band, Popped, Queues},
     region::Region,
     scheduler::Shared,
     sleep::WakeFor,
@@ -46,6 +46,9 @@ pub struct Worker {
     /// region waits for it to come back; where there is none, a job of the region is running here.
     credit: Cell<usize>,
     creditor: Cell<Option<&'static Region>>,
+    /// The region that this worker waits for in the midst of a job, the innermost. Its own queues' newest jobs belong
+    /// there.
+    awaited: Cell<Option<&'static Region>>,
     /// What else this thread is (see `seat`).
     pub(super) outer: Cell<*const Worker>,
     on_this_thread: PhantomData<Rc<()>>,
@@ -62,6 +65,7 @@ impl Worker {
             is_in_background: Cell::new(false),
             credit: Cell::new(0),
             creditor: Cell::new(None),
+            awaited: Cell::new(None),
             outer: Cell::new(ptr::null()),
             on_this_thread: PhantomData,
         }
@@ -113,12 +117,22 @@ impl Worker {
     pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
         self.spend(region);
         let job = Job { work, region, depth: self.depth.get() };
-        if region.owner_starves() && region.owner() != self.index {
+        let is_stray = self.awaited.get().is_some_and(|awaited| !awaited.is(region));
+        if is_stray && !region.is_background() {
+            // It belongs further out, and would be run too soon from here.
+            self.shared.strays().put(job);
+            self.shared.sleep().wake_worker(region.owner());
+            self.shared.sleep().wake_any();
+            return;
+        }
+        if is_stray || (region.owner() != self.index && region.feed_owner()) {
             self.shared.mailbox(region.owner()).put(job);
             self.shared.sleep().wake_worker(region.owner());
-        } else if region.is_background() {
+            return;
+        }
+        if region.is_background() {
             self.queues.push(job, Band::Background);
-            self.shared.sleep().wake_for_background();
+            self.shared.sleep().wake_beside(Band::Background);
         } else {
             self.queues.push(job, band);
             self.shared.sleep().wake_any();
@@ -142,6 +156,7 @@ impl Worker {
     ) -> Result<R, JobPanic> {
         let is_outermost = self.index == 0 && self.depth.get() == 0 && !self.is_in_background();
         self.depth.set(self.depth.get() + 1);
+        let outer = (self.awaited.replace((!is_outermost).then_some(region)), self.queues.start_wait());
         if is_outermost {
             self.shared.placement().make_room();
             self.shared.set_live(true);
@@ -153,6 +168,8 @@ impl Worker {
         if is_outermost {
             self.shared.set_live(false);
         }
+        self.awaited.set(outer.0);
+        self.queues.end_wait(outer.1);
         self.depth.set(self.depth.get() - 1);
         let Some(first) = region.take_panic() else { return result };
         discard(result);
@@ -202,14 +219,18 @@ impl Worker {
                     self.sees_loot(&Band::ALL) || (self.index > 0 && !self.shared.background().is_empty())
                 }
                 Until::Finished { region, may_help } => {
-                    self.shared.mailbox(self.index).has(region) || (may_help && self.sees_loot(&Band::FRAME))
+                    self.shared.mailbox(self.index).has(region)
+                        || self.shared.strays().has(region)
+                        || (may_help && self.sees_loot(&Band::FRAME))
                 }
             }
     }
 
-    /// Whether there is something in these bands to steal. Its own queues are empty when a worker asks, or hold nothing
-    /// for it, as nobody else puts anything in.
+    /// Whether there is something in these bands that this worker could take up, and does not have itself.
     pub(super) fn sees_loot(&self, bands: &[Band]) -> bool {
+        if self.shared.strays().has_any() {
+            return true;
+        }
         let others = self.shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
         others.map(|(_, loot)| loot).any(|loot| bands.iter().any(|&band| !loot.of(band).is_empty()))
     }
@@ -251,6 +272,10 @@ impl Worker {
     fn run(&self, job: Job) {
         let region = job.region;
         let was_in_background = self.is_in_background.replace(region.is_background());
+        // The owner of another region may wait for the credit that is left of it, and this job may wait for that owner.
+        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
+            self.settle();
+        }
         job.run(self);
         self.is_in_background.set(was_in_background);
         self.earn(region);
@@ -268,24 +293,49 @@ impl Worker {
     fn next_job(&self, until: Until) -> Option<Job> {
         match until {
             Until::Shutdown => self
-                .own_job(&Band::FRAME, 0)
-                .or_else(|| self.steal(&Band::FRAME))
-                .or_else(|| self.own_job(&[Band::Background], 0).or_else(|| self.steal(&[Band::Background]))),
+                .frame_job()
+                .or_else(|| self.own_job(&[Band::Background]))
+                .or_else(|| self.steal(&[Band::Background])),
             Until::Finished { region, may_help } => {
                 let pinned = self.shared.mailbox(self.index).take(region);
                 pinned.or_else(|| {
-                    if may_help {
-                        self.own_job(&Band::FRAME, 0).or_else(|| self.steal(&Band::FRAME))
-                    } else {
-                        self.own_job(&Band::ALL, self.depth.get())
-                    }
+                    if may_help { self.frame_job() } else { self.awaited_job() }
+                        .or_else(|| self.shared.strays().take(region))
                 })
             }
         }
     }
 
-    fn own_job(&self, bands: &[Band], depth: u32) -> Option<Job> {
-        bands.iter().find_map(|&band| self.queues.pop(band, depth))
+    /// A job of whatever belongs to the frame.
+    fn frame_job(&self) -> Option<Job> {
+        let own = self.own_job(&Band::FRAME);
+        own.or_else(|| self.steal(&Band::FRAME)).or_else(|| self.shared.strays().take_any())
+    }
+
+    /// Hands its background jobs to those who wait for them, as this thread is going to wait for one itself.
+    pub(super) fn part_with_background_jobs(&self) {
+        while let Some(job) = self.queues.pop(Band::Background) {
+            let owner = job.region.owner();
+            self.shared.mailbox(owner).put(job);
+            self.shared.sleep().wake_worker(owner);
+        }
+    }
+
+    fn own_job(&self, bands: &[Band]) -> Option<Job> {
+        bands.iter().find_map(|&band| self.queues.pop(band))
+    }
+
+    /// The newest job here that belongs to what this worker waits for in the midst of another.
+    fn awaited_job(&self) -> Option<Job> {
+        Band::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, self.depth.get()) {
+            Popped::Job(job) => Some(job),
+            Popped::Nothing => None,
+            Popped::PutBack => {
+                // Somebody may have looked for it in vain meanwhile.
+                self.shared.sleep().wake_beside(band);
+                None
+            }
+        })
     }
 
     /// One job of somebody else, the more urgent bands first.
@@ -296,6 +346,11 @@ impl Worker {
             let mut victims = (first..loot.len()).chain(0..first).filter(|&victim| victim != self.index);
             victims.find_map(|victim| {
                 let job = self.queues.steal_from(&loot[victim], band, self.depth.get())?;
+                if !loot[self.index].of(band).is_empty() {
+                    // More came over than this one job. Whoever pushed them may have relied on this worker to look for
+                    // more, and it is not going to look at what it has.
+                    self.shared.sleep().wake_beside(band);
+                }
                 self.victim.set(victim);
                 Some(job)
             })

@@ -7,7 +7,7 @@ use loom::{model, model::Builder, thread};
 use super::{Sleep, WakeFor};
 use crate::{
     sync::{Arc, AtomicBool, AtomicUsize, Ordering},
-    task::latch::Latch,
+    task::{latch::Latch, queue::Band},
 };
 
 /// Jobs are only counted here, and relaxed, so that nothing but the protocol's fences orders them.
@@ -236,7 +236,7 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
         let worker = start(&room, |room| room.consume(1));
         room.sleep.start_search();
         room.jobs.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_for_background();
+        room.sleep.wake_beside(Band::Background);
         // Worker 0 has no eyes for it.
         room.sleep.end_search(|| false);
         worker.join().unwrap();
