@@ -7,6 +7,7 @@ mod oracle;
 mod problems;
 mod run;
 mod stops;
+mod stress;
 
 use std::sync::LazyLock;
 

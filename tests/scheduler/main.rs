@@ -1,7 +1,11 @@
 //! The job system from outside: what an embedder can rely on, against plain loops and counts.
 
+mod background;
+mod helping;
 mod panics;
+mod pools;
 mod stress;
+mod waits;
 
 use std::{
     collections::HashSet,

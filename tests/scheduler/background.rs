@@ -1,0 +1,110 @@
+//! Background jobs: where they run, when, and what comes of them.
+
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+        mpsc,
+    },
+    thread,
+    time::Duration,
+};
+
+use crate::{assert_intact, eventually, scheduler};
+
+#[test]
+fn frames_never_run_them_on_the_calling_thread() {
+    let scheduler = Arc::new(scheduler(3));
+    let here = thread::current().id();
+    let strays = Arc::new(AtomicUsize::new(0));
+    let jobs: Vec<_> = (0..12)
+        .map(|_job| {
+            let (scheduler, strays) = (Arc::clone(&scheduler), Arc::clone(&strays));
+            scheduler.clone().background(move || {
+                let look = || {
+                    // Long enough for others to come by.
+                    thread::sleep(Duration::from_micros(200));
+                    strays.fetch_add(usize::from(thread::current().id() == here), Ordering::Relaxed);
+                };
+                look();
+                // What it opens is background work too.
+                scheduler.parallel_for(8, 1, |_range, _worker| look()).unwrap();
+                let inner = scheduler.scope(|scope| (0..8).for_each(|_| scope.spawn(|_scope, _worker| look())));
+                inner.unwrap();
+            })
+        })
+        .collect();
+    let are_finished = || jobs.iter().all(|job| job.is_finished());
+    while !are_finished() {
+        scheduler.parallel_for(30, 1, |_range, _worker| thread::yield_now()).unwrap();
+    }
+    assert_eq!(strays.load(Ordering::Relaxed), 0);
+    assert!(jobs.into_iter().all(|job| job.wait() == Ok(())));
+    assert_intact(&scheduler);
+}
+
+#[test]
+fn with_one_worker_they_run_only_where_they_are_asked_for() {
+    let scheduler = scheduler(1);
+    let ran = Arc::new(Mutex::new(Vec::new()));
+    let jobs: Vec<_> = (0..4)
+        .map(|number| {
+            let ran = Arc::clone(&ran);
+            scheduler.background(move || ran.lock().unwrap().push(number))
+        })
+        .collect();
+    scheduler.parallel_for(10, 1, |_range, _worker| {}).unwrap();
+    assert_eq!(*ran.lock().unwrap(), [0; 0], "a frame has run them");
+    let mut jobs = jobs.into_iter();
+    let third = jobs.by_ref().nth(2).unwrap();
+    assert_eq!(third.wait(), Ok(()));
+    assert_eq!(*ran.lock().unwrap(), [2], "that one, before older ones");
+    // The first two have been let go of, and run nevertheless; the third is not run again.
+    assert_eq!(scheduler.run_background(Duration::MAX), 3);
+    assert_eq!(*ran.lock().unwrap(), [2, 0, 1, 3]);
+    assert!(jobs.all(|job| job.is_finished()));
+}
+
+#[test]
+fn none_is_begun_when_the_budget_has_passed() {
+    let scheduler = scheduler(1);
+    let budget = Duration::from_millis(5);
+    let _jobs = [(); 3].map(|()| scheduler.background(move || thread::sleep(2 * budget)));
+    assert_eq!(scheduler.run_background(Duration::ZERO), 0);
+    assert_eq!(scheduler.run_background(budget), 1);
+    assert_eq!(scheduler.run_background(Duration::MAX), 2);
+}
+
+#[test]
+fn a_panic_is_what_waiting_returns() {
+    for workers in [1, 3] {
+        let scheduler = scheduler(workers);
+        let job = scheduler.background(|| panic!("in the background"));
+        let outcome: Result<(), _> = job.wait();
+        assert_eq!(outcome.unwrap_err().message, "in the background");
+        // Nobody waits for this one.
+        drop(scheduler.background(|| panic!("unheard")));
+        scheduler.run_background(Duration::MAX);
+        assert_intact(&scheduler);
+    }
+}
+
+#[test]
+fn who_waits_sleeps_until_a_job_that_has_begun_ends() {
+    let scheduler = scheduler(2);
+    for _round in 0..20 {
+        let (go, may_go) = mpsc::channel::<()>();
+        let has_begun = Arc::new(AtomicBool::new(false));
+        let begun = Arc::clone(&has_begun);
+        let job = scheduler.background(move || {
+            begun.store(true, Ordering::Relaxed);
+            may_go.recv().unwrap();
+            7
+        });
+        assert!(eventually(|| has_begun.load(Ordering::Relaxed)));
+        assert!(!job.is_finished());
+        let waiting = thread::spawn(|| job.wait());
+        go.send(()).unwrap();
+        assert_eq!(waiting.join().unwrap(), Ok(7));
+    }
+}

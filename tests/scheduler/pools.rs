@@ -1,0 +1,166 @@
+//! How pools are built and dropped: names, places and hooks of their threads, and what becomes of those when that fails.
+
+use std::{
+    sync::{Arc, Mutex, mpsc},
+    thread::{self, ThreadId},
+};
+
+use drawloom::task::{AffinityMask, Scheduler, SchedulerBuilder, SchedulerError};
+
+use crate::{assert_intact, eventually};
+
+type Threads = Arc<Mutex<Vec<(usize, ThreadId)>>>;
+
+/// A builder that notes who starts and who stops, and where.
+fn watched(workers: usize) -> (SchedulerBuilder, [Threads; 2]) {
+    let notes: [Threads; 2] = Default::default();
+    let [started, stopped] = notes.clone();
+    let note = |threads: Threads| move |worker| threads.lock().unwrap().push((worker, thread::current().id()));
+    (Scheduler::builder().workers(workers).on_start(note(started)).on_stop(note(stopped)), notes)
+}
+
+fn sorted(threads: &Threads) -> Vec<(usize, ThreadId)> {
+    let mut threads = threads.lock().unwrap().clone();
+    threads.sort_by_key(|&(worker, _)| worker);
+    threads
+}
+
+/// Which thread each worker runs jobs on, and what `look` says there.
+fn on_each<R: Send>(scheduler: &Scheduler, look: impl Fn() -> R + Sync) -> Vec<(usize, ThreadId, R)> {
+    let together = std::sync::Barrier::new(scheduler.workers());
+    let seen = Mutex::new(Vec::new());
+    let body = |_, worker: &drawloom::task::Worker| {
+        together.wait();
+        seen.lock().unwrap().push((worker.index(), thread::current().id(), look()));
+    };
+    scheduler.parallel_for(scheduler.workers(), 1, body).unwrap();
+    let mut seen = seen.into_inner().unwrap();
+    seen.sort_by_key(|(worker, ..)| *worker);
+    seen
+}
+
+#[test]
+fn hooks_run_once_on_the_thread_of_each_worker() {
+    let (builder, [started, stopped]) = watched(5);
+    let scheduler = builder.build().unwrap();
+    let workers: Vec<_> = on_each(&scheduler, || ()).into_iter().map(|(worker, thread, ())| (worker, thread)).collect();
+    // The calling thread is not the scheduler's, and has no hooks.
+    assert_eq!(sorted(&started), workers[1..]);
+    assert_eq!(sorted(&stopped), []);
+    drop(scheduler);
+    assert_eq!(sorted(&started), workers[1..]);
+    assert_eq!(sorted(&stopped), workers[1..]);
+}
+
+#[test]
+fn threads_have_the_names_they_are_given() {
+    let name = || thread::current().name().map(str::to_owned);
+    let named = Scheduler::builder().workers(4).name(|worker| format!("frame {worker}")).build().unwrap();
+    for (worker, _, name) in on_each(&named, name).split_off(1) {
+        assert_eq!(name, Some(format!("frame {worker}")));
+    }
+    for (worker, _, name) in on_each(&Scheduler::new(4).unwrap(), name).split_off(1) {
+        assert_eq!(name, Some(format!("drawloom-{worker}")));
+    }
+}
+
+#[test]
+fn a_name_with_a_null_character_is_an_error_and_no_thread_is_left() {
+    let (builder, [started, stopped]) = watched(4);
+    let name = |worker| if worker == 3 { "three\0".to_owned() } else { "fine".to_owned() };
+    let error = builder.name(name).build().unwrap_err();
+    let SchedulerError::Name { worker, name } = error else { panic!("{error}") };
+    assert_eq!((worker, name.as_str()), (3, "three\0"));
+    assert_eq!(started.lock().unwrap().len(), 2);
+    assert_eq!(sorted(&started), sorted(&stopped));
+}
+
+#[test]
+fn a_panic_in_a_start_hook_is_an_error_and_no_thread_is_left() {
+    for _round in 0..50 {
+        let (live, is_over) = mpsc::channel();
+        let live = Mutex::new(live);
+        let hook = move |worker| {
+            // The clone is dropped with the thread, as is what is on its stack.
+            thread_local!(static LIVE: std::cell::RefCell<Option<mpsc::Sender<()>>> = const { std::cell::RefCell::new(None) });
+            let sender = live.lock().unwrap().clone();
+            LIVE.set(Some(sender));
+            assert_ne!(worker, 2, "not this one");
+        };
+        let error = Scheduler::builder().workers(4).on_start(hook).build().unwrap_err();
+        let SchedulerError::StartHook { worker, panic } = error else { panic!("{error}") };
+        assert_eq!(worker, 2);
+        assert!(panic.message.contains("not this one"), "{panic}");
+        assert_eq!(is_over.try_recv(), Err(mpsc::TryRecvError::Disconnected), "a thread lives, or its hook");
+    }
+}
+
+#[test]
+fn a_panic_in_a_stop_hook_harms_nobody() {
+    let scheduler = Scheduler::builder().workers(3).on_stop(|worker| panic!("{worker} objects")).build().unwrap();
+    assert_intact(&scheduler);
+    drop(scheduler);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_stay_on_their_processors() {
+    /// What the system lets the calling thread run on.
+    fn allowed() -> Vec<usize> {
+        let status = std::fs::read_to_string("/proc/thread-self/status").unwrap();
+        let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap();
+        let bounds = |range: &str| {
+            let (first, last) = range.split_once('-').unwrap_or((range, range));
+            first.parse::<usize>().unwrap()..=last.parse().unwrap()
+        };
+        list.trim().split(',').flat_map(bounds).collect()
+    }
+    let here = allowed();
+    let processors = here.clone();
+    let mask_of = move |worker: usize| AffinityMask::new([processors[worker % processors.len()]]);
+    let scheduler = Scheduler::builder().workers(4).affinity(mask_of.clone()).build().unwrap();
+    for _frame in 0..3 {
+        let seen = on_each(&scheduler, allowed);
+        assert_eq!(seen[0].2, here, "the caller stays where it is");
+        for (worker, _, allowed) in &seen[1..] {
+            assert_eq!(allowed, mask_of(*worker).processors());
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_impossible_place_is_an_error_that_names_the_worker() {
+    for impossible in [AffinityMask::new([]), AffinityMask::new([1023]), AffinityMask::new([usize::MAX])] {
+        let (builder, [started, stopped]) = watched(4);
+        let possible = AffinityMask::new(0..1024);
+        let mask = move |worker| if worker == 2 { impossible.clone() } else { possible.clone() };
+        let error = builder.affinity(mask).build().unwrap_err();
+        assert!(matches!(error, SchedulerError::Affinity { worker: 2, .. }), "{error}");
+        assert_eq!(sorted(&started), sorted(&stopped));
+    }
+}
+
+#[test]
+fn a_background_job_may_own_the_last_share_of_its_scheduler() {
+    for _round in 0..50 {
+        let (builder, [started, stopped]) = watched(3);
+        let scheduler = Arc::new(builder.build().unwrap());
+        let (go, may_go) = mpsc::channel::<()>();
+        let owned = Arc::clone(&scheduler);
+        let job = scheduler.background(move || {
+            may_go.recv().unwrap();
+            drop(owned);
+            7
+        });
+        // Nobody may begin it here, where waiting for it would run it.
+        assert_eq!(Arc::strong_count(&scheduler), 2);
+        drop(scheduler);
+        go.send(()).unwrap();
+        assert!(eventually(|| job.is_finished()));
+        assert_eq!(job.wait(), Ok(7));
+        // The thread that ran the job ends after it, and nobody waits for that.
+        assert!(eventually(|| stopped.lock().unwrap().len() == 2));
+        assert_eq!(sorted(&started), sorted(&stopped));
+    }
+}

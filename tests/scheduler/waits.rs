@@ -1,0 +1,230 @@
+//! Jobs that wait: for scopes of their own, for background jobs, for locks. None waits for ever, and none is interrupted by
+//! what it did not wait for.
+
+use std::{
+    cell::Cell,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+        mpsc,
+    },
+    thread,
+    time::Duration,
+};
+
+use drawloom::task::Scheduler;
+
+/// Runs `body` on a thread of its own, and fails if it does not end in a time that is long for the slowest machine.
+fn ends(body: impl FnOnce() + Send + 'static) {
+    let (done, is_done) = mpsc::channel();
+    let thread = thread::spawn(move || {
+        body();
+        // The other end is gone only if this came too late.
+        let _ = done.send(());
+    });
+    match is_done.recv_timeout(Duration::from_secs(30)) {
+        Ok(()) | Err(mpsc::RecvTimeoutError::Disconnected) => thread.join().unwrap(),
+        Err(mpsc::RecvTimeoutError::Timeout) => panic!("it waits for ever"),
+    }
+}
+
+#[derive(Default)]
+struct Flag(AtomicBool);
+
+impl Flag {
+    fn raise(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+
+    fn wait(&self) {
+        while !self.0.load(Ordering::Acquire) {
+            thread::sleep(Duration::from_micros(100));
+        }
+    }
+}
+
+/// A worker has helped with a scope of a background job, and goes on to a frame's job that waits for that background job.
+#[test]
+fn who_has_helped_a_background_job_may_wait_for_it() {
+    ends(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let [helped, may_go_on, waits] = [(); 3].map(|()| Arc::new(Flag::default()));
+        let background = scheduler.background({
+            let (scheduler, helped, may_go_on) = (Arc::clone(&scheduler), Arc::clone(&helped), Arc::clone(&may_go_on));
+            move || {
+                let helped = &helped;
+                let outcome = scheduler.scope(|scope| {
+                    scope.spawn(move |_scope, _worker| {
+                        helped.raise();
+                        may_go_on.wait();
+                    });
+                    helped.wait();
+                });
+                assert_eq!(outcome, Ok(()));
+            }
+        });
+        helped.wait();
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(|_scope, _worker| {
+                waits.raise();
+                assert_eq!(background.wait(), Ok(()));
+            });
+            may_go_on.raise();
+            waits.wait();
+        });
+        assert_eq!(outcome, Ok(()));
+    });
+}
+
+/// As before, and what the background job still waits for lies in the queue of the worker that waits for it.
+#[test]
+fn who_has_a_background_loops_token_may_wait_for_that_loop() {
+    ends(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let [joined, may_go_on, has_left, waits] = [(); 4].map(|()| Arc::new(Flag::default()));
+        let background = scheduler.background({
+            let flags = [&joined, &may_go_on, &has_left].map(Arc::clone);
+            let scheduler = Arc::clone(&scheduler);
+            move || {
+                let [joined, may_go_on, has_left] = flags;
+                let outcome = scheduler.parallel_for(3, 1, |range, _worker| match range.start {
+                    0 => has_left.wait(),
+                    1 => {
+                        joined.raise();
+                        may_go_on.wait();
+                        has_left.raise();
+                    }
+                    _ => {}
+                });
+                assert_eq!(outcome, Ok(()));
+            }
+        });
+        joined.wait();
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(|_scope, _worker| {
+                waits.raise();
+                assert_eq!(background.wait(), Ok(()));
+            });
+            may_go_on.raise();
+            waits.wait();
+        });
+        assert_eq!(outcome, Ok(()));
+    });
+}
+
+/// A job holds a lock while it waits for a scope of its own. A worker that has helped with that scope goes on to a job that
+/// wants the lock.
+#[test]
+fn a_lock_may_be_held_over_a_wait() {
+    ends(|| {
+        let scheduler = &Scheduler::new(2).unwrap();
+        let lock = &Mutex::new(());
+        let [is_held, has_helped] = &[(); 2].map(|()| Flag::default());
+        let outcome = scheduler.scope(|outer| {
+            outer.spawn(move |outer, _worker| {
+                let _guard = lock.lock().unwrap();
+                is_held.raise();
+                let outcome = scheduler.scope(|inner| {
+                    inner.spawn(move |_inner, _worker| {
+                        outer.spawn(move |_outer, _worker| drop(lock.lock().unwrap()));
+                        has_helped.raise();
+                    });
+                    has_helped.wait();
+                });
+                assert_eq!(outcome, Ok(()));
+            });
+            is_held.wait();
+        });
+        assert_eq!(outcome, Ok(()));
+    });
+}
+
+#[test]
+fn a_job_of_an_outer_scope_does_not_run_inside_the_wait_for_an_inner_one() {
+    thread_local! {
+        static INSIDE: Cell<bool> = const { Cell::new(false) };
+    }
+    for workers in [1, 2, 4] {
+        let scheduler = &Scheduler::new(workers).unwrap();
+        let ran = &AtomicUsize::new(0);
+        let outcome = scheduler.scope(|outer| {
+            for _ in 0..50 {
+                outer.spawn(move |outer, _worker| {
+                    assert!(!INSIDE.replace(true));
+                    let outcome = scheduler.scope(|_inner| {
+                        outer.spawn(|_outer, _worker| {
+                            assert!(!INSIDE.get(), "it interrupted a job that waits for something else");
+                            ran.fetch_add(1, Ordering::Relaxed);
+                        });
+                    });
+                    assert_eq!(outcome, Ok(()));
+                    INSIDE.set(false);
+                });
+            }
+        });
+        assert_eq!(outcome, Ok(()));
+        assert_eq!(ran.load(Ordering::Relaxed), 50);
+    }
+}
+
+/// Two jobs that need each other, which one thief takes out of an overflow at once.
+#[test]
+fn what_a_thief_takes_beside_its_job_is_seen_by_others() {
+    ends(|| {
+        // A shuffled scheduler has all jobs in overflows.
+        let scheduler = Scheduler::builder().workers(3).shuffle(1).build().unwrap();
+        for _ in 0..20 {
+            // Until all workers sleep.
+            thread::sleep(Duration::from_millis(5));
+            let [started, ended] = &[(); 2].map(|()| AtomicUsize::new(0));
+            let outcome = scheduler.scope(|scope| {
+                for _ in 0..2 {
+                    scope.spawn(move |_scope, _worker| {
+                        started.fetch_add(1, Ordering::Relaxed);
+                        while started.load(Ordering::Relaxed) < 2 {
+                            thread::yield_now();
+                        }
+                        ended.fetch_add(1, Ordering::Relaxed);
+                    });
+                }
+                while ended.load(Ordering::Relaxed) < 2 {
+                    thread::yield_now();
+                }
+            });
+            assert_eq!(outcome, Ok(()));
+        }
+    });
+}
+
+/// The owner of a scope waits in the midst of a job, and has nothing to do. What is spawned into the scope then is not for the
+/// owner alone.
+#[test]
+fn an_owner_without_work_does_not_get_all_of_it() {
+    let scheduler = &Scheduler::new(5).unwrap();
+    let by: &[AtomicUsize; 5] = &[const { AtomicUsize::new(0) }; 5];
+    let [is_away, is_over] = &[(); 2].map(|()| Flag::default());
+    let outcome = scheduler.scope(|outer| {
+        outer.spawn(move |_outer, _worker| {
+            let outcome = scheduler.scope(|inner| {
+                inner.spawn(move |inner, _worker| {
+                    is_away.raise();
+                    // The owner goes to sleep meanwhile.
+                    thread::sleep(Duration::from_millis(20));
+                    for _ in 0..200 {
+                        inner.spawn(move |_inner, worker| {
+                            by[worker.index()].fetch_add(1, Ordering::Relaxed);
+                            thread::sleep(Duration::from_millis(1));
+                        });
+                    }
+                });
+                is_away.wait();
+            });
+            assert_eq!(outcome, Ok(()));
+            is_over.raise();
+        });
+        is_over.wait();
+    });
+    assert_eq!(outcome, Ok(()));
+    let by = by.each_ref().map(|jobs| jobs.load(Ordering::Relaxed));
+    assert!(by.iter().filter(|&&jobs| jobs > 20).count() >= 2, "200 jobs ran so: {by:?}");
+}
