@@ -2,28 +2,34 @@
 //!
 //! Everything in the crate that blocks, counts or hands work over takes its atomics, locks, threads and deques from
 //! here. Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with
-//! `--cfg drawloom_loom` they are those of loom, a model checker, so that the tests beside the code walk through the
-//! interleavings of their threads. Both sides have one shape: a lock returns its guard and cannot be poisoned, and a
-//! wait takes the guard and gives it back.
+//! `--cfg drawloom_loom` they are those of loom, a model checker that walks through all interleavings of a few threads and
+//! knows what each memory ordering leaves open; with `--cfg drawloom_shuttle` they are those of shuttle, which tries
+//! interleavings at random, in one total order, and so copes with whole runs. The tests for either stand beside the code.
+//!
+//! All sides have one shape: a lock returns its guard and cannot be poisoned, and a wait takes the guard and gives it back.
 
 #[cfg(drawloom_loom)]
+use loom as primitives;
+#[cfg(drawloom_shuttle)]
+use shuttle as primitives;
+#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
+use std as primitives;
+
+#[cfg(any(drawloom_loom, drawloom_shuttle))]
 pub(crate) use self::modelled::{Condvar, Deque, Mutex, Stealer};
-#[cfg(not(drawloom_loom))]
+#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
 pub(crate) use self::native::{Condvar, Deque, Mutex, Stealer};
+
+#[cfg(drawloom_shuttle)]
+pub(crate) use self::drawn::Instant;
+#[cfg(all(test, drawloom_shuttle))]
+pub(crate) use self::drawn::check;
+#[cfg(not(drawloom_shuttle))]
+pub(crate) use std::time::Instant;
 
 pub(crate) use crossbeam_deque::Steal;
 
-#[cfg(drawloom_loom)]
-pub(crate) use loom::{
-    hint::spin_loop,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering, fence},
-    },
-    thread, thread_local,
-};
-#[cfg(not(drawloom_loom))]
-pub(crate) use std::{
+pub(crate) use self::primitives::{
     hint::spin_loop,
     sync::{
         Arc,
@@ -32,7 +38,7 @@ pub(crate) use std::{
     thread, thread_local,
 };
 
-#[cfg(not(drawloom_loom))]
+#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
 mod native {
     use parking_lot::MutexGuard;
 
@@ -59,19 +65,20 @@ mod native {
     }
 }
 
-#[cfg(drawloom_loom)]
+#[cfg(any(drawloom_loom, drawloom_shuttle))]
 mod modelled {
     use std::{collections::VecDeque, sync::PoisonError};
 
     use crossbeam_deque::Steal;
-    use loom::sync::{Arc, MutexGuard};
 
-    /// Loom's mutex, without poisoning.
-    pub(crate) struct Mutex<T>(loom::sync::Mutex<T>);
+    use super::primitives::sync::{self, Arc, MutexGuard};
+
+    /// The checker's mutex, without poisoning.
+    pub(crate) struct Mutex<T>(sync::Mutex<T>);
 
     impl<T> Mutex<T> {
         pub(crate) fn new(value: T) -> Self {
-            Self(loom::sync::Mutex::new(value))
+            Self(sync::Mutex::new(value))
         }
 
         pub(crate) fn lock(&self) -> MutexGuard<'_, T> {
@@ -79,12 +86,12 @@ mod modelled {
         }
     }
 
-    /// Loom's condition variable, without poisoning.
-    pub(crate) struct Condvar(loom::sync::Condvar);
+    /// The checker's condition variable, without poisoning.
+    pub(crate) struct Condvar(sync::Condvar);
 
     impl Condvar {
         pub(crate) fn new() -> Self {
-            Self(loom::sync::Condvar::new())
+            Self(sync::Condvar::new())
         }
 
         pub(crate) fn wait<'lock, T>(&self, guard: MutexGuard<'lock, T>) -> MutexGuard<'lock, T> {
@@ -96,7 +103,7 @@ mod modelled {
         }
     }
 
-    /// A locked stand-in for crossbeam's deque, which has no form that loom can look into.
+    /// A locked stand-in for crossbeam's deque, which has no form that a checker can look into.
     pub(crate) struct Deque<T>(Arc<Mutex<VecDeque<T>>>);
 
     impl<T> Deque<T> {
@@ -135,5 +142,60 @@ mod modelled {
         pub(crate) fn is_empty(&self) -> bool {
             self.0.lock().is_empty()
         }
+    }
+}
+
+/// What shuttle draws.
+#[cfg(drawloom_shuttle)]
+mod drawn {
+    use std::time::Duration;
+
+    use shuttle::rand::{Rng, thread_rng};
+
+    /// A moment that is drawn too, so that what the time decides comes out either way, and the same way when an interleaving
+    /// is run again. One that is said to be later may be earlier, which counts as no time between them.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Instant(Duration);
+
+    /// The latest moment, in nanoseconds, as a rule and at times: most things take about the same, and few take long.
+    const LATEST: u64 = 1_000;
+    const LATEST_AT_TIMES: u64 = 20_000;
+
+    impl Instant {
+        pub(crate) fn now() -> Self {
+            let mut random = thread_rng();
+            let latest = if random.gen_ratio(1, 8) { LATEST_AT_TIMES } else { LATEST };
+            Self(Duration::from_nanos(random.gen_range(0..=latest)))
+        }
+
+        pub(crate) fn duration_since(self, earlier: Self) -> Duration {
+            self.0.saturating_sub(earlier.0)
+        }
+
+        pub(crate) fn elapsed(self) -> Duration {
+            Self::now().duration_since(self)
+        }
+    }
+
+    /// Runs a test in some thousand interleavings: half of them with a switch of threads at any moment, and half with few
+    /// switches, each of which holds a thread up for long (Burckhardt et al., "A Randomized Scheduler with Probabilistic
+    /// Guarantees of Finding Bugs", 2010).
+    #[cfg(test)]
+    pub(crate) fn check(run: impl Fn() + Send + Sync + 'static) {
+        use shuttle::{
+            Config, Runner,
+            scheduler::{PctScheduler, RandomScheduler},
+        };
+
+        const INTERLEAVINGS: usize = 2_000;
+        const SWITCHES: usize = 3;
+
+        let mut config = Config::new();
+        // The stack that shuttle gives a thread by itself is too small for the message of a panic to be put together.
+        config.stack_size = 256 * 1024;
+        let run = std::sync::Arc::new(run);
+        let again = std::sync::Arc::clone(&run);
+        Runner::new(RandomScheduler::new(INTERLEAVINGS), config.clone()).run(move || run());
+        Runner::new(PctScheduler::new(SWITCHES, INTERLEAVINGS), config).run(move || again());
     }
 }

@@ -1,9 +1,12 @@
 //! A run on one thread: one process after another, as they stand. Nothing is counted, as each stands after all it depends
 //! on.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::task::{Chunks, Worker};
+use crate::{
+    sync::Instant,
+    task::{Chunks, Worker},
+};
 
 use super::{
     error::NodeError,

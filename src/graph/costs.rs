@@ -1,8 +1,8 @@
 //! What the processes of a schedule cost, measured in some of the runs.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::sync::{AtomicU32, AtomicUsize, Ordering};
+use crate::sync::{AtomicU32, AtomicUsize, Instant, Ordering};
 
 /// What has been measured so far. Durations are in nanoseconds.
 pub(super) struct Costs {

@@ -1,13 +1,9 @@
 //! A run of a schedule: chooses the way it goes, and says how it ended.
 
-use std::{
-    mem,
-    ops::Range,
-    time::{Duration, Instant},
-};
+use std::{mem, ops::Range, time::Duration};
 
 use crate::{
-    sync::{AtomicBool, Mutex, Ordering},
+    sync::{AtomicBool, Instant, Mutex, Ordering},
     task::{Chunks, JobPanic, Scheduler, Worker, catch, discard},
 };
 

@@ -137,6 +137,9 @@ mod share;
 mod sharing;
 mod token;
 
+#[cfg(all(test, drawloom_shuttle))]
+mod shuttle_tests;
+
 pub use self::{
     builder::{FrameGraph, ProcessId, ResourceId},
     error::{CompileError, GraphProblem, NodeError, RunError},

@@ -96,3 +96,115 @@ impl OpenPass {
         finished > 0 && self.done.fetch_add(finished, Ordering::AcqRel) + finished == chunks.count()
     }
 }
+
+#[cfg(all(test, drawloom_loom))]
+mod loom_tests {
+    use loom::{cell::UnsafeCell, model, thread};
+
+    use super::{Flow, OpenPass, Progress};
+    use crate::{sync::Arc, task::Chunks};
+
+    /// What each of several threads writes, and the last of them reads, checked by loom for races.
+    struct Cells<const COUNT: usize>([UnsafeCell<usize>; COUNT]);
+
+    impl<const COUNT: usize> Cells<COUNT> {
+        fn new() -> Self {
+            Self([(); COUNT].map(|()| UnsafeCell::new(0)))
+        }
+
+        fn write(&self, place: usize, value: usize) {
+            // SAFETY: Only one thread writes the cell, before it counts itself off; loom checks that.
+            self.0[place].with_mut(|cell| unsafe { *cell = value });
+        }
+
+        fn values(&self) -> [usize; COUNT] {
+            // SAFETY: They are read when all who write them are counted off; loom checks that.
+            self.0.each_ref().map(|cell| cell.with(|cell| unsafe { *cell }))
+        }
+    }
+
+    /// Calls `call` on as many threads with 0, 1 and so on, and says how many of the calls returned true.
+    fn count_true<const THREADS: usize, T: 'static>(state: &Arc<T>, call: fn(&T, usize) -> bool) -> usize {
+        let threads: Vec<_> = (1..THREADS)
+            .map(|place| {
+                let state = Arc::clone(state);
+                thread::spawn(move || call(&state, place))
+            })
+            .collect();
+        let here = usize::from(call(state, 0));
+        here + threads.into_iter().map(|thread| usize::from(thread.join().unwrap())).sum::<usize>()
+    }
+
+    /// A process that depends on so many others.
+    struct Joint<const COUNT: usize> {
+        progress: Progress,
+        cells: Cells<COUNT>,
+    }
+
+    impl<const COUNT: usize> Joint<COUNT> {
+        fn new() -> Arc<Self> {
+            let mut dependencies = vec![Vec::new(); COUNT];
+            dependencies.push((0..COUNT).collect());
+            Arc::new(Self { progress: Progress::new(&Flow::new(&dependencies)), cells: Cells::new() })
+        }
+
+        /// What one of the others does, and the joint if that was the last.
+        fn complete(&self, place: usize) -> bool {
+            self.cells.write(place, 1);
+            let is_last = self.progress.release(COUNT as u32);
+            if is_last {
+                self.progress.arm(COUNT as u32, COUNT as u32);
+                assert_eq!(self.cells.values(), [1; COUNT]);
+            }
+            is_last
+        }
+    }
+
+    #[test]
+    fn one_of_two_dependencies_is_the_last_and_sees_the_other_in_each_of_two_runs() {
+        model(|| {
+            let joint = Joint::<2>::new();
+            for _run in 0..2 {
+                assert_eq!(count_true::<2, _>(&joint, Joint::complete), 1);
+                joint.cells.write(0, 0);
+                joint.cells.write(1, 0);
+            }
+        });
+    }
+
+    #[test]
+    fn one_of_three_dependencies_is_the_last_and_sees_the_others() {
+        model(|| assert_eq!(count_true::<3, _>(&Joint::<3>::new(), Joint::complete), 1));
+    }
+
+    /// A pass of three chunks.
+    struct Pass {
+        pass: OpenPass,
+        cells: Cells<3>,
+    }
+
+    impl Pass {
+        /// The first does two of the chunks.
+        fn work(&self, place: usize) -> bool {
+            let chunks = self.pass.chunks();
+            let own = if place == 0 { 0..2 } else { 2..3 };
+            let finished = own.len();
+            own.for_each(|chunk| self.cells.write(chunk, 1));
+            let is_last = self.pass.finish(finished, &chunks);
+            if is_last {
+                assert_eq!(self.cells.values(), [1; 3]);
+            }
+            is_last
+        }
+    }
+
+    #[test]
+    fn one_of_two_workers_finishes_a_pass_and_sees_all_chunks() {
+        model(|| {
+            let pass = Arc::new(Pass { pass: OpenPass::new(), cells: Cells::new() });
+            pass.pass.open(Chunks::new(3, 1), 0);
+            assert_eq!(count_true::<2, _>(&pass, Pass::work), 1);
+            assert!(!pass.pass.finish(0, &pass.pass.chunks()), "who has done nothing is not the last");
+        });
+    }
+}

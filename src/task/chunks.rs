@@ -1,8 +1,8 @@
 //! How a range is cut into chunks, and who takes which.
 
-use std::{ops::Range, time::Instant};
+use std::ops::Range;
 
-use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
 
 use super::worker::Worker;
 
@@ -192,8 +192,8 @@ impl Pace {
 
     /// So many more have been taken, and begin.
     fn adapt(&mut self, taken: usize) {
-        // Where threads are modelled time tells nothing.
-        if cfg!(any(drawloom_loom, drawloom_shuttle)) {
+        // A model that depends on the time cannot be walked through twice.
+        if cfg!(drawloom_loom) {
             return;
         }
         let now = Instant::now();

@@ -4,9 +4,9 @@
 //! for as long as a wake-up takes, which at worst doubles what waiting costs. Between frames it looks for
 //! [`HOT`], so that frames that follow at once meet workers that are awake; then it sleeps.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::sync::spin_loop;
+use crate::sync::{Instant, spin_loop};
 
 use super::{
     queue::Band,

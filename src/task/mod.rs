@@ -151,6 +151,9 @@ mod sleep;
 mod wake_price;
 mod worker;
 
+#[cfg(all(test, drawloom_shuttle))]
+mod shuttle_tests;
+
 pub use affinity::AffinityMask;
 pub use background::BackgroundJob;
 pub use builder::{SchedulerBuilder, SchedulerError};

@@ -279,3 +279,80 @@ impl Overflow {
         result
     }
 }
+
+#[cfg(all(test, drawloom_loom))]
+mod loom_tests {
+    use loom::{model::Builder, thread};
+
+    use super::{Band, Job, Queues, Work};
+    use crate::task::{
+        Crew, Scheduler, Tokens,
+        region::{self, Region},
+    };
+
+    struct NoTokens;
+
+    impl Tokens for NoTokens {
+        fn run(&self, _token: u64, _crew: &Crew<'_>) {
+            unreachable!("the jobs are taken, and not run");
+        }
+    }
+
+    fn token(job: Option<Job>) -> Option<u64> {
+        job.map(|job| match job.work {
+            Work::Token(token) => token,
+            Work::Closure(_) => unreachable!("there are tokens only"),
+        })
+    }
+
+    /// The owner pushes so many jobs, takes one back after `early` of them, and the rest at the end, while a thief is at it.
+    /// Says what the owner took at the end, and what the thief took.
+    fn share(region: &'static Region, jobs: u64, early: u64) -> (Option<u64>, Vec<u64>, Vec<u64>) {
+        let queues = Queues::new(None);
+        let loot = queues.loot();
+        let thief = thread::spawn(move || (0..4).filter_map(|_| token(loot.of(Band::Normal).steal())).collect());
+        let mut taken_early = None;
+        for number in 0..jobs {
+            if number == early {
+                taken_early = token(queues.pop(Band::Normal, 0));
+            }
+            queues.push(Job { work: Work::Token(number), region, depth: 0 }, Band::Normal);
+        }
+        let taken = std::iter::from_fn(|| token(queues.pop(Band::Normal, 0))).collect();
+        (taken_early, taken, thief.join().unwrap())
+    }
+
+    fn check_each_once(jobs: u64, early: u64) {
+        let mut builder = Builder::new();
+        builder.preemption_bound = Some(3);
+        builder.check(move || {
+            let scheduler = Scheduler::new(1).unwrap();
+            let outcome = scheduler.seated(|worker| {
+                region::open(worker, &NoTokens, |region| {
+                    let (taken_early, taken, stolen) = share(region, jobs, early);
+                    assert!(taken.is_sorted_by(|earlier, later| earlier > later), "not the newest first: {taken:?}");
+                    assert!(stolen.is_sorted(), "not the oldest first: {stolen:?}");
+                    let mut all: Vec<u64> = taken_early.into_iter().chain(taken).chain(stolen).collect();
+                    all.sort_unstable();
+                    assert_eq!(all, Vec::from_iter(0..jobs));
+                })
+            });
+            assert_eq!(outcome, Ok(()));
+        });
+    }
+
+    #[test]
+    fn jobs_that_overflow_are_taken_once_by_the_owner_or_a_thief() {
+        check_each_once(3, 3);
+    }
+
+    #[test]
+    fn jobs_that_follow_an_overflow_are_taken_after_it() {
+        check_each_once(4, 4);
+    }
+
+    #[test]
+    fn room_that_becomes_free_is_used_again() {
+        check_each_once(4, 3);
+    }
+}

@@ -4,12 +4,12 @@ use std::{
     fmt, mem,
     ops::Range,
     panic::{self, AssertUnwindSafe},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Arc, AtomicBool, AtomicUsize, Ordering, thread};
+use crate::sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread};
 
 use super::{
     background::{BackgroundJob, BackgroundQueue},
@@ -140,8 +140,9 @@ impl Scheduler {
     /// other than 0 when that has nothing else to do; or wherever [`run_background`](Self::run_background) is called, which
     /// with a single worker is the only place; or where its end is [waited for](BackgroundJob::wait).
     ///
-    /// What it spawns itself, in scopes and loops on this scheduler, is background work as well. Jobs that have not begun
-    /// when the scheduler is dropped run only if they are waited for.
+    /// What it spawns itself, in scopes and loops on this scheduler, is background work as well, unless it is run by who waits
+    /// for it: then it is part of that. Jobs that have not begun when the scheduler is dropped run only if they are waited
+    /// for.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let (job, queued) = BackgroundJob::new(job);
         self.shared.background().put(queued);

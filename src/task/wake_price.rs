@@ -1,11 +1,8 @@
 //! What it costs to wake a worker, measured where it will be paid.
 
-use std::{
-    sync::OnceLock,
-    time::{Duration, Instant},
-};
+use std::{sync::OnceLock, time::Duration};
 
-use crate::sync::spin_loop;
+use crate::sync::{Instant, spin_loop};
 
 use super::{placement::Placement, scheduler::Scheduler};
 

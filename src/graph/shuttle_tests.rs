@@ -1,0 +1,246 @@
+//! Whole runs of small schedules, in interleavings that shuttle draws.
+//!
+//! Each process counts how often each of its items has run, and looks whether all it depends on has run to the last item.
+
+use std::{iter, ops::Range, panic::resume_unwind, sync::Arc, time::Duration};
+
+use crate::{
+    sync::{AtomicUsize, Ordering, check},
+    task::{Scheduler, SchedulerBuilder, Worker},
+};
+
+use super::{FrameGraph, Node, NodeError, RunError, Schedule};
+
+/// Between what the schedules here take as a rule and what they take at times, as far as moments that are drawn go, so that
+/// some runs go alone to the end, and some are given up halfway.
+const WAKE_PRICE: Duration = Duration::from_micros(2);
+
+/// What a run works on.
+struct Frame<'frame> {
+    scheduler: &'frame Scheduler,
+    /// Per process, how often each of its items has run.
+    ran: Vec<Vec<AtomicUsize>>,
+    /// How often a process was asked anything before all that it depends on had run.
+    too_early: AtomicUsize,
+    /// Whether the processes that can fail do.
+    fails: bool,
+}
+
+/// What is particular about a process.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Plain,
+    Pinned,
+    /// It opens a scope and a loop in each item.
+    Nests,
+    /// Its second item ends in an error, or in a panic.
+    Fails,
+    Panics,
+}
+
+#[derive(Clone)]
+struct Process {
+    index: usize,
+    width: usize,
+    kind: Kind,
+    after: Vec<usize>,
+}
+
+impl Process {
+    fn look_back(&self, frame: &Frame<'_>) {
+        let mut items = self.after.iter().flat_map(|&before| &frame.ran[before]);
+        if items.any(|item| item.load(Ordering::Relaxed) != 1) {
+            frame.too_early.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn nest(&self, scheduler: &Scheduler) {
+        let inner = AtomicUsize::new(0);
+        let count = || _ = inner.fetch_add(1, Ordering::Relaxed);
+        let outcome = scheduler.scope(|scope| (0..2).for_each(|_job| scope.spawn(|_scope, _worker| count())));
+        assert_eq!(outcome, Ok(()));
+        assert_eq!(scheduler.parallel_for(2, 1, |_range, _worker| count()), Ok(()));
+        assert_eq!(inner.load(Ordering::Relaxed), 4);
+    }
+}
+
+impl Node<Frame<'_>> for Process {
+    fn width(&self, frame: &Frame<'_>) -> usize {
+        self.look_back(frame);
+        self.width
+    }
+
+    fn pinned(&self) -> bool {
+        self.kind == Kind::Pinned
+    }
+
+    fn run(&self, frame: &Frame<'_>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
+        assert!(worker.index() == 0 || self.kind != Kind::Pinned);
+        self.look_back(frame);
+        if frame.fails && range.contains(&1) {
+            match self.kind {
+                Kind::Fails => return Err("as planned".into()),
+                // Without a word on the console, which would be said in each interleaving.
+                Kind::Panics => resume_unwind(Box::new("as planned")),
+                Kind::Plain | Kind::Pinned | Kind::Nests => {}
+            }
+        }
+        if self.kind == Kind::Nests {
+            self.nest(frame.scheduler);
+        }
+        for item in range {
+            frame.ran[self.index][item].fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+/// Processes with their widths, and what they come after.
+fn processes(list: &[(usize, Kind, &[usize])]) -> Vec<Process> {
+    let process = |(index, &(width, kind, after)): (usize, &(usize, Kind, &[usize]))| Process {
+        index,
+        width,
+        kind,
+        after: after.to_vec(),
+    };
+    list.iter().enumerate().map(process).collect()
+}
+
+fn schedule(processes: &[Process]) -> Schedule<Process> {
+    let mut graph = FrameGraph::new();
+    let mut ids = Vec::new();
+    for process in processes {
+        let id = graph.add(process.index.to_string(), process.clone());
+        graph.keep(id);
+        process.after.iter().for_each(|&before| graph.order(ids[before], id));
+        ids.push(id);
+    }
+    graph.compile().expect("each comes after others")
+}
+
+/// Runs one frame, and says how often each item has run.
+fn run_frame(
+    schedule: &mut Schedule<Process>,
+    scheduler: &Scheduler,
+    fails: bool,
+) -> (Result<(), RunError>, Vec<Vec<usize>>) {
+    let counters = |process: &Process| iter::repeat_with(|| AtomicUsize::new(0)).take(process.width).collect();
+    let ran = schedule.processes().map(|(_, process)| counters(process)).collect();
+    let frame = Frame { scheduler, ran, too_early: AtomicUsize::new(0), fails };
+    let outcome = schedule.run(scheduler, &frame);
+    assert_eq!(frame.too_early.load(Ordering::Relaxed), 0);
+    let counts = |items: &Vec<AtomicUsize>| items.iter().map(|item| item.load(Ordering::Relaxed)).collect();
+    (outcome, frame.ran.iter().map(counts).collect())
+}
+
+/// Runs a whole frame.
+fn run_all(schedule: &mut Schedule<Process>, scheduler: &Scheduler) {
+    let (outcome, ran) = run_frame(schedule, scheduler, false);
+    outcome.unwrap();
+    assert!(ran.iter().flatten().all(|&times| times == 1), "an item is missing, or has run twice: {ran:?}");
+}
+
+/// Checks that many frames of these processes, on schedulers of a few workers and on one that shuffles.
+fn check_frames(frames: usize, always_share: bool, processes: Vec<Process>) {
+    let processes = Arc::new(processes);
+    for (workers, seed) in [(2, None), (3, None), (2, Some(1))] {
+        let processes = Arc::clone(&processes);
+        check(move || {
+            let builder = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE);
+            let scheduler = seed.into_iter().fold(builder, SchedulerBuilder::shuffle).build().unwrap();
+            let mut schedule = schedule(&processes);
+            schedule.always_share(always_share);
+            (0..frames).for_each(|_frame| run_all(&mut schedule, &scheduler));
+        });
+    }
+}
+
+#[test]
+fn shuttle_a_diamond_runs_in_order() {
+    use Kind::Plain;
+    check_frames(1, true, processes(&[(1, Plain, &[]), (1, Plain, &[0]), (1, Plain, &[0]), (1, Plain, &[1, 2])]));
+}
+
+#[test]
+fn shuttle_many_that_become_ready_together_all_run() {
+    use Kind::Plain;
+    let fan = [(1, Plain, &[0][..]); 9];
+    let list: Vec<_> =
+        iter::once((1, Plain, &[][..])).chain(fan).chain([(1, Plain, &[1, 2, 3, 4, 5, 6, 7, 8, 9][..])]).collect();
+    check_frames(1, true, processes(&list));
+}
+
+#[test]
+fn shuttle_a_wide_process_is_done_when_its_last_item_is() {
+    use Kind::Plain;
+    check_frames(1, true, processes(&[(1, Plain, &[]), (5, Plain, &[0]), (0, Plain, &[0]), (2, Plain, &[1, 2])]));
+}
+
+#[test]
+fn shuttle_pinned_processes_run_on_the_calling_thread() {
+    use Kind::{Pinned, Plain};
+    let list: [(usize, Kind, &[usize]); 5] =
+        [(1, Plain, &[]), (2, Pinned, &[0]), (1, Plain, &[0]), (2, Plain, &[1, 2]), (1, Pinned, &[2])];
+    check_frames(1, true, processes(&list));
+}
+
+#[test]
+fn shuttle_processes_may_open_scopes() {
+    use Kind::{Nests, Plain};
+    check_frames(1, true, processes(&[(2, Nests, &[]), (1, Nests, &[]), (1, Plain, &[0, 1])]));
+}
+
+#[test]
+fn shuttle_one_frame_follows_another() {
+    use Kind::{Pinned, Plain};
+    let list: [(usize, Kind, &[usize]); 5] =
+        [(3, Plain, &[]), (1, Plain, &[]), (1, Plain, &[0]), (1, Pinned, &[0, 1]), (2, Plain, &[2, 3])];
+    check_frames(3, true, processes(&list));
+}
+
+#[test]
+fn shuttle_a_run_that_is_too_long_for_one_thread_is_gone_on_with_by_all() {
+    use Kind::{Pinned, Plain};
+    let list: [(usize, Kind, &[usize]); 6] = [
+        (2, Plain, &[]),
+        (4, Plain, &[]),
+        (2, Plain, &[0]),
+        (2, Pinned, &[0]),
+        (1, Plain, &[0, 1]),
+        (3, Plain, &[2, 3, 4]),
+    ];
+    check_frames(4, false, processes(&list));
+}
+
+#[test]
+fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
+    use Kind::{Fails, Panics, Plain};
+    for (kind, other, always_share) in [(Fails, Plain, true), (Panics, Plain, false), (Fails, Panics, true)] {
+        for workers in [2, 3] {
+            check(move || {
+                let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
+                let list: [(usize, Kind, &[usize]); 5] =
+                    [(1, Plain, &[]), (3, kind, &[0]), (2, other, &[0]), (1, Plain, &[1]), (1, Plain, &[2, 3])];
+                let mut schedule = schedule(&processes(&list));
+                schedule.always_share(always_share);
+                if !always_share {
+                    run_all(&mut schedule, &scheduler);
+                }
+                let (outcome, ran) = run_frame(&mut schedule, &scheduler, true);
+                match outcome {
+                    Err(RunError::Failed { process, source }) => {
+                        assert_eq!((process.as_str(), source.to_string().as_str()), ("1", "as planned"));
+                    }
+                    Err(RunError::Panicked { process, message }) => {
+                        assert!(process == "1" || process == "2");
+                        assert_eq!(message, "as planned");
+                    }
+                    other => panic!("a run with a failure: {other:?}"),
+                }
+                assert_eq!(ran[3..], [[0], [0]], "what depends on a failure");
+                assert!(ran.iter().flatten().all(|&times| times <= 1), "{ran:?}");
+                run_all(&mut schedule, &scheduler);
+            });
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Scopes, loops and background jobs on a whole scheduler, in interleavings that shuttle draws.
+//!
+//! What is asserted is that all is run, once, and where it may be. That nobody sleeps through it is asserted by shuttle: a
+//! call that never returns leaves all threads asleep, which it takes for a failure.
+
+use std::{iter, panic::resume_unwind, sync::Arc};
+
+use crate::sync::{AtomicUsize, Ordering, check, thread};
+
+use super::{JobPanic, Scheduler};
+
+fn counters(count: usize) -> Vec<AtomicUsize> {
+    iter::repeat_with(|| AtomicUsize::new(0)).take(count).collect()
+}
+
+fn counts(counters: &[AtomicUsize]) -> Vec<usize> {
+    counters.iter().map(|counter| counter.load(Ordering::Relaxed)).collect()
+}
+
+fn count(counter: &AtomicUsize) {
+    counter.fetch_add(1, Ordering::Relaxed);
+}
+
+/// Panics without a word on the console, which would be said in each interleaving.
+fn panic_as_planned() -> ! {
+    resume_unwind(Box::new("as planned"))
+}
+
+/// Checks `run` on schedulers of a few workers.
+fn check_on_schedulers(run: impl Fn(&Scheduler) + Send + Sync + 'static) {
+    let run = Arc::new(run);
+    for workers in [2, 3] {
+        let run = Arc::clone(&run);
+        check(move || run(&Scheduler::new(workers).unwrap()));
+    }
+}
+
+#[test]
+fn shuttle_jobs_that_spawn_jobs_all_run_before_the_scope_ends() {
+    check_on_schedulers(|scheduler| {
+        let ran = counters(8);
+        let outcome = scheduler.scope(|scope| {
+            for jobs in ran.chunks(4) {
+                scope.spawn(move |scope, _worker| {
+                    for job in &jobs[1..] {
+                        scope.spawn(move |_scope, _worker| count(job));
+                    }
+                    count(&jobs[0]);
+                });
+            }
+        });
+        assert_eq!(outcome, Ok(()));
+        assert_eq!(counts(&ran), [1; 8]);
+    });
+}
+
+#[test]
+fn shuttle_pinned_jobs_run_on_the_calling_thread_in_order() {
+    check_on_schedulers(|scheduler| {
+        let caller = thread::current().id();
+        let pinned = counters(2);
+        let outcome = scheduler.scope(|scope| {
+            for counter in &pinned {
+                scope.spawn(move |scope, _worker| {
+                    for place in 0..2 {
+                        scope.spawn_pinned(move |_scope, worker| {
+                            assert_eq!((worker.index(), thread::current().id()), (0, caller));
+                            assert_eq!(counter.fetch_add(1, Ordering::Relaxed), place);
+                        });
+                    }
+                });
+            }
+        });
+        assert_eq!(outcome, Ok(()));
+        assert_eq!(counts(&pinned), [2, 2]);
+    });
+}
+
+#[test]
+fn shuttle_a_loop_gives_each_index_once() {
+    check_on_schedulers(|scheduler| {
+        let ran = counters(7);
+        for times in 1..3 {
+            let outcome = scheduler.parallel_for(ran.len(), 2, |range, _worker| ran[range].iter().for_each(count));
+            assert_eq!(outcome, Ok(()));
+            assert_eq!(counts(&ran), [times; 7]);
+        }
+    });
+}
+
+#[test]
+fn shuttle_a_loop_in_a_job_runs_nothing_else_on_its_worker() {
+    check_on_schedulers(|scheduler| {
+        let ran = counters(4);
+        let depths = counters(scheduler.workers());
+        let outcome = scheduler.scope(|scope| {
+            for _job in 0..3 {
+                let (ran, depths) = (&ran, &depths);
+                scope.spawn(move |_scope, worker| {
+                    let depth = &depths[worker.index()];
+                    assert_eq!(
+                        depth.fetch_add(1, Ordering::Relaxed),
+                        0,
+                        "another job of the scope has been interrupted"
+                    );
+                    let inner = scheduler.parallel_for(2, 1, |range, _worker| count(&ran[range.start]));
+                    assert_eq!(inner, Ok(()));
+                    depth.fetch_sub(1, Ordering::Relaxed);
+                    count(&ran[2]);
+                });
+            }
+            count(&ran[3]);
+        });
+        assert_eq!(outcome, Ok(()));
+        assert_eq!(counts(&ran), [3, 3, 3, 1]);
+    });
+}
+
+#[test]
+fn shuttle_a_panic_is_returned_when_the_other_jobs_have_run() {
+    check_on_schedulers(|scheduler| {
+        let ran = counters(3);
+        let outcome = scheduler.scope(|scope| {
+            for (job, counter) in ran.iter().enumerate() {
+                scope.spawn(move |scope, _worker| {
+                    scope.spawn(move |_scope, _worker| count(counter));
+                    if job == 1 {
+                        panic_as_planned();
+                    }
+                });
+            }
+        });
+        assert_eq!(outcome, Err(JobPanic { message: "as planned".to_owned() }));
+        assert_eq!(counts(&ran), [1; 3]);
+    });
+}
+
+#[test]
+fn shuttle_two_threads_that_share_a_scheduler_are_served_in_turn() {
+    check(|| {
+        let scheduler = Arc::new(Scheduler::new(2).unwrap());
+        let inside = Arc::new(AtomicUsize::new(0));
+        let serve = |scheduler: &Scheduler, inside: &AtomicUsize| {
+            let outcome = scheduler.scope(|scope| {
+                scope.spawn_pinned(|_scope, _worker| {
+                    assert_eq!(inside.fetch_add(1, Ordering::Relaxed), 0);
+                    inside.fetch_sub(1, Ordering::Relaxed);
+                });
+                scope.spawn(|_scope, _worker| ());
+            });
+            assert_eq!(outcome, Ok(()));
+        };
+        let other = thread::spawn({
+            let (scheduler, inside) = (Arc::clone(&scheduler), Arc::clone(&inside));
+            move || serve(&scheduler, &inside)
+        });
+        serve(&scheduler, &inside);
+        other.join().unwrap();
+    });
+}
+
+#[test]
+fn shuttle_background_jobs_run_beside_frames_and_off_the_calling_thread() {
+    check_on_schedulers(|scheduler| {
+        let caller = thread::current().id();
+        let ran = Arc::new(AtomicUsize::new(0));
+        let jobs = [1, 2].map(|number| {
+            let ran = Arc::clone(&ran);
+            scheduler.background(move || {
+                assert_ne!(thread::current().id(), caller);
+                count(&ran);
+                number
+            })
+        });
+        let frame = AtomicUsize::new(0);
+        scheduler.parallel_for(3, 1, |_range, _worker| count(&frame)).unwrap();
+        assert_eq!(frame.into_inner(), 3);
+        while !jobs.iter().all(|job| job.is_finished()) {
+            thread::yield_now();
+        }
+        assert_eq!(jobs.map(|job| job.wait()), [Ok(1), Ok(2)]);
+        assert_eq!(ran.load(Ordering::Relaxed), 2);
+    });
+}
+
+#[test]
+fn shuttle_whoever_waits_for_a_background_job_gets_it_whoever_runs_it() {
+    check_on_schedulers(|scheduler| {
+        let ran = Arc::new(AtomicUsize::new(0));
+        let job = scheduler.background({
+            let ran = Arc::clone(&ran);
+            move || ran.fetch_add(1, Ordering::Relaxed)
+        });
+        let failing = scheduler.background(|| panic_as_planned());
+        assert_eq!(failing.wait().map(|()| ()), Err(JobPanic { message: "as planned".to_owned() }));
+        assert_eq!(job.wait(), Ok(0));
+        assert_eq!(ran.load(Ordering::Relaxed), 1);
+    });
+}
+
+#[test]
+fn shuttle_a_background_job_has_scopes_of_its_own() {
+    check(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let caller = thread::current().id();
+        let job = scheduler.background({
+            let scheduler = Arc::clone(&scheduler);
+            move || {
+                let ran = counters(3);
+                let outcome = scheduler.parallel_for(ran.len(), 1, |range, _worker| {
+                    assert_ne!(thread::current().id(), caller);
+                    count(&ran[range.start]);
+                });
+                outcome.map(|()| counts(&ran))
+            }
+        });
+        scheduler.parallel_for(2, 1, |_range, _worker| ()).unwrap();
+        while !job.is_finished() {
+            thread::yield_now();
+        }
+        assert_eq!(job.wait(), Ok(Ok(vec![1; 3])));
+    });
+}
+
+#[test]
+fn shuttle_a_scheduler_ends_whatever_its_workers_are_at() {
+    check_on_schedulers(|_scheduler| ());
+    check(|| {
+        let scheduler = Scheduler::new(3).unwrap();
+        let ran = Arc::new(AtomicUsize::new(0));
+        let jobs = [(); 2].map(|()| {
+            let ran = Arc::clone(&ran);
+            scheduler.background(move || count(&ran))
+        });
+        drop(scheduler);
+        let before = ran.load(Ordering::Relaxed);
+        assert_eq!(jobs.map(|job| job.wait()), [Ok(()), Ok(())]);
+        assert!(before <= 2);
+        assert_eq!(ran.load(Ordering::Relaxed), 2, "each has run once, before the end or when it was waited for");
+    });
+}
