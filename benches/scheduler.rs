@@ -5,9 +5,9 @@
 //!     cargo bench --bench scheduler -- --row frame --row fine
 //!
 //! In a round all contenders of a row take turns, in an order drawn anew, and then those of the next row, so that whatever
-//! else the machine does meets them alike. A turn builds a pool of two workers, warms it up, measures, and drops it: pools do not disturb each other. What a
-//! contender does is checked before it is measured. Each row's file says what the row is; what is shown are medians. What
-//! was measured is written to `drawloom/scheduler.json` in the target folder too.
+//! else the machine does meets them alike. A turn builds a pool of two workers, warms it up, measures, and drops it, so that
+//! pools do not disturb each other. What a contender does is checked before it is measured. Each row's file says what the
+//! row is; what is shown are medians. What was measured is written to `drawloom/scheduler.json` in the target folder too.
 
 #[path = "scheduler/crew.rs"]
 mod crew;
@@ -126,17 +126,17 @@ impl Extent {
 
     fn row(&self, name: &str) -> Result<Row, Failure> {
         match name {
-            "graph_1k" => graph::row("graph_1k", self.graphs[0], self),
-            "graph_4k" => graph::row("graph_4k", self.graphs[1], self),
-            "graph_10k" => graph::row("graph_10k", self.graphs[2], self),
-            "frame" => passes::frame(self),
-            "frame_cold" => passes::frame_cold(self),
-            "fine" => passes::fine(self),
+            "graph_1k" => Ok(graph::row("graph_1k", self.graphs[0], self)),
+            "graph_4k" => Ok(graph::row("graph_4k", self.graphs[1], self)),
+            "graph_10k" => Ok(graph::row("graph_10k", self.graphs[2], self)),
+            "frame" => Ok(passes::frame(self)),
+            "frame_cold" => Ok(passes::frame_cold(self)),
+            "fine" => Ok(passes::fine(self)),
             "flat" => Ok(flat::row(self)),
             "wake" => Ok(wake::row(self)),
-            "idle" => idle::idle(self),
-            "asleep" => idle::asleep(self),
-            "tiny" => tiny::row(self),
+            "idle" => Ok(idle::idle(self)),
+            "asleep" => Ok(idle::asleep(self)),
+            "tiny" => Ok(tiny::row(self)),
             _ => Err(format!("there is no row {name:?}").into()),
         }
     }

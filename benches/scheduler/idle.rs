@@ -4,37 +4,31 @@
 
 use std::time::Duration;
 
+use crate::Extent;
 use crate::passes::Shape;
 use crate::turns::{Contender, Row};
 use crate::watch::Pace;
 use crate::work::Work;
-use crate::{Extent, Failure};
 
 const FRAME: Shape = Shape { passes: 1, jobs: 64 };
 
 /// 60 frames a second, each of 64 empty jobs. `sleep only` sleeps as often and has none: what it takes is the sleeping's.
-///
-/// # Errors
-/// If the graph cannot be compiled.
-pub fn idle(extent: &Extent) -> Result<Row, Failure> {
+pub fn idle(extent: &Extent) -> Row {
     let every = Duration::from_secs(1) / 60;
     let pace = Pace::Processor { every, frames: extent.idle_frames };
-    let mut row = row("idle", "µs CPU a frame", pace)?;
+    let mut row = row("idle", "µs CPU a frame", pace);
     let sleep_only = Contender::new("sleep only", |_work, watch| watch.frames(|| Ok(())));
     row.contenders.push(sleep_only.with_workers(1).with_easier_task().with_jobs(0));
-    Ok(row)
+    row
 }
 
 /// A frame, and then none.
-///
-/// # Errors
-/// If the graph cannot be compiled.
-pub fn asleep(extent: &Extent) -> Result<Row, Failure> {
+pub fn asleep(extent: &Extent) -> Row {
     row("asleep", "µs CPU a second", Pace::Asleep { still: extent.asleep })
 }
 
-fn row(name: &'static str, unit: &'static str, pace: Pace<'static>) -> Result<Row, Failure> {
-    Ok(Row {
+fn row(name: &'static str, unit: &'static str, pace: Pace<'static>) -> Row {
+    Row {
         name,
         unit,
         scale: 1e6,
@@ -43,7 +37,7 @@ fn row(name: &'static str, unit: &'static str, pace: Pace<'static>) -> Result<Ro
         jobs: FRAME.all(),
         order: FRAME.order(),
         contenders: vec![
-            FRAME.drawloom()?,
+            FRAME.drawloom(),
             FRAME.drawloom_parallel_for(),
             FRAME.rayon(),
             FRAME.rayon_single(),
@@ -51,5 +45,5 @@ fn row(name: &'static str, unit: &'static str, pace: Pace<'static>) -> Result<Ro
             FRAME.chili_scope_a_frame(),
             FRAME.std_threads(),
         ],
-    })
+    }
 }

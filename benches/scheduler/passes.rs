@@ -15,31 +15,24 @@ use crate::{Extent, Failure, WORKERS, pools};
 
 const PASSES: usize = 24;
 
-/// # Errors
-/// If the graph cannot be compiled.
-pub fn frame(extent: &Extent) -> Result<Row, Failure> {
+pub fn frame(extent: &Extent) -> Row {
     row("frame", Shape { passes: PASSES, jobs: 24 }, Duration::from_nanos(2_900), extent.hot())
 }
 
 /// The same, but a frame every 5 ms: workers and caches are cold.
-///
-/// # Errors
-/// If the graph cannot be compiled.
-pub fn frame_cold(extent: &Extent) -> Result<Row, Failure> {
+pub fn frame_cold(extent: &Extent) -> Row {
     let pace = Pace::Cold { every: Duration::from_millis(5), frames: extent.cold_frames };
     row("frame_cold", Shape { passes: PASSES, jobs: 24 }, Duration::from_nanos(2_900), pace)
 }
 
-/// # Errors
-/// If the graph cannot be compiled.
-pub fn fine(extent: &Extent) -> Result<Row, Failure> {
+pub fn fine(extent: &Extent) -> Row {
     row("fine", Shape { passes: PASSES, jobs: 192 }, Duration::from_nanos(300), extent.hot())
 }
 
-fn row(name: &'static str, shape: Shape, job: Duration, pace: Pace<'static>) -> Result<Row, Failure> {
+fn row(name: &'static str, shape: Shape, job: Duration, pace: Pace<'static>) -> Row {
     let mut contenders = vec![Contender::plain_loop(shape.all()), Contender::ideal(shape.all())];
-    contenders.extend(shape.contenders()?);
-    Ok(Row {
+    contenders.extend(shape.contenders());
+    Row {
         name,
         unit: "µs a frame",
         scale: 1e6,
@@ -48,7 +41,7 @@ fn row(name: &'static str, shape: Shape, job: Duration, pace: Pace<'static>) -> 
         jobs: shape.all(),
         order: shape.order(),
         contenders,
-    })
+    }
 }
 
 /// So many passes of so many jobs, each job a chunk of its own.
@@ -83,37 +76,35 @@ impl Shape {
     }
 
     /// All that can run passes, but for the plain loop.
-    ///
-    /// # Errors
-    /// If the graph cannot be compiled.
-    pub fn contenders(self) -> Result<Vec<Contender>, Failure> {
-        Ok(vec![
-            self.drawloom()?,
+    pub fn contenders(self) -> Vec<Contender> {
+        vec![
+            self.drawloom(),
             self.drawloom_parallel_for(),
             self.rayon(),
             self.rayon_single(),
             self.bevy_tasks(),
             self.chili(),
             self.std_threads(),
-        ])
+        ]
     }
 
-    /// A chain of nodes.
-    ///
-    /// # Errors
-    /// If the graph cannot be compiled.
-    pub fn drawloom(self) -> Result<Contender, Failure> {
+    /// A chain of nodes. Its schedule knows nothing at the start of a turn, as what it has learnt is of that turn's pool.
+    pub fn drawloom(self) -> Contender {
+        Contender::new("drawloom", move |work, watch| {
+            let mut schedule = self.schedule()?;
+            let scheduler = Scheduler::new(WORKERS)?;
+            watch.frames(|| Ok(schedule.run(&scheduler, work)?))
+        })
+    }
+
+    fn schedule(self) -> Result<Schedule<Chunks>, Failure> {
         let mut graph = FrameGraph::new();
         let nodes: Vec<_> = self.ranges().map(|jobs| graph.add(format!("{jobs:?}"), Chunks { jobs })).collect();
         for pair in nodes.windows(2) {
             graph.order(pair[0], pair[1]);
         }
         nodes.iter().for_each(|&node| graph.keep(node));
-        let mut schedule: Schedule<Chunks> = graph.compile()?;
-        Ok(Contender::new("drawloom", move |work, watch| {
-            let scheduler = Scheduler::new(WORKERS)?;
-            watch.frames(|| Ok(schedule.run(&scheduler, work)?))
-        }))
+        Ok(graph.compile()?)
     }
 
     pub fn drawloom_parallel_for(self) -> Contender {

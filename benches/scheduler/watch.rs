@@ -36,7 +36,7 @@ const WARM_UP: usize = 30;
 const LEAST_WARM_UP: usize = 3;
 const WARM_UP_TIME: [Duration; 2] = [Duration::from_millis(5), Duration::from_millis(40)];
 /// The same where frames are far apart.
-const COLD_WARM_UP: usize = 5;
+const COLD_WARM_UP: usize = 10;
 const CHECKED_FRAMES: usize = 20;
 const START: Duration = Duration::from_millis(10);
 
