@@ -103,7 +103,7 @@ impl Tickets {
     pub(crate) fn join(&self) -> Pace {
         self.is_open.store(false, Ordering::Relaxed);
         self.joined.fetch_add(1, Ordering::Relaxed);
-        Pace { most: self.pace.load(Ordering::Relaxed), since: None }
+        Pace::new(self.pace.load(Ordering::Relaxed))
     }
 
     /// Counts a worker out that does something else before all chunks are taken. Says whether it should queue a job through
@@ -131,7 +131,7 @@ impl Tickets {
         }
         // How long the last ones took, too: there may have been no others.
         if pace.since.is_some() {
-            pace.adapt(0);
+            pace.look(0);
         }
         if pace.most != self.pace.load(Ordering::Relaxed) {
             self.pace.store(pace.most, Ordering::Relaxed);
@@ -170,18 +170,26 @@ impl Tickets {
 pub(crate) struct Pace {
     /// Never less than one.
     most: usize,
-    /// When the chunks that were taken last began, and how many they are.
+    /// When the time was last asked, and how many chunks have been taken since.
     since: Option<(Instant, usize)>,
+    /// After how many chunks it is asked again.
+    look_after: usize,
 }
 
 impl Pace {
-    /// How many nanoseconds the chunks of one ticket may take: long enough for the ticket to cost nothing beside them, and so short
-    /// that it is no matter who runs them.
+    /// How many nanoseconds the chunks of one ticket may take: long enough for the ticket to cost nothing beside them, and so
+    /// short that it is no matter who runs them.
     const WORTH: usize = 8_000;
     /// The part of that which is worth a ticket even if less than that is left for each worker.
     const LEAST: usize = 16;
     /// By how much more than the last time may be taken: one cheap chunk says little about the rest.
     const GROWTH: usize = 4;
+    /// How many chunks go by without asking the time, once it is known.
+    const STEADY: usize = 8;
+
+    fn new(most: usize) -> Self {
+        Self { most, since: None, look_after: 1 }
+    }
 
     /// How many to take of so many: two thirds of what is this worker's share, within bounds.
     #[inline]
@@ -190,17 +198,27 @@ impl Pace {
         share.clamp((self.most / Self::LEAST).max(1), self.most).min(remaining)
     }
 
-    /// So many more have been taken, and begin.
+    /// So many more have been taken, and begin; those before are done.
+    #[inline]
     fn adapt(&mut self, taken: usize) {
-        // A model that depends on the time cannot be walked through twice.
+        match &mut self.since {
+            Some((_, chunks)) if *chunks < self.look_after => *chunks += taken,
+            _ => self.look(taken),
+        }
+    }
+
+    fn look(&mut self, taken: usize) {
+        // In loom's models time is real, and tells nothing.
         if cfg!(drawloom_loom) {
             return;
         }
         let now = Instant::now();
-        if let Some((since, chunks)) = self.since.replace((now, taken)) {
+        if let Some((since, chunks)) = self.since {
             let nanoseconds = (now.duration_since(since).as_nanos() as usize).max(1);
             let fitting = chunks.saturating_mul(Self::WORTH) / nanoseconds;
             self.most = fitting.clamp(1, self.most.max(chunks.saturating_mul(Self::GROWTH)));
+            self.look_after = Self::STEADY;
         }
+        self.since = Some((now, taken));
     }
 }

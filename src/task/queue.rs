@@ -36,10 +36,10 @@ impl Band {
 }
 
 /// How many jobs lie in the deque at most. Crossbeam's has room for 64 at first, and grows when that is full.
-const MOST_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 48 };
+const MOST_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 60 };
 
 /// How many jobs a thief takes out of an overflow beside the one it runs.
-const MOST_AT_ONCE: usize = 31;
+const MOST_AT_ONCE: usize = 59;
 
 /// A worker's own end of its queues, one for each band.
 pub(super) struct Queues {
@@ -167,11 +167,15 @@ impl Queue {
     }
 
     fn push(&self, job: Job) {
+        // Jobs in the overflow are newer than those in the deque, so as long as there are any, more follow them.
+        if !self.overflow.is_empty() {
+            self.overflow.put(job);
+            return;
+        }
         if self.room.get() == 0 {
             self.room.set(MOST_IN_DEQUE.saturating_sub(self.deque.len()));
         }
-        // Jobs in the overflow are newer than those in the deque, so as long as there are any, more follow them.
-        if self.room.get() == 0 || !self.overflow.is_empty() {
+        if self.room.get() == 0 {
             self.overflow.put(job);
         } else {
             self.room.set(self.room.get() - 1);
