@@ -96,7 +96,7 @@ impl SchedulerBuilder {
     }
 
     /// What it costs to wake a worker, instead of what is measured when the scheduler is built: see
-    /// [`Scheduler::wake_price`].
+    /// [`Scheduler::wake_price`]. With a price of 0 every loop is shared from its first chunk on.
     pub fn wake_price(mut self, price: Duration) -> Self {
         self.wake_price = Some(price);
         self

@@ -33,7 +33,7 @@ impl Chunks {
     /// The same chunks, in an order that this worker draws if the scheduler is to shuffle.
     pub(crate) fn shuffled(self, worker: &Worker) -> Self {
         let (Some(first), Some(step)) = (worker.draw(self.count), worker.draw(self.count)) else { return self };
-        // Every chunk is met once if step and count have no common divisor, as the count and its successor's remainder.
+        // Every chunk is met once if step and count have no common divisor.
         let step = (step..self.count).find(|&step| greatest_common_divisor(step, self.count) == 1).unwrap_or(1);
         Self { first, step, ..self }
     }

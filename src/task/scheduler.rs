@@ -37,7 +37,8 @@ use super::{
 /// and a job of that calls the first from a thread of the second; or where two threads each call one of two schedulers
 /// from within a call of the other.
 ///
-/// Dropping the scheduler ends its threads and waits until they are gone.
+/// Dropping the scheduler ends its threads and waits until they are gone; so who drops it must not be waited for by one of
+/// its jobs. A background job that drops the last share of its own scheduler is no such case.
 ///
 /// ```
 /// # use drawloom::task::Scheduler;
@@ -117,7 +118,8 @@ impl Scheduler {
     ///
     /// The ranges are `chunk` indices long, the last one may be shorter. A chunk of 0 is taken for 1, and a `length`
     /// beyond any slice, more than `isize::MAX`, may get chunks of up to 3. With a single worker or a single chunk
-    /// everything happens on the calling thread. `body` is not entered on a worker that is in the midst of it for this
+    /// everything happens on the calling thread, and so it does where the first chunks show that the loop is not worth waking
+    /// a worker for. `body` is not entered on a worker that is in the midst of it for this
     /// loop, even where it waits for a scope or a loop of its own.
     ///
     /// # Errors

@@ -94,6 +94,11 @@ impl Worker {
         self.shared.wake_price()
     }
 
+    /// Whether somebody sleeps who would have to be woken, and whom a worker may do without for what is not worth that.
+    pub(super) fn may_be_alone(&self) -> bool {
+        !self.is_shuffled() && !self.wake_price().is_zero() && self.shared.sleep().sleepers() > 0
+    }
+
     /// Whether jobs are to run in no particular order.
     #[inline]
     pub(crate) fn is_shuffled(&self) -> bool {

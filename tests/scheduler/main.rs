@@ -355,3 +355,28 @@ fn a_dropped_scheduler_leaves_no_thread() {
     assert_intact(&intact);
     assert_eq!(threads_named(last), 1);
 }
+
+#[test]
+fn a_loop_that_is_not_worth_waking_anybody_for_is_the_callers() {
+    let run = |price| {
+        let scheduler = Scheduler::builder().workers(4).wake_price(price).build().unwrap();
+        let by: [AtomicUsize; 4] = Default::default();
+        for _frame in 0..20 {
+            // Until the others sleep.
+            thread::sleep(Duration::from_millis(5));
+            let outcome = scheduler.parallel_for(256, 1, |range, worker| {
+                by[worker.index()].fetch_add(range.len(), Ordering::Relaxed);
+                if price.is_zero() {
+                    thread::yield_now();
+                }
+            });
+            assert_eq!(outcome, Ok(()));
+        }
+        let by = by.map(AtomicUsize::into_inner);
+        assert_eq!(by.iter().sum::<usize>(), 20 * 256);
+        by[0]
+    };
+    assert_eq!(run(Duration::from_secs(3600)), 20 * 256);
+    // Nobody can be sure to come in time, but in one of so many loops somebody does.
+    assert!(run(Duration::ZERO) < 20 * 256);
+}

@@ -6,9 +6,10 @@ use std::{
         Barrier,
         atomic::{AtomicUsize, Ordering},
     },
+    time::Duration,
 };
 
-use drawloom::task::{JobPanic, Scope, Worker, catch};
+use drawloom::task::{JobPanic, Scheduler, Scope, Worker, catch};
 
 use crate::{assert_intact, scheduler};
 
@@ -21,7 +22,9 @@ fn a_loop_of_more_chunks_than_could_ever_run_ends_at_its_first_panic() {
     for (workers, chunk) in [(1, 0), (1, 1), (4, 0), (4, 1)] {
         let together = Barrier::new(workers);
         let begun: Vec<_> = (0..workers).map(|_| AtomicUsize::new(0)).collect();
-        let outcome = scheduler(workers).parallel_for(usize::MAX, chunk, |range, _worker| {
+        // Where it costs nothing to wake workers they are woken before the first chunk is run.
+        let scheduler = Scheduler::builder().workers(workers).wake_price(Duration::ZERO).build().unwrap();
+        let outcome = scheduler.parallel_for(usize::MAX, chunk, |range, _worker| {
             // The first chunk of each worker waits for those of the others, so that all are there to go on too long.
             let Some(begun) = begun.get(range.start / range.len()) else { return };
             if begun.fetch_add(1, Ordering::Relaxed) == 0 {
