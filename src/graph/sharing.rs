@@ -54,6 +54,11 @@ const RELUCTANCE: f64 = 1.25;
 impl Sharing {
     /// The way of the next run, where a worker is woken at that price.
     pub(super) fn choose(&mut self, wake_price: Duration) -> Way {
+        let knows_nothing = self.alone.is_none() && self.shared_runs == 0 && self.given_up == 0;
+        if knows_nothing {
+            // What is less work than a wake-up shows it at once, and nobody is woken. All else loses no more than that.
+            return Way::Alone { at_most: Some(wake_price) };
+        }
         let wake_price = wake_price.as_nanos() as f64;
         let limit = self.shared.unwrap_or(0.0).max(wake_price);
         self.is_alone = match self.alone {
@@ -85,7 +90,8 @@ impl Sharing {
     pub(super) fn gave_up(&mut self) {
         self.given_up += GIVEN_UP;
         if self.given_up > GIVEN_UP {
-            *self = Self::default();
+            // Not as if nothing were known: the next runs are shared, and measured.
+            *self = Self { given_up: GIVEN_UP, ..Self::default() };
         }
     }
 

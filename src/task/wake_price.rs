@@ -2,7 +2,7 @@
 
 use std::{sync::OnceLock, time::Duration};
 
-use crate::sync::{Instant, spin_loop};
+use crate::sync::{Instant, spin_loop, thread};
 
 use super::{placement::Placement, scheduler::Scheduler};
 
@@ -11,6 +11,9 @@ const TRIES: usize = 5;
 
 /// How long a try may take: one that takes longer says that the machine is busy, and nothing about a wake-up.
 const PATIENCE: Duration = Duration::from_micros(200);
+
+/// How long it may take until all workers have started, or have gone back to sleep.
+const START: Duration = Duration::from_millis(5);
 
 /// What is assumed where no try succeeded.
 const ASSUMED: Duration = Duration::from_micros(50);
@@ -47,11 +50,13 @@ fn try_often(scheduler: &Scheduler) -> Vec<Wake> {
 
 fn try_once(scheduler: &Scheduler) -> Option<Wake> {
     let sleep = scheduler.shared().sleep();
-    if !wait_until(|| sleep.sleepers() == scheduler.workers() - 1) {
+    if !wait_until(START, || sleep.sleepers() == scheduler.workers() - 1) {
         return None;
     }
     let nap = Instant::now();
-    wait_until(|| nap.elapsed() >= NAP);
+    while nap.elapsed() < NAP {
+        spin_loop();
+    }
     let begun = OnceLock::new();
     let spawned = scheduler.scope(|scope| {
         let here = Placement::processor();
@@ -60,7 +65,7 @@ fn try_once(scheduler: &Scheduler) -> Option<Wake> {
             // There is one job, so nobody has set this before.
             let _ = begun.set((Instant::now(), Placement::processor()));
         });
-        wait_until(|| begun.get().is_some()).then_some((spawned, here))
+        wait_until(PATIENCE, || begun.get().is_some()).then_some((spawned, here))
     });
     let (spawned, here) = spawned.ok()??;
     let &(begun, there) = begun.get()?;
@@ -69,11 +74,15 @@ fn try_once(scheduler: &Scheduler) -> Option<Wake> {
 }
 
 /// Waits for that, as long as there is patience, and says whether it came.
-fn wait_until(mut condition: impl FnMut() -> bool) -> bool {
+fn wait_until(patience: Duration, mut condition: impl FnMut() -> bool) -> bool {
     let start = Instant::now();
     while !condition() {
-        if start.elapsed() >= PATIENCE {
+        if start.elapsed() >= patience {
             return false;
+        }
+        // The other thread may have to share this processor.
+        if patience > PATIENCE {
+            thread::yield_now();
         }
         spin_loop();
     }
