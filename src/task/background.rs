@@ -1,11 +1,12 @@
 //! Work that no frame waits for: streaming, baking, whatever may take longer than a frame.
 
-use std::{collections::VecDeque, fmt, sync::Arc};
+use std::{fmt, sync::Arc};
 
-use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering};
+use crate::sync::{Condvar, Mutex};
 
 use super::{
     job::{JobPanic, catch, discard},
+    locked_queue::LockedQueue,
     seat,
     worker::Worker,
 };
@@ -121,36 +122,4 @@ fn abandon<T>(result: Result<T, JobPanic>) {
 }
 
 /// Background jobs that nobody has begun, first in, first out.
-///
-/// The count is a hint, so it is relaxed; that a sleeping worker learns of a job is up to the fences of
-/// [`Sleep`](super::sleep::Sleep).
-pub(super) struct BackgroundQueue {
-    count: AtomicUsize,
-    jobs: Mutex<VecDeque<Arc<dyn Queued>>>,
-}
-
-impl BackgroundQueue {
-    pub(super) fn new() -> Self {
-        Self { count: AtomicUsize::new(0), jobs: Mutex::new(VecDeque::new()) }
-    }
-
-    pub(super) fn put(&self, job: Arc<dyn Queued>) {
-        let mut jobs = self.jobs.lock();
-        jobs.push_back(job);
-        self.count.store(jobs.len(), Ordering::Relaxed);
-    }
-
-    pub(super) fn take(&self) -> Option<Arc<dyn Queued>> {
-        if self.is_empty() {
-            return None;
-        }
-        let mut jobs = self.jobs.lock();
-        let job = jobs.pop_front();
-        self.count.store(jobs.len(), Ordering::Relaxed);
-        job
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.count.load(Ordering::Relaxed) == 0
-    }
-}
+pub(super) type BackgroundQueue = LockedQueue<Arc<dyn Queued>>;

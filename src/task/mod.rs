@@ -138,6 +138,7 @@ mod closure;
 mod idle;
 mod job;
 mod latch;
+mod locked_queue;
 mod mailbox;
 mod parallel_for;
 mod placement;

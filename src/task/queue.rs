@@ -14,11 +14,11 @@ use std::{array, cell::Cell, collections::VecDeque};
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Arc, AtomicUsize, Deque, Mutex, Ordering, Steal, Stealer};
+use crate::sync::{Arc, Deque, Steal, Stealer};
 
-use super::{job::Job, shuffle::Shuffle};
+use super::{job::Job, locked_queue::LockedQueue, shuffle::Shuffle};
 
-/// How urgent a job is: workers take more urgent ones first, wherever they are.
+/// How urgent a job is: of their own jobs workers take the more urgent ones first, and of others' too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Band {
     /// What the end of the frame waits for.
@@ -231,31 +231,29 @@ impl BandLoot {
 }
 
 struct Overflow {
-    count: AtomicUsize,
-    /// The oldest first.
-    jobs: Mutex<VecDeque<Job>>,
+    jobs: LockedQueue<Job>,
 }
 
 impl Overflow {
     fn new() -> Self {
-        Self { count: AtomicUsize::new(0), jobs: Mutex::new(VecDeque::new()) }
+        Self { jobs: LockedQueue::new() }
     }
 
     fn is_empty(&self) -> bool {
-        self.count.load(Ordering::Relaxed) == 0
+        self.jobs.is_empty()
     }
 
     fn put(&self, job: Job) {
-        self.change(|jobs| jobs.push_back(job));
+        self.jobs.put(job);
     }
 
     fn take_newest(&self) -> Option<Job> {
-        self.change(VecDeque::pop_back)
+        self.jobs.change(VecDeque::pop_back)
     }
 
     /// Takes the oldest jobs, to spare others the lock: gives back the first, and calls `keep` with the others.
     fn take_oldest(&self, keep: impl FnMut(Job)) -> Option<Job> {
-        let (first, others) = self.change(|jobs| {
+        let (first, others) = self.jobs.change(|jobs| {
             let count = (jobs.len() / 2).min(MOST_AT_ONCE);
             let first = jobs.pop_front();
             let others: [Option<Job>; MOST_AT_ONCE] =
@@ -268,19 +266,12 @@ impl Overflow {
 
     /// Some job that was queued at this depth or a deeper one.
     fn take_any(&self, shuffle: &Shuffle, depth: u32) -> Option<Job> {
-        self.change(|jobs| {
+        self.jobs.change(|jobs| {
             let fitting = jobs.iter().filter(|job| job.depth >= depth).count();
             let chosen = shuffle.below(fitting)?;
             let (place, _) = jobs.iter().enumerate().filter(|(_, job)| job.depth >= depth).nth(chosen)?;
             jobs.remove(place)
         })
-    }
-
-    fn change<R>(&self, change: impl FnOnce(&mut VecDeque<Job>) -> R) -> R {
-        let mut jobs = self.jobs.lock();
-        let result = change(&mut jobs);
-        self.count.store(jobs.len(), Ordering::Relaxed);
-        result
     }
 }
 

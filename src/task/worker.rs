@@ -195,7 +195,7 @@ impl Worker {
                 break;
             }
             if matches!(until, Until::Shutdown)
-                && let Some(job) = self.shared.background().take()
+                && let Some(job) = self.shared.background().take_oldest()
             {
                 idle.end(self, until);
                 self.run_in_background(&*job);
@@ -210,7 +210,7 @@ impl Worker {
     pub(super) fn work_in_background(&self, mut stop: impl FnMut() -> bool) -> usize {
         let mut jobs = 0;
         while !stop() {
-            let Some(job) = self.shared.background().take() else { break };
+            let Some(job) = self.shared.background().take_oldest() else { break };
             jobs += usize::from(self.run_in_background(&*job));
         }
         jobs
@@ -242,24 +242,26 @@ impl Worker {
 
     /// Takes over the count of a job of the region that has run here.
     fn earn(&self, region: &'static Region) {
-        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
-            self.settle();
-            self.creditor.set(Some(region));
-        }
+        self.deal_with(region);
         self.credit.set(self.credit.get() + 1);
     }
 
     /// Sees to it that one more job of the region is counted.
     fn spend(&self, region: &'static Region) {
-        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
-            self.settle();
-            self.creditor.set(Some(region));
-        }
+        self.deal_with(region);
         if self.credit.get() == 0 {
             region.latch().add(JOBS_COUNTED_AT_ONCE);
             self.credit.set(JOBS_COUNTED_AT_ONCE);
         }
         self.credit.set(self.credit.get() - 1);
+    }
+
+    /// Gives the credit of any other region back, so that what is earned and spent is this one's.
+    fn deal_with(&self, region: &'static Region) {
+        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
+            self.settle();
+            self.creditor.set(Some(region));
+        }
     }
 
     /// Gives all credit back, and wakes the owner of the region if it was the last to come back.
@@ -278,9 +280,7 @@ impl Worker {
         let region = job.region;
         let was_in_background = self.is_in_background.replace(region.is_background());
         // The owner of another region may wait for the credit that is left of it, and this job may wait for that owner.
-        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
-            self.settle();
-        }
+        self.deal_with(region);
         job.run(self);
         self.is_in_background.set(was_in_background);
         self.earn(region);

@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use drawloom::task::Scheduler;
+use drawloom::task::{BackgroundJob, Scheduler};
 
 /// Runs `body` on a thread of its own, and fails if it does not end in a time that is long for the slowest machine.
 fn ends(body: impl FnOnce() + Send + 'static) {
@@ -43,12 +43,26 @@ impl Flag {
     }
 }
 
+/// Waits for the background job in a job of a frame, and lets the one that helps with it go on, who comes across that job.
+fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_on: &Flag) {
+    let waits = Flag::default();
+    let outcome = scheduler.scope(|scope| {
+        scope.spawn(|_scope, _worker| {
+            waits.raise();
+            assert_eq!(background.wait(), Ok(()));
+        });
+        may_go_on.raise();
+        waits.wait();
+    });
+    assert_eq!(outcome, Ok(()));
+}
+
 /// A worker has helped with a scope of a background job, and goes on to a frame's job that waits for that background job.
 #[test]
 fn who_has_helped_a_background_job_may_wait_for_it() {
     ends(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
-        let [helped, may_go_on, waits] = [(); 3].map(|()| Arc::new(Flag::default()));
+        let [helped, may_go_on] = [(); 2].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
             let (scheduler, helped, may_go_on) = (Arc::clone(&scheduler), Arc::clone(&helped), Arc::clone(&may_go_on));
             move || {
@@ -64,15 +78,7 @@ fn who_has_helped_a_background_job_may_wait_for_it() {
             }
         });
         helped.wait();
-        let outcome = scheduler.scope(|scope| {
-            scope.spawn(|_scope, _worker| {
-                waits.raise();
-                assert_eq!(background.wait(), Ok(()));
-            });
-            may_go_on.raise();
-            waits.wait();
-        });
-        assert_eq!(outcome, Ok(()));
+        wait_in_a_frame(&scheduler, background, &may_go_on);
     });
 }
 
@@ -81,7 +87,7 @@ fn who_has_helped_a_background_job_may_wait_for_it() {
 fn who_has_a_background_loops_token_may_wait_for_that_loop() {
     ends(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
-        let [joined, may_go_on, has_left, waits] = [(); 4].map(|()| Arc::new(Flag::default()));
+        let [joined, may_go_on, has_left] = [(); 3].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
             let flags = [&joined, &may_go_on, &has_left].map(Arc::clone);
             let scheduler = Arc::clone(&scheduler);
@@ -100,15 +106,7 @@ fn who_has_a_background_loops_token_may_wait_for_that_loop() {
             }
         });
         joined.wait();
-        let outcome = scheduler.scope(|scope| {
-            scope.spawn(|_scope, _worker| {
-                waits.raise();
-                assert_eq!(background.wait(), Ok(()));
-            });
-            may_go_on.raise();
-            waits.wait();
-        });
-        assert_eq!(outcome, Ok(()));
+        wait_in_a_frame(&scheduler, background, &may_go_on);
     });
 }
 
