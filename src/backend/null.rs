@@ -125,8 +125,8 @@ impl Backend for NullBackend {
         ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
         let before = frame.prepared.lock().insert(pass, list.objects.len());
         ensure(before.is_none(), || format!("{pass:?} was prepared twice"))?;
-        ensure(list.objects.len() == list.commands.len(), || "objects and commands differ in number".to_owned())?;
-        let ordered = list.commands.is_sorted_by_key(|command| (command.key, command.object));
+        ensure(list.objects.len() == list.commands().count(), || "objects and commands differ in number".to_owned())?;
+        let ordered = list.commands().is_sorted_by_key(|command| (command.key, command.object));
         ensure(ordered, || "commands are not sorted".to_owned())?;
         let beyond = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
         ensure(beyond.is_none(), || format!("object {beyond:?} is not in the scene"))

@@ -6,8 +6,8 @@ use super::DrawState;
 /// equal keys are ordered by their object's index.
 ///
 /// ```text
-/// bit    63 62 | 61 … 54 | 53 … 38  | 37 … 20 | 19 … 0
-/// opaque  0  0 | state   | material | mesh    | depth, near to far
+/// bit    63 62 | 61 … 54 | 53 … 36 | 35 … 16            | 15 … 0
+/// opaque  0  0 | state   | mesh    | depth, near to far | 0
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
@@ -18,23 +18,28 @@ use super::DrawState;
 /// whole f32. All others only save state changes and overdraw: slots beyond what their bits can tell apart share a place,
 /// which costs speed and nothing else. The depth of opaque commands is the upper 20 bits of the f32 below its sign: steps
 /// of 2⁻¹² to 2⁻¹¹ of the distance, at any distance.
+///
+/// Materials have no bits: shaders find them by object, so another material is no change of state, and were commands
+/// ordered by it, fewer of them would become one draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SortKey(u64);
 
 impl SortKey {
+    /// Before every other, or the same.
+    pub const FIRST: Self = Self(0);
+
     /// Behind every other.
     pub const LAST: Self = Self(u64::MAX);
 
-    /// The key of an opaque command: by state, material and mesh, then front to back.
+    /// The key of an opaque command: by state and mesh, then front to back.
     ///
     /// `depth` is the distance along the view's axis in metres; what lies behind the camera counts as 0.
-    pub fn opaque(state: DrawState, material: u32, mesh: u32, depth: f32) -> Self {
+    pub fn opaque(state: DrawState, mesh: u32, depth: f32) -> Self {
         let state = (state.index() as u64 & 0xff) << 54;
-        let material = (u64::from(material) & 0xffff) << 38;
-        let mesh = (u64::from(mesh) & 0x3_ffff) << 20;
+        let mesh = (u64::from(mesh) & 0x3_ffff) << 36;
         // The bits of a positive float grow with it. `max` also turns a NaN into 0.
-        let depth = u64::from(depth.max(0.0).to_bits() >> 11);
-        Self(state | material | mesh | depth)
+        let depth = u64::from(depth.max(0.0).to_bits() >> 11) << 16;
+        Self(state | mesh | depth)
     }
 
     /// The key of a blended command: strictly back to front, to the last bit of `depth`, the distance along the view's axis
@@ -47,6 +52,11 @@ impl SortKey {
     /// The 64 bits.
     pub fn bits(self) -> u64 {
         self.0
+    }
+
+    /// The key with these 64 bits.
+    pub fn from_bits(bits: u64) -> Self {
+        Self(bits)
     }
 }
 
@@ -75,7 +85,7 @@ mod tests {
 
         #[test]
         fn opaque_commands_never_go_back_to_front(first in 0.0..f32::MAX, second in 0.0..f32::MAX) {
-            let key = |depth| SortKey::opaque(DrawState::PLAIN, 3, 4, depth);
+            let key = |depth| SortKey::opaque(DrawState::PLAIN, 4, depth);
             if first <= second {
                 prop_assert!(key(first) <= key(second));
             }
@@ -85,12 +95,12 @@ mod tests {
         }
 
         #[test]
-        fn opaque_commands_go_by_material_before_mesh_before_depth(
-            first in (0_u32..0x1_0000, 0_u32..0x4_0000, 0.0..1e9_f32),
-            second in (0_u32..0x1_0000, 0_u32..0x4_0000, 0.0..1e9_f32),
+        fn opaque_commands_go_by_mesh_before_depth(
+            first in (0_u32..0x4_0000, 0.0..1e9_f32),
+            second in (0_u32..0x4_0000, 0.0..1e9_f32),
         ) {
-            let key = |(material, mesh, depth)| SortKey::opaque(DrawState::PLAIN, material, mesh, depth);
-            if (first.0, first.1) < (second.0, second.1) {
+            let key = |(mesh, depth)| SortKey::opaque(DrawState::PLAIN, mesh, depth);
+            if first.0 < second.0 {
                 prop_assert!(key(first) < key(second));
             }
         }
@@ -99,10 +109,10 @@ mod tests {
     #[test]
     fn opaque_comes_before_blended_comes_before_nothing() {
         let state = DrawState::new(Topology::TriangleStrip, Cull::Nothing, Blend::Subtractive);
-        let last_opaque = SortKey::opaque(state, u32::MAX, u32::MAX, f32::INFINITY);
+        let last_opaque = SortKey::opaque(state, u32::MAX, f32::INFINITY);
         assert!(last_opaque < SortKey::blended(f32::INFINITY));
         assert!(SortKey::blended(f32::NEG_INFINITY) < SortKey::LAST);
-        assert!(SortKey::opaque(state, 0, 0, f32::NAN) < SortKey::blended(0.0));
+        assert!(SortKey::opaque(state, 0, f32::NAN) < SortKey::blended(0.0));
         assert_eq!(SortKey::blended(-0.0), SortKey::blended(0.0));
     }
 }

@@ -18,6 +18,7 @@ pub struct RendererBuilder<B> {
     outputs: Vec<String>,
     shadow_maps: ShadowMaps,
     granularity: Granularity,
+    instancing: bool,
 }
 
 impl<B: Backend> RendererBuilder<B> {
@@ -29,6 +30,7 @@ impl<B: Backend> RendererBuilder<B> {
             outputs: Vec::new(),
             shadow_maps: ShadowMaps::default(),
             granularity: Granularity::default(),
+            instancing: true,
         }
     }
 
@@ -63,6 +65,13 @@ impl<B: Backend> RendererBuilder<B> {
         self
     }
 
+    /// Whether equal commands become one instanced draw, which they do unless said otherwise. Without it each object is a draw
+    /// of its own, as in engines that do not merge: the same picture, at a higher price.
+    pub fn instancing(mut self, instancing: bool) -> Self {
+        self.instancing = instancing;
+        self
+    }
+
     /// The renderer, which records on the scheduler's workers, and the submitter. The thread that calls this is the device
     /// thread: the submitter cannot leave it.
     ///
@@ -75,6 +84,6 @@ impl<B: Backend> RendererBuilder<B> {
         let plans = Plans::new(self.deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = Arc::new(self.backend);
         let submitter = Submitter::new(Arc::clone(&backend));
-        Ok((Renderer::new(backend, plans, self.granularity, scheduler), submitter))
+        Ok((Renderer::new(backend, plans, self.granularity, self.instancing, scheduler), submitter))
     }
 }

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use super::FrameError;
 use super::phase::{PassTable, Phase};
-use crate::command::RenderCommand;
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
-use crate::queue::{DrawList, Selection};
+use crate::queue::Selection;
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -65,6 +64,7 @@ impl FrameJobs {
                 previous = Some(seen);
                 for (phase, name) in [
                     (Phase::Fill { pass: index }, "fill"),
+                    (Phase::Split { pass: index }, "split"),
                     (Phase::Sort { pass: index }, "sort"),
                     (Phase::Instance { pass: index }, "instance"),
                     (Phase::Prepare { pass: index }, "prepare"),
@@ -93,12 +93,7 @@ impl FrameJobs {
     pub(super) fn reset(&self, tables: &mut Vec<PassTable>, objects: usize) {
         tables.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(tables) {
-            table.selection = self.selections[pass.process];
-            match table.selection {
-                Some(_) => table.commands.reserve(objects, RenderCommand::NOTHING),
-                // Another pass may have stood here in the frame before.
-                None => *table.list.get_mut() = DrawList::default(),
-            }
+            table.reset(self.selections[pass.process], objects);
         }
     }
 }

@@ -10,9 +10,9 @@ use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::blocks::Blocks;
 use crate::command::RenderCommand;
 use crate::graph::{Node, NodeError};
-use crate::queue::{DrawList, Fill, Selection, instance, sort};
+use crate::queue::{DrawList, DrawPart, Fill, Selection, SortMemory, Split, instance, sort};
 use crate::task::Worker;
-use crate::view::{LightTable, ObjectRecord, ObjectTable, VisibleSet};
+use crate::view::{Frustum, LightTable, ObjectTable, VisibleSet, WorldBounds};
 
 /// A node of the frame's job graph: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +27,13 @@ pub(super) enum Phase {
     Compact { view: usize },
     /// Makes commands of it.
     Fill { pass: usize },
-    /// Brings them into order.
+    /// Cuts them into parts.
+    Split { pass: usize },
+    /// Brings a part into order.
     Sort { pass: usize },
-    /// Merges equal runs.
+    /// Merges a part's equal runs.
     Instance { pass: usize },
-    /// Uploads which objects are drawn, and makes pipelines.
+    /// Joins the parts, uploads which objects are drawn, and makes pipelines.
     Prepare { pass: usize },
     /// Records bundles.
     Record { pass: usize },
@@ -44,6 +46,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) request: &'a FrameRequest<'a>,
     pub(super) tables: &'a FrameTables,
     pub(super) granularity: Granularity,
+    /// Whether equal commands become one draw.
+    pub(super) merges: bool,
     pub(super) backend: &'a B,
     pub(super) frame: &'a B::Frame,
     pub(super) recordings: &'a [Recording<B>],
@@ -60,6 +64,8 @@ pub(super) struct FrameTables {
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
     pub(super) passes: Vec<PassTable>,
+    /// One for each worker.
+    sort_memory: Vec<Mutex<SortMemory>>,
 }
 
 /// What one pass draws, on its way from slots to batches.
@@ -67,16 +73,36 @@ pub(super) struct FrameTables {
 pub(super) struct PassTable {
     /// Which objects it draws; `None` for a pass without commands.
     pub(super) selection: Option<Selection>,
-    pub(super) commands: Blocks<RenderCommand>,
+    commands: Blocks<RenderCommand>,
+    split: RwLock<Split>,
+    /// As many as there may be.
+    parts: Vec<RwLock<DrawPart>>,
     pub(super) list: RwLock<DrawList>,
 }
 
+impl PassTable {
+    /// Makes room for a frame of `objects` objects, of which the pass draws those of the selection.
+    pub(super) fn reset(&mut self, selection: Option<Selection>, objects: usize) {
+        self.selection = selection;
+        match selection {
+            Some(_) => {
+                self.commands.reserve(objects, RenderCommand::NOTHING);
+                let parts = Split::most_parts(objects).max(self.parts.len());
+                self.parts.resize_with(parts, RwLock::default);
+            }
+            // Another pass may have stood here in the frame before.
+            None => *self.list.get_mut() = DrawList::default(),
+        }
+    }
+}
+
 impl FrameTables {
-    /// Makes room for what `views` views see of the objects, for which there is room already.
-    pub(super) fn reset(&mut self, views: usize) {
+    /// Makes room for what `views` views see of the objects, for which there is room already, and for so many workers.
+    pub(super) fn reset(&mut self, views: usize, workers: usize) {
         let objects = self.objects.len();
         self.visible.resize_with(views, VisibleSet::default);
         self.lights.resize_with(views, LightTable::default);
+        self.sort_memory.resize_with(workers, Mutex::default);
         for visible in &mut self.visible {
             visible.reset(objects);
         }
@@ -101,7 +127,7 @@ impl<B: Backend> Recording<B> {
 
 /// Objects in a job of [`Phase::Objects`], and blocks of them in a job of [`Phase::Upload`]: neither belongs to a view, so
 /// granularity does not apply.
-const OBJECTS_PER_JOB: usize = BLOCKS_PER_JOB * Blocks::<ObjectRecord>::SIZE;
+const OBJECTS_PER_JOB: usize = BLOCKS_PER_JOB * ObjectTable::BLOCK;
 const BLOCKS_PER_JOB: usize = 4;
 
 impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
@@ -110,13 +136,10 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
         match *self {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.block_count(),
-            Self::Fill { pass } => tables.visible[frame.request.passes[pass].view].count(),
-            Self::Record { pass } => frame.tables.passes[pass].list.read().bundle_count(),
-            Self::Compact { .. }
-            | Self::Sort { .. }
-            | Self::Instance { .. }
-            | Self::Prepare { .. }
-            | Self::Finish { .. } => 1,
+            Self::Fill { pass } => visible_count(frame, pass),
+            Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().part_count(),
+            Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
+            Self::Compact { .. } | Self::Split { .. } | Self::Prepare { .. } | Self::Finish { .. } => 1,
         }
     }
 
@@ -140,7 +163,7 @@ impl Phase {
         match self {
             Self::Objects | Self::Visibility { .. } | Self::Compact { .. } => Stage::Visibility,
             Self::Fill { .. } => Stage::Fill,
-            Self::Sort { .. } => Stage::Sort,
+            Self::Split { .. } | Self::Sort { .. } => Stage::Sort,
             Self::Instance { .. } => Stage::Instance,
             Self::Upload | Self::Prepare { .. } | Self::Record { .. } | Self::Finish { .. } => Stage::Record,
         }
@@ -161,13 +184,25 @@ impl Phase {
             Self::Visibility { view } => see(frame, view, range),
             Self::Compact { view } => tables.visible[view].compact(),
             Self::Fill { pass } => fill(frame, pass, range),
-            Self::Sort { pass } => {
-                let count = tables.visible[frame.request.passes[pass].view].count();
-                sort(&frame.tables.passes[pass].commands, count, &mut frame.tables.passes[pass].list.write().commands);
+            Self::Split { pass } => {
+                let table = &tables.passes[pass];
+                table.split.write().cut(&table.commands, visible_count(frame, pass));
             }
-            Self::Instance { pass } => instance(&mut frame.tables.passes[pass].list.write()),
+            Self::Sort { pass } => {
+                let table = &tables.passes[pass];
+                let (count, split) = (visible_count(frame, pass), table.split.read());
+                let mut memory = tables.sort_memory[worker.index()].lock();
+                for part in range {
+                    let sorted = &mut table.parts[part].write().commands;
+                    sort(&table.commands, count, split.part(part), &mut memory, sorted);
+                }
+            }
+            Self::Instance { pass } => {
+                range.for_each(|part| instance(&mut tables.passes[pass].parts[part].write(), frame.merges));
+            }
             Self::Prepare { pass } => {
-                let list = frame.tables.passes[pass].list.read();
+                join(&tables.passes[pass], frame.merges);
+                let list = tables.passes[pass].list.read();
                 frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
                 return frame.backend.prepare(worker, frame.frame, frame.request, frame.request.passes[pass], &list);
             }
@@ -178,16 +213,34 @@ impl Phase {
     }
 }
 
+fn visible_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
+    frame.tables.visible[frame.request.passes[pass].view].count()
+}
+
+fn join(table: &PassTable, merges: bool) {
+    let parts = table.split.read().part_count();
+    let mut parts: Vec<_> = table.parts[..parts].iter().map(RwLock::write).collect();
+    table.list.write().join(parts.iter_mut().map(|part| &mut **part), merges);
+}
+
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
     let frustum = &frame.request.views[view].frustum;
-    for (block, part) in Blocks::<ObjectRecord>::parts(range) {
-        let bounds = frame.tables.objects.bounds().read(block);
-        frame.tables.visible[view].test(part, |object| {
-            let bounds = bounds[object % Blocks::<ObjectRecord>::SIZE];
-            frustum.may_see(bounds.center, bounds.radius)
-        });
-    }
+    frame.tables.visible[view].test(range, |objects| {
+        let spheres = &frame.tables.objects.block(objects.start / ObjectTable::BLOCK).spheres;
+        let first = objects.start % ObjectTable::BLOCK;
+        let place = first % Frustum::AT_ONCE;
+        if objects.len() >= FEW {
+            return frustum.may_see_each(spheres, first - place) >> place;
+        }
+        (0..objects.len()).fold(0, |bits, offset| {
+            let WorldBounds { center, radius } = spheres.get(first + offset);
+            bits | u64::from(frustum.may_see(center, radius)) << offset
+        })
+    });
 }
+
+/// Fewer objects than these are tested one by one: it takes less time than to test a whole word of them.
+const FEW: usize = 12;
 
 fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
     let table = &frame.tables.passes[pass];

@@ -43,6 +43,7 @@ pub struct Renderer<B: Backend> {
     backend: Arc<B>,
     plans: Plans,
     granularity: Granularity,
+    merges: bool,
     scheduler: Arc<Scheduler>,
     jobs: JobsCache,
     tables: FrameTables,
@@ -56,9 +57,15 @@ impl<B: Backend> Renderer<B> {
         RendererBuilder::new(backend)
     }
 
-    pub(super) fn new(backend: Arc<B>, plans: Plans, granularity: Granularity, scheduler: Arc<Scheduler>) -> Self {
+    pub(super) fn new(
+        backend: Arc<B>,
+        plans: Plans,
+        granularity: Granularity,
+        merges: bool,
+        scheduler: Arc<Scheduler>,
+    ) -> Self {
         let (jobs, tables) = (JobsCache::default(), FrameTables::default());
-        Self { backend, plans, granularity, scheduler, jobs, tables, told: Vec::new() }
+        Self { backend, plans, granularity, merges, scheduler, jobs, tables, told: Vec::new() }
     }
 
     /// Records a frame: everything up to submission. The calling thread works too.
@@ -81,7 +88,7 @@ impl<B: Backend> Renderer<B> {
         let draws = plan.draws()?;
         let jobs = self.jobs.find(&plan, &draws, &views)?;
         jobs.reset(&mut self.tables.passes, scene.object_count());
-        self.tables.reset(views.len());
+        self.tables.reset(views.len(), self.scheduler.workers());
         let clock = StageClock::default();
         clock.measure(Stage::Visibility, || {
             let shadows = self.plans.tells_shadowed_apart();
@@ -105,6 +112,7 @@ impl<B: Backend> Renderer<B> {
             request: &request,
             tables: &self.tables,
             granularity: self.granularity,
+            merges: self.merges,
             backend: &*self.backend,
             frame: &frame,
             recordings: &recordings,
@@ -184,7 +192,7 @@ fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &Stage
         };
         for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
             let list = table.list.read();
-            statistics.commands += list.commands.len();
+            statistics.commands += list.objects.len();
             statistics.batches += list.batches.len();
             statistics.bundles += list.bundle_count();
         }

@@ -5,15 +5,64 @@ use crate::command::{DrawState, RenderCommand};
 /// What one process draws in one view: sorted commands, the batches they merge into, and the objects of each batch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DrawList {
-    /// In the order they are drawn.
-    pub commands: Vec<RenderCommand>,
+    /// In the order they are drawn, part by part.
+    commands: Vec<Vec<RenderCommand>>,
     /// In the order they are drawn.
     pub batches: Vec<Batch>,
     /// The index of each command's object: the 4 bytes an object that a view uploads.
     pub objects: Vec<u32>,
 }
 
+/// A part of a draw list, on its way.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DrawPart {
+    /// In the order they are drawn.
+    pub commands: Vec<RenderCommand>,
+    /// In the order they are drawn. Their objects are counted from the part's first.
+    pub batches: Vec<Batch>,
+    /// The index of each command's object.
+    pub objects: Vec<u32>,
+}
+
 impl DrawList {
+    /// Joins parts, each of which comes behind the one before. What they held is this list's, and its memory is theirs.
+    ///
+    /// Where one part ends and the next begins in the middle of a run of equals, the two batches become one if `merges`: the
+    /// list does not depend on where it was cut.
+    pub fn join<'a>(&mut self, parts: impl IntoIterator<Item = &'a mut DrawPart>, merges: bool) {
+        self.batches.clear();
+        self.objects.clear();
+        let mut count = 0;
+        for part in parts {
+            if self.commands.len() == count {
+                self.commands.push(Vec::new());
+            }
+            std::mem::swap(&mut self.commands[count], &mut part.commands);
+            count += 1;
+            if self.objects.is_empty() {
+                std::mem::swap(&mut self.batches, &mut part.batches);
+                std::mem::swap(&mut self.objects, &mut part.objects);
+                continue;
+            }
+            let first = self.objects.len() as u32;
+            let mut batches =
+                part.batches.iter().map(|batch| Batch { first: first + batch.first, ..*batch }).peekable();
+            if let Some(last) = self.batches.last_mut().filter(|_| merges)
+                && let Some(same) = batches.next_if(|next| (next.state, next.mesh) == (last.state, last.mesh))
+            {
+                last.count += same.count;
+            }
+            self.batches.extend(batches);
+            self.objects.extend_from_slice(&part.objects);
+        }
+        self.commands.truncate(count);
+    }
+
+    /// The sorted commands.
+    pub fn commands(&self) -> impl DoubleEndedIterator<Item = &RenderCommand> + Clone {
+        self.commands.iter().flatten()
+    }
+
     /// Batches in a bundle, whatever the granularity: fewer cost up to three times the price a draw, and boundaries that
     /// never move make the same picture from every granularity.
     pub const BATCHES_PER_BUNDLE: usize = 256;

@@ -8,7 +8,7 @@ use super::halvings::halvings;
 use crate::blocks::Blocks;
 use crate::command::{DrawState, RenderCommand, SortKey};
 use crate::scene::{Blend, Projection, SceneRef};
-use crate::view::{ObjectDraw, ObjectTable, RejectionReason, RenderView, VisibleSet, WorldBounds};
+use crate::view::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, places};
 
 /// Which objects a process draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -33,7 +33,8 @@ impl Selection {
             Blending::Blended => blend != Blend::None,
             Blending::Both => true,
         };
-        blends && material % self.materials.of.max(1) == self.materials.index
+        // A division would cost as much as all the rest of a command.
+        blends && (self.materials == MaterialShare::ALL || material % self.materials.of.max(1) == self.materials.index)
     }
 }
 
@@ -95,25 +96,25 @@ impl Fill<'_> {
             let mut slots = commands.write(block);
             // Visible objects come in order, so the table's blocks are changed seldom.
             let mut open = None;
-            self.visible.visit(part, |rank, object| {
-                let table_block = object / Blocks::<ObjectDraw>::SIZE;
-                if open.as_ref().is_none_or(|&(current, _, _)| current != table_block) {
-                    open = Some((
-                        table_block,
-                        self.table.draws().read(table_block),
-                        self.table.bounds().read(table_block),
-                    ));
-                }
-                if let Some((_, draws, bounds)) = &open {
-                    let entry = object % Blocks::<ObjectDraw>::SIZE;
-                    slots[rank % Blocks::<RenderCommand>::SIZE] =
-                        self.command(object, draws[entry], &bounds[entry], forward);
+            self.visible.visit(part, |rank, word, bits| {
+                let first = word * VisibleSet::WORD;
+                let index = first / ObjectTable::BLOCK;
+                let (_, objects) = match open.take() {
+                    Some((current, guard)) if current == index => open.insert((current, guard)),
+                    _ => open.insert((index, self.table.block(index))),
+                };
+                let start = rank % Blocks::<RenderCommand>::SIZE;
+                for (slot, place) in slots[start..].iter_mut().zip(places(bits)) {
+                    *slot = self.command(first + place, objects, forward);
                 }
             });
         }
     }
 
-    fn command(&self, object: usize, draw: ObjectDraw, bounds: &WorldBounds, forward: Vec3) -> RenderCommand {
+    #[inline]
+    fn command(&self, object: usize, objects: &ObjectBlock, forward: Vec3) -> RenderCommand {
+        let entry = object % ObjectTable::BLOCK;
+        let draw = objects.draws[entry];
         let blend = draw.state.blend();
         if !self.selection.takes(blend, draw.material) {
             return RenderCommand::NOTHING;
@@ -126,9 +127,10 @@ impl Fill<'_> {
                 self.table.rejections().count_once(RejectionReason::CoarseEdges, object);
             }
         }
-        let depth = forward.dot((bounds.center - self.view.camera.position).as_vec3());
+        let center = objects.spheres.get(entry).center;
+        let depth = forward.dot((center - self.view.camera.position).as_vec3());
         let key = match blend {
-            Blend::None => SortKey::opaque(state, draw.material, draw.mesh, depth),
+            Blend::None => SortKey::opaque(state, draw.mesh, depth),
             _ => SortKey::blended(depth),
         };
         RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::Spheres;
 use crate::scene::{Camera, Projection, ViewKind};
 
 /// What a camera sees: a pyramid, a box or half a ball, within six planes.
@@ -19,20 +20,36 @@ pub struct Frustum {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Plane {
     normal: Vec3,
-    /// In metres.
+    /// In metres, moved out by what is allowed for the rounding of itself; see [`Frustum::may_see`].
     offset: f32,
 }
 
 impl Plane {
     /// Everything is inside of it.
     const NOWHERE: Self = Self { normal: Vec3::ZERO, offset: f32::INFINITY };
+
+    fn new(normal: Vec3, offset: f32) -> Self {
+        Self { normal, offset: offset + ALLOWANCE * offset.abs() }
+    }
+
+    /// Whether any of a sphere of that reach may be inside.
+    #[inline]
+    fn may_hold(&self, [x, y, z]: [f32; 3], reach: f32) -> bool {
+        self.normal.x * x + self.normal.y * y + self.normal.z * z + self.offset >= -reach
+    }
+}
+
+/// How far a sphere relative to the camera reaches, with what is allowed for rounding.
+#[inline]
+fn reach([x, y, z]: [f32; 3], radius: f32) -> f32 {
+    radius + ALLOWANCE * (x.abs() + y.abs() + z.abs() + radius)
 }
 
 impl Frustum {
     /// What `camera` sees.
     pub fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
-        let plane = |normal: DVec3, offset: f32| Plane { normal: (orientation * normal.normalize()).as_vec3(), offset };
+        let plane = |normal: DVec3, offset| Plane::new((orientation * normal.normalize()).as_vec3(), offset);
         let [width, height] = camera.size.map(f64::from);
         let near = plane(DVec3::NEG_Z, -camera.near);
         let far = if camera.far.is_finite() { plane(DVec3::Z, camera.far) } else { Plane::NOWHERE };
@@ -70,22 +87,56 @@ impl Frustum {
     ///
     /// A plane's distance n·c + o is computed in f32 with n, c and o rounded to it. Each of the three products carries at
     /// most four roundings of u = 2⁻²⁴ (n, c, the product, the sums), so the distance is off by no more than
-    /// 4u(‖c‖₁ + r + |o|) to first order; twice that is allowed for. The bound is made of magnitudes from before any
-    /// cancellation.
+    /// 4u(‖c‖₁ + r + |o|) to first order; twice that is allowed for, 8u(‖c‖₁ + r) in the sphere's reach and 8u|o| in the
+    /// plane's offset. The bound is made of magnitudes from before any cancellation.
     pub fn may_see(&self, center: DVec3, radius: f32) -> bool {
-        let center = (center - self.origin).as_vec3();
-        let magnitude = center.x.abs() + center.y.abs() + center.z.abs() + radius;
-        self.planes.iter().all(|plane| {
-            let reach = radius + 8.0 * UNIT_ROUNDOFF * (magnitude + plane.offset.abs());
-            plane.normal.dot(center) + plane.offset >= -reach
-        })
+        let center = (center - self.origin).as_vec3().to_array();
+        let reach = reach(center, radius);
+        self.planes.iter().all(|plane| plane.may_hold(center, reach))
     }
+
+    /// The same for the [`Frustum::AT_ONCE`] spheres from `first` on: a bit each, from the lowest.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    pub fn may_see_each(&self, spheres: &Spheres, first: usize) -> u64 {
+        let entries = first..first + Self::AT_ONCE;
+        // One loop a step, over arrays of a fixed length: such loops become vector instructions.
+        let relative = |coordinates: &[f64], origin: f64| -> [f32; Self::AT_ONCE] {
+            let mut relative = [0.0; Self::AT_ONCE];
+            for (relative, coordinate) in relative.iter_mut().zip(coordinates) {
+                *relative = (coordinate - origin) as f32;
+            }
+            relative
+        };
+        let [x, y, z] = spheres.coordinates();
+        let x = relative(&x[entries.clone()], self.origin.x);
+        let y = relative(&y[entries.clone()], self.origin.y);
+        let z = relative(&z[entries.clone()], self.origin.z);
+        let radii = &spheres.radii()[entries];
+        let mut reaches = [0.0; Self::AT_ONCE];
+        for (entry, reached) in reaches.iter_mut().enumerate() {
+            *reached = reach([x[entry], y[entry], z[entry]], radii[entry]);
+        }
+        let mut seen = [u32::MAX; Self::AT_ONCE];
+        for plane in &self.planes {
+            for entry in 0..Self::AT_ONCE {
+                let holds = plane.may_hold([x[entry], y[entry], z[entry]], reaches[entry]);
+                seen[entry] &= u32::from(holds).wrapping_neg();
+            }
+        }
+        (0..).zip(seen).fold(0, |bits, (entry, seen)| bits | u64::from(seen & 1) << entry)
+    }
+
+    /// How many spheres [`Frustum::may_see_each`] looks at.
+    pub const AT_ONCE: usize = 64;
 }
 
 /// How far behind a paraboloid's camera is looked, as a share of its range.
 const PAST_THE_RIM: f32 = 0.05;
 
-const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;
+/// 8 unit roundoffs, of 2⁻²⁴ each.
+const ALLOWANCE: f32 = 8.0 * (f32::EPSILON / 2.0);
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
@@ -93,6 +144,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::view::WorldBounds;
 
     /// How far the sphere's centre is inside the nearest plane, in f64, from the camera's own definition.
     fn depth_inside(camera: &Camera, center: DVec3) -> f64 {
@@ -168,6 +220,36 @@ mod tests {
             let radius = tangent as f32;
             if depth >= -f64::from(radius) {
                 prop_assert!(Frustum::new(&camera).may_see(center, radius), "depth {depth} radius {radius}");
+            }
+        }
+
+        #[test]
+        fn spheres_are_seen_together_as_each_by_itself(
+            camera in any_camera(),
+            exponents in prop::collection::vec((-3.0..7.0_f64, -6.0..7.0_f32), Spheres::COUNT),
+            turn in 0.0..1.0_f64,
+        ) {
+            let frustum = Frustum::new(&camera);
+            let mut spheres = Spheres::default();
+            for (entry, (distance, radius)) in exponents.into_iter().enumerate() {
+                let (height, angle) = ((entry as f64 * 0.618 + turn).fract() * 2.0 - 1.0, entry as f64 * 2.4);
+                let across = (1.0 - height * height).sqrt();
+                let direction = DVec3::new(across * angle.cos(), height, across * angle.sin());
+                let center = camera.position + direction * 10_f64.powf(distance);
+                let bounds = match entry % 19 {
+                    0 => WorldBounds::NOTHING,
+                    1 => WorldBounds { center: DVec3::NAN, radius: 1.0 },
+                    2 => WorldBounds { center, radius: f32::INFINITY },
+                    _ => WorldBounds { center, radius: 10_f32.powf(radius) },
+                };
+                spheres.set(entry, bounds);
+            }
+            for first in [0, 64, 100, 192] {
+                let together = frustum.may_see_each(&spheres, first);
+                for entry in 0..Frustum::AT_ONCE {
+                    let WorldBounds { center, radius } = spheres.get(first + entry);
+                    prop_assert_eq!(together >> entry & 1 == 1, frustum.may_see(center, radius), "{} {}", center, radius);
+                }
             }
         }
 

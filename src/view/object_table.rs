@@ -2,51 +2,85 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-use parking_lot::{MappedRwLockReadGuard, RwLockReadGuard};
+use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::{FixedPosition, RejectionReason, Rejections};
-use crate::blocks::Blocks;
+use super::{FixedPosition, RejectionReason, Rejections, Spheres, WorldBounds};
 use crate::command::{Cull, DrawState};
 use crate::scene::{Material, Mesh, SceneRef};
 
 /// The frame's objects: what is uploaded, where each is, and how each is drawn. Objects that cannot be drawn are counted
 /// and left out.
+///
+/// They lie in blocks, each behind a lock of its own: jobs that fill different blocks never wait for each other, and one
+/// uncontended lock a block is a fraction of a nanosecond an object.
 #[derive(Debug, Default)]
 pub struct ObjectTable {
-    records: Blocks<ObjectRecord>,
-    bounds: Blocks<WorldBounds>,
-    draws: Blocks<ObjectDraw>,
+    blocks: Vec<RwLock<Box<ObjectBlock>>>,
     rejections: Rejections,
     length: usize,
 }
 
+/// What the table holds of [`ObjectTable::BLOCK`] objects; object `index` is at `index % BLOCK`.
+#[derive(Clone, Debug)]
+pub struct ObjectBlock {
+    /// What is uploaded.
+    pub records: [ObjectRecord; ObjectTable::BLOCK],
+    /// Where they are.
+    pub spheres: Spheres,
+    /// How they are drawn.
+    pub draws: [ObjectDraw; ObjectTable::BLOCK],
+}
+
+impl Default for ObjectBlock {
+    fn default() -> Self {
+        Self {
+            records: [bytemuck::Zeroable::zeroed(); ObjectTable::BLOCK],
+            spheres: Spheres::default(),
+            draws: [ObjectDraw::default(); ObjectTable::BLOCK],
+        }
+    }
+}
+
 impl ObjectTable {
+    /// Objects in a block.
+    pub const BLOCK: usize = Spheres::COUNT;
+
     /// Makes room for `objects` objects.
     pub fn reset(&mut self, objects: usize) {
         self.length = objects;
-        self.records.reserve(objects, bytemuck::Zeroable::zeroed());
-        self.bounds.reserve(objects, WorldBounds::NOTHING);
-        self.draws.reserve(objects, ObjectDraw::default());
+        let blocks = self.block_count().max(self.blocks.len());
+        self.blocks.resize_with(blocks, RwLock::default);
+        // What lies behind the last object is tested with it, and is not to be seen.
+        if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK) {
+            let spheres = &mut last.get_mut().spheres;
+            (objects % Self::BLOCK..Self::BLOCK).for_each(|entry| spheres.set(entry, WorldBounds::NOTHING));
+        }
         self.rejections = Rejections::default();
     }
 
     /// Fills in the objects of `range`.
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
-        for (block, part) in Blocks::<ObjectRecord>::parts(range) {
-            let mut records = self.records.write(block);
-            let mut bounds = self.bounds.write(block);
-            let mut draws = self.draws.write(block);
-            for object in part {
-                let entry = object % Blocks::<ObjectRecord>::SIZE;
+        let mut rest = range;
+        while !rest.is_empty() {
+            let index = rest.start / Self::BLOCK;
+            let end = ((index + 1) * Self::BLOCK).min(rest.end);
+            let mut block = self.blocks[index].write();
+            let ObjectBlock { records, spheres, draws } = &mut **block;
+            for object in rest.start..end {
+                let entry = object % Self::BLOCK;
                 match describe(scene, object) {
-                    Ok(described) => (records[entry], bounds[entry], draws[entry]) = described,
+                    Ok((record, bounds, draw)) => {
+                        records[entry] = record;
+                        spheres.set(entry, bounds);
+                        draws[entry] = draw;
+                    }
                     Err(reason) => {
-                        bounds[entry] = WorldBounds::NOTHING;
+                        spheres.set(entry, WorldBounds::NOTHING);
                         self.rejections.count(reason, object);
                     }
                 }
             }
+            rest.start = end;
         }
     }
 
@@ -62,7 +96,7 @@ impl ObjectTable {
 
     /// The number of blocks that the objects fill.
     pub fn block_count(&self) -> usize {
-        self.length.div_ceil(Blocks::<ObjectRecord>::SIZE)
+        self.length.div_ceil(Self::BLOCK)
     }
 
     /// What is uploaded, 64 bytes an object: the first object of a block, and the records of all of them.
@@ -70,19 +104,17 @@ impl ObjectTable {
     /// # Panics
     /// If there is no such block.
     pub fn records_of(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [ObjectRecord]>) {
-        let first = block * Blocks::<ObjectRecord>::SIZE;
-        let count = (self.length - first).min(Blocks::<ObjectRecord>::SIZE);
-        (first, RwLockReadGuard::map(self.records.read(block), |records| &records[..count]))
+        let first = block * Self::BLOCK;
+        let count = (self.length - first).min(Self::BLOCK);
+        (first, RwLockReadGuard::map(self.block(block), |block| &block.records[..count]))
     }
 
-    /// Where each object is.
-    pub fn bounds(&self) -> &Blocks<WorldBounds> {
-        &self.bounds
-    }
-
-    /// How each object is drawn.
-    pub fn draws(&self) -> &Blocks<ObjectDraw> {
-        &self.draws
+    /// All there is of a block of objects.
+    ///
+    /// # Panics
+    /// If there is no such block.
+    pub fn block(&self, index: usize) -> RwLockReadGuard<'_, Box<ObjectBlock>> {
+        self.blocks[index].read()
     }
 
     /// What was left out, and why.
@@ -110,20 +142,6 @@ pub struct ObjectRecord {
     pub scale: [f32; 3],
     /// Its index.
     pub object: u32,
-}
-
-/// Where an object is in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WorldBounds {
-    /// The centre of a sphere around it, in metres.
-    pub center: DVec3,
-    /// The sphere's radius in metres.
-    pub radius: f32,
-}
-
-impl WorldBounds {
-    /// Seen by nobody.
-    pub const NOTHING: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
 }
 
 /// How an object is drawn, as slots and state.

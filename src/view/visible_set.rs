@@ -24,20 +24,24 @@ impl VisibleSet {
         self.offsets.get_mut().clear();
     }
 
-    /// Tests a range of objects. Ranges tested at the same time must not share objects, but may share words.
-    pub fn test(&self, objects: Range<usize>, sees: impl Fn(usize) -> bool) {
-        let mut object = objects.start;
-        while object < objects.end {
-            let word_end = (object / 64 + 1) * 64;
-            let mut bits = 0;
-            for candidate in object..word_end.min(objects.end) {
-                bits |= u64::from(sees(candidate)) << (candidate % 64);
-            }
+    /// Tests a range of objects: `sees` is asked for at most [`VisibleSet::WORD`] objects at a time, none of them past a
+    /// multiple of that, and answers with a bit each, from the lowest; further bits are left out. Ranges tested at the same
+    /// time must not share objects, but may share words.
+    pub fn test(&self, objects: Range<usize>, sees: impl Fn(Range<usize>) -> u64) {
+        let mut rest = objects;
+        while !rest.is_empty() {
+            let word = rest.start / Self::WORD;
+            let asked = rest.start..((word + 1) * Self::WORD).min(rest.end);
+            let known = u64::MAX >> (Self::WORD - asked.len());
+            let bits = (sees(asked.clone()) & known) << (asked.start % Self::WORD);
             // Whoever reads the bits does so in a job that depends on this one, which orders the two.
-            self.words[object / 64].fetch_or(bits, Ordering::Relaxed);
-            object = word_end;
+            self.words[word].fetch_or(bits, Ordering::Relaxed);
+            rest.start = asked.end;
         }
     }
+
+    /// Objects in a word.
+    pub const WORD: usize = u64::BITS as usize;
 
     /// Counts what was seen: the prefix sum over words. To be called once, when every object was tested.
     pub fn compact(&self) {
@@ -56,9 +60,9 @@ impl VisibleSet {
         self.offsets.read().last().map_or(0, |&total| total as usize)
     }
 
-    /// Calls `visit(rank, object)` for the visible objects whose rank among them is in `ranks`, in order. Ranks past the
-    /// last are left out.
-    pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize)) {
+    /// Calls `visit(rank, word, bits)` for the visible objects whose rank among them is in `ranks`, word by word and in
+    /// order: bit `b` is object `word × WORD + b`, and the lowest is that of `rank`. Ranks past the last are left out.
+    pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
         let offsets = self.offsets.read();
         let end = ranks.end.min(offsets.last().map_or(0, |&total| total as usize));
         let mut rank = ranks.start;
@@ -69,14 +73,26 @@ impl VisibleSet {
             for _ in offsets[word] as usize..rank {
                 bits &= bits - 1;
             }
-            while bits != 0 && rank < end {
-                visit(rank, word * 64 + bits.trailing_zeros() as usize);
-                bits &= bits - 1;
-                rank += 1;
+            let past_the_end = (offsets[word + 1] as usize).saturating_sub(end);
+            for _ in 0..past_the_end {
+                bits &= !(1 << (u64::BITS - 1 - bits.leading_zeros()));
+            }
+            if bits != 0 {
+                visit(rank, word, bits);
+                rank += bits.count_ones() as usize;
             }
             word += 1;
         }
     }
+}
+
+/// The set bits' places, from the lowest.
+pub(crate) fn places(mut bits: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        place
+    })
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -84,6 +100,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    fn bits_of(asked: Range<usize>, sees: impl Fn(usize) -> bool) -> u64 {
+        (0..).zip(asked).fold(0, |bits, (place, object)| bits | u64::from(sees(object)) << place)
+    }
 
     proptest! {
         #[test]
@@ -98,16 +118,17 @@ mod tests {
             let mut starts: Vec<usize> = (0..seen.len()).step_by(chunk).collect();
             starts.reverse();
             for start in starts {
-                set.test(start..(start + chunk).min(seen.len()), |object| seen[object]);
+                set.test(start..(start + chunk).min(seen.len()), |asked| bits_of(asked, |object| seen[object]));
             }
             set.compact();
             prop_assert_eq!(set.count(), expected.len());
             let mut found = Vec::new();
             for start in (0..seen.len() + 1).step_by(ranks) {
-                set.visit(start..start + ranks, |rank, object| {
+                set.visit(start..start + ranks, |rank, word, bits| {
                     assert_eq!(rank, found.len());
-                    found.push(object);
+                    found.extend(places(bits).map(|place| word * VisibleSet::WORD + place));
                 });
+                prop_assert_eq!(found.len(), expected.len().min(start + ranks));
             }
             prop_assert_eq!(found, expected);
         }
@@ -117,11 +138,11 @@ mod tests {
     fn a_reset_forgets() {
         let mut set = VisibleSet::default();
         set.reset(3);
-        set.test(0..3, |_| true);
+        set.test(0..3, |_| u64::MAX);
         set.compact();
         set.reset(130);
         assert_eq!(set.count(), 0);
-        set.test(0..130, |object| object == 129);
+        set.test(0..130, |asked| bits_of(asked, |object| object == 129));
         set.compact();
         assert_eq!(set.count(), 1);
     }

@@ -74,13 +74,13 @@ fn after_a_frame_that_failed_the_last_one_can_still_be_looked_at() {
     scene.lights = vec![spot(DVec3::Y * 5.0)];
     let (mut renderer, _) = deferred(Deferred::to_picture());
     drop(renderer.record(scene.as_scene_ref()).unwrap());
-    let drawn = renderer.draw_list("geometry buffer", 0).unwrap().commands.len();
+    let drawn = renderer.draw_list("geometry buffer", 0).unwrap().objects.len();
 
     scene.lights.clear();
     scene.cameras[0].kind = ViewKind::Reflection;
     assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::NoProcess { .. })));
     assert!(renderer.draw_list("nobody", 0).is_none());
-    assert_eq!(renderer.draw_list("geometry buffer", 0).unwrap().commands.len(), drawn);
+    assert_eq!(renderer.draw_list("geometry buffer", 0).unwrap().objects.len(), drawn);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend};
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
-use drawloom::queue::DrawList;
+use drawloom::queue::{DrawList, DrawPart};
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::view::{LightTable, ObjectTable, Rejections, RenderView};
@@ -68,9 +68,14 @@ fn a_frame_by_the_rules_breaks_none() {
 #[test]
 fn commands_out_of_order_are_refused() {
     let rule = broken_rule(|worker, frame, list, request| {
-        let mut list = list.clone();
-        list.commands.reverse();
-        NullBackend.prepare(worker, frame, request, PASS, &list)
+        let mut part = DrawPart {
+            commands: list.commands().rev().copied().collect(),
+            batches: list.batches.clone(),
+            objects: list.objects.clone(),
+        };
+        let mut reversed = DrawList::default();
+        reversed.join([&mut part], true);
+        NullBackend.prepare(worker, frame, request, PASS, &reversed)
     });
     assert!(rule.contains("not sorted"), "{rule}");
 }

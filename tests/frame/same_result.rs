@@ -1,12 +1,15 @@
 //! Whoever does the work, and however it is cut: the queues are the same.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use drawloom::backend::NullPass;
+use drawloom::backend::{NullBackend, NullPass};
 use drawloom::glam::DVec3;
-use drawloom::queue::DrawList;
+use drawloom::process::Deferred;
+use drawloom::queue::{DrawList, Split};
 use drawloom::scene::{Blend, Projection, Scene, sample};
-use drawloom::{FrameStatistics, Granularity};
+use drawloom::task::Scheduler;
+use drawloom::{FrameStatistics, Granularity, Renderer};
 
 use crate::renderer;
 use crate::scenes::field;
@@ -36,7 +39,7 @@ fn drawn(scene: &Scene, workers: usize, granularity: Granularity) -> (Vec<DrawLi
 
 fn assert_same_for_all(scene: &Scene) {
     let (lists, passes, statistics) = drawn(scene, 1, Granularity::PerCamera);
-    assert!(lists.iter().all(|list| !list.commands.is_empty()));
+    assert!(lists.iter().all(|list| !list.objects.is_empty()));
     for workers in [1, 2, 4] {
         for granularity in GRANULARITIES {
             let (other_lists, other_passes, other_statistics) = drawn(scene, workers, granularity);
@@ -53,6 +56,43 @@ fn a_field_of_boxes() {
 }
 
 #[test]
+fn a_view_of_so_many_objects_that_it_is_sorted_in_parts() {
+    let mut scene = field(1500);
+    scene.cameras.truncate(1);
+    scene.duplicate_objects(40);
+    let (lists, passes, _) = drawn(&scene, 1, Granularity::PerCamera);
+    assert!(lists[0].objects.len() > 3 * Split::COMMANDS, "{}", lists[0].objects.len());
+    assert!(lists[0].commands().is_sorted_by(|one, next| (one.key, one.object) < (next.key, next.object)));
+    let batches = lists[0].batches.windows(2);
+    assert!(batches.into_iter().all(|pair| (pair[0].mesh, pair[0].state) != (pair[1].mesh, pair[1].state)));
+    for workers in [2, 4] {
+        for granularity in [Granularity::Chunk(300), Granularity::default()] {
+            let (other_lists, other_passes, _) = drawn(&scene, workers, granularity);
+            assert!(other_lists == lists, "{workers} workers, {granularity:?}");
+            assert_eq!(other_passes, passes, "{workers} workers, {granularity:?}");
+        }
+    }
+}
+
+#[test]
+fn without_instancing_the_same_objects_are_drawn_each_by_itself() {
+    let scene = field(1000);
+    let (lists, ..) = drawn(&scene, 2, Granularity::default());
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).instancing(false);
+    let (mut renderer, submitter) = builder.build(scheduler).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    for (view, list) in lists.iter().enumerate() {
+        let apart = renderer.draw_list("geometry buffer", view).unwrap();
+        assert!(list.batches.len() < list.objects.len() && apart.batches.len() == list.objects.len());
+        assert_eq!(apart.objects, list.objects);
+        assert!(apart.commands().eq(list.commands()));
+        assert!(apart.batches.iter().all(|batch| batch.count == 1));
+    }
+    submitter.submit(recorded).unwrap();
+}
+
+#[test]
 fn the_projects_own_scene() {
     assert_same_for_all(&sample::colonnade().unwrap());
 }
@@ -63,9 +103,7 @@ fn coincident_copies() {
     scene.duplicate_objects(5);
     let (lists, ..) = drawn(&scene, 2, Granularity::Chunk(64));
     for list in lists {
-        for pair in list.commands.windows(2) {
-            assert!((pair[0].key, pair[0].object) < (pair[1].key, pair[1].object));
-        }
+        assert!(list.commands().is_sorted_by(|one, next| (one.key, one.object) < (next.key, next.object)));
     }
     assert_same_for_all(&scene);
 }

@@ -1,0 +1,153 @@
+//! Split: many commands into parts that are sorted and merged at the same time.
+
+use crate::blocks::Blocks;
+use crate::command::{RenderCommand, SortKey};
+
+/// Cuts a view's commands into parts by key, so that one part after the other is all of them in order: a sample sort, of
+/// which every part is a job (Blelloch et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).
+///
+/// Where the cuts lie decides who sorts what, never what comes out.
+#[derive(Clone, Debug, Default)]
+pub struct Split {
+    /// Where each part but the first starts, ascending.
+    starts: Vec<SortKey>,
+    samples: Vec<SortKey>,
+}
+
+/// The commands of which one job takes care: those whose keys are in a range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    first: SortKey,
+    /// Not in it; nothing that is drawn has the last key.
+    end: SortKey,
+}
+
+impl Split {
+    /// Commands in a part, about.
+    pub const COMMANDS: usize = 8192;
+
+    /// The most parts. Each looks at every key.
+    pub const MOST_PARTS: usize = 32;
+
+    /// How many parts that many commands have at most.
+    pub fn most_parts(commands: usize) -> usize {
+        (commands / Self::COMMANDS).clamp(1, Self::MOST_PARTS)
+    }
+
+    /// Cuts the first `count` commands.
+    pub fn cut(&mut self, commands: &Blocks<RenderCommand>, count: usize) {
+        self.starts.clear();
+        let parts = Self::most_parts(count);
+        if parts == 1 {
+            return;
+        }
+        let samples = parts * SAMPLES_PER_PART;
+        self.samples.clear();
+        self.samples.extend((0..samples).filter_map(|sample| {
+            let place = sample * count / samples;
+            let command = commands.read(place / Blocks::<RenderCommand>::SIZE)[place % Blocks::<RenderCommand>::SIZE];
+            (command.key != SortKey::LAST).then_some(command.key)
+        }));
+        self.samples.sort_unstable();
+        let length = self.samples.len();
+        self.starts.extend((1..parts).filter_map(|part| self.samples.get(part * length / parts).copied()));
+        self.starts.dedup();
+    }
+
+    /// How many parts there are; one at least.
+    pub fn part_count(&self) -> usize {
+        self.starts.len() + 1
+    }
+
+    /// One of the parts.
+    ///
+    /// # Panics
+    /// If there is no such part.
+    pub fn part(&self, index: usize) -> Part {
+        let first = index.checked_sub(1).map_or(SortKey::FIRST, |before| self.starts[before]);
+        Part::between(first, self.starts.get(index).copied().unwrap_or(SortKey::LAST))
+    }
+}
+
+/// With so many the largest part is seldom half as large again as it should be.
+const SAMPLES_PER_PART: usize = 32;
+
+impl Part {
+    /// Everything that is drawn.
+    pub const ALL: Self = Self { first: SortKey::FIRST, end: SortKey::LAST };
+
+    /// What comes from `first` on and before `end`.
+    pub fn between(first: SortKey, end: SortKey) -> Self {
+        Self { first, end }
+    }
+
+    /// Whether a command with this key is in it.
+    #[inline]
+    pub fn holds(self, key: SortKey) -> bool {
+        // Both at once: what is before the first is far behind the end.
+        key.bits().wrapping_sub(self.first.bits()) < self.end.bits().wrapping_sub(self.first.bits())
+    }
+
+    /// Whether it is everything.
+    #[inline]
+    pub fn is_all(self) -> bool {
+        self == Self::ALL
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::command::DrawState;
+    use crate::queue::{SortMemory, sort};
+
+    fn commands_of(depths: &[f32]) -> Blocks<RenderCommand> {
+        let mut commands = Blocks::new();
+        commands.reserve(depths.len(), RenderCommand::NOTHING);
+        for (place, &depth) in depths.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+            let key = SortKey::opaque(DrawState::PLAIN, place as u32 % 3, depth);
+            commands.write(place / Blocks::<RenderCommand>::SIZE)[place % Blocks::<RenderCommand>::SIZE] =
+                RenderCommand {
+                    key,
+                    object: place as u32,
+                    mesh: place as u32 % 3,
+                    material: 0,
+                    state: DrawState::PLAIN,
+                };
+        }
+        commands
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn parts_one_after_the_other_are_everything_in_order(
+            count in 0_usize..40_000, seed in any::<u64>(), few_depths in prop::bool::ANY,
+        ) {
+            let depth = |place: u64| {
+                let random = (place ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+                if few_depths { (random % 3) as f32 } else { (random % 100_000) as f32 }
+            };
+            let depths: Vec<f32> = (0..count as u64).map(depth).collect();
+            let commands = commands_of(&depths);
+            let (mut memory, mut split) = (SortMemory::default(), Split::default());
+            split.cut(&commands, count);
+            prop_assert!(split.part_count() <= Split::most_parts(count));
+            let (mut in_parts, mut whole, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
+            for index in 0..split.part_count() {
+                sort(&commands, count, split.part(index), &mut memory, &mut sorted);
+                if !few_depths {
+                    prop_assert!(sorted.len() < 2 * Split::COMMANDS + Split::COMMANDS, "{} in a part", sorted.len());
+                }
+                in_parts.append(&mut sorted);
+            }
+            sort(&commands, count, Part::ALL, &mut memory, &mut whole);
+            prop_assert_eq!(whole.len(), depths.iter().filter(|&&depth| depth > 0.0).count());
+            prop_assert!(whole.is_sorted_by_key(|command| (command.key, command.object)));
+            prop_assert!(in_parts == whole);
+        }
+    }
+}
