@@ -40,7 +40,8 @@ const MESHES: u32 = 64;
 /// So many that a view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
 const MATERIALS: u32 = 16;
 
-const GRANULARITIES: [(&str, Granularity); 5] = [
+const GRANULARITIES: [(&str, Granularity); 6] = [
+    ("adaptive", Granularity::Adaptive),
     ("per-camera", Granularity::PerCamera),
     ("per-draw", Granularity::PerDraw),
     ("chunk:64", Granularity::Chunk(64)),

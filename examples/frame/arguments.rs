@@ -133,7 +133,7 @@ impl FromStr for PlacedCamera {
     }
 }
 
-/// `per-camera`, `per-draw` or `chunk:N`.
+/// `adaptive`, `per-camera`, `per-draw` or `chunk:N`.
 #[derive(Clone)]
 pub struct JobSize(pub Granularity);
 
@@ -141,6 +141,7 @@ impl JobSize {
     /// As it is written on the command line.
     pub fn name(&self) -> String {
         match self.0 {
+            Granularity::Adaptive => "adaptive".to_owned(),
             Granularity::PerCamera => "per-camera".to_owned(),
             Granularity::PerDraw => "per-draw".to_owned(),
             Granularity::Chunk(size) => format!("chunk:{size}"),
@@ -153,13 +154,14 @@ impl FromStr for JobSize {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match (text, text.strip_prefix("chunk:")) {
+            ("adaptive", _) => Ok(Self(Granularity::Adaptive)),
             ("per-camera", _) => Ok(Self(Granularity::PerCamera)),
             ("per-draw", _) => Ok(Self(Granularity::PerDraw)),
             (_, Some(size)) => {
                 let size = size.parse::<NonZeroUsize>().map_err(|error| format!("chunk size {size:?}: {error}"))?;
                 Ok(Self(Granularity::Chunk(size.get())))
             }
-            _ => Err("it is per-camera, per-draw or chunk:N".to_owned()),
+            _ => Err("it is adaptive, per-camera, per-draw or chunk:N".to_owned()),
         }
     }
 }

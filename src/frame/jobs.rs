@@ -1,10 +1,12 @@
 //! The frame's job graph: which phase waits for which.
 
+use std::mem::{Discriminant, discriminant};
 use std::sync::Arc;
 
 use super::FrameError;
-use super::phase::{PassTable, Phase};
-use crate::graph::{FrameGraph, Schedule};
+use super::cost_model::CostModel;
+use super::phase::{FrameNode, PassTable, Phase};
+use crate::graph::{FrameGraph, ProcessId, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::Selection;
 use crate::scene::ViewKind;
@@ -12,7 +14,9 @@ use crate::view::RenderView;
 
 /// What a frame's jobs are, for one plan and one list of views.
 pub(super) struct FrameJobs {
-    pub(super) schedule: Schedule<Phase>,
+    pub(super) schedule: Schedule<FrameNode>,
+    /// What they cost.
+    pub(super) costs: CostModel,
     /// In the order they are submitted: by process, then by view.
     pub(super) passes: Vec<Pass>,
     /// What the jobs were drawn up for.
@@ -35,31 +39,21 @@ impl FrameJobs {
             }
         }
 
-        let mut graph = FrameGraph::new();
-        let objects = graph.add("objects", Phase::Objects);
-        let upload = graph.add("upload objects", Phase::Upload);
-        graph.order(objects, upload);
-        graph.keep(objects);
-        graph.keep(upload);
+        let mut nodes = Nodes::default();
+        let objects = nodes.add("objects".to_owned(), Phase::Objects, None, None);
+        nodes.add("upload objects".to_owned(), Phase::Upload, None, Some(objects));
 
         let mut compacted = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
             let process = &plan.processes()[pass.process].process;
             let view = pass.view;
             let view_name = format!("view {view} {:?}", views[view].name());
-            let mut add = |name: String, phase, after| {
-                let id = graph.add(name, phase);
-                graph.keep(id);
-                if let Some(after) = after {
-                    graph.order(after, id);
-                }
-                id
-            };
             let mut previous = None;
             if draws[pass.process].selection().is_some() {
                 let seen = *compacted[view].get_or_insert_with(|| {
-                    let seen = add(format!("visibility, {view_name}"), Phase::Visibility { view }, Some(objects));
-                    add(format!("compact, {view_name}"), Phase::Compact { view }, Some(seen))
+                    let name = format!("visibility, {view_name}");
+                    let seen = nodes.add(name, Phase::Visibility { view }, None, Some(objects));
+                    nodes.add(format!("compact, {view_name}"), Phase::Compact { view }, None, Some(seen))
                 });
                 previous = Some(seen);
                 for (phase, name) in [
@@ -70,15 +64,19 @@ impl FrameJobs {
                     (Phase::Prepare { pass: index }, "prepare"),
                     (Phase::Record { pass: index }, "record"),
                 ] {
-                    previous = Some(add(format!("{}, {view_name}, {name}", process.name()), phase, previous));
+                    let name = format!("{}, {view_name}, {name}", process.name());
+                    previous = Some(nodes.add(name, phase, Some(pass.process), previous));
                 }
             }
-            add(format!("{}, {view_name}, finish", process.name()), Phase::Finish { pass: index }, previous);
+            let name = format!("{}, {view_name}, finish", process.name());
+            nodes.add(name, Phase::Finish { pass: index }, Some(pass.process), previous);
         }
+        let Nodes { graph, kinds, count } = nodes;
+        let costs = CostModel::new(kinds.len(), count);
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
         let views = views.iter().map(|view| (view.name().to_owned(), view.kind())).collect();
         let selections = draws.iter().map(Draws::selection).collect();
-        Ok(Self { schedule, passes, plan: Arc::clone(plan), views, selections })
+        Ok(Self { schedule, costs, passes, plan: Arc::clone(plan), views, selections })
     }
 
     /// Whether they are what this plan, these draws and these views need.
@@ -95,6 +93,34 @@ impl FrameJobs {
         for (pass, table) in self.passes.iter().zip(tables) {
             table.reset(self.selections[pass.process], objects);
         }
+    }
+}
+
+/// The nodes of a frame's job graph, as they come.
+#[derive(Default)]
+struct Nodes {
+    graph: FrameGraph<FrameNode>,
+    /// A phase of a process is of one kind in all its views. Each is told by any of its nodes.
+    kinds: Vec<(Discriminant<Phase>, Option<usize>)>,
+    count: usize,
+}
+
+impl Nodes {
+    /// Adds a phase, of a process if it is of one, which comes after another.
+    fn add(&mut self, name: String, phase: Phase, process: Option<usize>, after: Option<ProcessId>) -> ProcessId {
+        let kind = (discriminant(&phase), process);
+        let place = self.kinds.iter().position(|known| *known == kind);
+        let place = place.unwrap_or_else(|| {
+            self.kinds.push(kind);
+            self.kinds.len() - 1
+        });
+        let id = self.graph.add(name, FrameNode { phase, node: self.count, kind: place });
+        self.count += 1;
+        self.graph.keep(id);
+        if let Some(after) = after {
+            self.graph.order(after, id);
+        }
+        id
     }
 }
 

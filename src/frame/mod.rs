@@ -1,6 +1,7 @@
 //! The façade: a scene goes in, recorded queues come out, and the device thread submits them.
 
 mod builder;
+mod cost_model;
 mod error;
 mod granularity;
 mod jobs;

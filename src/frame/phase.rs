@@ -5,6 +5,7 @@ use std::ops::Range;
 use parking_lot::{Mutex, RwLock};
 
 use super::Granularity;
+use super::cost_model::CostModel;
 use super::statistics::{Stage, StageClock};
 use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::blocks::Blocks;
@@ -14,7 +15,7 @@ use crate::queue::{DrawList, DrawPart, Fill, Selection, SortMemory, Split, insta
 use crate::task::Worker;
 use crate::view::{Frustum, LightTable, ObjectTable, VisibleSet, WorldBounds};
 
-/// A node of the frame's job graph: one phase, of the frame, of a view, or of a pass (by index).
+/// What a node of the frame's job graph does: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Checks every object and works out what all views need to know of it.
@@ -52,6 +53,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) frame: &'a B::Frame,
     pub(super) recordings: &'a [Recording<B>],
     pub(super) clock: &'a StageClock,
+    pub(super) costs: &'a CostModel,
+    pub(super) workers: usize,
 }
 
 /// What a frame's parts leave for each other; kept from frame to frame so that its memory is reused.
@@ -125,15 +128,40 @@ impl<B: Backend> Recording<B> {
     }
 }
 
-/// Objects in a job of [`Phase::Objects`], and blocks of them in a job of [`Phase::Upload`]: neither belongs to a view, so
-/// granularity does not apply.
-const OBJECTS_PER_JOB: usize = BLOCKS_PER_JOB * ObjectTable::BLOCK;
-const BLOCKS_PER_JOB: usize = 4;
+/// A phase as a node of the frame's job graph.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FrameNode {
+    pub(super) phase: Phase,
+    /// Its place among the nodes.
+    pub(super) node: usize,
+    /// What an item of it is like, as the [`CostModel`] knows it.
+    pub(super) kind: usize,
+}
 
-impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
+impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode {
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        self.phase.width(frame)
+    }
+
+    fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
+        let learnt = || frame.costs.items(self.kind, self.node, self.phase.width(frame), frame.workers);
+        frame.granularity.parts(self.phase.items_per_part()).unwrap_or_else(learnt)
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
+        let items = range.len();
+        let (result, took) = frame.clock.measure(self.phase.stage(), || self.phase.work(frame, range, worker));
+        if frame.granularity == Granularity::Adaptive {
+            frame.costs.note(self.kind, items, took);
+        }
+        Ok(result?)
+    }
+}
+
+impl Phase {
+    fn width<B: Backend>(self, frame: &FrameContext<'_, B>) -> usize {
         let tables = frame.tables;
-        match *self {
+        match self {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.block_count(),
             Self::Fill { pass } => visible_count(frame, pass),
@@ -143,22 +171,16 @@ impl<B: Backend> Node<FrameContext<'_, B>> for Phase {
         }
     }
 
-    fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
+    /// How many objects or draws are in the smallest part that can be a job.
+    fn items_per_part(self) -> usize {
         match self {
-            Self::Objects => OBJECTS_PER_JOB,
-            Self::Upload => BLOCKS_PER_JOB,
-            Self::Visibility { .. } | Self::Fill { .. } => frame.granularity.items(),
-            Self::Record { .. } => frame.granularity.bundles(),
+            Self::Upload => ObjectTable::BLOCK,
+            Self::Sort { .. } | Self::Instance { .. } => Split::COMMANDS,
+            Self::Record { .. } => DrawList::BATCHES_PER_BUNDLE,
             _ => 1,
         }
     }
 
-    fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
-        Ok(frame.clock.measure(self.stage(), || self.work(frame, range, worker))?)
-    }
-}
-
-impl Phase {
     fn stage(self) -> Stage {
         match self {
             Self::Objects | Self::Visibility { .. } | Self::Compact { .. } => Stage::Visibility,

@@ -106,7 +106,7 @@ impl<B: Backend> Renderer<B> {
             rejections: self.tables.objects.rejections(),
         };
 
-        let frame = clock.measure(Stage::Record, || self.backend.begin(&request))?;
+        let frame = clock.measure(Stage::Record, || self.backend.begin(&request)).0?;
         let recordings: Vec<Recording<B>> = request.passes.iter().map(|_| Recording::new()).collect();
         let context = FrameContext {
             request: &request,
@@ -117,8 +117,15 @@ impl<B: Backend> Renderer<B> {
             frame: &frame,
             recordings: &recordings,
             clock: &clock,
+            costs: &jobs.costs,
+            workers: self.scheduler.workers(),
         };
-        jobs.schedule.run(&self.scheduler, &context)?;
+        let outcome = jobs.schedule.run(&self.scheduler, &context);
+        match outcome {
+            Ok(()) => jobs.costs.learn(),
+            Err(_) => jobs.costs.forget_frame(),
+        }
+        outcome?;
 
         let queues = queues_of(&request, recordings)?;
         let statistics = statistics_of(&request, &self.tables, &clock);

@@ -74,14 +74,14 @@ pub(super) struct StageClock {
 }
 
 impl StageClock {
-    /// Runs `work` and adds the time it takes to `stage`.
-    pub(super) fn measure<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
+    /// Runs `work`, adds the time it takes to `stage`, and says how long that was.
+    pub(super) fn measure<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> (R, Duration) {
         let start = Instant::now();
         let result = work();
-        let elapsed = start.elapsed().as_nanos() as u64;
+        let took = start.elapsed();
         // Read when all jobs have ended, which orders everything.
-        self.nanoseconds[stage as usize].fetch_add(elapsed, Ordering::Relaxed);
-        result
+        self.nanoseconds[stage as usize].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+        (result, took)
     }
 
     pub(super) fn times(&self) -> StageTimes {

@@ -24,3 +24,4 @@ pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
 pub use scene_ref::SceneRef;
+pub(crate) use scene_ref::is_unit;

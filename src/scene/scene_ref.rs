@@ -68,7 +68,7 @@ impl SceneRef<'_> {
 
 /// Whether the square of a length is that of a unit vector or quaternion. What an engine's own arithmetic has turned many
 /// times may have drifted by a thousandth, and is brought back to unit length where it is used.
-pub(super) fn is_unit(length_squared: f32) -> bool {
+pub(crate) fn is_unit(length_squared: f32) -> bool {
     (length_squared - 1.0).abs() < 2e-3
 }
 

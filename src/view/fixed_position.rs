@@ -19,7 +19,8 @@ impl FixedPosition {
 
     /// The nearest fixed-point position; `None` where a coordinate is not finite or beyond [`FixedPosition::REACH`].
     pub fn new(position: DVec3) -> Option<Self> {
-        let within = position.is_finite() && position.abs().max_element() < Self::REACH;
+        // No number is less than one that is none.
+        let within = position.abs().cmplt(DVec3::splat(Self::REACH)).all();
         within.then(|| {
             Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| (steps + 0.5_f64.copysign(steps)) as i64))
         })

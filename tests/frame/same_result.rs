@@ -14,7 +14,8 @@ use drawloom::{FrameStatistics, Granularity, Renderer};
 use crate::renderer;
 use crate::scenes::field;
 
-const GRANULARITIES: [Granularity; 6] = [
+const GRANULARITIES: [Granularity; 7] = [
+    Granularity::Adaptive,
     Granularity::PerCamera,
     Granularity::PerDraw,
     Granularity::Chunk(7),
