@@ -94,7 +94,7 @@ impl PassTable {
                 self.parts.resize_with(parts, RwLock::default);
             }
             // Another pass may have stood here in the frame before.
-            None => *self.list.get_mut() = DrawList::default(),
+            None => self.list.get_mut().clear(),
         }
     }
 }
@@ -240,9 +240,11 @@ fn visible_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize 
 }
 
 fn join(table: &PassTable, merges: bool) {
-    let parts = table.split.read().part_count();
-    let mut parts: Vec<_> = table.parts[..parts].iter().map(RwLock::write).collect();
-    table.list.write().join(parts.iter_mut().map(|part| &mut **part), merges);
+    let mut list = table.list.write();
+    list.clear();
+    for part in &table.parts[..table.split.read().part_count()] {
+        list.append(&mut part.write(), merges);
+    }
 }
 
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {

@@ -3,10 +3,11 @@
 use crate::command::{DrawState, RenderCommand};
 
 /// What one process draws in one view: sorted commands, the batches they merge into, and the objects of each batch.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct DrawList {
-    /// In the order they are drawn, part by part.
+    /// In the order they are drawn, part by part; behind the last part there may be memory for more.
     commands: Vec<Vec<RenderCommand>>,
+    parts: usize,
     /// In the order they are drawn.
     pub batches: Vec<Batch>,
     /// The index of each command's object: the 4 bytes an object that a view uploads.
@@ -25,42 +26,42 @@ pub struct DrawPart {
 }
 
 impl DrawList {
-    /// Joins parts, each of which comes behind the one before. What they held is this list's, and its memory is theirs.
+    /// Leaves nothing to draw, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.parts = 0;
+        self.batches.clear();
+        self.objects.clear();
+    }
+
+    /// Joins a part on behind those that are there. What it held is this list's, and it has other memory instead.
     ///
     /// Where one part ends and the next begins in the middle of a run of equals, the two batches become one if `merges`: the
     /// list does not depend on where it was cut.
-    pub fn join<'a>(&mut self, parts: impl IntoIterator<Item = &'a mut DrawPart>, merges: bool) {
-        self.batches.clear();
-        self.objects.clear();
-        let mut count = 0;
-        for part in parts {
-            if self.commands.len() == count {
-                self.commands.push(Vec::new());
-            }
-            std::mem::swap(&mut self.commands[count], &mut part.commands);
-            count += 1;
-            if self.objects.is_empty() {
-                std::mem::swap(&mut self.batches, &mut part.batches);
-                std::mem::swap(&mut self.objects, &mut part.objects);
-                continue;
-            }
-            let first = self.objects.len() as u32;
-            let mut batches =
-                part.batches.iter().map(|batch| Batch { first: first + batch.first, ..*batch }).peekable();
-            if let Some(last) = self.batches.last_mut().filter(|_| merges)
-                && let Some(same) = batches.next_if(|next| (next.state, next.mesh) == (last.state, last.mesh))
-            {
-                last.count += same.count;
-            }
-            self.batches.extend(batches);
-            self.objects.extend_from_slice(&part.objects);
+    pub fn append(&mut self, part: &mut DrawPart, merges: bool) {
+        if self.parts == self.commands.len() {
+            self.commands.push(Vec::new());
         }
-        self.commands.truncate(count);
+        std::mem::swap(&mut self.commands[self.parts], &mut part.commands);
+        self.parts += 1;
+        if self.objects.is_empty() {
+            std::mem::swap(&mut self.batches, &mut part.batches);
+            std::mem::swap(&mut self.objects, &mut part.objects);
+            return;
+        }
+        let first = self.objects.len() as u32;
+        let mut batches = part.batches.iter().map(|batch| Batch { first: first + batch.first, ..*batch }).peekable();
+        if let Some(last) = self.batches.last_mut().filter(|_| merges)
+            && let Some(same) = batches.next_if(|next| (next.state, next.mesh) == (last.state, last.mesh))
+        {
+            last.count += same.count;
+        }
+        self.batches.extend(batches);
+        self.objects.extend_from_slice(&part.objects);
     }
 
     /// The sorted commands.
     pub fn commands(&self) -> impl DoubleEndedIterator<Item = &RenderCommand> + Clone {
-        self.commands.iter().flatten()
+        self.commands[..self.parts].iter().flatten()
     }
 
     /// Batches in a bundle, whatever the granularity: fewer cost up to three times the price a draw, and boundaries that
@@ -81,6 +82,14 @@ impl DrawList {
         &self.batches[start..self.batches.len().min(start + Self::BATCHES_PER_BUNDLE)]
     }
 }
+
+impl PartialEq for DrawList {
+    fn eq(&self, other: &Self) -> bool {
+        self.batches == other.batches && self.objects == other.objects && self.commands().eq(other.commands())
+    }
+}
+
+impl Eq for DrawList {}
 
 /// One instanced draw: a run of commands with the same mesh and state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -74,7 +74,8 @@ mod tests {
             };
             let mut parts: Vec<_> = edges.windows(2).map(sorted).collect();
             let mut list = DrawList::default();
-            list.join(&mut parts, merges);
+            list.clear();
+            parts.iter_mut().for_each(|part| list.append(part, merges));
 
             let mut expected: Vec<_> = commands.into_iter().filter(|command| command.key != SortKey::LAST).collect();
             expected.sort_by_key(|command| (command.key, command.object));

@@ -74,7 +74,7 @@ fn commands_out_of_order_are_refused() {
             objects: list.objects.clone(),
         };
         let mut reversed = DrawList::default();
-        reversed.join([&mut part], true);
+        reversed.append(&mut part, true);
         NullBackend.prepare(worker, frame, request, PASS, &reversed)
     });
     assert!(rule.contains("not sorted"), "{rule}");
