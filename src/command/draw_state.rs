@@ -50,6 +50,16 @@ impl DrawState {
         usize::from(self.0)
     }
 
+    /// The state of this byte.
+    pub(super) fn from_byte(byte: u8) -> Self {
+        Self(byte)
+    }
+
+    /// The byte.
+    pub(super) fn byte(self) -> u8 {
+        self.0
+    }
+
     /// How indices make triangles.
     pub fn topology(self) -> Topology {
         if self.0 & 1 == 0 { Topology::TriangleList } else { Topology::TriangleStrip }

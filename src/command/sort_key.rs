@@ -6,8 +6,8 @@ use super::DrawState;
 /// equal keys are ordered by their object's index.
 ///
 /// ```text
-/// bit    63 62 | 61 … 54 | 53 … 36 | 35 … 16            | 15 … 0
-/// opaque  0  0 | state   | mesh    | depth, near to far | 0
+/// bit    63 62 | 61 … 54 | 53 52 | 51 … 20 | 19 … 0
+/// opaque  0  0 | state   | 0     | mesh    | depth, near to far
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
@@ -15,9 +15,8 @@ use super::DrawState;
 /// ```
 ///
 /// Bits that the picture depends on: 63 and 62 (blended after opaque), and the depth of blended commands, which is the
-/// whole f32. All others only save state changes and overdraw: slots beyond what their bits can tell apart share a place,
-/// which costs speed and nothing else. The depth of opaque commands is the upper 20 bits of the f32 below its sign: steps
-/// of 2⁻¹² to 2⁻¹¹ of the distance, at any distance.
+/// whole f32. All others only save state changes and overdraw. The depth of opaque commands is the upper 20 bits of the f32
+/// below its sign: steps of 2⁻¹² to 2⁻¹¹ of the distance, at any distance.
 ///
 /// Materials have no bits: shaders find them by object, so another material is no change of state, and were commands
 /// ordered by it, fewer of them would become one draw.
@@ -36,9 +35,10 @@ impl SortKey {
     /// `depth` is the distance along the view's axis in metres; what lies behind the camera counts as 0.
     pub fn opaque(state: DrawState, mesh: u32, depth: f32) -> Self {
         let state = (state.index() as u64 & 0xff) << 54;
-        let mesh = (u64::from(mesh) & 0x3_ffff) << 36;
-        // The bits of a positive float grow with it. `max` also turns a NaN into 0.
-        let depth = u64::from(depth.max(0.0).to_bits() >> 11) << 16;
+        let mesh = u64::from(mesh) << 20;
+        // The bits of a positive float grow with it. `max` also turns a NaN into 0, and the sum a −0, whose sign would be a
+        // bit of the mesh.
+        let depth = u64::from((depth.max(0.0) + 0.0).to_bits() >> 11);
         Self(state | mesh | depth)
     }
 
@@ -57,6 +57,11 @@ impl SortKey {
     /// The key with these 64 bits.
     pub fn from_bits(bits: u64) -> Self {
         Self(bits)
+    }
+
+    /// The state and the mesh's slot that the key of an opaque command repeats; `None` of any other key.
+    pub(super) fn repeated(self) -> Option<(DrawState, u32)> {
+        (self.0 >> 62 == 0).then(|| (DrawState::from_byte((self.0 >> 54) as u8), (self.0 >> 20) as u32))
     }
 }
 
@@ -96,13 +101,21 @@ mod tests {
 
         #[test]
         fn opaque_commands_go_by_mesh_before_depth(
-            first in (0_u32..0x4_0000, 0.0..1e9_f32),
-            second in (0_u32..0x4_0000, 0.0..1e9_f32),
+            first in (any::<u32>(), 0.0..1e9_f32),
+            second in (any::<u32>(), 0.0..1e9_f32),
         ) {
             let key = |(mesh, depth)| SortKey::opaque(DrawState::PLAIN, mesh, depth);
             if first.0 < second.0 {
                 prop_assert!(key(first) < key(second));
             }
+        }
+
+        #[test]
+        fn only_an_opaque_key_repeats_state_and_mesh(byte in any::<u8>(), mesh in any::<u32>(), depth in any::<f32>()) {
+            let state = DrawState::from_byte(byte);
+            prop_assert_eq!(SortKey::opaque(state, mesh, depth).repeated(), Some((state, mesh)));
+            prop_assert_eq!(SortKey::blended(depth).repeated(), None);
+            prop_assert_eq!(SortKey::LAST.repeated(), None);
         }
     }
 
@@ -114,5 +127,6 @@ mod tests {
         assert!(SortKey::blended(f32::NEG_INFINITY) < SortKey::LAST);
         assert!(SortKey::opaque(state, 0, f32::NAN) < SortKey::blended(0.0));
         assert_eq!(SortKey::blended(-0.0), SortKey::blended(0.0));
+        assert_eq!(SortKey::opaque(state, 2, -0.0), SortKey::opaque(state, 2, 0.0));
     }
 }

@@ -1,0 +1,197 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::command::{DrawState, SortKey};
+
+/// Any command at all: keys that repeat nothing of what they should, slots of 32 bits, and their neighbours.
+fn any_command() -> impl Strategy<Value = RenderCommand> {
+    let key = prop_oneof![
+        any::<u64>(),
+        any::<u64>().prop_map(|bits| bits >> 2),
+        0..64_u64,
+        Just(u64::MAX),
+        (0..64_u32).prop_map(|bit| 1 << bit),
+        (0..64_u32).prop_map(|bit| (1 << bit) - 1),
+        any::<f32>().prop_map(|depth| SortKey::blended(depth).bits()),
+    ];
+    let slot = || prop_oneof![any::<u32>(), 0..300_u32, Just(u32::MAX), 0xffff_0000..=u32::MAX];
+    (key, slot(), slot(), slot(), any::<u8>()).prop_map(|(bits, object, mesh, material, byte)| RenderCommand {
+        key: SortKey::from_bits(bits),
+        object,
+        mesh,
+        material,
+        state: DrawState::from_byte(byte),
+    })
+}
+
+/// Commands as frames have them, sorted.
+fn usual_commands(most: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
+    let command = (0..200_u32, 0..30_u32, 0.1..100.0_f32, 0..10_u8).prop_map(|(mesh, material, depth, kind)| {
+        let state = DrawState::from_byte(kind % 3);
+        let key = match kind {
+            0 => SortKey::blended(depth),
+            _ => SortKey::opaque(state, mesh, depth),
+        };
+        RenderCommand { key, object: 0, mesh, material, state }
+    });
+    prop::collection::vec(command, 0..most).prop_map(|mut commands| {
+        for (object, command) in commands.iter_mut().enumerate() {
+            command.object = object as u32;
+        }
+        commands.sort_by_key(|command| (command.key, command.object));
+        commands
+    })
+}
+
+fn commands() -> impl Strategy<Value = Vec<RenderCommand>> {
+    prop_oneof![
+        prop::collection::vec(any_command(), 0..100),
+        usual_commands(100),
+        // Some of them several times over.
+        prop::collection::vec((any_command(), 1..4_usize), 0..30).prop_map(|runs| {
+            runs.into_iter().flat_map(|(command, count)| std::iter::repeat_n(command, count)).collect()
+        }),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn any_commands_come_back_as_they_were(commands in commands()) {
+        let coded = DeltaCommands::encode(&commands);
+        prop_assert_eq!((coded.len(), coded.is_empty()), (commands.len(), commands.is_empty()));
+        prop_assert_eq!(coded.iter().len(), commands.len());
+        prop_assert!(coded.bytes().len() <= HEADER + commands.len() * LONGEST);
+        prop_assert_eq!(coded.iter().collect::<Vec<_>>(), &commands[..]);
+        let received = DeltaCommands::from_bytes(coded.into_bytes()).unwrap();
+        prop_assert_eq!(received.len(), commands.len());
+        prop_assert_eq!(received.iter().collect::<Vec<_>>(), commands);
+    }
+
+    #[test]
+    fn it_makes_no_difference_how_commands_are_appended(
+        (commands, parts) in (commands(), prop::collection::vec(0..100_usize, 0..6)),
+        forgotten in commands(),
+    ) {
+        let expected = DeltaCommands::encode(&commands);
+        let mut coded = DeltaCommands::encode(&forgotten);
+        coded.clear();
+        let nothing = DeltaCommands::new();
+        prop_assert_eq!((coded.len(), coded.bytes()), (0, nothing.bytes()));
+        let mut rest = &commands[..];
+        for part in parts {
+            let (now, later) = rest.split_at(part.min(rest.len()));
+            coded.extend_from_slice(now);
+            rest = later;
+            // What was received is appended to like what was coded here.
+            coded = DeltaCommands::from_bytes(coded.into_bytes()).unwrap();
+        }
+        rest.iter().for_each(|command| coded.push(*command));
+        prop_assert_eq!(coded.bytes(), expected.bytes());
+        prop_assert_eq!(coded.iter().collect::<Vec<_>>(), commands);
+    }
+
+    #[test]
+    fn a_damaged_byte_is_found(
+        (commands, place, other) in (commands(), any::<prop::sample::Index>(), 1..=u8::MAX),
+    ) {
+        let mut bytes = DeltaCommands::encode(&commands).into_bytes();
+        let place = place.index(bytes.len());
+        bytes[place] ^= other;
+        let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len()).unwrap_err();
+        prop_assert_eq!(error == DeltaError::Foreign, place < MARK.len());
+    }
+
+    #[test]
+    fn missing_bytes_and_bytes_too_many_are_found(
+        (commands, place) in (commands(), any::<prop::sample::Index>()),
+        more in prop::collection::vec(any::<u8>(), 1..20),
+    ) {
+        let whole = DeltaCommands::encode(&commands).into_bytes();
+        let error = |bytes: &[u8]| DeltaCommands::from_bytes(bytes.to_vec()).map(|coded| coded.len()).unwrap_err();
+        let kept = place.index(whole.len());
+        let expected_count = commands.len() as u64;
+        match error(&whole[..kept]) {
+            DeltaError::Foreign => prop_assert!(kept < HEADER),
+            DeltaError::Truncated { index, count } => {
+                prop_assert!(kept >= HEADER && index < count && count == expected_count);
+            }
+            other => prop_assert!(false, "{other}"),
+        }
+        prop_assert_eq!(error(&[&whole[..], &more].concat()), DeltaError::TooLong { bytes: more.len() });
+    }
+
+    /// Whatever they are, they begin with some commands. Those, with a header that fits, are commands like any others.
+    #[test]
+    fn made_up_bytes_are_commands_or_an_error(
+        body in prop::collection::vec(prop_oneof![any::<u8>(), 0..=13_u8, Just(0x50)], 0..300),
+    ) {
+        let mut bytes = [&MARK, &[0; 4][..], &[0xff; 8], &body].concat();
+        let error = |bytes: &[u8]| DeltaCommands::from_bytes(bytes.to_vec()).map(|coded| coded.len()).unwrap_err();
+        let (DeltaError::Truncated { index: count, .. } | DeltaError::Malformed { index: count }) = error(&bytes) else {
+            panic!("{}", error(&bytes));
+        };
+        bytes[8..HEADER].copy_from_slice(&count.to_le_bytes());
+        if let DeltaError::TooLong { bytes: left } = error(&bytes) {
+            bytes.truncate(bytes.len() - left);
+        }
+        let DeltaError::Damaged { found, stored: 0 } = error(&bytes) else { panic!("{}", error(&bytes)) };
+        bytes[4..8].copy_from_slice(&found.to_le_bytes());
+        let coded = DeltaCommands::from_bytes(bytes).unwrap();
+        let commands: Vec<_> = coded.iter().collect();
+        prop_assert_eq!(commands.len() as u64, count);
+        prop_assert!(DeltaCommands::encode(&commands).iter().eq(commands));
+    }
+
+    #[test]
+    fn usual_commands_are_short(commands in usual_commands(200)) {
+        let coded = DeltaCommands::encode(&commands);
+        let opaque = commands.iter().filter(|command| command.key < SortKey::blended(f32::INFINITY)).count();
+        // Of an opaque command the key changes in up to 7 bytes, the object in 2. Of a blended one mesh, material and
+        // state are there as well.
+        prop_assert!(coded.bytes().len() <= HEADER + opaque * 10 + (commands.len() - opaque) * 14);
+    }
+}
+
+#[test]
+fn a_huge_count_takes_no_memory_and_no_time() {
+    let mut bytes = DeltaCommands::encode(&[RenderCommand::NOTHING; 3]).into_bytes();
+    bytes[8..HEADER].fill(0xff);
+    let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len());
+    assert_eq!(error, Err(DeltaError::Truncated { index: 3, count: u64::MAX }));
+}
+
+#[test]
+fn ways_to_code_that_there_are_not_are_found() {
+    for body in [&[0x0e][..], &[0x0f], &[0x60], &[0x70], &[0xd0, 0x05], &[0xd0, 5 << 3], &[0xd0, 0x80]] {
+        let mut bytes = DeltaCommands::new().into_bytes();
+        bytes[8] = 1;
+        // However many bytes would be read of it.
+        bytes.extend([body, &[0; 30]].concat());
+        let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len());
+        assert_eq!(error, Err(DeltaError::Malformed { index: 0 }), "{body:x?}");
+    }
+}
+
+#[test]
+fn copies_of_an_object_are_a_byte_each() {
+    let key = SortKey::opaque(DrawState::PLAIN, 300_000, 4.0);
+    let copy = |index: u32| RenderCommand {
+        key,
+        object: 5 + index * 126,
+        mesh: 300_000,
+        material: 70_000,
+        state: DrawState::PLAIN,
+    };
+    let [two, many] = [2, 102].map(|count| DeltaCommands::encode(&(0..count).map(copy).collect::<Vec<_>>()));
+    assert_eq!(many.bytes().len() - two.bytes().len(), 100);
+}
+
+#[test]
+fn memory_is_kept_from_frame_to_frame() {
+    let commands = [RenderCommand::NOTHING, RenderCommand { object: 9, ..RenderCommand::NOTHING }].repeat(1_000);
+    let mut coded = DeltaCommands::encode(&commands);
+    let before = (coded.bytes().as_ptr(), coded.bytes.capacity());
+    coded.clear();
+    coded.extend_from_slice(&commands);
+    assert_eq!((coded.bytes().as_ptr(), coded.bytes.capacity()), before);
+}

@@ -1,0 +1,67 @@
+//! Delta commands of whole frames: they come back as they were, and take few bytes.
+//!
+//! The case that needs a shared scene is ignored, and never passes, where that is missing.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::NullBackend;
+use drawloom::command::{DeltaCommands, RenderCommand};
+use drawloom::process::Deferred;
+use drawloom::scene::{Scene, obj, sample};
+use drawloom::task::Scheduler;
+use libtest_mimic::{Arguments, Failed, Trial, run};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza/sponza_part.obj");
+    let is_missing = !sponza.is_file();
+    let trials = vec![
+        Trial::test("the_projects_own_scene", || check(&sample::colonnade()?)),
+        Trial::test("shared::sponza_twenty_times", move || {
+            let mut scene = obj::load(sponza)?.scene;
+            scene.duplicate_objects(20);
+            check(&scene)
+        })
+        .with_ignored_flag(is_missing),
+    ];
+    run(&arguments, trials).exit_code()
+}
+
+/// What a command may take on average, in bytes: half of its fixed form.
+const MOST: f64 = 12.0;
+
+/// Codes what each process draws in each view of a frame, by itself.
+fn check(scene: &Scene) -> Result<(), Failed> {
+    let lists = draw_lists(scene)?;
+    let (mut count, mut bytes) = (0, 0);
+    let mut coded = DeltaCommands::new();
+    for commands in &lists {
+        coded.clear();
+        coded.extend_from_slice(commands);
+        let received = DeltaCommands::from_bytes(coded.bytes().to_vec())?;
+        if !received.iter().eq(commands.iter().copied()) {
+            return Err("not the commands that were coded".into());
+        }
+        count += commands.len();
+        bytes += coded.bytes().len();
+    }
+    let average = bytes as f64 / count as f64;
+    println!("{count} commands in {} lists, {average:.2} bytes each", lists.len());
+    // Not a single command would be NaN.
+    if average <= MOST { Ok(()) } else { Err(format!("{average:.1} bytes a command").into()) }
+}
+
+/// What each process of a deferred pipeline draws in each view.
+fn draw_lists(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Failed> {
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+    let passes = submitted.submission.passes.iter();
+    let list = |process: &str, view| {
+        renderer.draw_list(process, view).map(|list| list.commands().copied().collect::<Vec<_>>())
+    };
+    Ok(passes.filter_map(|pass| list(&pass.process, pass.view)).filter(|commands| !commands.is_empty()).collect())
+}
