@@ -148,7 +148,7 @@ mod modelled {
 /// What shuttle draws.
 #[cfg(drawloom_shuttle)]
 mod drawn {
-    use std::time::Duration;
+    use std::{ops::Add, time::Duration};
 
     use shuttle::rand::{Rng, thread_rng};
 
@@ -174,6 +174,14 @@ mod drawn {
 
         pub(crate) fn elapsed(self) -> Duration {
             Self::now().duration_since(self)
+        }
+    }
+
+    impl Add<Duration> for Instant {
+        type Output = Self;
+
+        fn add(self, later: Duration) -> Self {
+            Self(self.0 + later)
         }
     }
 

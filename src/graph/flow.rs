@@ -2,7 +2,7 @@
 
 /// All by the processes' indices in the schedule, which are also an order they may run in. An index takes 32 bits: more
 /// processes, or edges between them, than that counts do not fit into memory as long as the graph is being built.
-pub(super) struct Flow {
+pub(crate) struct Flow {
     /// Where the dependents of each process start in `dependents`, and where the last ones end.
     starts: Box<[u32]>,
     /// The dependents of each process, those with the longest way to the end of the frame first.
@@ -20,7 +20,7 @@ pub(super) struct Flow {
 
 impl Flow {
     /// The flow of processes, of each of which its dependencies are given, all of them before it.
-    pub(super) fn new(dependencies: &[Vec<usize>]) -> Self {
+    pub(crate) fn new(dependencies: &[Vec<usize>]) -> Self {
         let count = dependencies.len();
         let mut dependents = vec![Vec::new(); count];
         for (process, list) in dependencies.iter().enumerate() {
@@ -45,39 +45,39 @@ impl Flow {
     }
 
     /// How many processes there are.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.dependency_counts.len()
     }
 
-    pub(super) fn dependents(&self, process: u32) -> &[u32] {
+    pub(crate) fn dependents(&self, process: u32) -> &[u32] {
         let process = process as usize;
         &self.dependents[self.starts[process] as usize..self.starts[process + 1] as usize]
     }
 
     /// The place of the first dependent of a process in a list of those of all, in which each process has a place for each.
-    pub(super) fn first_place(&self, process: u32) -> u32 {
+    pub(crate) fn first_place(&self, process: u32) -> u32 {
         self.starts[process as usize]
     }
 
-    pub(super) fn edges(&self) -> usize {
+    pub(crate) fn edges(&self) -> usize {
         self.dependents.len()
     }
 
-    pub(super) fn dependency_count(&self, process: u32) -> u32 {
+    pub(crate) fn dependency_count(&self, process: u32) -> u32 {
         self.dependency_counts[process as usize]
     }
 
-    pub(super) fn roots(&self) -> &[u32] {
+    pub(crate) fn roots(&self) -> &[u32] {
         &self.roots
     }
 
-    pub(super) fn is_urgent(&self, process: u32) -> bool {
+    pub(crate) fn is_urgent(&self, process: u32) -> bool {
         self.is_urgent[process as usize]
     }
 
     /// Ranks the processes by what they cost, in nanoseconds each: by the longest way through the graph that leads through
     /// them.
-    pub(super) fn rank(&mut self, costs: &[u64]) {
+    pub(crate) fn rank(&mut self, costs: &[u64]) {
         self.from_start.fill(0);
         for (process, &cost) in costs.iter().enumerate() {
             let end = self.from_start[process].saturating_add(cost);

@@ -129,6 +129,7 @@ mod edges;
 mod error;
 mod execute;
 mod flow;
+mod measure;
 mod node;
 mod order;
 mod progress;
@@ -143,6 +144,12 @@ mod shuttle_tests;
 pub use self::{
     builder::{FrameGraph, ProcessId, ResourceId},
     error::{CompileError, GraphProblem, NodeError, RunError},
+    measure::{ChunkMeasure, ProcessMeasure, RunMeasure},
     node::{Closure, Node},
     schedule::Schedule,
+};
+
+pub(crate) use self::{
+    flow::Flow,
+    sharing::{Sharing, Way},
 };

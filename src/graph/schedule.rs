@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, fmt, time::Duration};
 
-use super::{builder::ProcessId, costs::Costs, flow::Flow, progress::Progress, sharing::Sharing};
+use super::{builder::ProcessId, costs::Costs, flow::Flow, measure::Notes, progress::Progress, sharing::Sharing};
 
 /// A graph in the order it runs in, checked, and flat: compiled once and [run](Self::run) every frame.
 ///
@@ -20,6 +20,7 @@ pub struct Schedule<P> {
     pub(super) progress: Progress,
     pub(super) costs: Costs,
     pub(super) sharing: Sharing,
+    pub(super) notes: Notes,
     pub(super) always_shares: bool,
 }
 

@@ -13,7 +13,10 @@
 
 use std::ops::Range;
 
-use crate::task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens};
+use crate::{
+    sync::Instant,
+    task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens},
+};
 
 use super::{alone::Left, execute::Run, node::Node, progress::OpenPass, schedule::Schedule, token::Token};
 
@@ -166,13 +169,13 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             let places = if self.is_stopped() {
                 pass.tickets.take_rest(chunks)
             } else {
-                pass.tickets.take(chunks, &mut pace, worker)
+                pass.tickets.take(chunks, &mut pace, worker.workers(), Instant::now)
             };
             if places.is_empty() {
                 return finished;
             }
             finished += places.len();
-            if pass.tickets.invites(places.end, chunks, worker) {
+            if pass.tickets.invites(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
             self.attempt(process, |position| self.run_chunks(position, chunks, places, worker));

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// What has been seen of a schedule's runs.
 #[derive(Debug, Default)]
-pub(super) struct Sharing {
+pub(crate) struct Sharing {
     /// Nanoseconds on one thread: of late, or in the runs that were measured.
     alone: Option<f64>,
     /// Nanoseconds on all workers, in the runs that were measured.
@@ -23,7 +23,7 @@ pub(super) struct Sharing {
 
 /// How a run is to go.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Way {
+pub(crate) enum Way {
     /// On the calling thread, unless there is a limit and it takes longer than that.
     Alone { at_most: Option<Duration> },
     /// On all workers.
@@ -53,7 +53,7 @@ const RELUCTANCE: f64 = 1.25;
 
 impl Sharing {
     /// The way of the next run, where a worker is woken at that price.
-    pub(super) fn choose(&mut self, wake_price: Duration) -> Way {
+    pub(crate) fn choose(&mut self, wake_price: Duration) -> Way {
         let knows_nothing = self.alone.is_none() && self.shared_runs == 0 && self.given_up == 0;
         if knows_nothing {
             // What is less work than a wake-up shows it at once, and nobody is woken. All else loses no more than that.
@@ -74,20 +74,20 @@ impl Sharing {
     }
 
     /// The way of the next run if it is to be shared in any case.
-    pub(super) fn share(&self) -> Way {
+    pub(crate) fn share(&self) -> Way {
         let is_one_of_the_first = (1..=FIRST_MEASURED).contains(&self.shared_runs);
         Way::Shared { is_measured: is_one_of_the_first || self.since_measured + 1 >= MEASURED_EVERY }
     }
 
     /// A run went alone and took that long.
-    pub(super) fn went_alone(&mut self, took: Duration) {
+    pub(crate) fn went_alone(&mut self, took: Duration) {
         self.given_up = self.given_up.saturating_sub(1);
         self.since_measured = self.since_measured.saturating_add(1);
         average(&mut self.alone, took);
     }
 
     /// A run was begun alone, and shared when it was found too long.
-    pub(super) fn gave_up(&mut self) {
+    pub(crate) fn gave_up(&mut self) {
         self.given_up += GIVEN_UP;
         if self.given_up > GIVEN_UP {
             // Not as if nothing were known: the next runs are shared, and measured.
@@ -96,7 +96,7 @@ impl Sharing {
     }
 
     /// A run was shared and took that long; where it was measured, all workers' time on it is known.
-    pub(super) fn was_shared(&mut self, took: Duration, work: Option<Duration>) {
+    pub(crate) fn was_shared(&mut self, took: Duration, work: Option<Duration>) {
         self.shared_runs = self.shared_runs.saturating_add(1);
         let Some(work) = work else {
             self.since_measured += 1;

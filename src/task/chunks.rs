@@ -113,16 +113,23 @@ impl Tickets {
         self.taken.load(Ordering::Relaxed) < chunks.count && !self.is_open.swap(true, Ordering::Relaxed)
     }
 
-    /// The places of the next chunks for a worker to run. There are none if it is empty.
-    pub(crate) fn take(&self, chunks: &Chunks, pace: &mut Pace, worker: &Worker) -> Range<usize> {
+    /// The places of the next chunks for a worker, one of so many, to run. There are none if it is empty. `now` tells the
+    /// time, which is not asked at every ticket.
+    pub(crate) fn take(
+        &self,
+        chunks: &Chunks,
+        pace: &mut Pace,
+        workers: usize,
+        now: impl Fn() -> Instant,
+    ) -> Range<usize> {
         let mut taken = self.taken.load(Ordering::Relaxed);
         while taken < chunks.count {
             let remaining = chunks.count - taken;
-            let end = taken + pace.of(remaining, worker.workers());
+            let end = taken + pace.of(remaining, workers);
             match self.taken.compare_exchange_weak(taken, end, Ordering::Relaxed, Ordering::Relaxed) {
                 Ok(_) => {
-                    if end - taken > 1 || remaining > 2 * worker.workers() {
-                        pace.adapt(end - taken);
+                    if end - taken > 1 || remaining > 2 * workers {
+                        pace.adapt(end - taken, now);
                     }
                     return taken..end;
                 }
@@ -131,7 +138,7 @@ impl Tickets {
         }
         // How long the last ones took, too: there may have been no others.
         if pace.since.is_some() {
-            pace.look(0);
+            pace.look(0, now);
         }
         if pace.most != self.pace.load(Ordering::Relaxed) {
             self.pace.store(pace.most, Ordering::Relaxed);
@@ -145,12 +152,13 @@ impl Tickets {
         taken.min(chunks.count)..chunks.count
     }
 
-    /// Whether a worker that has taken the chunks before `end` should queue a job through which another can join.
-    pub(crate) fn invites(&self, end: usize, chunks: &Chunks, worker: &Worker) -> bool {
+    /// Whether a worker, one of so many, that has taken the chunks before `end` should queue a job through which another can
+    /// join.
+    pub(crate) fn invites(&self, end: usize, chunks: &Chunks, workers: usize) -> bool {
         // The looks before the swap spare the others the cache line.
         end < chunks.count
             && !self.is_open.load(Ordering::Relaxed)
-            && self.joined.load(Ordering::Relaxed) < worker.workers()
+            && self.joined.load(Ordering::Relaxed) < workers
             && !self.is_open.swap(true, Ordering::Relaxed)
     }
 
@@ -200,19 +208,19 @@ impl Pace {
 
     /// So many more have been taken, and begin; those before are done.
     #[inline]
-    fn adapt(&mut self, taken: usize) {
+    fn adapt(&mut self, taken: usize, now: impl FnOnce() -> Instant) {
         match &mut self.since {
             Some((_, chunks)) if *chunks < self.look_after => *chunks += taken,
-            _ => self.look(taken),
+            _ => self.look(taken, now),
         }
     }
 
-    fn look(&mut self, taken: usize) {
+    fn look(&mut self, taken: usize, now: impl FnOnce() -> Instant) {
         // In loom's models time is real, and tells nothing.
         if cfg!(drawloom_loom) {
             return;
         }
-        let now = Instant::now();
+        let now = now();
         if let Some((since, chunks)) = self.since {
             let nanoseconds = (now.duration_since(since).as_nanos() as usize).max(1);
             let fitting = chunks.saturating_mul(Self::WORTH) / nanoseconds;

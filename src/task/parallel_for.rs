@@ -93,11 +93,11 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
     fn work(&self, mut pace: Pace, crew: &Crew<'_>) {
         let worker = crew.worker();
         loop {
-            let places = self.tickets.take(&self.chunks, &mut pace, worker);
+            let places = self.tickets.take(&self.chunks, &mut pace, worker.workers(), Instant::now);
             if places.is_empty() {
                 return;
             }
-            if self.tickets.invites(places.end, &self.chunks, worker) {
+            if self.tickets.invites(places.end, &self.chunks, worker.workers()) {
                 crew.push(0, Band::Normal);
             }
             for place in places {

@@ -32,7 +32,7 @@ pub(crate) enum Band {
 impl Band {
     pub(super) const ALL: [Self; 3] = [Self::Urgent, Self::Normal, Self::Background];
     /// What a frame consists of.
-    pub(super) const FRAME: [Self; 2] = [Self::Urgent, Self::Normal];
+    pub(crate) const FRAME: [Self; 2] = [Self::Urgent, Self::Normal];
 }
 
 /// How many jobs lie in the deque at most. Crossbeam's has room for 64 at first, and grows when that is full.

@@ -3,6 +3,7 @@
 mod compile;
 mod dot;
 mod extremes;
+mod measure;
 mod oracle;
 mod problems;
 mod run;
