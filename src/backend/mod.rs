@@ -12,19 +12,19 @@ use crate::task::Worker;
 use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 #[cfg(feature = "wgpu")]
-pub use self::wgpu::{Picture, WgpuBackend, WgpuResources, WgpuSubmission};
+pub use self::wgpu::{Encode, Picture, Record, WgpuBackend, WgpuPass, WgpuResources, WgpuSubmission};
 pub use null::{NullBackend, NullPass, NullSubmission};
 
 /// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
 /// several workers at once; each of those takes the worker as proof that it runs in a job (M 10.3 asserts it).
 ///
 /// The order within a frame: `begin`; then `upload_objects` for every block of objects, and for every pass `prepare`,
-/// `record` for each run of its bundles, and `finish`; then, later and on the device thread, `submit`.
+/// `record` for each run of its parts, and `finish`; then, later and on the device thread, `submit`.
 pub trait Backend: Send + Sync + 'static {
     /// What one frame holds from `begin` until it was submitted.
     type Frame: Send + Sync;
-    /// A recorded bundle.
-    type Bundle: Send;
+    /// What is recorded of a pass before it is finished: a bundle, say.
+    type Part: Send;
     /// A finished pass, ready to be submitted.
     type Commands: Send;
     /// What is known of a frame that was submitted.
@@ -55,16 +55,13 @@ pub trait Backend: Send + Sync + 'static {
     ///
     /// # Errors
     /// If the device refuses; a shader of the process that does not compile is found here at the latest.
-    fn prepare(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        request: &FrameRequest<'_>,
-        pass: Pass,
-        list: &DrawList,
-    ) -> Result<(), BackendError>;
+    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
 
-    /// Records bundles of a pass.
+    /// How many parts of a pass are to be recorded before it is finished; 0 where it is recorded as it is finished. The same
+    /// throughout a frame.
+    fn parts(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize;
+
+    /// Records parts of a pass, and puts each of them, in order.
     ///
     /// # Errors
     /// If the device refuses what was recorded.
@@ -72,12 +69,13 @@ pub trait Backend: Send + Sync + 'static {
         &self,
         worker: &Worker,
         frame: &Self::Frame,
-        pass: Pass,
-        list: &DrawList,
-        bundles: Range<usize>,
-    ) -> Result<Vec<Self::Bundle>, BackendError>;
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        put: &mut dyn FnMut(Self::Part),
+    ) -> Result<(), BackendError>;
 
-    /// Finishes a pass: its bundles in order, or what it draws without any.
+    /// Finishes a pass: its parts in order, or what it draws without any. A pass without commands has an empty list. What it
+    /// leaves of the parts is dropped; the memory is used again.
     ///
     /// # Errors
     /// If the device refuses the pass.
@@ -85,9 +83,8 @@ pub trait Backend: Send + Sync + 'static {
         &self,
         worker: &Worker,
         frame: &Self::Frame,
-        request: &FrameRequest<'_>,
-        pass: Pass,
-        bundles: Vec<Self::Bundle>,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<Self::Part>,
     ) -> Result<Self::Commands, BackendError>;
 
     /// Submits a frame's passes in this order. Called on the device thread alone.
@@ -115,6 +112,17 @@ pub struct FrameRequest<'a> {
     pub scene: &'a SceneRef<'a>,
     /// Where the backend counts what it leaves out.
     pub rejections: &'a Rejections,
+}
+
+/// What one pass of a frame is to be.
+#[derive(Clone, Copy)]
+pub struct PassRequest<'a> {
+    /// The frame.
+    pub frame: &'a FrameRequest<'a>,
+    /// The process and the view.
+    pub pass: Pass,
+    /// What it draws; empty for a pass without commands.
+    pub list: &'a DrawList,
 }
 
 /// What a device could not do.

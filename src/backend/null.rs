@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use parking_lot::Mutex;
 
-use super::{Backend, BackendError, FrameRequest};
+use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, Pass};
 use crate::queue::{Batch, DrawList};
 use crate::scene::Mesh;
@@ -67,7 +67,7 @@ pub struct NullBundle {
 
 impl Backend for NullBackend {
     type Frame = NullFrame;
-    type Bundle = NullBundle;
+    type Part = NullBundle;
     type Commands = NullPass;
     type Submission = NullSubmission;
 
@@ -118,9 +118,7 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        _request: &FrameRequest<'_>,
-        pass: Pass,
-        list: &DrawList,
+        &PassRequest { pass, list, .. }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
         ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
         let before = frame.prepared.lock().insert(pass, list.objects.len());
@@ -132,37 +130,41 @@ impl Backend for NullBackend {
         ensure(beyond.is_none(), || format!("object {beyond:?} is not in the scene"))
     }
 
+    fn parts(&self, _frame: &NullFrame, pass: &PassRequest<'_>) -> usize {
+        pass.list.bundle_count()
+    }
+
     fn record(
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        pass: Pass,
-        list: &DrawList,
+        &PassRequest { pass, list, .. }: &PassRequest<'_>,
         bundles: Range<usize>,
-    ) -> Result<Vec<NullBundle>, BackendError> {
-        let record = |bundle| {
+        put: &mut dyn FnMut(NullBundle),
+    ) -> Result<(), BackendError> {
+        for bundle in bundles {
             let first_time = frame.recorded.lock().insert((pass, bundle));
             ensure(first_time, || format!("bundle {bundle} of {pass:?} was recorded twice"))?;
-            record_bundle(frame, list.bundle(bundle))
-        };
-        bundles.map(record).collect()
+            put(record_bundle(frame, list.bundle(bundle))?);
+        }
+        Ok(())
     }
 
     fn finish(
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        request: &FrameRequest<'_>,
-        pass: Pass,
-        bundles: Vec<NullBundle>,
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        bundles: &mut Vec<NullBundle>,
     ) -> Result<NullPass, BackendError> {
         ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
         let process = &request.plan.processes()[pass.process].process;
         if !matches!(request.draws[pass.process], Draws::Commands(_)) {
-            ensure(bundles.is_empty(), || format!("{:?} draws no commands but has bundles", process.name()))?;
+            let has_none = bundles.is_empty() && list.batches.is_empty();
+            ensure(has_none, || format!("{:?} draws no commands but has bundles", process.name()))?;
         }
         let mut end = 0;
-        for bundle in &bundles {
+        for bundle in &*bundles {
             ensure(bundle.objects.start == end, || "bundles are not in order".to_owned())?;
             end = bundle.objects.end;
         }

@@ -7,7 +7,7 @@ use parking_lot::{Mutex, RwLock};
 use super::Granularity;
 use super::cost_model::CostModel;
 use super::statistics::{Stage, StageClock};
-use crate::backend::{Backend, BackendError, FrameRequest};
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::blocks::Blocks;
 use crate::command::RenderCommand;
 use crate::graph::{Node, NodeError};
@@ -36,7 +36,7 @@ pub(super) enum Phase {
     Instance { pass: usize },
     /// Joins the parts, uploads which objects are drawn, and makes pipelines.
     Prepare { pass: usize },
-    /// Records bundles.
+    /// Records the pass's parts: bundles, say.
     Record { pass: usize },
     /// Finishes the pass.
     Finish { pass: usize },
@@ -112,19 +112,26 @@ impl FrameTables {
     }
 }
 
-/// What one pass records: its bundles as they come, and itself when it is finished.
+/// What one pass records: its parts as they come, and itself when it is finished. Its memory is kept from frame to frame.
 pub(super) struct Recording<B: Backend> {
-    bundles: Mutex<Vec<Option<B::Bundle>>>,
+    parts: Mutex<Vec<Option<B::Part>>>,
+    /// The same when all are there.
+    in_order: Mutex<Vec<B::Part>>,
     finished: Mutex<Option<B::Commands>>,
 }
 
-impl<B: Backend> Recording<B> {
-    pub(super) fn new() -> Self {
-        Self { bundles: Mutex::new(Vec::new()), finished: Mutex::new(None) }
+impl<B: Backend> Default for Recording<B> {
+    fn default() -> Self {
+        Self { parts: Mutex::default(), in_order: Mutex::default(), finished: Mutex::default() }
     }
+}
 
-    pub(super) fn into_finished(self) -> Option<B::Commands> {
-        self.finished.into_inner()
+impl<B: Backend> Recording<B> {
+    /// Takes what was recorded, if it was finished, and drops what an unfinished frame has left.
+    pub(super) fn take(&mut self) -> Option<B::Commands> {
+        self.parts.get_mut().clear();
+        self.in_order.get_mut().clear();
+        self.finished.get_mut().take()
     }
 }
 
@@ -166,7 +173,7 @@ impl Phase {
             Self::Upload => tables.objects.block_count(),
             Self::Fill { pass } => visible_count(frame, pass),
             Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().part_count(),
-            Self::Record { pass } => tables.passes[pass].list.read().bundle_count(),
+            Self::Record { pass } => part_count(frame, pass),
             Self::Compact { .. } | Self::Split { .. } | Self::Prepare { .. } | Self::Finish { .. } => 1,
         }
     }
@@ -224,9 +231,9 @@ impl Phase {
             }
             Self::Prepare { pass } => {
                 join(&tables.passes[pass], frame.merges);
+                frame.recordings[pass].parts.lock().resize_with(part_count(frame, pass), || None);
                 let list = tables.passes[pass].list.read();
-                frame.recordings[pass].bundles.lock().resize_with(list.bundle_count(), || None);
-                return frame.backend.prepare(worker, frame.frame, frame.request, frame.request.passes[pass], &list);
+                return frame.backend.prepare(worker, frame.frame, &pass_request(frame, pass, &list));
             }
             Self::Record { pass } => return record(frame, pass, range, worker),
             Self::Finish { pass } => return finish(frame, pass, worker),
@@ -237,6 +244,14 @@ impl Phase {
 
 fn visible_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
     frame.tables.visible[frame.request.passes[pass].view].count()
+}
+
+fn pass_request<'a, B: Backend>(frame: &FrameContext<'a, B>, pass: usize, list: &'a DrawList) -> PassRequest<'a> {
+    PassRequest { frame: frame.request, pass: frame.request.passes[pass], list }
+}
+
+fn part_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
+    frame.backend.parts(frame.frame, &pass_request(frame, pass, &frame.tables.passes[pass].list.read()))
 }
 
 fn join(table: &PassTable, merges: bool) {
@@ -281,25 +296,29 @@ fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize
 
 fn record<B: Backend>(
     frame: &FrameContext<'_, B>,
-    pass: usize,
-    bundles: Range<usize>,
+    index: usize,
+    parts: Range<usize>,
     worker: &Worker,
 ) -> Result<(), BackendError> {
-    let list = frame.tables.passes[pass].list.read();
-    let recorded = frame.backend.record(worker, frame.frame, frame.request.passes[pass], &list, bundles.clone())?;
-    let mut slots = frame.recordings[pass].bundles.lock();
-    for (slot, bundle) in slots[bundles].iter_mut().zip(recorded) {
-        *slot = Some(bundle);
-    }
-    Ok(())
+    let list = frame.tables.passes[index].list.read();
+    let mut place = parts.start;
+    let mut put = |part| {
+        frame.recordings[index].parts.lock()[place] = Some(part);
+        place += 1;
+    };
+    frame.backend.record(worker, frame.frame, &pass_request(frame, index, &list), parts, &mut put)
 }
 
-fn finish<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, worker: &Worker) -> Result<(), BackendError> {
-    let recording = &frame.recordings[pass];
-    let bundles = std::mem::take(&mut *recording.bundles.lock()).into_iter().collect::<Option<Vec<_>>>();
-    let lost = || BackendError::BrokenRule { rule: "every bundle is recorded before its pass is finished".to_owned() };
-    let bundles = bundles.ok_or_else(lost)?;
-    let finished = frame.backend.finish(worker, frame.frame, frame.request, frame.request.passes[pass], bundles)?;
+fn finish<B: Backend>(frame: &FrameContext<'_, B>, index: usize, worker: &Worker) -> Result<(), BackendError> {
+    let recording = &frame.recordings[index];
+    let (mut parts, mut in_order) = (recording.parts.lock(), recording.in_order.lock());
+    let count = parts.len();
+    in_order.extend(parts.drain(..).flatten());
+    if in_order.len() < count {
+        return Err(BackendError::BrokenRule { rule: "every part is recorded before its pass is finished".to_owned() });
+    }
+    let list = frame.tables.passes[index].list.read();
+    let finished = frame.backend.finish(worker, frame.frame, &pass_request(frame, index, &list), &mut in_order)?;
     *recording.finished.lock() = Some(finished);
     Ok(())
 }

@@ -4,6 +4,7 @@ mod bad_input;
 mod changes;
 mod deferred;
 mod failing_process;
+mod measure;
 mod rules;
 mod same_result;
 mod views;

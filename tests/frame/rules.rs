@@ -1,9 +1,10 @@
 //! The null backend refuses what breaks a rule of the frame.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use drawloom::Granularity;
-use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend};
+use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest};
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
 use drawloom::queue::{DrawList, DrawPart};
 use drawloom::scene::Scene;
@@ -49,6 +50,21 @@ fn broken_rule(
     rule.into_inner().unwrap()
 }
 
+fn pass<'a>(frame: &'a FrameRequest<'a>, list: &'a DrawList) -> PassRequest<'a> {
+    PassRequest { frame, pass: PASS, list }
+}
+
+fn record(
+    worker: &Worker,
+    frame: &<NullBackend as Backend>::Frame,
+    pass: &PassRequest<'_>,
+    bundles: Range<usize>,
+) -> Result<Vec<<NullBackend as Backend>::Part>, BackendError> {
+    let mut recorded = Vec::new();
+    NullBackend.record(worker, frame, pass, bundles, &mut |bundle| recorded.push(bundle))?;
+    Ok(recorded)
+}
+
 fn one_view() -> Scene {
     let mut scene = field(300);
     scene.cameras.truncate(1);
@@ -58,9 +74,9 @@ fn one_view() -> Scene {
 #[test]
 fn a_frame_by_the_rules_breaks_none() {
     let rule = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, request, PASS, list)?;
-        let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
-        NullBackend.finish(worker, frame, request, PASS, bundles).map(|_| ())
+        NullBackend.prepare(worker, frame, &pass(request, list))?;
+        let mut bundles = record(worker, frame, &pass(request, list), 0..list.bundle_count())?;
+        NullBackend.finish(worker, frame, &pass(request, list), &mut bundles).map(|_| ())
     });
     assert_eq!(rule, "");
 }
@@ -75,7 +91,7 @@ fn commands_out_of_order_are_refused() {
         };
         let mut reversed = DrawList::default();
         reversed.append(&mut part, true);
-        NullBackend.prepare(worker, frame, request, PASS, &reversed)
+        NullBackend.prepare(worker, frame, &pass(request, &reversed))
     });
     assert!(rule.contains("not sorted"), "{rule}");
 }
@@ -83,29 +99,29 @@ fn commands_out_of_order_are_refused() {
 #[test]
 fn a_bundle_that_is_lost_or_recorded_twice_is_refused() {
     let lost = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, request, PASS, list)?;
-        NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())
+        NullBackend.prepare(worker, frame, &pass(request, list))?;
+        NullBackend.finish(worker, frame, &pass(request, list), &mut Vec::new()).map(|_| ())
     });
     assert!(lost.contains("objects recorded"), "{lost}");
-    let twice = broken_rule(|worker, frame, list, _| {
-        NullBackend.record(worker, frame, PASS, list, 0..1)?;
-        NullBackend.record(worker, frame, PASS, list, 0..1).map(|_| ())
+    let twice = broken_rule(|worker, frame, list, request| {
+        record(worker, frame, &pass(request, list), 0..1)?;
+        record(worker, frame, &pass(request, list), 0..1).map(|_| ())
     });
     assert!(twice.contains("recorded twice"), "{twice}");
 }
 
 #[test]
 fn batches_that_overlap_or_draw_no_mesh_are_refused() {
-    let overlap = broken_rule(|worker, frame, list, _| {
+    let overlap = broken_rule(|worker, frame, list, request| {
         let mut list = list.clone();
         list.batches[1].first -= 1;
-        NullBackend.record(worker, frame, PASS, &list, 0..1).map(|_| ())
+        record(worker, frame, &pass(request, &list), 0..1).map(|_| ())
     });
     assert!(overlap.contains("overlap"), "{overlap}");
-    let no_mesh = broken_rule(|worker, frame, list, _| {
+    let no_mesh = broken_rule(|worker, frame, list, request| {
         let mut list = list.clone();
         list.batches[0].mesh = 99;
-        NullBackend.record(worker, frame, PASS, &list, 0..1).map(|_| ())
+        record(worker, frame, &pass(request, &list), 0..1).map(|_| ())
     });
     assert!(no_mesh.contains("slot 99"), "{no_mesh}");
 }
@@ -113,10 +129,10 @@ fn batches_that_overlap_or_draw_no_mesh_are_refused() {
 #[test]
 fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
     let twice = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, request, PASS, list)?;
-        let bundles = NullBackend.record(worker, frame, PASS, list, 0..list.bundle_count())?;
-        NullBackend.finish(worker, frame, request, PASS, bundles)?;
-        NullBackend.finish(worker, frame, request, PASS, Vec::new()).map(|_| ())
+        NullBackend.prepare(worker, frame, &pass(request, list))?;
+        let mut bundles = record(worker, frame, &pass(request, list), 0..list.bundle_count())?;
+        NullBackend.finish(worker, frame, &pass(request, list), &mut bundles)?;
+        NullBackend.finish(worker, frame, &pass(request, list), &mut Vec::new()).map(|_| ())
     });
     assert!(twice.contains("finished twice"), "{twice}");
     let uploaded = broken_rule(|worker, frame, _, request| {

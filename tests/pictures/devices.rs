@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::{BackendError, WgpuBackend};
+use drawloom::backend::{BackendError, Encode, Record, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::Light;
@@ -17,6 +17,7 @@ use crate::{Case, adapter};
 pub const CASES: &[Case] = &[
     ("noop_takes_every_frame", noop),
     ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
+    ("a_way_to_record_that_the_device_lacks_a_feature_for_is_refused_by_the_features_name", no_indirect_draws),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
     ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
     ("more_shadow_maps_than_a_texture_has_layers_are_refused_and_fewer_drawn_again", many_shadow_maps),
@@ -48,6 +49,17 @@ fn low_limits() -> Result<(), Failed> {
         noop_with(wgpu::Limits { max_storage_buffers_per_shader_stage: 3, ..WgpuBackend::REQUIRED_LIMITS })?;
     match WgpuBackend::new(device, queue).err() {
         Some(BackendError::Limit { limit, allowed: 3, needed: 4 }) if limit.contains("storage_buffers") => Ok(()),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn no_indirect_draws() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
+    for record in [Record::Direct, Record::Bundles, Record::Kept] {
+        WgpuBackend::new(device.clone(), queue.clone())?.record(record)?;
+    }
+    match WgpuBackend::new(device, queue)?.record(Record::Indirect).err() {
+        Some(BackendError::MissingFeature { missing }) if missing.contains("INDIRECT_FIRST_INSTANCE") => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }
@@ -135,9 +147,18 @@ fn many_textures() -> Result<(), Failed> {
 }
 
 fn lost_device() -> Result<(), Failed> {
+    for record in [Record::Direct, Record::Bundles, Record::Kept] {
+        for encode in [Encode::PerPass, Encode::Split, Encode::OnSubmit] {
+            lost_while(record, encode).map_err(|failed| format!("{record:?} {encode:?}: {failed:?}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn lost_while(record: Record, encode: Encode) -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let backend = WgpuBackend::new(device.clone(), queue)?;
+    let backend = WgpuBackend::new(device.clone(), queue)?.record(record)?.encode(encode);
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
     let scene = field(500);
     submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;

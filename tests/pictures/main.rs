@@ -26,6 +26,7 @@ mod shadows;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 mod studio;
+mod techniques;
 mod transparency;
 
 use std::path::PathBuf;
@@ -53,6 +54,7 @@ fn main() {
         (requirements::CASES, Needs::Adapter),
         (same_bytes::CASES, Needs::Adapter),
         (same_bytes::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (techniques::CASES, Needs::Adapter),
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::arena::{Arena, filled_buffer};
-use super::frame_buffers::check_storage;
+use super::growing_buffer::check_storage;
 use super::layouts::Layouts;
 use super::textures::{TextureArrays, TexturePlace};
 use crate::backend::BackendError;

@@ -1,15 +1,18 @@
-//! The buffers of one frame on its way.
+//! The buffers of one frame on its way, and what is kept with them until the next.
 
 use std::mem;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use parking_lot::Mutex;
+use parking_lot::{Mutex, RwLock};
 
-use super::arena::new_buffer;
+use super::frame_pass::FramePass;
+use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_aligned, check_storage, roomy};
+use super::kept::Subdivided;
 use super::layouts::Layouts;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
-use crate::view::{LightTable, ObjectRecord, ViewRecord};
+use crate::view::{ObjectRecord, ViewRecord};
 
 /// Buffers that no frame uses at present.
 ///
@@ -17,24 +20,44 @@ use crate::view::{LightTable, ObjectRecord, ViewRecord};
 /// them at once: wgpu puts those writes behind what was submitted before.
 #[derive(Default)]
 pub(super) struct BufferPool {
-    free: Mutex<Vec<Buffers>>,
+    free: Mutex<Free>,
+}
+
+#[derive(Default)]
+struct Free {
+    buffers: Vec<Buffers>,
+    /// How often everything was forgotten. What was lent before does not come back.
+    generation: u64,
 }
 
 impl BufferPool {
+    /// For so many frames the pool keeps bundles and bindings of buffers that no frame has taken.
+    const KEPT_UNUSED: u32 = 8;
+
     /// The bytes of all buffers that no frame uses.
     pub(super) fn bytes(&self) -> u64 {
-        let size = |buffer: &GrowingBuffer| buffer.buffer.as_ref().map_or(0, wgpu::Buffer::size);
-        self.free.lock().iter().flat_map(|buffers| buffers.all().map(size)).sum()
+        self.free.lock().buffers.iter().flat_map(|buffers| buffers.all().map(GrowingBuffer::size)).sum()
     }
 
-    /// Drops what is free, because a device error may have left it unusable.
+    /// Drops everything, because a device error may have left it unusable.
     pub(super) fn forget(&self) {
-        self.free.lock().clear();
+        let mut free = self.free.lock();
+        free.buffers.clear();
+        free.generation += 1;
     }
 
     pub(super) fn take(self: &Arc<Self>) -> FrameBuffers {
-        let buffers = self.free.lock().pop().unwrap_or_default();
-        FrameBuffers { buffers, pool: Arc::clone(self) }
+        let mut free = self.free.lock();
+        let mut buffers = free.buffers.pop().unwrap_or_default();
+        buffers.unused = 0;
+        for idle in &mut free.buffers {
+            idle.unused += 1;
+            if idle.unused == Self::KEPT_UNUSED {
+                idle.passes.iter_mut().for_each(FramePass::forget);
+            }
+        }
+        let (generation, spoiled) = (free.generation, AtomicBool::new(false));
+        FrameBuffers { buffers, pool: Arc::clone(self), generation, spoiled }
     }
 }
 
@@ -42,11 +65,18 @@ impl BufferPool {
 pub(super) struct FrameBuffers {
     buffers: Buffers,
     pool: Arc<BufferPool>,
+    generation: u64,
+    spoiled: AtomicBool,
 }
 
 impl Drop for FrameBuffers {
     fn drop(&mut self) {
-        self.pool.free.lock().push(mem::take(&mut self.buffers));
+        // The frame may have ended early, or late. What it has subdivided is not to outlive it.
+        self.buffers.subdivided.get_mut().clear();
+        let mut free = self.pool.free.lock();
+        if !*self.spoiled.get_mut() && free.generation == self.generation {
+            free.buffers.push(mem::take(&mut self.buffers));
+        }
     }
 }
 
@@ -54,7 +84,7 @@ impl FrameBuffers {
     /// Makes room for a frame, and uploads its views, lights and parameters.
     ///
     /// # Errors
-    /// If the device has no room, or a camera is out of reach.
+    /// If the device has no room, or a camera is out of reach. Then they are not to be used any more.
     pub(super) fn begin(
         &mut self,
         device: &wgpu::Device,
@@ -62,57 +92,58 @@ impl FrameBuffers {
         layouts: &Layouts,
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
-        let views = view_bytes(request)?;
-        let (lights, light_ranges) = light_bytes(request);
-        let (parameters, parameter_ranges) = parameter_bytes(request.passes, request.draws);
+        let buffers = &mut self.buffers;
+        buffers.set_passes(request);
+        let limits = device.limits();
         let objects = request.scene.object_count().max(1);
-        let drawn_stride = aligned(objects * 4);
-        let drawn_places = drawn_places(request);
-        let drawn_count = drawn_places.iter().flatten().count();
-
-        let longest = light_ranges.iter().map(|(_, bytes)| *bytes).max().unwrap_or(0);
-        for bytes in [objects * size_of::<ObjectRecord>(), drawn_stride, longest] {
+        let object_bytes = objects * size_of::<ObjectRecord>();
+        let longest = request.lights.iter().map(|lights| size_of_val(lights.records())).max().unwrap_or(0);
+        for bytes in [object_bytes, objects * 4, longest] {
             check_storage(device, bytes)?;
         }
-        let buffers = &mut self.buffers;
-        let sizes = [
-            objects * size_of::<ObjectRecord>(),
-            views.len(),
-            lights.len(),
-            drawn_count * drawn_stride,
-            parameters.len(),
-        ];
-        // If this ends early, what the groups were made for is forgotten, and so are they.
-        let groups_key = buffers.groups_key.take();
-        let mut renewed = false;
-        for (buffer, size) in buffers.all_mut().into_iter().zip(sizes) {
-            renewed |= buffer.reserve(device, size)?;
-        }
-        buffers.views.write(queue, 0, &views);
-        buffers.lights.write(queue, 0, &lights);
-        buffers.parameters.write(queue, 0, &parameters);
+        write_views(buffers.views.rewrite(), request)?;
+        buffers.next_key.passes.clear();
+        buffers.next_key.passes.extend(buffers.passes.iter().map(|pass| (pass.pass, pass.drawn_place)));
+        buffers.set_light_ranges(request, limits.max_storage_buffer_binding_size);
+        let drawn_count = buffers.passes.iter().filter(|pass| pass.drawn_place.is_some()).count();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / drawn_count.max(1) as u64);
+        let stride = roomy(buffers.key.drawn_stride, objects * 4, most);
+        buffers.next_key.drawn_stride = stride;
 
-        let passes = request.passes.iter().copied().zip(drawn_places.iter().copied()).collect();
-        let key = GroupsKey { passes, objects, light_ranges, drawn_stride };
-        if renewed || groups_key.as_ref() != Some(&key) {
-            buffers.groups = (0..request.passes.len()).map(|pass| buffers.group(device, layouts, &key, pass)).collect();
+        let mut renewed = buffers.objects.reserve(device, object_bytes)?;
+        renewed |= buffers.drawn.reserve(device, drawn_count * stride)?;
+        for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
+            renewed |= mirrored.upload(device, queue)?;
         }
-        buffers.groups_key = Some(key);
-        buffers.drawn_stride = drawn_stride;
-        buffers.drawn_places = drawn_places;
-        buffers.parameter_ranges = parameter_ranges;
+        if renewed || buffers.key != buffers.next_key {
+            mem::swap(&mut buffers.key, &mut buffers.next_key);
+            let objects_bound = buffers.objects.size().min(limits.max_storage_buffer_binding_size & !3) as usize;
+            for index in 0..buffers.passes.len() {
+                buffers.passes[index].frame_group = Some(buffers.group(device, layouts, index, objects_bound));
+            }
+        }
         Ok(())
     }
 
-    /// `@group(0)` of a pass.
-    pub(super) fn group(&self, pass: usize) -> &wgpu::BindGroup {
-        &self.buffers.groups[pass]
+    /// The passes in the order they are submitted.
+    pub(super) fn passes(&self) -> &[FramePass] {
+        &self.buffers.passes
     }
 
-    /// A pass's parameters; `None` where it has none.
-    pub(super) fn parameters(&self, pass: usize) -> Option<wgpu::BufferBinding<'_>> {
-        let (offset, length) = self.buffers.parameter_ranges[pass]?;
-        self.buffers.parameters.binding(offset, length)
+    /// The same, with the buffer of parameters.
+    pub(super) fn passes_mut(&mut self) -> (&mut [FramePass], &GrowingBuffer) {
+        (&mut self.buffers.passes, &self.buffers.parameters.on_device)
+    }
+
+    /// The meshes that the frame draws subdivided.
+    pub(super) fn subdivided(&self) -> &RwLock<Subdivided> {
+        &self.buffers.subdivided
+    }
+
+    /// Says that the device found an error: what is kept with these buffers is not for another frame.
+    pub(super) fn spoil(&self) {
+        // Read when the frame is dropped, which only its owner can do.
+        self.spoiled.store(true, Ordering::Relaxed);
     }
 
     pub(super) fn write_objects(&self, queue: &wgpu::Queue, first: usize, records: &[ObjectRecord]) {
@@ -120,8 +151,8 @@ impl FrameBuffers {
     }
 
     pub(super) fn write_drawn(&self, queue: &wgpu::Queue, pass: usize, objects: &[u32]) {
-        if let Some(place) = self.buffers.drawn_places[pass] {
-            self.buffers.drawn.write(queue, place * self.buffers.drawn_stride, bytemuck::cast_slice(objects));
+        if let Some(place) = self.buffers.passes[pass].drawn_place {
+            self.buffers.drawn.write(queue, place * self.buffers.key.drawn_stride, bytemuck::cast_slice(objects));
         }
     }
 }
@@ -129,28 +160,27 @@ impl FrameBuffers {
 struct Buffers {
     objects: GrowingBuffer,
     /// A [`ViewRecord`] a view.
-    views: GrowingBuffer,
+    views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
-    lights: GrowingBuffer,
+    lights: MirroredBuffer,
     /// For each pass of commands, which objects it draws; `drawn_stride` bytes apart.
     drawn: GrowingBuffer,
-    drawn_stride: usize,
-    /// For each pass, its place in `drawn`; none for a pass without commands.
-    drawn_places: Vec<Option<usize>>,
-    /// Each pass's parameters, and where in the buffer they are.
-    parameters: GrowingBuffer,
-    parameter_ranges: Vec<Option<(usize, usize)>>,
-    /// `@group(0)` of each pass, and what it was made for.
-    groups: Vec<wgpu::BindGroup>,
-    groups_key: Option<GroupsKey>,
+    /// Each pass's parameters.
+    parameters: MirroredBuffer,
+    passes: Vec<FramePass>,
+    /// What the passes' bind groups were made for, and what this frame's are to be for.
+    key: GroupsKey,
+    next_key: GroupsKey,
+    subdivided: RwLock<Subdivided>,
+    /// How many frames went by that had others.
+    unused: u32,
 }
 
 /// What bind groups depend on, beside the buffers themselves.
-#[derive(PartialEq)]
+#[derive(Default, PartialEq)]
 struct GroupsKey {
     /// Each with its place in `drawn`.
     passes: Vec<(Pass, Option<usize>)>,
-    objects: usize,
     /// Each view's place and length in the buffer of lights.
     light_ranges: Vec<(usize, usize)>,
     drawn_stride: usize,
@@ -158,41 +188,70 @@ struct GroupsKey {
 
 impl Default for Buffers {
     fn default() -> Self {
-        let storage = |label| GrowingBuffer::new(label, wgpu::BufferUsages::STORAGE);
-        let uniform = |label| GrowingBuffer::new(label, wgpu::BufferUsages::UNIFORM);
+        use wgpu::BufferUsages;
         Self {
-            objects: storage("objects"),
-            views: uniform("views"),
-            lights: storage("lights"),
-            drawn: storage("drawn objects"),
-            drawn_stride: 0,
-            drawn_places: Vec::new(),
-            parameters: uniform("parameters"),
-            parameter_ranges: Vec::new(),
-            groups: Vec::new(),
-            groups_key: None,
+            objects: GrowingBuffer::new("objects", BufferUsages::STORAGE),
+            views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
+            lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
+            drawn: GrowingBuffer::new("drawn objects", BufferUsages::STORAGE),
+            parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
+            passes: Vec::new(),
+            key: GroupsKey::default(),
+            next_key: GroupsKey::default(),
+            subdivided: RwLock::default(),
+            unused: 0,
         }
     }
 }
 
 impl Buffers {
     fn all(&self) -> [&GrowingBuffer; 5] {
-        [&self.objects, &self.views, &self.lights, &self.drawn, &self.parameters]
+        let Self { objects, views, lights, drawn, parameters, .. } = self;
+        [objects, &views.on_device, &lights.on_device, drawn, &parameters.on_device]
     }
 
-    fn all_mut(&mut self) -> [&mut GrowingBuffer; 5] {
-        [&mut self.objects, &mut self.views, &mut self.lights, &mut self.drawn, &mut self.parameters]
+    /// Makes the passes those of this frame, and collects their parameters.
+    fn set_passes(&mut self, request: &FrameRequest<'_>) {
+        let bytes = self.parameters.rewrite();
+        self.passes.resize_with(request.passes.len(), FramePass::default);
+        let mut drawn_places = 0..;
+        for (kept, &pass) in self.passes.iter_mut().zip(request.passes) {
+            let draws = &request.draws[pass.process];
+            kept.pass = pass;
+            kept.set_label(request.plan.processes()[pass.process].process.name(), request.views[pass.view].name());
+            kept.drawn_place = if matches!(draws, Draws::Commands(_)) { drawn_places.next() } else { None };
+            let parameters = draws.parameters();
+            kept.parameters = (!parameters.is_empty()).then_some((bytes.len(), parameters.len()));
+            append_aligned(bytes, parameters);
+        }
     }
 
-    fn group(&self, device: &wgpu::Device, layouts: &Layouts, key: &GroupsKey, pass: usize) -> wgpu::BindGroup {
-        let (Pass { view, .. }, drawn_place) = key.passes[pass];
+    /// Gives each view room for its lights, and collects them.
+    fn set_light_ranges(&mut self, request: &FrameRequest<'_>, most: u64) {
+        let bytes = self.lights.rewrite();
+        let ranges = &mut self.next_key.light_ranges;
+        ranges.clear();
+        for (view, lights) in request.lights.iter().enumerate() {
+            let before = self.key.light_ranges.get(view).map_or(0, |(_, length)| *length);
+            // A view that no light reaches reads nothing there, but its layout has the binding.
+            let room = roomy(before, size_of_val(lights.records()), most);
+            let start = bytes.len();
+            bytes.extend_from_slice(bytemuck::cast_slice(lights.records()));
+            bytes.resize(start + room, 0);
+            ranges.push((start, room));
+        }
+    }
+
+    fn group(&self, device: &wgpu::Device, layouts: &Layouts, pass: usize, objects_bound: usize) -> wgpu::BindGroup {
+        let FramePass { pass: Pass { view, .. }, drawn_place, .. } = self.passes[pass];
         // A pass without commands reads nothing there, but its layout has the binding: any part will do.
-        let drawn = drawn_place.map_or((0, ALIGNMENT), |place| (place * key.drawn_stride, key.drawn_stride));
+        let stride = self.key.drawn_stride;
+        let drawn = drawn_place.map_or((0, ALIGNMENT), |place| (place * stride, stride));
         let bindings = [
-            self.views.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
-            self.objects.binding(0, key.objects * size_of::<ObjectRecord>()),
+            self.views.on_device.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
+            self.objects.binding(0, objects_bound),
             self.drawn.binding(drawn.0, drawn.1),
-            self.lights.binding(key.light_ranges[view].0, key.light_ranges[view].1),
+            self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
         ];
         let entries: Vec<_> = (0..)
             .zip(bindings.into_iter().flatten())
@@ -206,105 +265,13 @@ impl Buffers {
     }
 }
 
-/// A buffer that is replaced by a larger one when it is too small.
-struct GrowingBuffer {
-    label: &'static str,
-    usage: wgpu::BufferUsages,
-    buffer: Option<wgpu::Buffer>,
-}
-
-impl GrowingBuffer {
-    fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
-        Self { label, usage: usage | wgpu::BufferUsages::COPY_DST, buffer: None }
-    }
-
-    /// Makes room for `bytes`, and says whether that took another buffer.
-    fn reserve(&mut self, device: &wgpu::Device, bytes: usize) -> Result<bool, BackendError> {
-        let needed = (bytes as u64).max(ALIGNMENT as u64);
-        if self.buffer.as_ref().is_some_and(|buffer| buffer.size() >= needed) {
-            return Ok(false);
-        }
-        // Half as much again, so that a scene that grows by one object a frame does not move every frame.
-        let size = (needed + needed / 2).min(device.limits().max_buffer_size & !3).max(needed);
-        self.buffer = Some(new_buffer(device, self.label, size, self.usage)?);
-        Ok(true)
-    }
-
-    fn write(&self, queue: &wgpu::Queue, offset: usize, bytes: &[u8]) {
-        if let Some(buffer) = self.buffer.as_ref().filter(|_| !bytes.is_empty()) {
-            queue.write_buffer(buffer, offset as u64, bytes);
-        }
-    }
-
-    /// A part of the buffer; `None` before [`GrowingBuffer::reserve`].
-    fn binding(&self, offset: usize, bytes: usize) -> Option<wgpu::BufferBinding<'_>> {
-        let size = std::num::NonZeroU64::new(bytes as u64);
-        self.buffer.as_ref().map(|buffer| wgpu::BufferBinding { buffer, offset: offset as u64, size })
-    }
-}
-
 /// # Errors
-/// If a shader on this device cannot read a storage buffer of that many bytes.
-pub(super) fn check_storage(device: &wgpu::Device, bytes: usize) -> Result<(), BackendError> {
-    let (allowed, needed) = (device.limits().max_storage_buffer_binding_size, bytes as u64);
-    if needed > allowed {
-        return Err(BackendError::Limit { limit: "max_storage_buffer_binding_size", allowed, needed });
-    }
-    Ok(())
-}
-
-/// Every device takes multiples of this as offsets into uniform and storage buffers.
-const ALIGNMENT: usize = 256;
-
-fn aligned(bytes: usize) -> usize {
-    bytes.max(1).next_multiple_of(ALIGNMENT)
-}
-
-fn view_bytes(request: &FrameRequest<'_>) -> Result<Vec<u8>, BackendError> {
-    let mut bytes = Vec::with_capacity(request.views.len() * ALIGNMENT);
+/// If a camera is out of reach.
+fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
     for (view, lights) in request.views.iter().zip(request.lights) {
         let record = ViewRecord::new(view, request.scene, lights.records().len())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
-        append_aligned(&mut bytes, bytemuck::bytes_of(&record));
+        append_aligned(bytes, bytemuck::bytes_of(&record));
     }
-    Ok(bytes)
-}
-
-fn light_bytes(request: &FrameRequest<'_>) -> (Vec<u8>, Vec<(usize, usize)>) {
-    let mut bytes = Vec::new();
-    let append = |lights: &LightTable| {
-        let offset = bytes.len();
-        append_aligned(&mut bytes, bytemuck::cast_slice(lights.records()));
-        // A view that no light reaches reads nothing there, but its layout has the binding.
-        bytes.resize(bytes.len().max(offset + ALIGNMENT), 0);
-        (offset, bytes.len() - offset)
-    };
-    let ranges = request.lights.iter().map(append).collect();
-    (bytes, ranges)
-}
-
-fn parameter_bytes(passes: &[Pass], draws: &[Draws<'_>]) -> (Vec<u8>, Vec<Option<(usize, usize)>>) {
-    let mut bytes = Vec::new();
-    let mut append = |pass: &Pass| {
-        let parameters = draws[pass.process].parameters();
-        let offset = bytes.len();
-        append_aligned(&mut bytes, parameters);
-        (!parameters.is_empty()).then_some((offset, parameters.len()))
-    };
-    let ranges = passes.iter().map(&mut append).collect();
-    (bytes, ranges)
-}
-
-fn drawn_places(request: &FrameRequest<'_>) -> Vec<Option<usize>> {
-    let mut next = 0..;
-    let of_pass = |pass: &Pass| match request.draws[pass.process] {
-        Draws::Commands(_) => next.next(),
-        _ => None,
-    };
-    request.passes.iter().map(of_pass).collect()
-}
-
-fn append_aligned(bytes: &mut Vec<u8>, more: &[u8]) {
-    bytes.extend_from_slice(more);
-    bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+    Ok(())
 }

@@ -1,14 +1,30 @@
 //! The wgpu backend.
 //!
 //! What it rests on was measured: vertices and indices lie in arenas, what an object is comes from one storage buffer, and
-//! state is set per batch only, because that is the form of recording that is cheap and that scales with threads. A bundle
-//! is replayed, and encoded for the device, inside `CommandEncoder::finish`; so every pass has an encoder of its own,
-//! finished on a worker, and the device thread is left with `Queue::submit`.
+//! state is set per batch only, because that is the form of recording that is cheap and that scales with threads.
+//!
+//! There are several ways to make commands of a pass's batches ([`Record`]) and to encode them ([`Encode`]). A bundle is not
+//! a thing of the device: it is replayed, and encoded, inside `CommandEncoder::finish`. So it costs more than recording
+//! straight into the pass if it is replayed once, and a tenth of it if it is kept; but whole frames can be recorded by
+//! several workers only in bundles or in several encoders. Which way is the cheapest depends on the adapter and the scene, so
+//! every pass finds out for itself (`chooser`), unless an engine says. None of them changes the picture.
+//!
+//! Each frame has buffers of its own, and with them is kept from frame to frame what they are bound in: bind groups,
+//! bundles, arguments of indirect draws. Nothing of it is used again unless all that it was made of is compared and is the
+//! same; after an error nothing is.
 
 mod arena;
+mod arguments;
 mod assets;
+mod begin;
+mod chooser;
+mod encode;
 mod error_scope;
+mod frame;
 mod frame_buffers;
+mod frame_pass;
+mod growing_buffer;
+mod kept;
 mod layouts;
 mod light_meshes;
 mod picture;
@@ -18,28 +34,34 @@ mod subdivisions;
 mod targets;
 mod texels;
 mod textures;
+mod ways;
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
-use parking_lot::{Mutex, RwLock};
+use parking_lot::Mutex;
 
-use self::assets::{AssetCache, AssetSnapshot};
+use self::arena::new_buffer;
+use self::assets::AssetCache;
 use self::error_scope::{caught, checked};
-use self::frame_buffers::{BufferPool, FrameBuffers};
+use self::frame::{Commands, Part};
+use self::frame_buffers::BufferPool;
 use self::layouts::Layouts;
 use self::light_meshes::LightMeshes;
 use self::pipelines::ProcessPipelines;
-use self::subdivisions::{SubdividedMesh, Subdivisions};
-use self::targets::{FrameTargets, TargetCache};
-use super::{Backend, BackendError, FrameRequest};
+use self::subdivisions::Subdivisions;
+use self::targets::TargetCache;
+use self::ways::Ways;
+use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, FramePlan, Pass};
-use crate::queue::DrawList;
 use crate::task::Worker;
-use crate::view::{ObjectTable, RejectionReason};
+use crate::view::ObjectTable;
 
+pub use frame::{WgpuCommands, WgpuFrame, WgpuPart};
 pub use picture::{Picture, WgpuSubmission};
+pub use ways::{Encode, Record, WgpuPass};
 
 /// Draws with wgpu, on a device that the engine made.
 ///
@@ -61,16 +83,26 @@ pub struct WgpuBackend {
     subdivisions: Subdivisions,
     targets: Mutex<TargetCache>,
     buffers: Arc<BufferPool>,
+    ways: Ways,
+    /// How many frames were begun.
+    frames: AtomicU64,
+    /// How many workers have taken part so far.
+    workers: AtomicUsize,
+    /// The passes of commands of the frame that was submitted last.
+    latest: Mutex<Vec<WgpuPass>>,
 }
 
 impl WgpuBackend {
     /// The features a device must have: none beyond WebGPU's own.
     pub const REQUIRED_FEATURES: wgpu::Features = wgpu::Features::empty();
 
+    /// Features that are used where a device has them: for [`Record::Indirect`].
+    pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
+
     /// The limits a device must have. Higher ones are used where it has them: for larger pictures, and for more objects.
     pub const REQUIRED_LIMITS: wgpu::Limits = wgpu::Limits::downlevel_defaults();
 
-    /// A backend on the engine's device.
+    /// A backend on the engine's device. How passes are recorded and encoded is measured, and chosen for each of them.
     ///
     /// # Errors
     /// If the device lacks a feature or a limit, naming it.
@@ -88,6 +120,7 @@ impl WgpuBackend {
             return Err(error);
         }
         let layouts = checked(&device, "Drawloom's bind group layouts", || Layouts::new(&device))?;
+        let has_indirect = device.features().contains(Self::OPTIONAL_FEATURES) && takes_indirect(&device);
         Ok(Self {
             device,
             queue,
@@ -98,7 +131,35 @@ impl WgpuBackend {
             subdivisions: Subdivisions::default(),
             targets: Mutex::default(),
             buffers: Arc::default(),
+            ways: Ways::new(has_indirect),
+            frames: AtomicU64::new(0),
+            workers: AtomicUsize::new(1),
+            latest: Mutex::default(),
         })
+    }
+
+    /// Records every pass this way, instead of the one that was measured to be the cheapest.
+    ///
+    /// # Errors
+    /// If the device lacks a feature for it, naming it.
+    pub fn record(self, record: Record) -> Result<Self, BackendError> {
+        if record == Record::Indirect && !self.ways.has_indirect() {
+            let missing = (Self::OPTIONAL_FEATURES - self.device.features()).to_string();
+            // WebGPU promises it; some devices behind OpenGL have it not, and then it is no feature that could be asked for.
+            let missing = if missing.is_empty() { "INDIRECT_EXECUTION".to_owned() } else { missing };
+            return Err(BackendError::MissingFeature { missing });
+        }
+        Ok(Self { ways: self.ways.only_record(record), ..self })
+    }
+
+    /// Encodes every pass this way, instead of the one that was measured to be the cheapest.
+    pub fn encode(self, encode: Encode) -> Self {
+        Self { ways: self.ways.only_encode(encode), ..self }
+    }
+
+    /// How the passes of commands of the frame that was submitted last were recorded, in the order of submission.
+    pub fn passes(&self) -> Vec<WgpuPass> {
+        self.latest.lock().clone()
     }
 
     /// The device.
@@ -114,7 +175,7 @@ impl WgpuBackend {
     /// What is kept on the device from frame to frame, beside the scene's own meshes and textures.
     pub fn resources(&self) -> WgpuResources {
         let kept = self.pipelines.lock();
-        let mut distinct: Vec<_> = kept.values().flat_map(|kept| &kept.of_processes).collect();
+        let mut distinct: Vec<_> = kept.values().flat_map(|kept| kept.of_processes.iter()).collect();
         distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
         let pipelines = distinct.into_iter().map(|pipelines| pipelines.prepared().len()).sum();
@@ -124,14 +185,20 @@ impl WgpuBackend {
 
     /// The pipelines of every process of a plan: those there are, also from other plans, or new ones where a process draws in
     /// another way than it did.
-    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Vec<Arc<ProcessPipelines>>, BackendError> {
+    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let mut kept = self.pipelines.lock();
-        let mut of_plan = kept.get(&plan.identity()).map_or_else(Vec::new, |kept| kept.of_processes.clone());
+        let there = kept.get(&plan.identity()).map(|kept| &kept.of_processes);
+        if let Some(of_plan) =
+            there.filter(|of_plan| of_plan.iter().zip(draws).all(|(one, draws)| one.still_fit(draws)))
+        {
+            return Ok(Arc::clone(of_plan));
+        }
+        let mut of_plan = there.map_or_else(Vec::new, |of_plan| of_plan.to_vec());
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
             if of_plan.get(index).is_some_and(|pipelines| pipelines.still_fit(draws)) {
                 continue;
             }
-            let mut all = kept.values().flat_map(|kept| &kept.of_processes);
+            let mut all = kept.values().flat_map(|kept| kept.of_processes.iter());
             let fitting = all.find(|pipelines| pipelines.fit(plan, planned, draws)).cloned();
             let made = match fitting {
                 Some(fitting) => fitting,
@@ -149,7 +216,8 @@ impl WgpuBackend {
         }
         // What only plans that are gone had in common with this one was found above.
         kept.retain(|_, kept| kept.plan.strong_count() > 0);
-        kept.insert(plan.identity(), PlanPipelines { plan: plan.alive(), of_processes: of_plan.clone() });
+        let of_plan: Arc<[_]> = of_plan.into();
+        kept.insert(plan.identity(), PlanPipelines { plan: plan.alive(), of_processes: Arc::clone(&of_plan) });
         Ok(of_plan)
     }
 
@@ -166,59 +234,6 @@ impl WgpuBackend {
         Ok(kept.clone())
     }
 
-    fn start(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, views, passes, scene, rejections, .. } = *request;
-        let pipelines = self.pipelines(plan, draws)?;
-        let light_meshes = self.light_meshes(draws)?;
-        self.subdivisions.begin(scene.assets);
-        let assets = checked(&self.device, "meshes, materials and textures", || {
-            self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
-        })??;
-        let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
-        let (buffers, process_groups) = checked(&self.device, "the frame's buffers", || {
-            let mut buffers = self.buffers.take();
-            buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
-            let groups = passes.iter().enumerate().map(|(index, pass)| {
-                let parameters = buffers.parameters(index);
-                let declaration = &plan.processes()[pass.process].declaration;
-                pipelines[pass.process].process_group(&self.device, parameters, &targets, pass.view, declaration)
-            });
-            let groups: Vec<_> = groups.collect();
-            Ok::<_, BackendError>((buffers, groups))
-        })??;
-        let label = |pass: &Pass| {
-            format!("{:?} in view {:?}", plan.processes()[pass.process].process.name(), views[pass.view].name())
-        };
-        Ok(WgpuFrame {
-            labels: passes.iter().map(label).collect(),
-            passes: passes.to_vec(),
-            pipelines,
-            assets,
-            light_meshes,
-            subdivided: RwLock::default(),
-            targets,
-            process_groups,
-            background: scene.background.as_dvec3().to_array(),
-            buffers,
-        })
-    }
-
-    /// Finds or makes the subdivided meshes that batches draw.
-    fn subdivide(&self, frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) -> Result<(), BackendError> {
-        for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
-            let halvings = batch.state.halvings();
-            let assets = request.scene.assets;
-            let mesh = self.subdivisions.find(&self.device, &self.queue, assets, batch.mesh, halvings)?;
-            if mesh.is_coarse {
-                for rank in batch.first..batch.first + batch.count {
-                    request.rejections.count_once(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);
-                }
-            }
-            frame.subdivided.write().insert((batch.mesh, halvings), mesh);
-        }
-        Ok(())
-    }
-
     /// Drops everything that is kept from frame to frame. After a device error some of it may be unusable, and the next
     /// frame is to find out for itself.
     fn forget(&self) {
@@ -230,12 +245,18 @@ impl WgpuBackend {
     }
 }
 
+/// Whether the device can draw indirectly at all.
+fn takes_indirect(device: &wgpu::Device) -> bool {
+    let make = || new_buffer(device, "indirect draws", 256, wgpu::BufferUsages::INDIRECT);
+    matches!(checked(device, "indirect draws", make), Ok(Ok(_)))
+}
+
 /// The pipelines of a plan.
 struct PlanPipelines {
     /// Whether the plan still is.
     plan: Weak<()>,
     /// One for each process.
-    of_processes: Vec<Arc<ProcessPipelines>>,
+    of_processes: Arc<[Arc<ProcessPipelines>]>,
 }
 
 /// What a [`WgpuBackend`] keeps on the device from frame to frame, beside the scene's own meshes and textures.
@@ -251,36 +272,10 @@ pub struct WgpuResources {
     pub buffer_bytes: u64,
 }
 
-/// A frame on its way through the wgpu backend.
-pub struct WgpuFrame {
-    labels: Vec<String>,
-    passes: Vec<Pass>,
-    /// One for each process.
-    pipelines: Vec<Arc<ProcessPipelines>>,
-    assets: Arc<AssetSnapshot>,
-    light_meshes: Option<Arc<LightMeshes>>,
-    /// By mesh slot, and how often its edges are halved.
-    subdivided: RwLock<HashMap<(u32, u32), Arc<SubdividedMesh>>>,
-    targets: FrameTargets,
-    /// For each pass, its targets and parameters at `@group(2)`; none for a pass without.
-    process_groups: Vec<Option<wgpu::BindGroup>>,
-    background: [f64; 3],
-    /// Given back to the pool when the frame is dropped.
-    buffers: FrameBuffers,
-}
-
-impl WgpuFrame {
-    /// The index of a pass among the frame's.
-    fn index(&self, pass: Pass) -> usize {
-        // Passes are in the order of their process, then their view, which is the order of `Pass`.
-        self.passes.partition_point(|other| *other < pass)
-    }
-}
-
 impl Backend for WgpuBackend {
     type Frame = WgpuFrame;
-    type Bundle = wgpu::RenderBundle;
-    type Commands = wgpu::CommandBuffer;
+    type Part = WgpuPart;
+    type Commands = WgpuCommands;
     type Submission = WgpuSubmission;
 
     fn adapter(&self) -> String {
@@ -305,75 +300,95 @@ impl Backend for WgpuBackend {
                 frame.buffers.write_objects(&self.queue, first, &records);
             }
         })
+        .inspect_err(|_| frame.buffers.spoil())
     }
 
     fn prepare(
         &self,
         _worker: &Worker,
         frame: &WgpuFrame,
-        request: &FrameRequest<'_>,
-        pass: Pass,
-        list: &DrawList,
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
         let index = frame.index(pass);
-        let pipelines = &frame.pipelines[pass.process];
-        let made = checked(&self.device, &frame.labels[index], || {
+        let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
+        pass.spent.set_size(list.batches.len(), list.bundle_count(), pass.way.parts(list));
+        let made = checked(&self.device, &pass.label, || {
             frame.buffers.write_drawn(&self.queue, index, &list.objects);
             self.subdivide(frame, request, list)?;
+            match pass.way.record {
+                Record::Kept => pass.kept.set_count(list.bundle_count()),
+                Record::Indirect => {
+                    let upload = || pass.arguments.upload(&self.device, &self.queue, &frame.assets, &list.batches);
+                    pass.spent.alone(upload)?;
+                }
+                Record::Direct | Record::Bundles => {}
+            }
             Ok::<_, BackendError>(pipelines.make_missing(&self.device, &list.batches))
         })
         .flatten()
         // Of what was made just now some may be unusable.
-        .inspect_err(|_| self.subdivisions.forget())?;
+        .inspect_err(|_| {
+            self.subdivisions.forget();
+            frame.buffers.spoil();
+        })?;
         pipelines.keep(made);
         Ok(())
     }
 
+    fn parts(&self, frame: &WgpuFrame, pass: &PassRequest<'_>) -> usize {
+        frame.pass(frame.index(pass.pass)).way.parts(pass.list)
+    }
+
     fn record(
         &self,
-        _worker: &Worker,
+        worker: &Worker,
         frame: &WgpuFrame,
-        pass: Pass,
-        list: &DrawList,
-        bundles: Range<usize>,
-    ) -> Result<Vec<wgpu::RenderBundle>, BackendError> {
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        parts: Range<usize>,
+        put: &mut dyn FnMut(WgpuPart),
+    ) -> Result<(), BackendError> {
+        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         let index = frame.index(pass);
-        let label = &frame.labels[index];
-        let record = |bundle| record::bundle(&self.device, frame, index, list.bundle(bundle));
+        let pass = frame.pass(index);
+        let encoders = pass.way.encoders(list.bundle_count());
+        let record = |part| match encoders {
+            1 => record::bundle(&self.device, frame, index, list, part).map(Part::Bundle),
+            _ => self.record_encoder(frame, request, index, list, part),
+        };
+        let all = || parts.map(record).try_for_each(|part| part.map(|part| put(WgpuPart(part))));
         // One scope for the whole job: a scope locks the device twice.
-        checked(&self.device, label, || caught(label, || bundles.map(record).collect::<Result<_, _>>()))??
+        pass.spent
+            .on_parts(|| checked(&self.device, &pass.label, || caught(&pass.label, all)))
+            .flatten()
+            .flatten()
+            .inspect_err(|_| frame.buffers.spoil())
     }
 
     fn finish(
         &self,
-        _worker: &Worker,
+        worker: &Worker,
         frame: &WgpuFrame,
-        request: &FrameRequest<'_>,
-        pass: Pass,
-        bundles: Vec<wgpu::RenderBundle>,
-    ) -> Result<wgpu::CommandBuffer, BackendError> {
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        parts: &mut Vec<WgpuPart>,
+    ) -> Result<WgpuCommands, BackendError> {
+        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        if matches!(parts.first(), Some(WgpuPart(Part::Encoder(_)))) {
+            return Ok(WgpuCommands(Commands::Parts(std::mem::take(parts))));
+        }
         let index = frame.index(pass);
-        checked(&self.device, &frame.labels[index], || {
-            let mut encoder = self
-                .device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(&frame.labels[index]) });
-            match &request.draws[pass.process] {
-                Draws::Raw(raw) => record::raw(&self.device, &mut encoder, frame, request, pass, *raw)?,
-                _ => record::pass(&mut encoder, frame, request, index, &bundles)?,
-            }
-            Ok(encoder.finish())
-        })?
+        let pass = frame.pass(index);
+        let finish = || {
+            let encoder = self.encode_pass(frame, request, index, list, parts)?;
+            Ok(match pass.way.encode {
+                Encode::OnSubmit => Commands::Open(encoder),
+                Encode::PerPass | Encode::Split => Commands::Finished(encoder.finish()),
+            })
+        };
+        let commands = pass.spent.alone(|| checked(&self.device, &pass.label, finish)).flatten();
+        commands.map(WgpuCommands).inspect_err(|_| frame.buffers.spoil())
     }
 
-    fn submit(
-        &self,
-        frame: WgpuFrame,
-        passes: Vec<(Pass, wgpu::CommandBuffer)>,
-    ) -> Result<WgpuSubmission, BackendError> {
-        checked(&self.device, "the frame", || {
-            let index = self.queue.submit(passes.into_iter().map(|(_, commands)| commands));
-            // The clone leaves the frame whole, whose buffers go back to the pool from here.
-            WgpuSubmission::new(self.device.clone(), self.queue.clone(), index, frame.targets.clone())
-        })
+    fn submit(&self, frame: WgpuFrame, passes: Vec<(Pass, WgpuCommands)>) -> Result<WgpuSubmission, BackendError> {
+        self.submit_frame(&frame, passes).inspect_err(|_| frame.buffers.spoil())
     }
 }

@@ -1,5 +1,7 @@
 //! What is known of a submitted frame, and its pictures brought back.
 
+use std::sync::Arc;
+
 use super::error_scope::checked;
 use super::targets::{FrameTargets, Target};
 use crate::backend::BackendError;
@@ -10,7 +12,7 @@ pub struct WgpuSubmission {
     device: wgpu::Device,
     queue: wgpu::Queue,
     index: wgpu::SubmissionIndex,
-    targets: FrameTargets,
+    targets: Arc<FrameTargets>,
 }
 
 /// A target's pixels.
@@ -31,7 +33,7 @@ impl WgpuSubmission {
         device: wgpu::Device,
         queue: wgpu::Queue,
         index: wgpu::SubmissionIndex,
-        targets: FrameTargets,
+        targets: Arc<FrameTargets>,
     ) -> Self {
         Self { device, queue, index, targets }
     }

@@ -3,10 +3,11 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use parking_lot::{RwLock, RwLockReadGuard};
+use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
+use super::chooser::Chooser;
 use super::layouts::{Layouts, Sampled, process_layout, texture_format};
-use super::targets::FrameTargets;
+use super::ways::Ways;
 use crate::command::{Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
 use crate::queue::Batch;
@@ -22,6 +23,8 @@ pub(super) struct ProcessPipelines {
     /// `None` for a raw pass.
     shader: Option<Shader>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
+    /// Which way is taken, for each view that the process draws in.
+    choosers: Mutex<Vec<Option<Chooser>>>,
 }
 
 /// All that pipelines are made from and that a process may change from frame to frame.
@@ -73,7 +76,7 @@ impl<'a> Recipe<'a> {
 /// What a process draws into and reads from.
 #[derive(Clone, Debug, PartialEq)]
 struct Attachments {
-    colors: Vec<wgpu::TextureFormat>,
+    colors: Vec<Option<wgpu::TextureFormat>>,
     depth: Option<Depth>,
     sampled: Vec<Sampled>,
 }
@@ -94,7 +97,7 @@ impl Attachments {
         };
         let format_of =
             |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
-        let colors = declaration.colors().map(|(target, _)| texture_format(format_of(declaration.views, target)));
+        let colors = declaration.colors().map(|(target, _)| Some(texture_format(format_of(declaration.views, target))));
         let depth = declaration.depth().map(|(target, access)| Depth {
             format: texture_format(format_of(declaration.views, target)),
             writable: access.writes(),
@@ -141,8 +144,8 @@ impl ProcessPipelines {
             });
             Shader { module, layout }
         });
-        let (name, by_state) = (name.to_owned(), RwLock::default());
-        let pipelines = Self { name, recipe, attachments, process_layout, shader, by_state };
+        let (name, by_state, choosers) = (name.to_owned(), RwLock::default(), Mutex::default());
+        let pipelines = Self { name, recipe, attachments, process_layout, shader, by_state, choosers };
         if let Some(state) = pipelines.recipe.state {
             pipelines.keep(pipelines.make(device, state));
         }
@@ -190,23 +193,16 @@ impl ProcessPipelines {
         self.by_state.read()
     }
 
-    /// What the process has at `@group(2)` in one pass.
-    pub(super) fn process_group(
+    /// What the process has at `@group(2)` in one pass; `None` where it has nothing there.
+    pub(super) fn process_group<'a>(
         &self,
         device: &wgpu::Device,
-        parameters: Option<wgpu::BufferBinding<'_>>,
-        targets: &FrameTargets,
-        view: usize,
-        declaration: &Declaration,
+        parameters: Option<wgpu::BufferBinding<'a>>,
+        sampled: impl Iterator<Item = &'a wgpu::TextureView>,
     ) -> Option<wgpu::BindGroup> {
         let layout = self.process_layout.as_ref()?;
         let parameters = parameters.map(|buffer| (0, wgpu::BindingResource::Buffer(buffer)));
-        let texture = |(name, access): &(String, Access)| match access {
-            Access::Sample => targets.find(view, name).map(|target| &target.view),
-            Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
-            _ => None,
-        };
-        let sampled = (1..).zip(declaration.accesses.iter().filter_map(texture));
+        let sampled = (1..).zip(sampled);
         let sampled = sampled.map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));
         let entries: Vec<_> = parameters
             .into_iter()
@@ -218,14 +214,10 @@ impl ProcessPipelines {
     }
 
     /// What a bundle must know of the pass that it is for.
-    pub(super) fn bundle_descriptor<'a>(
-        &self,
-        label: &'a str,
-        color_formats: &'a [Option<wgpu::TextureFormat>],
-    ) -> wgpu::RenderBundleEncoderDescriptor<'a> {
+    pub(super) fn bundle_descriptor<'a>(&'a self, label: &'a str) -> wgpu::RenderBundleEncoderDescriptor<'a> {
         wgpu::RenderBundleEncoderDescriptor {
             label: Some(label),
-            color_formats,
+            color_formats: &self.attachments.colors,
             depth_stencil: self.attachments.depth.map(|depth| wgpu::RenderBundleDepthStencil {
                 format: depth.format,
                 depth_read_only: !depth.writable,
@@ -236,20 +228,26 @@ impl ProcessPipelines {
         }
     }
 
-    /// The formats of the colour targets.
-    pub(super) fn color_formats(&self) -> Vec<Option<wgpu::TextureFormat>> {
-        self.attachments.colors.iter().copied().map(Some).collect()
+    /// Asks or tells what chooses the way of one view's pass.
+    pub(super) fn with_chooser<R>(&self, view: usize, ways: &Ways, work: impl FnOnce(&mut Chooser) -> R) -> R {
+        let mut choosers = self.choosers.lock();
+        if choosers.len() <= view {
+            choosers.resize_with(view + 1, || None);
+        }
+        work(choosers[view].get_or_insert_with(|| ways.chooser()))
+    }
+
+    /// The process's name.
+    pub(super) fn name(&self) -> &str {
+        &self.name
     }
 
     /// `None` for a raw pass, which has no pipelines.
     fn make(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
         let shader = self.shader.as_ref()?;
-        let target = |format: &wgpu::TextureFormat| {
-            Some(wgpu::ColorTargetState {
-                format: *format,
-                blend: blend_state(state.blend()),
-                write_mask: wgpu::ColorWrites::ALL,
-            })
+        let target = |format: &Option<wgpu::TextureFormat>| {
+            let (blend, write_mask) = (blend_state(state.blend()), wgpu::ColorWrites::ALL);
+            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask })
         };
         let targets: Vec<_> = self.attachments.colors.iter().map(target).collect();
         let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];

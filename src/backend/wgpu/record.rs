@@ -1,111 +1,204 @@
-//! Recording: batches into bundles, bundles into passes.
+//! Recording: batches into bundles or passes, bundles into passes.
 
-use super::WgpuFrame;
-use super::assets::AssetSnapshot;
+use std::collections::HashMap;
+use std::ops::Range;
+
+use wgpu::util::RenderEncoder;
+
+use super::arguments::Arguments;
+use super::assets::{AssetSnapshot, MeshRange};
+use super::frame::WgpuFrame;
+use super::frame_pass::FramePass;
+use super::kept::Subdivided;
 use super::pipelines::fixed_state;
+use super::ways::Record;
 use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawState;
 use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
-use crate::queue::Batch;
+use crate::queue::{Batch, DrawList};
 
-/// Records batches. Whatever stays the same from one batch to the next is set once.
+/// One bundle of a pass: an earlier frame's if that way is taken and there is one, or a new one.
 ///
 /// # Errors
 /// If what a batch needs was not made before: an error of Drawloom's own.
 pub(super) fn bundle(
     device: &wgpu::Device,
     frame: &WgpuFrame,
-    pass: usize,
-    batches: &[Batch],
+    index: usize,
+    list: &DrawList,
+    place: usize,
 ) -> Result<wgpu::RenderBundle, BackendError> {
-    let pipelines = &frame.pipelines[frame.passes[pass].process];
-    let color_formats = pipelines.color_formats();
-    let label = &frame.labels[pass];
-    let by_state = pipelines.prepared();
-    let subdivided = frame.subdivided.read();
-    let mut encoder = device.create_render_bundle_encoder(&pipelines.bundle_descriptor(label, &color_formats));
-    encoder.set_bind_group(0, frame.buffers.group(pass), &[]);
-    encoder.set_bind_group(1, &frame.assets.group, &[]);
-    if let Some(group) = &frame.process_groups[pass] {
-        encoder.set_bind_group(2, group, &[]);
+    let (pass, batches) = (frame.pass(index), list.bundle(place));
+    let subdivided = frame.buffers.subdivided().read();
+    if pass.way.record != Record::Kept {
+        pass.spent.count_bundle(false);
+        return new_bundle(device, frame, pass, batches, &subdivided);
     }
-    set_arenas(&mut encoder, &frame.assets);
-    for run in batches.chunk_by(|one, next| one.state == next.state) {
-        let state = run[0].state;
-        let pipeline = by_state.get(&state.of_pipeline());
-        encoder.set_pipeline(pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?);
-        for batch in run {
-            let objects = batch.first..batch.first + batch.count;
-            if state.halvings() > 0 {
-                let mesh = subdivided.get(&(batch.mesh, state.halvings()));
-                let mesh = mesh.ok_or_else(|| broken("a mesh is subdivided before it is drawn"))?;
-                encoder.set_vertex_buffer(0, mesh.vertices.slice(..));
-                encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-                encoder.draw_indexed(0..mesh.index_count, 0, objects);
-            } else {
-                let mesh = frame.assets.meshes.get(batch.mesh as usize).copied().flatten();
-                let mesh = mesh.ok_or_else(|| broken("a batch draws a mesh that is there"))?;
-                let indices = mesh.first_index..mesh.first_index + mesh.index_count;
-                encoder.draw_indexed(indices, mesh.base_vertex, objects);
-            }
-        }
-        if state.halvings() > 0 {
-            set_arenas(&mut encoder, &frame.assets);
-        }
+    let kept = pass.kept.find(place, batches, &subdivided);
+    pass.spent.count_bundle(kept.is_some());
+    if let Some(kept) = kept {
+        return Ok(kept);
     }
-    Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(label) }))
+    let bundle = new_bundle(device, frame, pass, batches, &subdivided)?;
+    pass.kept.keep(place, batches, &subdivided, bundle.clone());
+    Ok(bundle)
 }
 
-/// Encodes a pass: clears its targets, and replays its bundles or draws its lights or its full-screen triangle.
+fn new_bundle(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    pass: &FramePass,
+    batches: &[Batch],
+    subdivided: &Subdivided,
+) -> Result<wgpu::RenderBundle, BackendError> {
+    let pipelines = frame.pipelines(pass.pass);
+    let by_state = pipelines.prepared();
+    let mut encoder = device.create_render_bundle_encoder(&pipelines.bundle_descriptor(&pass.label));
+    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided };
+    prepared.draw(&mut encoder, batches, |encoder, run| prepared.draw_each(encoder, &batches[run]))?;
+    Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(&pass.label) }))
+}
+
+/// What batches are drawn with.
+struct Prepared<'a> {
+    frame: &'a WgpuFrame,
+    pass: &'a FramePass,
+    by_state: &'a HashMap<DrawState, wgpu::RenderPipeline>,
+    subdivided: &'a Subdivided,
+}
+
+impl<'a> Prepared<'a> {
+    /// Draws batches. Whatever stays the same from one batch to the next is set once. Those of one state whose meshes lie in
+    /// the arenas are left to `draw_run`.
+    ///
+    /// # Errors
+    /// If what a batch needs was not made before: an error of Drawloom's own.
+    fn draw<E: RenderEncoder<'a>>(
+        &self,
+        encoder: &mut E,
+        batches: &[Batch],
+        mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        self.set_groups(encoder);
+        self.set_arenas(encoder);
+        let mut start = 0;
+        for run in batches.chunk_by(|one, next| one.state == next.state) {
+            let state = run[0].state;
+            let pipeline = self.by_state.get(&state.of_pipeline());
+            encoder.set_pipeline(pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?);
+            if state.halvings() == 0 {
+                draw_run(encoder, start..start + run.len())?;
+            } else {
+                self.draw_subdivided(encoder, run)?;
+                self.set_arenas(encoder);
+            }
+            start += run.len();
+        }
+        Ok(())
+    }
+
+    fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        for batch in run {
+            let mesh = mesh_of(&self.frame.assets, batch)?;
+            let indices = mesh.first_index..mesh.first_index + mesh.index_count;
+            encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
+        }
+        Ok(())
+    }
+
+    fn draw_subdivided(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        for batch in run {
+            let mesh = self.subdivided.get(&(batch.mesh, batch.state.halvings()));
+            let mesh = mesh.ok_or_else(|| broken("a mesh is subdivided before it is drawn"))?;
+            encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
+            encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
+        }
+        Ok(())
+    }
+
+    fn set_groups(&self, encoder: &mut impl RenderEncoder<'a>) {
+        encoder.set_bind_group(0, self.pass.frame_group.as_ref(), &[]);
+        encoder.set_bind_group(1, Some(&self.frame.assets.group), &[]);
+        if let Some(kept) = &self.pass.process_group {
+            encoder.set_bind_group(2, Some(&kept.group), &[]);
+        }
+    }
+
+    fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) {
+        encoder.set_vertex_buffer(0, Some(self.frame.assets.vertices.slice(..)));
+        encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+    }
+}
+
+/// Encodes a pass, or a part of it: clears its targets if it is the first, and draws some bundles' batches without a bundle.
 ///
 /// # Errors
-/// If what the pass needs was not made before: an error of Drawloom's own.
-pub(super) fn pass(
+/// If what a batch needs was not made before: an error of Drawloom's own.
+pub(super) fn batches(
     encoder: &mut wgpu::CommandEncoder,
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
     index: usize,
-    bundles: &[wgpu::RenderBundle],
+    list: &DrawList,
+    bundles: Range<usize>,
 ) -> Result<(), BackendError> {
-    let Pass { process, view } = frame.passes[index];
-    let (declaration, draws) = (&request.plan.processes()[process].declaration, &request.draws[process]);
-    let colors: Vec<_> = declaration
-        .colors()
-        .map(|(name, clear)| {
-            frame.targets.find(view, name).map(|target| wgpu::RenderPassColorAttachment {
-                view: &target.view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load: load(clear, frame.background), store: wgpu::StoreOp::Store },
-            })
-        })
-        .collect();
-    let depth = declaration.depth().and_then(|(name, access)| {
-        let target = frame.targets.find(view, name)?;
-        // Reversed: 0 is infinitely far away.
-        let load = if access == Access::DrawDepth { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
-        Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &target.view,
-            depth_ops: access.writes().then_some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
-        })
-    });
-    let mut render_pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(&frame.labels[index]),
-        color_attachments: &colors,
-        depth_stencil_attachment: depth,
-        ..wgpu::RenderPassDescriptor::default()
-    });
-    let Some(state) = fixed_state(draws) else {
-        render_pass.execute_bundles(bundles);
+    let pass = frame.pass(index);
+    let by_state = frame.pipelines(pass.pass).prepared();
+    let subdivided = frame.buffers.subdivided().read();
+    let arguments = pass.arguments.read();
+    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
+    let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
+    let batches = &list.batches[first..end.min(list.batches.len())];
+    let mut render_pass = begin_pass(encoder, frame, request, index, bundles.start == 0);
+    if batches.is_empty() {
         return Ok(());
-    };
-    let by_state = frame.pipelines[process].prepared();
-    render_pass.set_pipeline(by_state.get(&state).ok_or_else(|| broken("a pipeline is made before it is used"))?);
-    render_pass.set_bind_group(0, frame.buffers.group(index), &[]);
-    render_pass.set_bind_group(1, &frame.assets.group, &[]);
-    if let Some(group) = &frame.process_groups[index] {
-        render_pass.set_bind_group(2, group, &[]);
     }
+    if pass.way.record != Record::Indirect {
+        return prepared.draw(&mut render_pass, batches, |encoder, run| prepared.draw_each(encoder, &batches[run]));
+    }
+    let buffer = arguments.as_ref().and_then(|arguments| arguments.on_device.buffer());
+    let buffer = buffer.ok_or_else(|| broken("arguments are uploaded before they are drawn with"))?;
+    prepared.draw(&mut render_pass, batches, |render_pass, run| {
+        let offset = (first + run.start) as u64 * Arguments::STRIDE;
+        render_pass.multi_draw_indexed_indirect(buffer, offset, run.len() as u32);
+        Ok(())
+    })
+}
+
+/// Encodes a pass, or a part of it: clears its targets if it is the first, and replays bundles.
+pub(super) fn bundles<'a>(
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    is_first: bool,
+    bundles: impl IntoIterator<Item = &'a wgpu::RenderBundle>,
+) {
+    begin_pass(encoder, frame, request, index, is_first).execute_bundles(bundles);
+}
+
+/// Encodes a pass that draws lights, or a full-screen triangle.
+///
+/// # Errors
+/// If what the pass needs was not made before: an error of Drawloom's own.
+pub(super) fn fixed(
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+) -> Result<(), BackendError> {
+    let pass = frame.pass(index);
+    let Pass { process, view } = pass.pass;
+    let draws = &request.draws[process];
+    let by_state = frame.pipelines(pass.pass).prepared();
+    let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
+    let pipeline = pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?;
+    let subdivided = Subdivided::new();
+    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
+    let mut render_pass = begin_pass(encoder, frame, request, index, true);
+    render_pass.set_pipeline(pipeline);
+    prepared.set_groups(&mut render_pass);
     match draws {
         Draws::Lights(draws) => {
             let meshes = frame.light_meshes.as_ref();
@@ -140,9 +233,58 @@ pub(super) fn raw(
     raw.encode(encoder, &resources).map_err(BackendError::RawPass)
 }
 
-fn set_arenas<'a>(encoder: &mut wgpu::RenderBundleEncoder<'a>, assets: &'a AssetSnapshot) {
-    encoder.set_vertex_buffer(0, assets.vertices.slice(..));
-    encoder.set_index_buffer(assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+/// Where the mesh of a batch lies in the arenas.
+///
+/// # Errors
+/// If there is no such mesh: an error of Drawloom's own.
+pub(super) fn mesh_of(assets: &AssetSnapshot, batch: &Batch) -> Result<MeshRange, BackendError> {
+    let mesh = assets.meshes.get(batch.mesh as usize).copied().flatten();
+    mesh.ok_or_else(|| broken("a batch draws a mesh that is there"))
+}
+
+/// No device has more colour targets.
+const MOST_COLORS: usize = 8;
+
+/// Begins a pass. Only the first of several that draw into the same targets clears what is to be cleared.
+fn begin_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    is_first: bool,
+) -> wgpu::RenderPass<'a> {
+    let pass = frame.pass(index);
+    let Pass { process, view } = pass.pass;
+    let declaration = &request.plan.processes()[process].declaration;
+    let mut colors = [const { None }; MOST_COLORS];
+    let mut count = 0;
+    for (color, (name, clear)) in colors.iter_mut().zip(declaration.colors()) {
+        let clear = clear.filter(|_| is_first);
+        *color = frame.targets.find(view, name).map(|target| wgpu::RenderPassColorAttachment {
+            view: &target.view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: load(clear, frame.background), store: wgpu::StoreOp::Store },
+        });
+        count += 1;
+    }
+    let depth = declaration.depth().and_then(|(name, access)| {
+        let target = frame.targets.find(view, name)?;
+        let is_kept = access == Access::DrawDepth || !is_first;
+        // Reversed: 0 is infinitely far away.
+        let load = if is_kept { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
+        Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &target.view,
+            depth_ops: access.writes().then_some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        })
+    });
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(&pass.label),
+        color_attachments: &colors[..count],
+        depth_stencil_attachment: depth,
+        ..wgpu::RenderPassDescriptor::default()
+    })
 }
 
 fn broken(rule: &str) -> BackendError {

@@ -9,7 +9,7 @@ use crate::scene::ViewKind;
 use crate::view::RenderView;
 
 /// The targets of one frame.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct FrameTargets {
     /// One for each view: those it has for itself, and its layers of those it shares.
     views: Vec<Vec<Target>>,
@@ -70,7 +70,10 @@ impl FrameTargets {
 /// more is dropped.
 #[derive(Default)]
 pub(super) struct TargetCache {
-    current: FrameTargets,
+    current: Arc<FrameTargets>,
+    /// What the targets were made for: the plan by its identity, and kind, size and layer of each view.
+    plan: Option<u64>,
+    views: Vec<(ViewKind, [u32; 2], u32)>,
 }
 
 impl TargetCache {
@@ -81,7 +84,13 @@ impl TargetCache {
         device: &wgpu::Device,
         plan: &FramePlan,
         views: &[RenderView],
-    ) -> Result<FrameTargets, BackendError> {
+    ) -> Result<Arc<FrameTargets>, BackendError> {
+        let wanted = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
+        if self.plan == Some(plan.identity()) && self.views.iter().copied().eq(wanted()) {
+            return Ok(Arc::clone(&self.current));
+        }
+        // Until the new ones are there, there are none for this plan.
+        self.plan = None;
         let mut next = FrameTargets::default();
         for planned in plan.targets().iter().filter(|planned| planned.layered) {
             next.layered.push(self.layered(device, planned, views)?);
@@ -99,8 +108,11 @@ impl TargetCache {
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push(targets);
         }
-        self.current = next.clone();
-        Ok(next)
+        self.current = Arc::new(next);
+        self.plan = Some(plan.identity());
+        self.views.clear();
+        self.views.extend(wanted());
+        Ok(Arc::clone(&self.current))
     }
 
     /// What is kept.
