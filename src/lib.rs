@@ -26,6 +26,7 @@
 //! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
+//! - [`report`] tells how long a frame would take on more workers than the machine has.
 //! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
 //!
 //! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded Rendering"),
@@ -55,10 +56,11 @@ pub mod queue;
 pub mod process;
 pub mod backend;
 mod frame;
+pub mod report;
 
 pub use frame::{
-    BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
-    Submitted, Submitter, ViewQueue, ViewStatistics,
+    BuildError, FrameError, FrameMeasure, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder,
+    StageTimes, SubmitError, Submitted, Submitter, ViewQueue, ViewStatistics,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

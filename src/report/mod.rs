@@ -1,0 +1,51 @@
+//! What a frame could be: its time on a machine of more workers than this one has.
+//!
+//! A run of a schedule is [measured](crate::graph::Schedule::run_measured) once: what every chunk took. A [`Replay`] then
+//! runs those chunks again on a clock of its own, on as many workers as are asked for, by the rules of this crate's own
+//! scheduler: who takes what, who is woken when, and what each of that [costs](Prices).
+//!
+//! ```
+//! use drawloom::{
+//!     graph::{Closure, FrameGraph},
+//!     report::{Prices, Replay},
+//!     task::Scheduler,
+//! };
+//! use std::hint::black_box;
+//!
+//! let mut graph = FrameGraph::new();
+//! let cull = Closure::new(|_: &(), range, _worker| {
+//!     range.for_each(|item| _ = black_box((0..1_000).fold(item, |sum, step| black_box(sum ^ step))));
+//!     Ok(())
+//! });
+//! let cull = graph.add("cull", cull.with_width(|_| 2_000).with_chunk(16));
+//! graph.keep(cull);
+//! let mut schedule = graph.compile()?;
+//!
+//! let scheduler = Scheduler::new(1)?;
+//! let measure = schedule.run_measured(&scheduler, &())?;
+//! let replay = Replay::new(&measure, Prices::measure()?);
+//! for workers in [1, 2, 4, 8, 16] {
+//!     println!("on {workers} workers: {:?}", replay.frame_time(workers));
+//! }
+//! assert!(replay.frame_time(4) < replay.frame_time(1));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What it leaves out
+//!
+//! That all workers share caches, memory and clock rate, and what a process itself makes them wait for: locks, counters.
+//! The more workers, the more a prediction is what could be at best.
+
+mod costs;
+mod crew;
+mod prices;
+mod replay;
+mod run;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod sketch;
+
+pub use self::{
+    prices::Prices,
+    replay::{Replay, Replayed},
+};
