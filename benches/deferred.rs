@@ -11,6 +11,8 @@
 
 #[path = "../examples/frame/adapter.rs"]
 mod adapter;
+#[path = "shared/backends.rs"]
+mod backends;
 #[path = "shared/boxes.rs"]
 mod boxes;
 #[path = "deferred/field.rs"]
@@ -25,9 +27,12 @@ mod pre_pass;
 mod random;
 #[path = "deferred/report.rs"]
 mod report;
+#[path = "shared/results.rs"]
+mod results;
 #[path = "deferred/shadows.rs"]
 mod shadows;
 #[path = "shared/stopwatch.rs"]
+#[expect(dead_code, reason = "how long the scene is held is for other benches")]
 mod stopwatch;
 #[path = "shared/table.rs"]
 mod table;
@@ -39,8 +44,8 @@ use std::error::Error;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use backends::BackendName;
 use report::Report;
-use turns::BackendName;
 
 /// Compares the deferred pipeline with others, and with itself.
 #[derive(Parser)]
@@ -100,16 +105,15 @@ impl Extent {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let extent = Extent::new(&arguments);
-    let adapter = turns::adapter_name();
+    let adapter = backends::adapter_name();
     if adapter.is_none() {
         eprintln!("no graphics adapter found: what a device takes is left out");
     }
-    let backends = if adapter.is_some() { BackendName::ALL } else { &BackendName::ALL[..1] };
 
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left  {msg}")?);
     let mut report = Report::new(&extent, adapter);
-    for &backend in backends {
+    for &backend in BackendName::available() {
         report.lights.extend(lights::measure(&extent, backend, &progress)?);
         report.shadows.extend(shadows::measure(&extent, backend, &progress)?);
         report.depth_pre_pass.extend(pre_pass::measure(&extent, backend, &progress)?);
@@ -117,5 +121,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench { report.write() } else { Ok(()) }
+    if arguments.bench {
+        report.write()?;
+    }
+    Ok(())
 }

@@ -26,6 +26,8 @@ mod pools;
 mod random;
 #[path = "scheduler/report.rs"]
 mod report;
+#[path = "shared/results.rs"]
+mod results;
 #[path = "shared/table.rs"]
 mod table;
 #[path = "scheduler/tiny.rs"]
@@ -168,5 +170,8 @@ fn main() -> Result<(), Failure> {
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench { report.write() } else { Ok(()) }
+    if arguments.bench {
+        report.write()?;
+    }
+    Ok(())
 }

@@ -9,11 +9,12 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::backends::BackendName;
 use crate::field::Field;
 use crate::forward::{a_loop_over_lights, a_pass_a_light};
 use crate::report::milliseconds;
 use crate::table::Table;
-use crate::turns::{BackendName, Setting, Turns};
+use crate::turns::{Setting, Turns};
 
 /// A line of the table.
 #[derive(Serialize)]

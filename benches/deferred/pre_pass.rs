@@ -10,10 +10,11 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::backends::BackendName;
 use crate::boxes::new_box;
 use crate::report::milliseconds;
 use crate::table::Table;
-use crate::turns::{BackendName, Setting, Turns};
+use crate::turns::{Setting, Turns};
 
 /// A line of the table.
 #[derive(Serialize)]

@@ -1,13 +1,11 @@
 //! What was measured, as tables and as JSON.
 
-use std::error::Error;
-use std::fs;
-use std::path::Path;
+use std::io;
 use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::{Extent, lights, pre_pass, shadows};
+use crate::{Extent, lights, pre_pass, results, shadows};
 
 /// What was measured.
 #[derive(Serialize)]
@@ -57,14 +55,8 @@ impl Report {
 
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self) -> Result<(), Box<dyn Error>> {
-        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("the target folder has no name")?;
-        let folder = target.join("drawloom");
-        let path = folder.join("deferred.json");
-        fs::create_dir_all(&folder)?;
-        fs::write(&path, serde_json::to_string_pretty(self)? + "\n")?;
-        println!("{} written", path.display());
-        Ok(())
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("deferred.json", self)
     }
 }
 

@@ -9,10 +9,11 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::backends::BackendName;
 use crate::field::Field;
 use crate::report::milliseconds;
 use crate::table::Table;
-use crate::turns::{BackendName, Turns};
+use crate::turns::Turns;
 
 /// A line of the table.
 #[derive(Serialize)]

@@ -11,55 +11,11 @@ use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Renderer, RendererBuilder, Submitter};
 use indicatif::ProgressBar;
-use serde::Serialize;
 
+use crate::Extent;
+use crate::backends::BackendName;
 use crate::random::Random;
 use crate::stopwatch::{FrameTime, WARM_UP, median, timed_frame};
-use crate::{Extent, adapter};
-
-/// What draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BackendName {
-    /// wgpu's own, which does nothing: what is left is the processor's part.
-    Noop,
-    /// The machine's.
-    Adapter,
-}
-
-impl BackendName {
-    pub const ALL: &[Self] = &[Self::Noop, Self::Adapter];
-
-    /// What an [`Extent`](crate::Extent) says of this one.
-    pub fn of(self, [noop, adapter]: [usize; 2]) -> usize {
-        match self {
-            Self::Noop => noop,
-            Self::Adapter => adapter,
-        }
-    }
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Noop => "noop",
-            Self::Adapter => "adapter",
-        }
-    }
-
-    fn open(self) -> Result<WgpuBackend, Box<dyn Error>> {
-        let (device, queue) = match self {
-            Self::Noop => adapter::noop_device()?,
-            Self::Adapter => adapter::device()?,
-        };
-        Ok(WgpuBackend::new(device, queue)?)
-    }
-}
-
-/// The machine's adapter; `None` where there is none.
-pub fn adapter_name() -> Option<String> {
-    let (device, _) = adapter::device().ok()?;
-    let information = device.adapter_info();
-    Some(format!("{} ({})", information.name, information.backend))
-}
 
 /// Those of one block, all on one backend.
 pub struct Turns<'a> {
@@ -117,14 +73,10 @@ impl<'a> Turns<'a> {
         self.progress.set_message(format!("{block}, {}", self.backend.name()));
         self.progress.inc_length(((WARM_UP + rounds) * self.settings.len()) as u64);
         let mut random = Random::new();
-        let mut order: Vec<_> = (0..self.settings.len()).collect();
         for round in 0..WARM_UP + rounds {
-            for place in (1..order.len()).rev() {
-                order.swap(place, random.below(place + 1));
-            }
-            for &index in &order {
+            for index in random.order(self.settings.len()) {
                 let Setting { scene, renderer, submitter, times, statistics, submission } = &mut self.settings[index];
-                let (submitted, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
+                let (submitted, time) = timed_frame(renderer, submitter, scene.as_scene_ref(), WgpuSubmission::wait)?;
                 if round >= WARM_UP {
                     times.push(time);
                 }

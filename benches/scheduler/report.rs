@@ -1,13 +1,12 @@
 //! What was measured, as a table and as JSON.
 
-use std::fs;
-use std::path::Path;
+use std::io;
 
 use serde::Serialize;
 
 use crate::table::Table;
 use crate::turns::Row;
-use crate::{Extent, Failure};
+use crate::{Extent, results};
 
 /// What was measured.
 pub struct Report {
@@ -107,14 +106,8 @@ impl Report {
 
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self) -> Result<(), Failure> {
-        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("the target folder has no name")?;
-        let folder = target.join("drawloom");
-        let path = folder.join("scheduler.json");
-        fs::create_dir_all(&folder)?;
-        fs::write(&path, serde_json::to_string_pretty(&self.lines)? + "\n")?;
-        println!("{} written", path.display());
-        Ok(())
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("scheduler.json", &self.lines)
     }
 }
 

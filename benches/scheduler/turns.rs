@@ -140,11 +140,7 @@ impl Row {
     /// If a contender fails.
     pub fn round(&mut self, random: &mut Random, progress: &ProgressBar) -> Result<(), Failure> {
         progress.set_message(self.name);
-        let mut order: Vec<_> = (0..self.contenders.len()).collect();
-        for place in (1..order.len()).rev() {
-            order.swap(place, random.below(place + 1));
-        }
-        for index in order {
+        for index in random.order(self.contenders.len()) {
             let contender = &mut self.contenders[index];
             let scale = self.scale / contender.parts as f64;
             let samples = contender.take_turn(self.name, &self.work, self.pace)?;

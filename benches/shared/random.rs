@@ -34,6 +34,16 @@ impl Random {
         DVec3::new(across * turn.cos(), height, across * turn.sin())
     }
 
+    /// The numbers below `count`, in an order drawn anew: for who takes turns, so that it is not always the same one that
+    /// comes after one that left the machine in disorder.
+    pub fn order(&mut self, count: usize) -> Vec<usize> {
+        let mut order: Vec<_> = (0..count).collect();
+        for place in (1..count).rev() {
+            order.swap(place, self.below(place + 1));
+        }
+        order
+    }
+
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.0 ^ (self.0 >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);

@@ -1,0 +1,57 @@
+//! What a frame would take with other numbers of workers.
+
+use std::error::Error;
+
+use drawloom::backend::WgpuBackend;
+use drawloom::report::{Prices, Replay};
+use drawloom::scene::SceneRef;
+use drawloom::{Renderer, Submitter};
+
+use crate::stopwatch::middle;
+
+/// More workers than most machines have.
+pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
+
+/// Seconds a frame, by number of workers: of each frame that was replayed.
+#[derive(Clone)]
+pub struct Prediction {
+    prices: Prices,
+    times: Vec<(usize, Vec<f64>)>,
+}
+
+impl Prediction {
+    /// For so many workers, for one, and for more.
+    pub fn new(prices: Prices, workers: usize) -> Self {
+        let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
+        counts.sort_unstable();
+        counts.dedup();
+        Self { prices, times: counts.into_iter().map(|count| (count, Vec::new())).collect() }
+    }
+
+    /// Draws a frame, and replays it.
+    ///
+    /// # Errors
+    /// If it cannot be drawn.
+    pub fn replay(
+        &mut self,
+        renderer: &mut Renderer<WgpuBackend>,
+        submitter: &Submitter<WgpuBackend>,
+        scene: SceneRef<'_>,
+    ) -> Result<(), Box<dyn Error>> {
+        let (recorded, measure) = renderer.record_measured(scene)?;
+        let submitted = submitter.submit(recorded)?;
+        submitted.submission.wait()?;
+        let replay = Replay::of_frame(&measure, self.prices);
+        for (workers, times) in &mut self.times {
+            let frame = replay.frame_time(*workers) + submitted.statistics.stages.submit;
+            times.push(frame.as_secs_f64());
+        }
+        Ok(())
+    }
+
+    /// The median; `None` where it was not asked for.
+    pub fn of(&self, workers: usize) -> Option<f64> {
+        let found = self.times.iter().find(|(count, _)| *count == workers);
+        found.map(|(_, times)| middle(times.iter().copied()))
+    }
+}

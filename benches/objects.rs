@@ -1,0 +1,140 @@
+//! What a second core gains, by the number of objects: the table of L 6 again, on this machine.
+//!
+//!     cargo bench --bench objects
+//!     cargo bench --bench objects -- --quick
+//!     cargo bench --bench objects -- --backend noop
+//!
+//! L's scene holds 7 to 2,006 objects; those that are added stand where others stand already, so that the device has
+//! little to do with them. All of them move a little in every frame, and are drawn through the deferred pipeline with one
+//! hemispherical light that casts shadows, so each is drawn in two views.
+//!
+//! - *single* is L's first scenario: the same processes on one thread, recorded straight into the passes, a draw an object.
+//! - *multi* is what this crate does on two workers, with instancing and without.
+//!
+//! They take turns, in an order drawn anew each round; a turn is as many frames as fill some milliseconds, each from
+//! hand-over to the return of submit. Frames a second are those of the median round, and a ratio is the median of the
+//! rounds' own. What the device takes is waited for, and not counted. The ceiling is explained in `objects/ceiling.rs`. The
+//! stall is how long the engine's world is held (L 3): until recording ends, of the whole frame.
+//!
+//! Growth is what an object costs where there are many: two workers, no instancing.
+//!
+//! Written to `drawloom/objects.json` and `.svg` in the target folder too.
+
+#[path = "../examples/frame/adapter.rs"]
+mod adapter;
+#[path = "shared/backends.rs"]
+mod backends;
+#[path = "shared/boxes.rs"]
+mod boxes;
+#[path = "objects/ceiling.rs"]
+mod ceiling;
+#[path = "shared/chart.rs"]
+#[expect(dead_code, reason = "lying bars are for other benches")]
+mod chart;
+#[path = "objects/chart.rs"]
+mod charts;
+#[path = "objects/growth.rs"]
+mod growth;
+#[path = "shared/moving.rs"]
+mod moving;
+#[path = "shared/random.rs"]
+#[expect(dead_code, reason = "directions are for other benches")]
+mod random;
+#[path = "objects/report.rs"]
+mod report;
+#[path = "shared/results.rs"]
+mod results;
+#[path = "objects/scenario.rs"]
+mod scenario;
+#[path = "shared/stopwatch.rs"]
+#[expect(dead_code, reason = "single frames are for other benches")]
+mod stopwatch;
+#[path = "shared/table.rs"]
+mod table;
+#[path = "objects/turns.rs"]
+mod turns;
+#[path = "objects/world.rs"]
+mod world;
+
+use std::error::Error;
+use std::time::Duration;
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use backends::BackendName;
+use report::Report;
+
+/// Compares one thread with two workers.
+#[derive(Parser)]
+struct Arguments {
+    /// Few rounds and small scenes, to see that it works.
+    #[arg(long)]
+    quick: bool,
+    /// Measures on this backend only.
+    #[arg(long, value_parser = ["noop", "adapter"])]
+    backend: Option<String>,
+    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+/// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
+pub struct Extent {
+    name: &'static str,
+    /// Frames of each scenario that are not counted: tables grow, pipelines are made, and prices are learnt in them.
+    warm_up: [usize; 2],
+    rounds: [usize; 2],
+    /// How long a turn takes at least.
+    turn: [Duration; 2],
+    objects: &'static [usize],
+    /// Frames and rounds where there are more objects than in the table above.
+    growth_warm_up: [usize; 2],
+    growth_rounds: [usize; 2],
+    growth: &'static [usize],
+}
+
+impl Extent {
+    const FULL: Self = Self {
+        name: "full",
+        warm_up: [60, 40],
+        rounds: [41, 15],
+        turn: [Duration::from_millis(4), Duration::ZERO],
+        objects: &[7, 16, 106, 1_006, 2_006, 10_000, 100_000],
+        growth_warm_up: [40, 5],
+        growth_rounds: [15, 5],
+        growth: &[10_000, 100_000, 1_000_000],
+    };
+    const QUICK: Self = Self {
+        name: "quick",
+        warm_up: [3, 1],
+        rounds: [3, 1],
+        turn: [Duration::ZERO; 2],
+        objects: &[7, 106, 1_006],
+        growth_warm_up: [1, 1],
+        growth_rounds: [3, 1],
+        growth: &[1_000, 10_000],
+    };
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    let extent = if arguments.quick || !arguments.bench { Extent::QUICK } else { Extent::FULL };
+    let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
+    let progress = ProgressBar::new(0);
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
+    let mut report = Report::new(&extent);
+    for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
+        for &objects in extent.objects {
+            report.scenarios.extend(scenario::measure(&extent, backend, objects, &progress)?);
+        }
+        report.growth.extend(growth::measure(&extent, backend, &progress)?);
+    }
+    progress.finish_and_clear();
+    report.print();
+    // A trial must not take the place of what was measured.
+    if arguments.bench {
+        report.write()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,145 @@
+//! What it costs to record, by technique: 4 cameras × 10,000 moving objects of 64 meshes and 16 materials, from visibility to
+//! submit.
+//!
+//!     cargo bench --bench record
+//!     cargo bench --bench record -- --quick
+//!     cargo bench --bench record -- --backend noop
+//!
+//! - *naive* does what a plain engine does: the same culling, and then for each object all state, in the order of the scene,
+//!   on one thread, straight into the pass.
+//! - *rayon* cuts the objects of each camera into chunks, culls them and records a bundle of each in parallel; meshes lie in
+//!   one buffer and objects in another, so that nothing is set between draws.
+//! - *encoder-per-thread* has a thread for each camera, which culls and records straight into an encoder of its own, in the
+//!   same form.
+//! - *drawloom* is this crate as it comes, and the others of the name are its ways to record, each by itself.
+//!
+//! All draw the same picture, which is looked at first; upload what moves in every frame, and use wgpu alike. They take turns,
+//! in an order drawn anew each round; a turn is as many frames as fill some milliseconds. What is shown are medians, beside
+//! how often a frame asks for memory: the whole process, in frames that are not timed; and of that, for Drawloom, what is
+//! its own, which is what it asks for where the backend does nothing.
+//!
+//! Written to `drawloom/record.json` and `.svg` in the target folder too.
+
+#[path = "../examples/frame/adapter.rs"]
+mod adapter;
+#[path = "record/allocations.rs"]
+mod allocations;
+#[path = "shared/backends.rs"]
+mod backends;
+#[path = "shared/boxes.rs"]
+mod boxes;
+#[path = "shared/chart.rs"]
+#[expect(dead_code, reason = "upright bars and lines are for other benches")]
+mod chart;
+#[path = "shared/clouds.rs"]
+#[expect(dead_code, reason = "cameras back to back are for other benches")]
+mod clouds;
+#[path = "record/draw_only.rs"]
+mod draw_only;
+#[path = "record/encoders.rs"]
+mod encoders;
+#[path = "shared/moving.rs"]
+mod moving;
+#[path = "record/naive.rs"]
+mod naive;
+#[path = "record/nobody.rs"]
+mod nobody;
+#[path = "record/objects.rs"]
+mod objects;
+#[path = "record/ours.rs"]
+mod ours;
+#[path = "record/parallel.rs"]
+mod parallel;
+#[path = "record/pictures.rs"]
+mod pictures;
+#[path = "shared/random.rs"]
+mod random;
+#[path = "record/report.rs"]
+mod report;
+#[path = "shared/results.rs"]
+mod results;
+#[path = "shared/stopwatch.rs"]
+#[expect(dead_code, reason = "single frames are for other benches")]
+mod stopwatch;
+#[path = "record/studio.rs"]
+mod studio;
+#[path = "shared/table.rs"]
+mod table;
+#[path = "record/technique.rs"]
+mod technique;
+#[path = "record/turns.rs"]
+mod turns;
+
+use std::error::Error;
+use std::time::Duration;
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use allocations::Counting;
+use backends::BackendName;
+use report::Report;
+
+/// Those of the whole process.
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Each of which sees every object.
+pub const CAMERAS: usize = 4;
+
+/// Compares ways to record.
+#[derive(Parser)]
+struct Arguments {
+    /// Few rounds and small scenes, to see that it works.
+    #[arg(long)]
+    quick: bool,
+    /// Measures on this backend only.
+    #[arg(long, value_parser = ["noop", "adapter"])]
+    backend: Option<String>,
+    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+/// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
+pub struct Extent {
+    name: &'static str,
+    /// Frames of each technique that are not counted: tables grow, pipelines are made, and prices are learnt in them.
+    warm_up: [usize; 2],
+    rounds: [usize; 2],
+    /// How long a turn takes at least.
+    turn: [Duration; 2],
+    /// That each camera sees.
+    objects: usize,
+}
+
+impl Extent {
+    const FULL: Self = Self {
+        name: "full",
+        warm_up: [60, 40],
+        rounds: [41, 15],
+        turn: [Duration::from_millis(4), Duration::ZERO],
+        objects: 10_000,
+    };
+    const QUICK: Self =
+        Self { name: "quick", warm_up: [3, 1], rounds: [3, 1], turn: [Duration::ZERO; 2], objects: 1_000 };
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    let extent = if arguments.quick || !arguments.bench { Extent::QUICK } else { Extent::FULL };
+    let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
+    let progress = ProgressBar::new(0);
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
+    let mut report = Report::new(&extent);
+    for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
+        report.rows.extend(turns::measure(&extent, backend, &progress)?);
+    }
+    progress.finish_and_clear();
+    report.print();
+    // A trial must not take the place of what was measured.
+    if arguments.bench {
+        report.write()?;
+    }
+    Ok(())
+}

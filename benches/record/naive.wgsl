@@ -1,0 +1,24 @@
+struct Object {
+    world_from_object: mat4x4<f32>,
+    material: u32,
+}
+
+struct Surface {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) normal: vec3<f32>,
+}
+
+@group(0) @binding(0) var<uniform> clip_from_world: mat4x4<f32>;
+@group(1) @binding(0) var<uniform> color: vec4<f32>;
+@group(2) @binding(0) var<uniform> object: Object;
+
+@vertex
+fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> Surface {
+    let place = object.world_from_object * vec4<f32>(position, 1.0);
+    return Surface(clip_from_world * place, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz);
+}
+
+@fragment
+fn fragment(in: Surface) -> @location(0) vec4<f32> {
+    return vec4<f32>(color.rgb * (0.6 + 0.4 * normalize(in.normal).y), 1.0);
+}

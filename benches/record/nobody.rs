@@ -1,0 +1,69 @@
+//! A backend that does nothing and asks for no memory: what is left is the frame's own part.
+
+use std::ops::Range;
+
+use drawloom::backend::{Backend, BackendError, FrameRequest, PassRequest};
+use drawloom::process::Pass;
+use drawloom::task::Worker;
+use drawloom::view::ObjectTable;
+
+/// It takes everything, and keeps nothing.
+pub struct Nobody;
+
+impl Backend for Nobody {
+    type Frame = ();
+    type Part = ();
+    type Commands = ();
+    type Submission = ();
+
+    fn adapter(&self) -> String {
+        "nobody".to_owned()
+    }
+
+    fn begin(&self, _request: &FrameRequest<'_>) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn upload_objects(
+        &self,
+        _worker: &Worker,
+        _frame: &(),
+        _objects: &ObjectTable,
+        _blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn prepare(&self, _worker: &Worker, _frame: &(), _pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn parts(&self, _frame: &(), _pass: &PassRequest<'_>) -> usize {
+        0
+    }
+
+    fn record(
+        &self,
+        _worker: &Worker,
+        _frame: &(),
+        _pass: &PassRequest<'_>,
+        _parts: Range<usize>,
+        _put: &mut dyn FnMut(()),
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn finish(
+        &self,
+        _worker: &Worker,
+        _frame: &(),
+        _pass: &PassRequest<'_>,
+        _parts: &mut Vec<()>,
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn submit(&self, _frame: (), _passes: Vec<(Pass, ())>) -> Result<(), BackendError> {
+        Ok(())
+    }
+}

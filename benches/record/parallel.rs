@@ -1,0 +1,91 @@
+//! Chunks of objects, each culled and recorded as a bundle by whichever thread is free.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use drawloom::scene::SceneRef;
+use drawloom::view::Frustum;
+use drawloom::wgpu;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::draw_only::DrawOnly;
+use crate::objects::{ObjectRecord, Sphere, clip_from_world};
+use crate::technique::{Failure, Technique};
+
+/// Objects: fewer make bundles dear, more leave threads without work at the end.
+const CHUNK: usize = 256;
+
+pub struct Parallel {
+    shared: DrawOnly,
+    pool: ThreadPool,
+    drawn: usize,
+}
+
+impl Parallel {
+    pub fn new(shared: DrawOnly, threads: usize) -> Result<Self, Failure> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
+        Ok(Self { shared, pool, drawn: 0 })
+    }
+}
+
+impl Technique for Parallel {
+    fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
+        let Self { shared, pool, drawn } = self;
+        *drawn = pool.install(|| {
+            let chunks = shared.records.par_chunks_mut(CHUNK).zip(shared.spheres.par_chunks_mut(CHUNK));
+            chunks.enumerate().for_each(|(chunk, (records, spheres))| {
+                for (object, (record, sphere)) in (chunk * CHUNK..).zip(records.iter_mut().zip(spheres)) {
+                    (*record, *sphere) = (ObjectRecord::new(&scene, object), Sphere::new(&scene, object));
+                }
+            });
+            shared.write_objects();
+            for (index, camera) in scene.cameras.iter().enumerate() {
+                shared.write_camera(index, &clip_from_world(camera));
+            }
+            record(shared, &scene)
+        });
+        Ok(())
+    }
+
+    fn wait(&mut self) -> Result<(), Failure> {
+        self.shared.studio.wait()
+    }
+
+    fn drawn(&self) -> usize {
+        self.drawn
+    }
+
+    fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
+        self.shared.studio.read(camera)
+    }
+}
+
+/// Returns how many objects are drawn.
+fn record(shared: &DrawOnly, scene: &SceneRef<'_>) -> usize {
+    let drawn = AtomicUsize::new(0);
+    let frustums: Vec<_> = scene.cameras.iter().map(Frustum::new).collect();
+    let chunks = shared.spheres.len().div_ceil(CHUNK);
+    let bundle = |index: usize| {
+        let (camera, chunk) = (index / chunks, index % chunks);
+        let mut encoder = shared.studio.bundle_encoder();
+        shared.set(&mut encoder, camera);
+        let mut count = 0;
+        for object in (chunk * CHUNK..shared.spheres.len()).take(CHUNK) {
+            if shared.spheres[object].is_seen(&frustums[camera]) {
+                shared.draw(&mut encoder, scene, object);
+                count += 1;
+            }
+        }
+        drawn.fetch_add(count, Ordering::Relaxed);
+        encoder.finish(&wgpu::RenderBundleDescriptor::default())
+    };
+    let bundles: Vec<_> = (0..chunks * frustums.len()).into_par_iter().map(bundle).collect();
+    let encode = |(camera, bundles): (usize, &[wgpu::RenderBundle])| {
+        let mut encoder = shared.studio.encoder();
+        shared.studio.pass(&mut encoder, camera).execute_bundles(bundles);
+        encoder.finish()
+    };
+    let commands: Vec<_> = bundles.par_chunks(chunks).enumerate().map(encode).collect();
+    shared.studio.queue.submit(commands);
+    drawn.into_inner()
+}

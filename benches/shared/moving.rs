@@ -1,0 +1,36 @@
+//! A scene all of whose objects move.
+
+use drawloom::glam::DVec3;
+use drawloom::scene::{Scene, SceneRef};
+
+/// An engine's world: what moves are arrays of its own, which it lends.
+pub struct Moving {
+    scene: Scene,
+    positions: Vec<DVec3>,
+    frame: u32,
+}
+
+/// How far an object moves in a frame, in metres; and after how many it turns round.
+const STEP: f64 = 1e-3;
+const FRAMES: u32 = 64;
+
+impl Moving {
+    pub fn new(scene: Scene) -> Self {
+        let positions = scene.as_scene_ref().positions.to_vec();
+        Self { scene, positions, frame: 0 }
+    }
+
+    /// Moves every object a little: to and fro, so that it is never far from where it was.
+    pub fn step(&mut self) {
+        let forth = (self.frame / FRAMES).is_multiple_of(2);
+        let step = DVec3::new(STEP, STEP / 2.0, 0.0) * if forth { 1.0 } else { -1.0 };
+        for position in &mut self.positions {
+            *position += step;
+        }
+        self.frame += 1;
+    }
+
+    pub fn as_scene_ref(&self) -> SceneRef<'_> {
+        SceneRef { positions: &self.positions, ..self.scene.as_scene_ref() }
+    }
+}
