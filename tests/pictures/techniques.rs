@@ -131,9 +131,11 @@ fn move_all(scene: &mut Scene, by: f64) -> Result<(), Failed> {
     Ok(())
 }
 
+type Change = fn(&mut Scene) -> Result<(), Failed>;
+
 /// What happens to a scene before each frame: nothing at first, then everything moves, an object goes and comes back, assets
 /// are added, a picture is resized.
-const STORY: [fn(&mut Scene) -> Result<(), Failed>; 8] = [
+const STORY: [Change; 8] = [
     |_| Ok(()),
     |_| Ok(()),
     |scene| move_all(scene, 1.0),

@@ -230,7 +230,7 @@ mod tests {
 
     impl Play {
         fn new() -> Self {
-            let ways = Ways::new(true);
+            let ways = Ways::new(true, true);
             let (chooser, taken) = (ways.chooser(), Vec::new());
             Self { ways, chooser, frame: 0, noise: 0x9E37_79B9_7F4A_7C15, taken }
         }
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn the_cheapest_way_is_found_within_thirty_frames() {
-        let offered = Ways::new(true).offered().to_vec();
+        let offered = Ways::new(true, true).offered().to_vec();
         for wanted in offered {
             let mut play = Play::new();
             play.run(30, 2000, 0.2, |way| if way == wanted { 10.0 } else { 15.0 });

@@ -1,8 +1,9 @@
 //! The buffers of one frame on its way, and what is kept with them until the next.
 
 use std::mem;
+use std::num::NonZeroU64;
+use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use parking_lot::{Mutex, RwLock};
 
@@ -11,8 +12,9 @@ use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_ali
 use super::kept::Subdivided;
 use super::layouts::Layouts;
 use crate::backend::{BackendError, FrameRequest};
+use crate::blocks::Blocks;
 use crate::process::{Draws, Pass};
-use crate::view::{ObjectRecord, ViewRecord};
+use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
 
 /// Buffers that no frame uses at present.
 ///
@@ -39,7 +41,7 @@ impl BufferPool {
         self.free.lock().buffers.iter().flat_map(|buffers| buffers.all().map(GrowingBuffer::size)).sum()
     }
 
-    /// Drops everything, because a device error may have left it unusable.
+    /// Drops everything, and what frames on their way have when they end, because a device error may have left it unusable.
     pub(super) fn forget(&self) {
         let mut free = self.free.lock();
         free.buffers.clear();
@@ -56,8 +58,7 @@ impl BufferPool {
                 idle.passes.iter_mut().for_each(FramePass::forget);
             }
         }
-        let (generation, spoiled) = (free.generation, AtomicBool::new(false));
-        FrameBuffers { buffers, pool: Arc::clone(self), generation, spoiled }
+        FrameBuffers { buffers, pool: Arc::clone(self), generation: free.generation }
     }
 }
 
@@ -66,7 +67,6 @@ pub(super) struct FrameBuffers {
     buffers: Buffers,
     pool: Arc<BufferPool>,
     generation: u64,
-    spoiled: AtomicBool,
 }
 
 impl Drop for FrameBuffers {
@@ -74,7 +74,7 @@ impl Drop for FrameBuffers {
         // The frame may have ended early, or late. What it has subdivided is not to outlive it.
         self.buffers.subdivided.get_mut().clear();
         let mut free = self.pool.free.lock();
-        if !*self.spoiled.get_mut() && free.generation == self.generation {
+        if free.generation == self.generation {
             free.buffers.push(mem::take(&mut self.buffers));
         }
     }
@@ -140,14 +140,19 @@ impl FrameBuffers {
         &self.buffers.subdivided
     }
 
-    /// Says that the device found an error: what is kept with these buffers is not for another frame.
-    pub(super) fn spoil(&self) {
-        // Read when the frame is dropped, which only its owner can do.
-        self.spoiled.store(true, Ordering::Relaxed);
-    }
-
-    pub(super) fn write_objects(&self, queue: &wgpu::Queue, first: usize, records: &[ObjectRecord]) {
-        self.buffers.objects.write(queue, first * size_of::<ObjectRecord>(), bytemuck::cast_slice(records));
+    /// Uploads blocks of objects at once: every write costs the same again, however small.
+    pub(super) fn write_objects(&self, queue: &wgpu::Queue, objects: &ObjectTable, blocks: Range<usize>) {
+        let first = blocks.start * Blocks::<ObjectRecord>::SIZE;
+        let end = objects.len().min(blocks.end * Blocks::<ObjectRecord>::SIZE);
+        let bytes = |objects: usize| objects * size_of::<ObjectRecord>();
+        let size = NonZeroU64::new(bytes(end - first) as u64);
+        let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
+        let Some(mut staged) = queue.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
+        for block in blocks {
+            let (start, records) = objects.records_of(block);
+            let place = bytes(start - first)..bytes(start - first + records.len());
+            staged.slice(place).copy_from_slice(bytemuck::cast_slice(&records));
+        }
     }
 
     pub(super) fn write_drawn(&self, queue: &wgpu::Queue, pass: usize, objects: &[u32]) {

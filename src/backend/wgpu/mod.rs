@@ -121,6 +121,8 @@ impl WgpuBackend {
         }
         let layouts = checked(&device, "Drawloom's bind group layouts", || Layouts::new(&device))?;
         let has_indirect = device.features().contains(Self::OPTIONAL_FEATURES) && takes_indirect(&device);
+        // There wgpu panics over the arguments' alignment, unless its check of indirect calls is switched off.
+        let tries_indirect = has_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
         Ok(Self {
             device,
             queue,
@@ -131,7 +133,7 @@ impl WgpuBackend {
             subdivisions: Subdivisions::default(),
             targets: Mutex::default(),
             buffers: Arc::default(),
-            ways: Ways::new(has_indirect),
+            ways: Ways::new(has_indirect, tries_indirect),
             frames: AtomicU64::new(0),
             workers: AtomicUsize::new(1),
             latest: Mutex::default(),
@@ -294,13 +296,8 @@ impl Backend for WgpuBackend {
         objects: &ObjectTable,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        checked(&self.device, "objects", || {
-            for block in blocks {
-                let (first, records) = objects.records_of(block);
-                frame.buffers.write_objects(&self.queue, first, &records);
-            }
-        })
-        .inspect_err(|_| frame.buffers.spoil())
+        checked(&self.device, "objects", || frame.buffers.write_objects(&self.queue, objects, blocks))
+            .inspect_err(|_| self.buffers.forget())
     }
 
     fn prepare(
@@ -329,7 +326,7 @@ impl Backend for WgpuBackend {
         // Of what was made just now some may be unusable.
         .inspect_err(|_| {
             self.subdivisions.forget();
-            frame.buffers.spoil();
+            self.buffers.forget();
         })?;
         pipelines.keep(made);
         Ok(())
@@ -344,24 +341,35 @@ impl Backend for WgpuBackend {
         worker: &Worker,
         frame: &WgpuFrame,
         &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
-        parts: Range<usize>,
+        mut parts: Range<usize>,
         put: &mut dyn FnMut(WgpuPart),
     ) -> Result<(), BackendError> {
         self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         let index = frame.index(pass);
         let pass = frame.pass(index);
         let encoders = pass.way.encoders(list.bundle_count());
+        // What is there already needs no scope: a scope locks the device twice.
+        pass.spent.on_parts(|| {
+            while let Some(kept) = (!parts.is_empty()).then(|| record::kept(frame, index, list, parts.start)).flatten()
+            {
+                put(kept);
+                parts.start += 1;
+            }
+        });
+        if parts.is_empty() {
+            return Ok(());
+        }
         let record = |part| match encoders {
             1 => record::bundle(&self.device, frame, index, list, part).map(Part::Bundle),
             _ => self.record_encoder(frame, request, index, list, part),
         };
         let all = || parts.map(record).try_for_each(|part| part.map(|part| put(WgpuPart(part))));
-        // One scope for the whole job: a scope locks the device twice.
+        // One scope for all the others.
         pass.spent
             .on_parts(|| checked(&self.device, &pass.label, || caught(&pass.label, all)))
             .flatten()
             .flatten()
-            .inspect_err(|_| frame.buffers.spoil())
+            .inspect_err(|_| self.buffers.forget())
     }
 
     fn finish(
@@ -385,10 +393,10 @@ impl Backend for WgpuBackend {
             })
         };
         let commands = pass.spent.alone(|| checked(&self.device, &pass.label, finish)).flatten();
-        commands.map(WgpuCommands).inspect_err(|_| frame.buffers.spoil())
+        commands.map(WgpuCommands).inspect_err(|_| self.buffers.forget())
     }
 
     fn submit(&self, frame: WgpuFrame, passes: Vec<(Pass, WgpuCommands)>) -> Result<WgpuSubmission, BackendError> {
-        self.submit_frame(&frame, passes).inspect_err(|_| frame.buffers.spoil())
+        self.submit_frame(&frame, passes).inspect_err(|_| self.buffers.forget())
     }
 }

@@ -7,7 +7,7 @@ use wgpu::util::RenderEncoder;
 
 use super::arguments::Arguments;
 use super::assets::{AssetSnapshot, MeshRange};
-use super::frame::WgpuFrame;
+use super::frame::{Part, WgpuFrame, WgpuPart};
 use super::frame_pass::FramePass;
 use super::kept::Subdivided;
 use super::pipelines::fixed_state;
@@ -16,6 +16,17 @@ use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawState;
 use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
 use crate::queue::{Batch, DrawList};
+
+/// An earlier frame's bundle at a place of a pass that has one encoder, if that way is taken and there is one.
+pub(super) fn kept(frame: &WgpuFrame, index: usize, list: &DrawList, place: usize) -> Option<WgpuPart> {
+    let pass = frame.pass(index);
+    if pass.way.record != Record::Kept || pass.way.encoders(list.bundle_count()) > 1 {
+        return None;
+    }
+    let bundle = pass.kept.find(place, list.bundle(place), &frame.buffers.subdivided().read())?;
+    pass.spent.count_bundle(true);
+    Some(WgpuPart(Part::Bundle(bundle)))
+}
 
 /// One bundle of a pass: an earlier frame's if that way is taken and there is one, or a new one.
 ///

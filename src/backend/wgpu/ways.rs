@@ -16,7 +16,8 @@ pub enum Record {
     /// replayed and not recorded. Objects may move meanwhile, as long as the view draws the same ones.
     Kept,
     /// Straight into the pass, by one `multi_draw_indexed_indirect` for each run of batches of one state. Its arguments are
-    /// uploaded where they have changed. Needs [`wgpu::Features::INDIRECT_FIRST_INSTANCE`].
+    /// uploaded where they have changed. Needs [`wgpu::Features::INDIRECT_FIRST_INSTANCE`]; on wgpu's `noop` backend also an
+    /// instance without [`wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL`].
     Indirect,
 }
 
@@ -96,14 +97,16 @@ impl Way {
 pub(super) struct Ways {
     record: Option<Record>,
     encode: Option<Encode>,
+    /// Whether the device can draw indirectly, and whether that is to be tried unasked.
     has_indirect: bool,
+    tries_indirect: bool,
     offered: Vec<Way>,
 }
 
 impl Ways {
     /// All that a device has.
-    pub(super) fn new(has_indirect: bool) -> Self {
-        Self { record: None, encode: None, has_indirect, offered: Vec::new() }.listed()
+    pub(super) fn new(has_indirect: bool, tries_indirect: bool) -> Self {
+        Self { record: None, encode: None, has_indirect, tries_indirect, offered: Vec::new() }.listed()
     }
 
     pub(super) fn has_indirect(&self) -> bool {
@@ -131,7 +134,7 @@ impl Ways {
     fn listed(self) -> Self {
         let records = match self.record {
             Some(record) => vec![record],
-            None if self.has_indirect => vec![Record::Kept, Record::Direct, Record::Bundles, Record::Indirect],
+            None if self.tries_indirect => vec![Record::Kept, Record::Direct, Record::Bundles, Record::Indirect],
             None => vec![Record::Kept, Record::Direct, Record::Bundles],
         };
         // The device thread is everybody's bottleneck, so nothing is moved there unasked.
@@ -181,13 +184,13 @@ mod tests {
 
     #[test]
     fn what_is_fixed_is_all_there_is() {
-        let all = Ways::new(true).offered().to_vec();
+        let all = Ways::new(true, true).offered().to_vec();
         assert_eq!(all[0], Way { record: Record::Kept, encode: Encode::PerPass });
         assert!(all.iter().all(|way| way.encode != Encode::OnSubmit));
-        assert!(Ways::new(false).offered().iter().all(|way| way.record != Record::Indirect));
-        let fixed = Ways::new(true).only_record(Record::Indirect).only_encode(Encode::OnSubmit);
+        assert!(Ways::new(true, false).offered().iter().all(|way| way.record != Record::Indirect));
+        let fixed = Ways::new(true, false).only_record(Record::Indirect).only_encode(Encode::OnSubmit);
         assert_eq!(fixed.offered(), [Way { record: Record::Indirect, encode: Encode::OnSubmit }]);
-        let recorded = Ways::new(true).only_record(Record::Bundles);
+        let recorded = Ways::new(true, true).only_record(Record::Bundles);
         assert!(recorded.offered().iter().all(|way| way.record == Record::Bundles));
     }
 }
