@@ -20,6 +20,8 @@ pub(super) struct Chooser {
     learned_batches: usize,
     /// What the way in use costs as a rule: a cost far above it is a reason to learn anew.
     usual: Option<f64>,
+    /// For how many frames it has cost far more.
+    dear: u32,
     /// Not before this frame, lest a scene that goes to and fro is never left alone.
     next_learning: u64,
     learning_pause: u64,
@@ -58,6 +60,8 @@ const LONGEST_TRIAL: u64 = 16;
 const MARGIN: f64 = 0.9;
 /// How much dearer than usual the way in use must become for all to be tried again.
 const ALARM: f64 = 1.6;
+/// And for how many frames: a few may come one after the other in which somebody else had the processor.
+const ALARMED_FRAMES: u32 = 8;
 
 impl Chooser {
     pub(super) fn new(ways: usize) -> Self {
@@ -70,6 +74,7 @@ impl Chooser {
             batches: 0,
             learned_batches: 0,
             usual: None,
+            dear: 0,
             next_learning: 0,
             learning_pause: SHORTEST_LEARNING_PAUSE,
         }
@@ -131,7 +136,7 @@ impl Chooser {
         match (samples.are_telling(), is_cheaper) {
             (true, true) => {
                 // Who loses has to wait longer each time: two that are as good do not change places for ever.
-                self.usual = None;
+                (self.usual, self.dear) = (None, 0);
                 let loser = std::mem::replace(&mut self.current, candidate);
                 self.give_up(loser, frame);
             }
@@ -158,10 +163,14 @@ impl Chooser {
         }
         let median = samples.median();
         let usual = *self.usual.get_or_insert(median);
-        if median > usual * ALARM && frame >= self.next_learning {
-            self.learn(frame);
-        } else {
+        if median <= usual * ALARM {
+            self.dear = 0;
             self.usual = Some(usual + (median - usual) / 32.0);
+            return;
+        }
+        self.dear += 1;
+        if self.dear >= ALARMED_FRAMES && frame >= self.next_learning {
+            self.learn(frame);
         }
     }
 
@@ -172,7 +181,7 @@ impl Chooser {
         }
         self.is_learning = true;
         self.trial = None;
-        self.usual = None;
+        (self.usual, self.dear) = (None, 0);
         self.next_learning = frame + self.learning_pause;
         // The first time is the first there is anything to learn from.
         if self.learned_batches > 0 {
@@ -298,10 +307,20 @@ mod tests {
     }
 
     #[test]
+    fn a_little_cheaper_is_not_enough() {
+        let mut play = Play::new();
+        play.run(5_000, 2000, 0.0, |way| if way == Ways::new(true, true).offered()[0] { 20.0 } else { 19.0 });
+        assert_eq!(play.chooser.current, 0);
+        play.run(5_000, 2000, 0.0, |way| if way == Ways::new(true, true).offered()[0] { 20.0 } else { 17.0 });
+        assert_ne!(play.chooser.current, 0);
+    }
+
+    #[test]
     fn what_becomes_dear_is_left_soon_and_taken_again() {
         use super::super::ways::Record;
         let mut play = Play::new();
-        play.run(60, 2000, 0.1, cheapest(Record::Kept));
+        // For so long that all others are tried seldom.
+        play.run(1_500, 2000, 0.1, cheapest(Record::Kept));
         assert_eq!(play.last().record, Record::Kept);
         play.run(40, 2000, 0.1, |way| if way.record == Record::Kept { 60.0 } else { 30.0 });
         assert_ne!(play.last().record, Record::Kept);
@@ -315,7 +334,8 @@ mod tests {
         let mut play = Play::new();
         play.run(300, 20, 0.1, cheapest(Record::Direct));
         assert_eq!(play.last().record, Record::Direct);
-        play.run(30, 5000, 0.1, cheapest(Record::Indirect));
+        let cheaper = |way: Way| if way.record == Record::Indirect { 5.0 } else { cheapest(Record::Direct)(way) };
+        play.run(30, 5000, 0.1, cheaper);
         assert_eq!(play.last().record, Record::Indirect);
     }
 

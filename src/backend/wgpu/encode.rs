@@ -92,7 +92,7 @@ impl WgpuBackend {
                 })),
                 Commands::Open(encoder) => {
                     let pass = frame.pass(frame.index(pass));
-                    let finish = || checked(&self.device, "frame", || encoder.finish());
+                    let finish = || checked(&self.device, &pass.label, || encoder.finish());
                     finished.push(pass.spent.alone(finish)?);
                 }
             }

@@ -139,7 +139,8 @@ impl Ways {
         };
         // The device thread is everybody's bottleneck, so nothing is moved there unasked.
         let encodes = self.encode.map_or(vec![Encode::PerPass, Encode::Split], |encode| vec![encode]);
-        // Of what is measured, a bundle made to be replayed once and one encoder of several draws it is no way to win.
+        // Fewer ways are learned sooner. Bundles that are replayed once gain nothing by several encoders, and indirect draws
+        // are too few for them.
         let measured = self.record.is_none() && self.encode.is_none();
         let is_worth_it = |way: &Way| {
             !measured || way.encode == Encode::PerPass || matches!(way.record, Record::Kept | Record::Direct)
