@@ -106,9 +106,14 @@ struct Nodes {
 }
 
 impl Nodes {
-    /// Adds a phase, of a process if it is of one, which comes after another.
+    /// Adds a phase, of a process if it is of one, which comes after another. To split is to decide how large the jobs are that
+    /// sort, so the two are of one kind.
     fn add(&mut self, name: String, phase: Phase, process: Option<usize>, after: Option<ProcessId>) -> ProcessId {
-        let kind = (discriminant(&phase), process);
+        let known_as = match phase {
+            Phase::Sort { pass } => Phase::Split { pass },
+            other => other,
+        };
+        let kind = (discriminant(&known_as), process);
         let place = self.kinds.iter().position(|known| *known == kind);
         let place = place.unwrap_or_else(|| {
             self.kinds.push(kind);

@@ -78,7 +78,7 @@ pub(super) struct PassTable {
     pub(super) selection: Option<Selection>,
     commands: Blocks<RenderCommand>,
     split: RwLock<Split>,
-    /// As many as there may be.
+    /// As many as there may be at most.
     parts: Vec<RwLock<DrawPart>>,
     pub(super) list: RwLock<DrawList>,
 }
@@ -90,8 +90,7 @@ impl PassTable {
         match selection {
             Some(_) => {
                 self.commands.reserve(objects, RenderCommand::NOTHING);
-                let parts = Split::most_parts(objects).max(self.parts.len());
-                self.parts.resize_with(parts, RwLock::default);
+                self.parts.resize_with(Split::MOST_PARTS, RwLock::default);
             }
             // Another pass may have stood here in the frame before.
             None => self.list.get_mut().clear(),
@@ -151,17 +150,28 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode {
     }
 
     fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
-        let learnt = || frame.costs.items(self.kind, self.node, self.phase.width(frame), frame.workers);
-        frame.granularity.parts(self.phase.items_per_part()).unwrap_or_else(learnt)
+        match self.phase {
+            // Their parts were cut to be jobs.
+            Phase::Sort { .. } | Phase::Instance { .. } => 1,
+            _ => self.job_size(frame, self.phase.width(frame)),
+        }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
-        let items = range.len();
-        let (result, took) = frame.clock.measure(self.phase.stage(), || self.phase.work(frame, range, worker));
+        let chunk = range.clone();
+        let (result, took) = frame.clock.measure(self.phase.stage(), || self.work(frame, chunk, worker));
         if frame.granularity == Granularity::Adaptive {
-            frame.costs.note(self.kind, items, took);
+            frame.costs.note(self.kind, self.phase.items(frame, range), took);
         }
         Ok(result?)
+    }
+}
+
+impl FrameNode {
+    /// How many of `width` items make a job.
+    fn job_size<B: Backend>(&self, frame: &FrameContext<'_, B>, width: usize) -> usize {
+        let learnt = || frame.costs.items(self.kind, self.node, width, frame.workers);
+        frame.granularity.parts(self.phase.items_per_part()).unwrap_or_else(learnt)
     }
 }
 
@@ -182,9 +192,18 @@ impl Phase {
     fn items_per_part(self) -> usize {
         match self {
             Self::Upload => ObjectTable::BLOCK,
-            Self::Sort { .. } | Self::Instance { .. } => Split::COMMANDS,
             Self::Record { .. } => DrawList::BATCHES_PER_BUNDLE,
             _ => 1,
+        }
+    }
+
+    /// How many items of the kind that its costs are known of lie in a range: to sort a part of a view's commands is to sort
+    /// so many commands, and to split them is nothing beside that.
+    fn items<B: Backend>(self, frame: &FrameContext<'_, B>, range: Range<usize>) -> usize {
+        match self {
+            Self::Split { .. } => 0,
+            Self::Sort { pass } => range.map(|part| frame.tables.passes[pass].parts[part].read().commands.len()).sum(),
+            _ => range.len(),
         }
     }
 
@@ -197,27 +216,32 @@ impl Phase {
             Self::Upload | Self::Prepare { .. } | Self::Record { .. } | Self::Finish { .. } => Stage::Record,
         }
     }
+}
 
+impl FrameNode {
     fn work<B: Backend>(
-        self,
+        &self,
         frame: &FrameContext<'_, B>,
         range: Range<usize>,
         worker: &Worker,
     ) -> Result<(), BackendError> {
         let tables = frame.tables;
-        match self {
-            Self::Objects => tables.objects.fill(frame.request.scene, range),
-            Self::Upload => {
+        match self.phase {
+            Phase::Objects => tables.objects.fill(frame.request.scene, range),
+            Phase::Upload => {
                 return frame.backend.upload_objects(worker, frame.frame, &tables.objects, range);
             }
-            Self::Visibility { view } => see(frame, view, range),
-            Self::Compact { view } => tables.visible[view].compact(),
-            Self::Fill { pass } => fill(frame, pass, range),
-            Self::Split { pass } => {
+            Phase::Visibility { view } => see(frame, view, range),
+            Phase::Compact { view } => tables.visible[view].compact(),
+            Phase::Fill { pass } => fill(frame, pass, range),
+            Phase::Split { pass } => {
                 let table = &tables.passes[pass];
-                table.split.write().cut(&table.commands, visible_count(frame, pass));
+                let count = visible_count(frame, pass);
+                // Each part reads every key of the view, so there are no more than there are workers.
+                let parts = count.div_ceil(self.job_size(frame, count)).min(frame.workers);
+                table.split.write().cut(&table.commands, count, parts);
             }
-            Self::Sort { pass } => {
+            Phase::Sort { pass } => {
                 let table = &tables.passes[pass];
                 let (count, split) = (visible_count(frame, pass), table.split.read());
                 let mut memory = tables.sort_memory[worker.index()].lock();
@@ -226,17 +250,17 @@ impl Phase {
                     sort(&table.commands, count, split.part(part), &mut memory, sorted);
                 }
             }
-            Self::Instance { pass } => {
+            Phase::Instance { pass } => {
                 range.for_each(|part| instance(&mut tables.passes[pass].parts[part].write(), frame.merges));
             }
-            Self::Prepare { pass } => {
+            Phase::Prepare { pass } => {
                 join(&tables.passes[pass], frame.merges);
                 frame.recordings[pass].parts.lock().resize_with(part_count(frame, pass), || None);
                 let list = tables.passes[pass].list.read();
                 return frame.backend.prepare(worker, frame.frame, &pass_request(frame, pass, &list));
             }
-            Self::Record { pass } => return record(frame, pass, range, worker),
-            Self::Finish { pass } => return finish(frame, pass, worker),
+            Phase::Record { pass } => return record(frame, pass, range, worker),
+            Phase::Finish { pass } => return finish(frame, pass, worker),
         }
         Ok(())
     }

@@ -23,21 +23,16 @@ pub struct Part {
 }
 
 impl Split {
-    /// Commands in a part, about.
-    pub const COMMANDS: usize = 8192;
+    /// Fewer commands are no part of their own.
+    pub const FEWEST: usize = 1024;
 
     /// The most parts. Each looks at every key.
     pub const MOST_PARTS: usize = 32;
 
-    /// How many parts that many commands have at most.
-    pub fn most_parts(commands: usize) -> usize {
-        (commands / Self::COMMANDS).clamp(1, Self::MOST_PARTS)
-    }
-
-    /// Cuts the first `count` commands.
-    pub fn cut(&mut self, commands: &Blocks<RenderCommand>, count: usize) {
+    /// Cuts the first `count` commands into about so many parts, or fewer where these would be small.
+    pub fn cut(&mut self, commands: &Blocks<RenderCommand>, count: usize, parts: usize) {
         self.starts.clear();
-        let parts = Self::most_parts(count);
+        let parts = parts.min(count / Self::FEWEST).clamp(1, Self::MOST_PARTS);
         if parts == 1 {
             return;
         }
@@ -69,8 +64,8 @@ impl Split {
     }
 }
 
-/// With so many the largest part is seldom half as large again as it should be.
-const SAMPLES_PER_PART: usize = 32;
+/// With so many the largest part is seldom a quarter larger than it should be.
+const SAMPLES_PER_PART: usize = 64;
 
 impl Part {
     /// Everything that is drawn.
@@ -125,7 +120,7 @@ mod tests {
 
         #[test]
         fn parts_one_after_the_other_are_everything_in_order(
-            count in 0_usize..40_000, seed in any::<u64>(), few_depths in prop::bool::ANY,
+            count in 0_usize..40_000, parts in 1_usize..40, seed in any::<u64>(), few_depths in prop::bool::ANY,
         ) {
             let depth = |place: u64| {
                 let random = (place ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
@@ -134,13 +129,14 @@ mod tests {
             let depths: Vec<f32> = (0..count as u64).map(depth).collect();
             let commands = commands_of(&depths);
             let (mut memory, mut split) = (SortMemory::default(), Split::default());
-            split.cut(&commands, count);
-            prop_assert!(split.part_count() <= Split::most_parts(count));
+            split.cut(&commands, count, parts);
+            let parts = parts.min(count / Split::FEWEST).clamp(1, Split::MOST_PARTS);
+            prop_assert!(split.part_count() <= parts);
             let (mut in_parts, mut whole, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
             for index in 0..split.part_count() {
                 sort(&commands, count, split.part(index), &mut memory, &mut sorted);
                 if !few_depths {
-                    prop_assert!(sorted.len() < 2 * Split::COMMANDS + Split::COMMANDS, "{} in a part", sorted.len());
+                    prop_assert!(sorted.len() <= 3 * count / parts, "{} of {count} in one of {parts}", sorted.len());
                 }
                 in_parts.append(&mut sorted);
             }

@@ -62,12 +62,12 @@ fn a_view_of_so_many_objects_that_it_is_sorted_in_parts() {
     scene.cameras.truncate(1);
     scene.duplicate_objects(40);
     let (lists, passes, _) = drawn(&scene, 1, Granularity::PerCamera);
-    assert!(lists[0].objects.len() > 3 * Split::COMMANDS, "{}", lists[0].objects.len());
+    assert!(lists[0].objects.len() > 8 * Split::FEWEST, "{}", lists[0].objects.len());
     assert!(lists[0].commands().is_sorted_by(|one, next| (one.key, one.object) < (next.key, next.object)));
     let batches = lists[0].batches.windows(2);
     assert!(batches.into_iter().all(|pair| (pair[0].mesh, pair[0].state) != (pair[1].mesh, pair[1].state)));
     for workers in [2, 4] {
-        for granularity in [Granularity::Chunk(300), Granularity::default()] {
+        for granularity in [Granularity::Chunk(300), Granularity::Chunk(9000), Granularity::Adaptive] {
             let (other_lists, other_passes, _) = drawn(&scene, workers, granularity);
             assert!(other_lists == lists, "{workers} workers, {granularity:?}");
             assert_eq!(other_passes, passes, "{workers} workers, {granularity:?}");
