@@ -1,7 +1,7 @@
 //! Renders a scene through the whole frame, and says what that took.
 //!
 //!     cargo run --release --example frame
-//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --frames 100
+//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
 
 #[path = "frame/adapter.rs"]
 mod adapter;
@@ -19,7 +19,7 @@ use drawloom::backend::{Backend, NullBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::{Scene, obj, sample};
 use drawloom::task::Scheduler;
-use drawloom::{FrameStatistics, Renderer, Submitted};
+use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use arguments::{Arguments, BackendName};
@@ -41,12 +41,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let report = match arguments.backend {
         BackendName::Null => draw(arguments, &scene, NullBackend, |_| Ok(()))?.1,
         BackendName::Noop => {
-            let (device, queue) = adapter::noop_device()?;
-            draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?.1
+            let backend = wgpu_backend(arguments, adapter::noop_device()?)?;
+            draw(arguments, &scene, backend, WgpuSubmission::wait)?.1
         }
         BackendName::Wgpu => {
-            let (device, queue) = adapter::device()?;
-            let (last, report) = draw(arguments, &scene, WgpuBackend::new(device, queue)?, WgpuSubmission::wait)?;
+            let backend = wgpu_backend(arguments, adapter::device()?)?;
+            let (last, report) = draw(arguments, &scene, backend, WgpuSubmission::wait)?;
             save(arguments, &last.submission)?;
             report
         }
@@ -56,6 +56,17 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         Some(path) => report.write(path),
         None => Ok(()),
     }
+}
+
+fn wgpu_backend(
+    arguments: &Arguments,
+    (device, queue): (wgpu::Device, wgpu::Queue),
+) -> Result<WgpuBackend, Box<dyn Error>> {
+    let backend = WgpuBackend::new(device, queue)?;
+    Ok(match arguments.record {
+        None => backend,
+        Some(record) => backend.record(record.way())?,
+    })
 }
 
 fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {

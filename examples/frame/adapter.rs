@@ -34,7 +34,7 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 
 fn open(adapter: &wgpu::Adapter, required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     // Not needed, but with it there is one more way to record.
-    let welcome = adapter.features() & wgpu::Features::INDIRECT_FIRST_INSTANCE;
+    let welcome = adapter.features() & WgpuBackend::OPTIONAL_FEATURES;
     let descriptor = wgpu::DeviceDescriptor {
         required_features: WgpuBackend::REQUIRED_FEATURES | welcome,
         required_limits,

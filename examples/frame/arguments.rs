@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use clap::{Parser, ValueEnum, error::ErrorKind};
 use drawloom::Granularity;
+use drawloom::backend::Record;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
 
@@ -29,9 +30,13 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     pub workers: Option<NonZeroUsize>,
 
-    /// The size of a job: per-camera, per-draw or chunk:N.
-    #[arg(long, value_name = "SIZE", default_value = "chunk:512")]
+    /// The size of a job: adaptive, per-camera, per-draw or chunk:N.
+    #[arg(long, value_name = "SIZE", default_value = "adaptive")]
     pub granularity: JobSize,
+
+    /// How draws become commands of the device; for each pass whatever is measured to be cheapest, if not given.
+    #[arg(long, value_enum, value_name = "WAY")]
+    pub record: Option<RecordName>,
 
     /// The scene's objects N times over, at the same place.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -67,10 +72,51 @@ impl Arguments {
     pub fn checked() -> Self {
         let arguments = Self::parse();
         if arguments.out.is_some() && arguments.backend != BackendName::Wgpu {
-            let message = "--out needs a picture, and this backend draws none";
-            <Self as clap::CommandFactory>::command().error(ErrorKind::ArgumentConflict, message).exit();
+            conflict("--out needs a picture, and this backend draws none");
+        }
+        if arguments.record.is_some() && arguments.backend == BackendName::Null {
+            conflict("--record is for wgpu, and this backend records nothing");
         }
         arguments
+    }
+}
+
+fn conflict(message: &str) -> ! {
+    <Arguments as clap::CommandFactory>::command().error(ErrorKind::ArgumentConflict, message).exit()
+}
+
+/// How draws become commands of the device.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RecordName {
+    /// Straight into each pass.
+    Direct,
+    /// Into bundles, on all workers.
+    Bundles,
+    /// Into bundles that are kept from frame to frame.
+    Kept,
+    /// By indirect draws; not every adapter has them.
+    Indirect,
+}
+
+impl RecordName {
+    /// As it is written on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Bundles => "bundles",
+            Self::Kept => "kept",
+            Self::Indirect => "indirect",
+        }
+    }
+
+    /// What it stands for.
+    pub fn way(self) -> Record {
+        match self {
+            Self::Direct => Record::Direct,
+            Self::Bundles => Record::Bundles,
+            Self::Kept => Record::Kept,
+            Self::Indirect => Record::Indirect,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use drawloom::FrameStatistics;
 use serde::Serialize;
 
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, RecordName};
 
 /// What is told of the frames.
 #[derive(Serialize)]
@@ -16,6 +16,8 @@ pub struct Report {
     backend: &'static str,
     workers: usize,
     granularity: String,
+    /// How draws become commands of the device; none if that was left to what is measured.
+    record: Option<&'static str>,
     objects: usize,
     frames: usize,
     views: Vec<View>,
@@ -82,6 +84,7 @@ impl Report {
             backend: arguments.backend.name(),
             workers,
             granularity: arguments.granularity.name(),
+            record: arguments.record.map(RecordName::name),
             objects: frame.objects,
             frames: measured.len(),
             views: frame.views.iter().map(view).collect(),
@@ -111,7 +114,8 @@ impl Report {
     pub fn print(&self) {
         let Self { adapter, backend, workers, granularity, objects, frames, .. } = self;
         println!("adapter  {adapter}");
-        println!("frames   {frames} on {backend}, {workers} workers, {granularity}");
+        let record = self.record.map_or(String::new(), |record| format!(", {record}"));
+        println!("frames   {frames} on {backend}, {workers} workers, {granularity}{record}");
         println!("objects  {objects}");
         for rejection in &self.rejections {
             println!("not as asked: {rejection}");

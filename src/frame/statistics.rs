@@ -36,7 +36,7 @@ pub struct ViewStatistics {
     pub commands: usize,
     /// Instanced draws, over all its processes.
     pub batches: usize,
-    /// Bundles, over all its processes.
+    /// Bundles that those fill, whether they are recorded as bundles or not.
     pub bundles: usize,
 }
 
