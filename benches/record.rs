@@ -24,6 +24,8 @@
 mod adapter;
 #[path = "record/allocations.rs"]
 mod allocations;
+#[path = "record/apart.rs"]
+mod apart;
 #[path = "shared/backends.rs"]
 mod backends;
 #[path = "shared/boxes.rs"]
@@ -133,7 +135,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
     let mut report = Report::new(&extent);
     for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
-        report.rows.extend(turns::measure(&extent, backend, &progress)?);
+        let (rows, apart) = turns::measure(&extent, backend, &progress)?;
+        report.rows.extend(rows);
+        report.apart.push((backend, apart));
     }
     progress.finish_and_clear();
     report.print();

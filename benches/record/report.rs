@@ -28,11 +28,19 @@ pub struct Report {
     rounds: [usize; 2],
     objects: usize,
     pub rows: Vec<Row>,
+    /// For each backend nanoseconds an object and view of two threads that draw a frame each at the same time.
+    pub apart: Vec<(BackendName, f64)>,
 }
 
 impl Report {
     pub fn new(extent: &Extent) -> Self {
-        Self { extent: extent.name, rounds: extent.rounds, objects: extent.objects, rows: Vec::new() }
+        Self {
+            extent: extent.name,
+            rounds: extent.rounds,
+            objects: extent.objects,
+            rows: Vec::new(),
+            apart: Vec::new(),
+        }
     }
 
     pub fn print(&self) {
@@ -57,6 +65,15 @@ impl Report {
             ]);
         }
         table.print();
+        for (backend, apart) in &self.apart {
+            let Some(one) = self.find(*backend, "drawloom", 1) else { continue };
+            println!(
+                "{}: two threads that draw a frame each, and share nothing, take {apart:.1} ns: {:.2} times as fast as one",
+                backend.name(),
+                one.ns_per_object_view / apart
+            );
+        }
+        println!();
         self.print_marks();
     }
 

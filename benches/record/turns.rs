@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use indicatif::ProgressBar;
 
 use crate::allocations::requests_in;
+use crate::apart::Apart;
 use crate::backends::BackendName;
 use crate::clouds::around_one;
 use crate::moving::Moving;
@@ -19,9 +20,11 @@ use crate::{CAMERAS, Extent, pictures};
 /// Frames in which requests for memory are counted.
 const COUNTED: usize = 8;
 
+/// What each takes; and nanoseconds an object and view of two threads that draw a frame each at the same time.
+///
 /// # Errors
 /// If a frame cannot be drawn, or is not the others'.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Failure> {
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<(Vec<Row>, f64), Failure> {
     let (warm_up, rounds, turn) = (backend.of(extent.warm_up), backend.of(extent.rounds), backend.of(extent.turn));
     let mut world = Moving::new(around_one(CAMERAS, extent.objects)?);
     let mut contenders = Contender::all(backend, &world.as_scene_ref())?;
@@ -29,6 +32,8 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     progress.inc_length(((warm_up + rounds) * contenders.len()) as u64);
     pictures::compare(&mut contenders, world.as_scene_ref(), backend == BackendName::Adapter)?;
 
+    let apart = Apart::new(backend, extent.objects);
+    let mut times_apart = Vec::new();
     let mut times = vec![Vec::new(); contenders.len()];
     let mut random = Random::new();
     for round in 0..warm_up + rounds {
@@ -41,7 +46,12 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             }
             progress.inc(1);
         }
+        let time = apart.take_turn()?;
+        if round >= warm_up {
+            times_apart.push(time);
+        }
     }
+    let nanoseconds = |seconds: f64| seconds * 1e9 / (CAMERAS * extent.objects) as f64;
     let mut rows = Vec::new();
     for (contender, times) in contenders.iter_mut().zip(times) {
         let own = contender.is_ours().then(|| own_requests(contender.workers, warm_up, &mut world)).transpose()?;
@@ -49,7 +59,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             technique: contender.name,
             backend,
             workers: contender.workers,
-            ns_per_object_view: middle(times) * 1e9 / (CAMERAS * extent.objects) as f64,
+            ns_per_object_view: nanoseconds(middle(times)),
             allocations_per_frame: requests(&mut world, |world| {
                 let (result, requests) = requests_in(|| contender.technique.frame(world.as_scene_ref()));
                 result?;
@@ -59,7 +69,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             own_allocations_per_frame: own,
         });
     }
-    Ok(rows)
+    Ok((rows, nanoseconds(middle(times_apart))))
 }
 
 /// As many frames as take so long, and one at least; returns seconds a frame.
