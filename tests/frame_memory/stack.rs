@@ -1,7 +1,4 @@
-//! What a stack says: the stage of the frame, whose code asks, and where the crate called for it.
-
-use std::fs;
-use std::path::Path;
+//! What a stack says: where in the frame it is, whose code asks, and where the crate called for it.
 
 /// Whose code asked for memory: the innermost that is one of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,10 +11,21 @@ pub enum Owner {
     Nobody,
 }
 
+/// Where in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// In the jobs: from visibility to the finished pass, and in the graph that runs them.
+    Jobs,
+    /// Before and after them, while the frame is recorded.
+    Around,
+    Submit,
+    Unknown,
+}
+
 /// One request, as far as it matters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
-    pub stage: String,
+    pub stage: Stage,
     pub owner: Owner,
     /// The crate's lines that led there, the innermost first.
     pub lines: Vec<String>,
@@ -25,12 +33,6 @@ pub struct Place {
 
 /// How many lines of a stack are told apart.
 const MOST_LINES: usize = 4;
-
-pub const UNKNOWN: &str = "unknown";
-pub const BEFORE: &str = "before the jobs";
-pub const AFTER: &str = "after the jobs";
-pub const GRAPH: &str = "between jobs";
-pub const SUBMIT: &str = "submit";
 
 /// Reads a stack as the standard library prints it.
 pub fn read(stack: &str) -> Place {
@@ -45,7 +47,6 @@ pub fn read(stack: &str) -> Place {
 }
 
 struct Frame<'a> {
-    function: &'a str,
     file: &'a str,
     line: usize,
     owner: Owner,
@@ -53,19 +54,14 @@ struct Frame<'a> {
 
 /// The frames of a stack, the innermost first. Each is two lines: `  7: function` and `at file:line:column`.
 fn frames(stack: &str) -> Vec<Frame<'_>> {
-    let mut frames = Vec::new();
-    let mut function = "";
-    for text in stack.lines().map(str::trim) {
-        if let Some(place) = text.strip_prefix("at ") {
-            let mut parts = place.rsplitn(3, ':').skip(1);
-            let line = parts.next().and_then(|line| line.parse().ok()).unwrap_or(0);
-            let file = parts.next().unwrap_or("");
-            frames.push(Frame { function, file: shorten(file), line, owner: owner_of(file) });
-        } else if let Some((_, name)) = text.split_once(": ") {
-            function = name;
-        }
-    }
-    frames
+    stack.lines().filter_map(|text| text.trim().strip_prefix("at ")).map(frame).collect()
+}
+
+fn frame(place: &str) -> Frame<'_> {
+    let mut parts = place.rsplitn(3, ':').skip(1);
+    let line = parts.next().and_then(|line| line.parse().ok()).unwrap_or(0);
+    let file = parts.next().unwrap_or("");
+    Frame { file: shorten(file), line, owner: owner_of(file) }
 }
 
 /// A path relative to the package.
@@ -84,48 +80,15 @@ fn owner_of(file: &str) -> Owner {
     }
 }
 
-/// The phase whose arm a job is in; without a job, where in a frame the calling thread is.
-fn stage(ours: &[&Frame<'_>]) -> String {
-    let find = |file: &str, function: &str| {
-        ours.iter().find(|frame| frame.file == file && is_named(frame.function, function)).map(|frame| frame.line)
-    };
-    if let Some(line) = find("src/frame/phase.rs", "work") {
-        return arm_above("src/frame/phase.rs", line).unwrap_or_else(|| UNKNOWN.to_owned());
+fn stage(ours: &[&Frame<'_>]) -> Stage {
+    let passes = |folder: &str| ours.iter().any(|frame| frame.file.starts_with(folder));
+    if passes("src/graph/") {
+        Stage::Jobs
+    } else if passes("src/frame/renderer.rs") {
+        Stage::Around
+    } else if passes("src/frame/recorded.rs") {
+        Stage::Submit
+    } else {
+        Stage::Unknown
     }
-    if ours.iter().any(|frame| frame.file.starts_with("src/graph/") && frame.function.contains("run")) {
-        return GRAPH.to_owned();
-    }
-    if let Some(line) = find("src/frame/renderer.rs", "record") {
-        let run = line_of("src/frame/renderer.rs", "schedule.run(");
-        return if run.is_none_or(|run| line < run) { BEFORE } else { AFTER }.to_owned();
-    }
-    match find("src/frame/recorded.rs", "submit") {
-        Some(_) => SUBMIT.to_owned(),
-        None => UNKNOWN.to_owned(),
-    }
-}
-
-/// Whether a function has that name, whatever it is part of and whatever types it is for.
-fn is_named(function: &str, name: &str) -> bool {
-    let end = function.rfind(&format!("::{name}")).map_or(0, |place| place + 2);
-    function[end..]
-        .strip_prefix(name)
-        .is_some_and(|rest| !rest.starts_with(|next: char| next.is_alphanumeric() || next == '_'))
-}
-
-/// The match arm `Self::Name` that a line is in.
-fn arm_above(file: &str, line: usize) -> Option<String> {
-    let text = source(file);
-    let above: Vec<_> = text.lines().take(line).collect();
-    let arm = above.iter().rev().find_map(|text| text.trim().strip_prefix("Self::"))?;
-    let name: String = arm.chars().take_while(|letter| letter.is_alphanumeric()).collect();
-    Some(format!("job {name}"))
-}
-
-fn line_of(file: &str, part: &str) -> Option<usize> {
-    source(file).lines().position(|line| line.contains(part)).map(|index| index + 1)
-}
-
-fn source(file: &str) -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap_or_default()
 }
