@@ -70,9 +70,10 @@ impl<B: Backend> Submitter<B> {
         }
         let start = Instant::now();
         let Recorded { queues, frame, mut statistics, .. } = recorded;
-        let mut passes: Vec<_> = queues.into_iter().flat_map(|queue| queue.passes).collect();
+        let mut passes = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
+        passes.extend(queues.into_iter().flat_map(|queue| queue.passes));
         // Passes are ordered by process first, and processes are in an order that keeps every dependency.
-        passes.sort_by_key(|(pass, _)| *pass);
+        passes.sort_unstable_by_key(|(pass, _)| *pass);
         let submission = self.backend.submit(frame, passes)?;
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })

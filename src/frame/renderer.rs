@@ -212,7 +212,9 @@ fn queues_of<B: Backend>(
     request: &FrameRequest<'_>,
     recordings: &mut [Recording<B>],
 ) -> Result<Vec<ViewQueue<B::Commands>>, FrameError> {
-    let mut queues: Vec<_> = (0..request.views.len()).map(|view| ViewQueue { view, passes: Vec::new() }).collect();
+    let pass_count = |view| request.passes.iter().filter(|pass| pass.view == view).count();
+    let queue = |view| ViewQueue { view, passes: Vec::with_capacity(pass_count(view)) };
+    let mut queues: Vec<_> = (0..request.views.len()).map(queue).collect();
     for (&pass, recording) in request.passes.iter().zip(recordings) {
         let lost = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
         queues[pass.view].passes.push((pass, recording.take().ok_or_else(lost)?));

@@ -14,7 +14,8 @@ pub(super) struct ValidLights {
 impl ValidLights {
     /// Counts those that are left out.
     pub(super) fn new(scene: &SceneRef<'_>, rejections: &Rejections) -> Self {
-        let mut valid = Self { lights: Vec::with_capacity(scene.lights.len()), indices: Vec::new() };
+        let mut valid =
+            Self { lights: Vec::with_capacity(scene.lights.len()), indices: Vec::with_capacity(scene.lights.len()) };
         for (index, light) in scene.lights.iter().enumerate() {
             if let Err(error) = light.check(index) {
                 tracing::debug!(target: "drawloom", %error, "light left out");

@@ -13,6 +13,8 @@ pub struct LightTable {
     records: Vec<LightRecord>,
     /// The class and the index of each light that reaches the view, on the way to its record.
     reaching: Vec<(usize, usize)>,
+    /// For each light, its shadow map's view.
+    maps: Vec<Option<usize>>,
     /// By [`LightClass::index`].
     ranges: [Range<u32>; LightClass::COUNT],
 }
@@ -56,10 +58,11 @@ impl LightTable {
         if view.kind() == ViewKind::Shadow {
             return;
         }
-        let mut maps = vec![None; if shadows { lights.len() } else { 0 }];
-        for map in views {
-            if let Some(place) = map.light.and_then(|light| maps.get_mut(light)) {
-                *place = Some(map);
+        self.maps.clear();
+        self.maps.resize(if shadows { lights.len() } else { 0 }, None);
+        for (index, map) in views.iter().enumerate() {
+            if let Some(place) = map.light.and_then(|light| self.maps.get_mut(light)) {
+                *place = Some(index);
             }
         }
         let mut counts = [0; LightClass::COUNT];
@@ -77,7 +80,8 @@ impl LightTable {
             let start = self.records.len() as u32;
             let of_class = self.reaching.iter().filter(|(other, _)| *other == class);
             let record = |&(_, light): &(usize, usize)| {
-                LightRecord::new(&lights[light], origin, maps.get(light).copied().flatten())
+                let map = self.maps.get(light).copied().flatten();
+                LightRecord::new(&lights[light], origin, map.map(|index| &views[index]))
             };
             self.records.extend(of_class.map(record));
             self.ranges[class] = start..self.records.len() as u32;
