@@ -2,21 +2,23 @@
 
 use std::error::Error;
 
-use drawloom::backend::WgpuBackend;
+use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::report::{Prices, Replay};
 use drawloom::scene::SceneRef;
 use drawloom::{Renderer, Submitter};
 
-use crate::stopwatch::middle;
+use crate::stopwatch::{middle, timed_frame};
 
 /// More workers than most machines have.
 pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 
-/// Seconds a frame, by number of workers: of each frame that was replayed.
+/// Seconds a frame, by number of workers: of each frame that was replayed. Beside it, what the frame before it took, with
+/// everything as near in memory: what the replay for as many workers as there are is to be compared with.
 #[derive(Clone)]
 pub struct Prediction {
     prices: Prices,
     times: Vec<(usize, Vec<f64>)>,
+    measured: Vec<f64>,
 }
 
 impl Prediction {
@@ -25,10 +27,10 @@ impl Prediction {
         let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
         counts.sort_unstable();
         counts.dedup();
-        Self { prices, times: counts.into_iter().map(|count| (count, Vec::new())).collect() }
+        Self { prices, times: counts.into_iter().map(|count| (count, Vec::new())).collect(), measured: Vec::new() }
     }
 
-    /// Draws a frame, and replays it.
+    /// Draws two frames, and replays the second.
     ///
     /// # Errors
     /// If it cannot be drawn.
@@ -38,6 +40,8 @@ impl Prediction {
         submitter: &Submitter<WgpuBackend>,
         scene: SceneRef<'_>,
     ) -> Result<(), Box<dyn Error>> {
+        let (_, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
+        self.measured.push(time.processor.as_secs_f64());
         let (recorded, measure) = renderer.record_measured(scene)?;
         let submitted = submitter.submit(recorded)?;
         submitted.submission.wait()?;
@@ -47,6 +51,11 @@ impl Prediction {
             times.push(frame.as_secs_f64());
         }
         Ok(())
+    }
+
+    /// The median of the frames beside those that were replayed.
+    pub fn measured(&self) -> f64 {
+        middle(self.measured.iter().copied())
     }
 
     /// The median; `None` where it was not asked for.

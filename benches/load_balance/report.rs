@@ -89,11 +89,10 @@ impl Report {
             let ratio = against(Mode::PER_CAMERA, Mode::ADAPTIVE);
             self.against_per_camera.push((block.backend, block.workers, ratio));
         }
-        let medians: Vec<_> = times.iter().map(|times| middle(times.measured.iter().copied())).collect();
-        self.add_predictions(block, &predictions, &medians);
+        self.add_predictions(block, &predictions);
     }
 
-    fn add_predictions(&mut self, block: &Block<'_>, predictions: &[Prediction], measured: &[f64]) {
+    fn add_predictions(&mut self, block: &Block<'_>, predictions: &[Prediction]) {
         let (scene, backend, object_views) = (block.case.name, block.backend, block.case.object_views() as f64);
         for workers in PREDICTED {
             if self
@@ -122,7 +121,7 @@ impl Report {
                 });
             }
         }
-        for (index, (mode, prediction)) in Mode::ALL.iter().zip(predictions).enumerate() {
+        for (mode, prediction) in Mode::ALL.iter().zip(predictions) {
             let workers = if mode.is_serial { 1 } else { block.workers };
             self.errors.push(ReplayError {
                 scene,
@@ -130,7 +129,7 @@ impl Report {
                 workers,
                 mode: mode.name,
                 predicted: prediction.of(workers).unwrap_or(f64::NAN) * 1e3,
-                measured: measured[index] * 1e3,
+                measured: prediction.measured() * 1e3,
             });
         }
     }
