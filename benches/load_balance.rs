@@ -111,7 +111,8 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let extent = if arguments.quick || !arguments.bench { Extent::QUICK } else { Extent::FULL };
+    let is_quick = arguments.quick || !arguments.bench;
+    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
     let is_asked = |name: &str| arguments.scenes.is_empty() || arguments.scenes.iter().any(|scene| scene == name);
     let is_wanted = |name: &str| arguments.backend.as_deref().is_none_or(|wanted| wanted == name);
     let cases: Vec<_> = scenes::all(extent.share)?.into_iter().filter(|case| is_asked(case.name)).collect();
@@ -131,7 +132,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench {
+    if !is_quick {
         report.write()?;
     }
     Ok(())

@@ -119,7 +119,8 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let extent = if arguments.quick || !arguments.bench { Extent::QUICK } else { Extent::FULL };
+    let is_quick = arguments.quick || !arguments.bench;
+    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
     let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
@@ -133,7 +134,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench {
+    if !is_quick {
         report.write()?;
     }
     Ok(())

@@ -129,20 +129,19 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let extent = if arguments.quick || !arguments.bench { Extent::QUICK } else { Extent::FULL };
+    let is_quick = arguments.quick || !arguments.bench;
+    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
     let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
     let mut report = Report::new(&extent);
     for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
-        let (rows, apart) = turns::measure(&extent, backend, &progress)?;
-        report.rows.extend(rows);
-        report.apart.push((backend, apart));
+        report.measured.push(turns::measure(&extent, backend, &progress)?);
     }
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench {
+    if !is_quick {
         report.write()?;
     }
     Ok(())

@@ -170,7 +170,7 @@ fn main() -> Result<(), Failure> {
     progress.finish_and_clear();
     report.print();
     // A trial must not take the place of what was measured.
-    if arguments.bench {
+    if !quick {
         report.write()?;
     }
     Ok(())

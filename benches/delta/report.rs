@@ -1,12 +1,11 @@
 //! What was measured, as a table and as JSON.
 
-use std::error::Error;
-use std::fs;
-use std::path::Path;
+use std::io;
 
 use drawloom::command::RenderCommand;
 use serde::Serialize;
 
+use crate::results;
 use crate::table::Table;
 
 /// A scene's commands, in nanoseconds a command.
@@ -73,13 +72,7 @@ impl Report {
 
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self) -> Result<(), Box<dyn Error>> {
-        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("the target folder has no name")?;
-        let folder = target.join("drawloom");
-        let path = folder.join("delta.json");
-        fs::create_dir_all(&folder)?;
-        fs::write(&path, serde_json::to_string_pretty(&self.rows)? + "\n")?;
-        println!("{} written", path.display());
-        Ok(())
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("delta.json", &self.rows)
     }
 }

@@ -60,14 +60,15 @@ pub fn measure(
         }
     }
     let mut turns: [Vec<Turn>; 3] = Default::default();
+    let mut serial = Vec::new();
     let mut random = Random::new();
     for _ in 0..rounds {
         for index in random.order(painters.len()) {
             turns[index].push(painters[index].turn(&mut world, turn)?);
             progress.inc(1);
         }
+        serial.push(painters[0].serial_part(&mut world)?);
     }
-    let serial = (0..rounds).map(|_| painters[0].serial_part(&mut world)).collect::<Result<Vec<_>, _>>()?;
     let frame = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.frame));
     let held = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held));
     let held_share = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held / turn.frame));

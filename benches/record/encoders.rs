@@ -18,6 +18,9 @@ pub struct EncoderPerThread {
     drawn: usize,
 }
 
+/// Fewer are not worth another thread.
+const OBJECTS_AT_ONCE: usize = 512;
+
 impl EncoderPerThread {
     pub fn new(shared: DrawOnly) -> Result<Self, Failure> {
         let threads = ThreadPoolBuilder::new().num_threads(CAMERAS).build()?;
@@ -28,10 +31,14 @@ impl EncoderPerThread {
 impl Technique for EncoderPerThread {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
         let Self { shared, threads, drawn } = self;
-        for object in 0..scene.object_count() {
-            shared.records[object] = ObjectRecord::new(&scene, object);
-            shared.spheres[object] = Sphere::new(&scene, object);
-        }
+        let DrawOnly { records, spheres, .. } = &mut *shared;
+        threads.install(|| {
+            let objects = records.par_iter_mut().zip(spheres).enumerate().with_min_len(OBJECTS_AT_ONCE);
+            objects.for_each(|(object, (record, sphere))| {
+                *record = ObjectRecord::new(&scene, object);
+                *sphere = Sphere::new(&scene, object);
+            });
+        });
         shared.write_objects();
         let encode = |(index, camera): (usize, &Camera)| encode(shared, &scene, index, camera);
         let encoded: Vec<_> = threads.install(|| {

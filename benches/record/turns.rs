@@ -20,11 +20,19 @@ use crate::{CAMERAS, Extent, pictures};
 /// Frames in which requests for memory are counted.
 const COUNTED: usize = 8;
 
-/// What each takes; and nanoseconds an object and view of two threads that draw a frame each at the same time.
-///
+/// What was measured on one backend.
+pub struct Measured {
+    pub backend: BackendName,
+    pub rows: Vec<Row>,
+    /// Nanoseconds an object and view of two threads that draw a frame each at the same time.
+    pub apart: f64,
+    /// How many times as fast two workers are as one; and the two threads that share nothing.
+    pub speed_ups: [f64; 2],
+}
+
 /// # Errors
 /// If a frame cannot be drawn, or is not the others'.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<(Vec<Row>, f64), Failure> {
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Measured, Failure> {
     let (warm_up, rounds, turn) = (backend.of(extent.warm_up), backend.of(extent.rounds), backend.of(extent.turn));
     let mut world = Moving::new(around_one(CAMERAS, extent.objects)?);
     let mut contenders = Contender::all(backend, &world.as_scene_ref())?;
@@ -53,13 +61,22 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     }
     let nanoseconds = |seconds: f64| seconds * 1e9 / (CAMERAS * extent.objects) as f64;
     let mut rows = Vec::new();
-    for (contender, times) in contenders.iter_mut().zip(times) {
+    let find = |name, workers| contenders.iter().position(|one| (one.name, one.workers) == (name, workers));
+    let [naive, one, two] = [("naive", 1), ("drawloom", 1), ("drawloom", 2)].map(|(name, workers)| find(name, workers));
+    // Of the same round each: what the machine does meanwhile meets both.
+    let faster = |slow: Option<usize>, fast: &[f64]| {
+        let slow = slow.map_or(&[][..], |index| &times[index]);
+        middle(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
+    };
+    let speed_ups = [faster(one, two.map_or(&[][..], |two| &times[two])), faster(one, &times_apart)];
+    for (contender, times) in contenders.iter_mut().zip(&times) {
         let own = contender.is_ours().then(|| own_requests(contender.workers, warm_up, &mut world)).transpose()?;
         rows.push(Row {
             technique: contender.name,
             backend,
             workers: contender.workers,
-            ns_per_object_view: nanoseconds(middle(times)),
+            ns_per_object_view: nanoseconds(middle(times.iter().copied())),
+            of_naive: faster(naive, times),
             allocations_per_frame: requests(&mut world, |world| {
                 let (result, requests) = requests_in(|| contender.technique.frame(world.as_scene_ref()));
                 result?;
@@ -69,7 +86,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             own_allocations_per_frame: own,
         });
     }
-    Ok((rows, nanoseconds(middle(times_apart))))
+    Ok(Measured { backend, rows, apart: nanoseconds(middle(times_apart)), speed_ups })
 }
 
 /// As many frames as take so long, and one at least; returns seconds a frame.

@@ -63,6 +63,9 @@ impl ProcessCosts {
     }
 }
 
+/// Nothing counts for longer than that, so that sums of prices without end, by which nobody is to be woken, still fit.
+const LONGEST: Duration = Duration::from_secs(3_600);
+
 pub(super) fn nanoseconds(time: Duration) -> u64 {
-    time.as_nanos().try_into().unwrap_or(u64::MAX)
+    time.min(LONGEST).as_nanos() as u64
 }

@@ -12,7 +12,7 @@ use crate::task::Band;
 
 use super::{costs::nanoseconds, prices::Prices};
 
-/// A worker looks for work for no longer than that, in nanoseconds, whatever a wake-up costs.
+/// A worker that others count on looks for work for no longer than that, in nanoseconds, whatever a wake-up costs.
 const LONGEST_LOOK: u64 = 100_000;
 
 /// The workers, and the clock. Times are in nanoseconds since the run began. `T` is what lies in the queues, `A` what a
@@ -188,7 +188,7 @@ impl<T, A> Crew<T, A> {
     fn look(&mut self, worker: usize) -> Turn<T, A> {
         let Some((token, is_stolen)) = self.find(worker) else {
             let since = *self.members[worker].idle_since.get_or_insert(self.now);
-            self.set(worker, State::Looking, since + self.wake.min(LONGEST_LOOK));
+            self.set(worker, State::Looking, since + self.silence + self.wake.min(LONGEST_LOOK));
             return Turn::Rest;
         };
         let has_searched = self.is_searching(&self.members[worker]);

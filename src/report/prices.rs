@@ -64,7 +64,7 @@ impl Prices {
         note: Duration::ZERO,
     };
 
-    /// Measures them on this machine, which takes some milliseconds. Two workers are started for that, and stopped.
+    /// Measures them on this machine, which takes some 20 ms. A scheduler of two workers is started for that, and stopped.
     ///
     /// # Errors
     ///

@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::{
     frame::FrameMeasure,
     graph::{Flow, RunMeasure, Sharing, Way},
+    task::Scheduler,
 };
 
 use super::{
@@ -67,13 +68,14 @@ impl Replay {
         self
     }
 
-    /// How long the frame takes on so many workers: 0 is taken for 1.
+    /// How long the frame takes on so many workers, as in [`run`](Self::run).
     pub fn frame_time(&self, workers: usize) -> Duration {
         self.run(workers).time
     }
 
-    /// The frame on so many workers: 0 is taken for 1.
+    /// The frame on so many workers: 0 is taken for 1, and more than [`Scheduler::MOST_WORKERS`] for that many.
     pub fn run(&self, workers: usize) -> Replayed {
+        let workers = workers.clamp(1, Scheduler::MOST_WORKERS);
         let alone = self.costs.alone(&self.prices);
         if workers > 1 {
             let shared = self.share(workers);
@@ -81,7 +83,7 @@ impl Replay {
                 return self.replayed(false, shared.time, shared.busy);
             }
         }
-        let mut busy = vec![0; workers.max(1)];
+        let mut busy = vec![0; workers];
         busy[0] = self.costs.work();
         self.replayed(true, alone, busy)
     }
@@ -125,7 +127,7 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::{Prices, Replay, Replayed};
+    use super::{Prices, Replay, Replayed, Scheduler};
     use crate::report::sketch::{Sketch, any_sketch};
 
     fn micros(count: u64) -> Duration {
@@ -232,6 +234,16 @@ mod tests {
     }
 
     #[test]
+    fn who_looks_in_silence_still_has_the_time_that_a_wake_up_takes() {
+        let sketch = Sketch::new().add(&[], &[10]).add(&[0], &[100]).add(&[0], &[40]).add(&[1], &[50]).add(&[1], &[50]);
+        // The other worker has nothing to do from 80 µs on, and at 120 two become ready.
+        let prices = Prices { silence: micros(20), ..dear_wakes() };
+        assert_eq!(replay(&sketch, prices).frame_time(2), micros(170));
+        let prices = Prices { silence: micros(5), ..dear_wakes() };
+        assert_eq!(replay(&sketch, prices).frame_time(2), micros(200));
+    }
+
+    #[test]
     fn one_worker_at_a_time_is_woken_and_wakes_the_next() {
         let sketch = Sketch::new().add(&[], &[10]).add(&[], &[200]).add(&[0], &[200]).add(&[0], &[100]);
         // At 20 µs, when there is more to do, the second is on its way. It comes at 30, wakes the third, and begins at 40.
@@ -252,6 +264,22 @@ mod tests {
         let measure = Sketch::new().add(&[], &[10; 4]).measure(&Prices::FREE);
         let prices = Prices { note: micros(1), ..Prices::FREE };
         assert_eq!(Replay::new(&measure, prices).frame_time(1), micros(36));
+    }
+
+    #[test]
+    fn there_are_no_more_workers_than_a_scheduler_may_have() {
+        let pass = Sketch::new().add(&[], &[10; 64]);
+        let replay = replay(&pass, Prices::FREE);
+        assert_eq!(replay.run(usize::MAX), replay.run(Scheduler::MOST_WORKERS));
+    }
+
+    #[test]
+    fn prices_without_end_leave_all_work_to_one_thread() {
+        let pass = Sketch::new().add(&[], &[10; 64]).add(&[0], &[10; 64]);
+        let ever = Duration::MAX;
+        let prices =
+            Prices { wake: ever, waker: ever, steal: ever, silence: ever, ticket: ever, process: ever, ..Prices::FREE };
+        assert_eq!(times(&replay(&pass, prices), [1, 2, 64]), [micros(1280); 3]);
     }
 
     #[test]
