@@ -1,6 +1,6 @@
 //! Drawloom produces an engine's frames on every core.
 //!
-//! An engine hands over its scene; Drawloom splits the frame into jobs, records wgpu bundles on all workers, and hands the
+//! An engine hands over its scene; Drawloom splits the frame into jobs, records it for wgpu on all workers, and hands the
 //! device thread one ordered queue per camera to submit. What matters here, in this order: it does what the engine's
 //! author expects; it is right at the extremes; it is fast; it is pleasant to read; it is small.
 //!
@@ -12,9 +12,9 @@
 //!    ▼
 //!  fill              per view: a command for each of them     parallel over chunks    command, queue
 //!    ▼
-//!  sort → instance   by key; equal runs become one draw       parallel over views     queue
+//!  sort → instance   by key; equal runs become one draw       parallel over parts     queue
 //!    ▼
-//!  record            batches into bundles, bundles into a pass  parallel over chunks  backend
+//!  record            batches into passes, or bundles first    parallel over chunks    backend
 //!    ▼
 //!  per-camera queue  finished passes in order, one queue a view
 //!    ▼

@@ -87,13 +87,11 @@ impl PassTable {
     /// Makes room for a frame of `objects` objects, of which the pass draws those of the selection.
     pub(super) fn reset(&mut self, selection: Option<Selection>, objects: usize) {
         self.selection = selection;
-        match selection {
-            Some(_) => {
-                self.commands.reserve(objects, RenderCommand::NOTHING);
-                self.parts.resize_with(Split::MOST_PARTS, RwLock::default);
-            }
-            // Another pass may have stood here in the frame before.
-            None => self.list.get_mut().clear(),
+        // Another pass may have stood here in the frame before, and this frame may fail.
+        self.list.get_mut().clear();
+        if selection.is_some() {
+            self.commands.reserve(objects, RenderCommand::NOTHING);
+            self.parts.resize_with(Split::MOST_PARTS, RwLock::default);
         }
     }
 }
@@ -197,12 +195,15 @@ impl Phase {
         }
     }
 
-    /// How many items of the kind that its costs are known of lie in a range: to sort a part of a view's commands is to sort
-    /// so many commands, and to split them is nothing beside that.
+    /// How many items of the kind that its costs are known of lie in a range. A part's share of the visible objects counts,
+    /// drawn or not, since as much is known when they are split; and to split them is nothing beside sorting them.
     fn items<B: Backend>(self, frame: &FrameContext<'_, B>, range: Range<usize>) -> usize {
         match self {
             Self::Split { .. } => 0,
-            Self::Sort { pass } => range.map(|part| frame.tables.passes[pass].parts[part].read().commands.len()).sum(),
+            Self::Sort { pass } => {
+                let parts = frame.tables.passes[pass].split.read().part_count();
+                visible_count(frame, pass) * range.len() / parts
+            }
             _ => range.len(),
         }
     }

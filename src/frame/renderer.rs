@@ -177,7 +177,8 @@ impl<B: Backend> Renderer<B> {
         Ok(())
     }
 
-    /// What the last recorded frame drew in one view by one process; `None` where that process draws no commands there.
+    /// What the last frame drew in one view by one process, which may be nothing if it failed; `None` where that process draws
+    /// no commands there.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let jobs = self.jobs.latest()?;
         let name = |pass: &Pass| jobs.plan.processes()[pass.process].process.name();

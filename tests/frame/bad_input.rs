@@ -101,6 +101,19 @@ fn a_camera_that_cannot_be_is_refused_by_name() {
 }
 
 #[test]
+fn a_frame_that_failed_leaves_no_draw_list_of_the_one_before() {
+    let (mut renderer, submitter) = renderer(2, Granularity::default());
+    let mut scene = field(300);
+    submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let views = scene.cameras.len();
+    scene.cameras.push(Camera::looking_at("far away", DVec3::splat(1e12), DVec3::ZERO));
+    assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::Backend(_))));
+    for view in 0..=views {
+        assert!(renderer.draw_list("geometry buffer", view).is_none_or(|list| list.objects.is_empty()), "view {view}");
+    }
+}
+
+#[test]
 fn a_view_that_no_process_draws_is_refused_by_name() {
     let mut scene = field(10);
     scene.cameras[1].kind = ViewKind::Reflection;

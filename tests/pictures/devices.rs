@@ -18,6 +18,7 @@ pub const CASES: &[Case] = &[
     ("noop_takes_every_frame", noop),
     ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
     ("a_way_to_record_that_the_device_lacks_a_feature_for_is_refused_by_the_features_name", no_indirect_draws),
+    ("indirect_draws_that_wgpu_panics_over_are_an_error", indirect_draws_on_noop),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
     ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
     ("more_shadow_maps_than_a_texture_has_layers_are_refused_and_fewer_drawn_again", many_shadow_maps),
@@ -62,6 +63,23 @@ fn no_indirect_draws() -> Result<(), Failed> {
         Some(BackendError::MissingFeature { missing }) if missing.contains("INDIRECT_FIRST_INSTANCE") => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
+}
+
+/// On wgpu's own backend its check of indirect draws panics as a pass is finished, on whatever thread that is.
+fn indirect_draws_on_noop() -> Result<(), Failed> {
+    for encode in [Encode::PerPass, Encode::OnSubmit] {
+        let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, WgpuBackend::OPTIONAL_FEATURES)?;
+        let backend = WgpuBackend::new(device, queue)?.record(Record::Indirect)?.encode(encode);
+        let (mut renderer, submitter) =
+            Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
+        let scene = field(500);
+        for _ in 0..2 {
+            if renderer.record(scene.as_scene_ref()).is_ok_and(|frame| submitter.submit(frame).is_ok()) {
+                return Err(format!("{encode:?}: wgpu takes them by now").into());
+            }
+        }
+    }
+    Ok(())
 }
 
 fn large_picture() -> Result<(), Failed> {
@@ -178,11 +196,18 @@ fn lost_while(record: Record, encode: Encode) -> Result<(), Failed> {
 }
 
 fn noop_with(required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Failed> {
+    noop_device(required_limits, wgpu::Features::empty())
+}
+
+fn noop_device(
+    required_limits: wgpu::Limits,
+    required_features: wgpu::Features,
+) -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::NOOP;
     descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
-    let descriptor = wgpu::DeviceDescriptor { required_limits, ..wgpu::DeviceDescriptor::default() };
+    let descriptor = wgpu::DeviceDescriptor { required_limits, required_features, ..wgpu::DeviceDescriptor::default() };
     Ok(pollster::block_on(adapter.request_device(&descriptor))?)
 }

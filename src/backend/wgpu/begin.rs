@@ -77,7 +77,8 @@ impl WgpuBackend {
                 choice = pipelines.with_chooser(view, &self.ways, |one| one.choose(offered, *number, &mut may_try));
             }
             pass.take(offered[choice.0], choice.0, choice.1);
-            if let (Record::Kept, Some(frame_group)) = (pass.way.record, &pass.frame_group) {
+            let keeps = pass.drawn_place.is_some() && pass.way.record == Record::Kept;
+            if let Some(frame_group) = pass.frame_group.as_ref().filter(|_| keeps) {
                 pass.kept.begin(Surroundings {
                     frame_group: frame_group.clone(),
                     process_group: pass.process_group.as_ref().map(|kept| kept.group.clone()),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::chooser::Chooser;
-use super::error_scope::checked;
+use super::error_scope::{caught, checked};
 use super::frame::{Commands, Part};
 use super::frame_pass::FramePass;
 use super::{Record, WgpuBackend, WgpuCommands, WgpuFrame, WgpuPart, WgpuSubmission, record};
@@ -92,8 +92,9 @@ impl WgpuBackend {
                 })),
                 Commands::Open(encoder) => {
                     let pass = frame.pass(frame.index(pass));
-                    let finish = || checked(&self.device, &pass.label, || encoder.finish());
-                    finished.push(pass.spent.alone(finish)?);
+                    // No scheduler catches what wgpu panics over here.
+                    let finish = || checked(&self.device, &pass.label, || caught(&pass.label, || encoder.finish()));
+                    finished.push(pass.spent.alone(finish)??);
                 }
             }
         }

@@ -99,10 +99,10 @@ pub(super) fn append_aligned(bytes: &mut Vec<u8>, more: &[u8]) {
 /// bindings seldom change; otherwise a quarter more than it needs, or as much as `most` allows. A multiple of [`ALIGNMENT`].
 pub(super) fn roomy(before: usize, needed: usize, most: u64) -> usize {
     let needed = needed.max(1).next_multiple_of(ALIGNMENT);
-    if (needed..=4 * needed).contains(&before) {
+    let most = usize::try_from(most).unwrap_or(usize::MAX) / ALIGNMENT * ALIGNMENT;
+    if (needed..=most.min(4 * needed)).contains(&before) {
         return before;
     }
-    let most = usize::try_from(most).unwrap_or(usize::MAX) / ALIGNMENT * ALIGNMENT;
     (needed + needed / 4).next_multiple_of(ALIGNMENT).min(most).max(needed)
 }
 
@@ -135,6 +135,8 @@ mod tests {
         assert!(changes <= 2, "{changes}");
         assert_eq!(roomy(1 << 20, 100, u64::MAX), 512);
         assert_eq!(roomy(0, 1000, 1100), 1024);
+        // There may be less room than there was.
+        assert_eq!(roomy(2048, 1000, 1500), 1280);
         assert_eq!(roomy(0, 0, u64::MAX), 512);
     }
 }

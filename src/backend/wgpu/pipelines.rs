@@ -185,7 +185,11 @@ impl ProcessPipelines {
 
     /// Keeps pipelines that were made.
     pub(super) fn keep(&self, made: impl IntoIterator<Item = (DrawState, wgpu::RenderPipeline)>) {
-        self.by_state.write().extend(made);
+        let mut made = made.into_iter().peekable();
+        // Whoever records reads the pipelines for as long as that takes. As a rule there is none to add, and nothing to wait for.
+        if made.peek().is_some() {
+            self.by_state.write().extend(made);
+        }
     }
 
     /// The pipelines there are, by state.
@@ -343,5 +347,41 @@ fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
         Blend::Alpha => Some(wgpu::BlendState::ALPHA_BLENDING),
         Blend::Additive => Some(both(add(BlendOperation::Add))),
         Blend::Subtractive => Some(both(add(BlendOperation::ReverseSubtract))),
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::sync::{Arc, mpsc};
+    use std::time::Duration;
+
+    use super::*;
+    use crate::process::{GeometryBuffer, GeometryFormats};
+
+    #[test]
+    fn who_has_no_pipeline_to_add_does_not_wait_for_those_who_record() {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::NOOP;
+        descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
+        let (device, _) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
+        let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
+        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let draws = plan.draws().unwrap();
+        let layouts = Layouts::new(&device);
+        let pipelines = ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0]);
+
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let recording = pipelines.prepared();
+            scope.spawn(|| {
+                pipelines.keep(pipelines.make_missing(&device, &[]));
+                sender.send(()).unwrap();
+            });
+            let kept = receiver.recv_timeout(Duration::from_secs(10));
+            drop(recording);
+            kept.unwrap();
+        });
     }
 }

@@ -171,11 +171,16 @@ pub(super) fn batches(
     let buffer = arguments.as_ref().and_then(|arguments| arguments.on_device.buffer());
     let buffer = buffer.ok_or_else(|| broken("arguments are uploaded before they are drawn with"))?;
     prepared.draw(&mut render_pass, batches, |render_pass, run| {
-        let offset = (first + run.start) as u64 * Arguments::STRIDE;
-        render_pass.multi_draw_indexed_indirect(buffer, offset, run.len() as u32);
+        for start in run.clone().step_by(MOST_INDIRECT) {
+            let offset = (first + start) as u64 * Arguments::STRIDE;
+            render_pass.multi_draw_indexed_indirect(buffer, offset, (run.end - start).min(MOST_INDIRECT) as u32);
+        }
         Ok(())
     })
 }
+
+/// Draws of one indirect call: as many as every Vulkan device that has such calls allows.
+const MOST_INDIRECT: usize = 65_535;
 
 /// Encodes a pass, or a part of it: clears its targets if it is the first, and replays bundles.
 pub(super) fn bundles<'a>(
