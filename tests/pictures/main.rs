@@ -13,6 +13,7 @@ mod geometry;
 mod judge;
 mod light_volumes;
 mod lighting;
+mod painted;
 mod placement;
 mod post;
 mod processes;
@@ -46,6 +47,7 @@ fn main() {
         (geometry::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
+        (painted::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),

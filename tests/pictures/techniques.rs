@@ -32,7 +32,7 @@ const RECORDS: [Record; 4] = [Record::Direct, Record::Bundles, Record::Kept, Rec
 const ENCODES: [Encode; 3] = [Encode::PerPass, Encode::Split, Encode::OnSubmit];
 
 /// The machine's adapter with all features that Drawloom has a use for.
-fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
+pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
     let open = || {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
@@ -103,7 +103,7 @@ fn small_colonnade() -> Result<Scene, Failed> {
 }
 
 /// So many meshes and panes of glass that nearly nothing merges: several bundles a view, of what is opaque and of what is not.
-fn many_batches() -> Scene {
+pub fn many_batches() -> Scene {
     let mut scene = field(3200);
     let meshes: Vec<_> = (0..1600).map(|_| scene.add(cube()).unwrap()).collect();
     let stone = Material { diffuse: Vec3::splat(0.4), ..Material::default() };
@@ -253,13 +253,13 @@ fn measured() -> Result<(), Failed> {
 }
 
 /// Bundles that were recorded and that were replayed, over the passes that `is_meant` picks.
-fn counts(studio: &Studio, is_meant: impl Fn(&WgpuPass) -> bool) -> (usize, usize) {
+pub fn counts(studio: &Studio, is_meant: impl Fn(&WgpuPass) -> bool) -> (usize, usize) {
     let passes = studio.renderer.backend().passes();
     let meant = passes.iter().filter(|pass| is_meant(pass));
     meant.fold((0, 0), |(recorded, replayed), pass| (recorded + pass.recorded, replayed + pass.replayed))
 }
 
-fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> {
+pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> {
     if condition { Ok(()) } else { Err(what().into()) }
 }
 
