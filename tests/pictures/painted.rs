@@ -44,6 +44,7 @@ impl RenderProcess for Painted {
         }
         let own =
             painted!("@fragment fn fragment() -> @location(0) vec4<f32> { return vec4<f32>(1.0, 0.0, 0.0, 1.0); }");
+        let other = painted!("@fragment fn fragment() -> @location(0) vec4<f32> { return vec4<f32>(1.0); }");
         let one = painted!(
             "@group(2) @binding(0) var<uniform> colors: Colors;
             @fragment fn fragment() -> @location(0) vec4<f32> { return colors.first; }"
@@ -56,7 +57,9 @@ impl RenderProcess for Painted {
             0 => (own, &[]),
             1 => (one, &[[0.0, 1.0, 0.0, 1.0]]),
             2 => (one, &[[0.0, 0.0, 1.0, 1.0]]),
-            _ => (two, &[[0.0; 4], [1.0, 1.0, 0.0, 1.0]]),
+            3 => (two, &[[0.0; 4], [1.0, 1.0, 0.0, 1.0]]),
+            4 => (other, &[]),
+            _ => (one, &[[0.0, 1.0, 1.0, 1.0], [0.0; 4]]),
         };
         Draws::Commands(CommandDraws {
             shader,
@@ -83,7 +86,8 @@ fn painted_otherwise() -> Result<(), Failed> {
     };
     let mut kept = studio(Record::Kept)?;
     // Other bytes in the same place are read by the bundles that are there.
-    for (next, is_recorded) in [(0, true), (1, true), (2, false), (3, true), (0, true), (3, true), (1, true)] {
+    let steps = [(0, true), (4, true), (1, true), (2, false), (5, true), (3, true), (0, true), (3, true), (1, true)];
+    for (next, is_recorded) in steps {
         step.store(next, Ordering::Relaxed);
         let expected = paint(&mut studio(Record::Direct)?)?;
         for turn in 0..2 {
