@@ -49,6 +49,8 @@ mod scenes;
 mod stopwatch;
 #[path = "shared/table.rs"]
 mod table;
+#[path = "shared/trial.rs"]
+mod trial;
 #[path = "load_balance/turns.rs"]
 mod turns;
 
@@ -60,25 +62,18 @@ use clap::Parser;
 use drawloom::report::Prices;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use backends::BackendName;
 use report::Report;
+use trial::Trial;
 use turns::Block;
 
 /// Compares granularities.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds and small scenes, to see that it works.
-    #[arg(long)]
-    quick: bool,
+    #[command(flatten)]
+    trial: Trial,
     /// Measures this scene only; may be given several times.
     #[arg(long = "scene", value_parser = scenes::NAMES)]
     scenes: Vec<String>,
-    /// Measures on this backend only.
-    #[arg(long, value_parser = ["noop", "adapter"])]
-    backend: Option<String>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
@@ -111,17 +106,15 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let is_quick = arguments.quick || !arguments.bench;
-    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
+    let extent = if arguments.trial.is_quick() { Extent::QUICK } else { Extent::FULL };
     let is_asked = |name: &str| arguments.scenes.is_empty() || arguments.scenes.iter().any(|scene| scene == name);
-    let is_wanted = |name: &str| arguments.backend.as_deref().is_none_or(|wanted| wanted == name);
     let cases: Vec<_> = scenes::all(extent.share)?.into_iter().filter(|case| is_asked(case.name)).collect();
 
     let prices = Prices::measure()?;
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
     let mut report = Report::new(&extent);
-    for &backend in BackendName::available().iter().filter(|backend| is_wanted(backend.name())) {
+    for backend in arguments.trial.backends() {
         for case in &cases {
             for workers in worker_counts()? {
                 let block = Block { case, backend, workers, prices, extent: &extent, progress: &progress };
@@ -131,8 +124,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
-    if !is_quick {
+    if !arguments.trial.is_quick() {
         report.write()?;
     }
     Ok(())

@@ -51,6 +51,8 @@ mod scenario;
 mod stopwatch;
 #[path = "shared/table.rs"]
 mod table;
+#[path = "shared/trial.rs"]
+mod trial;
 #[path = "objects/turns.rs"]
 mod turns;
 #[path = "objects/world.rs"]
@@ -62,21 +64,14 @@ use std::time::Duration;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use backends::BackendName;
 use report::Report;
+use trial::Trial;
 
 /// Compares one thread with two workers.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds and small scenes, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Measures on this backend only.
-    #[arg(long, value_parser = ["noop", "adapter"])]
-    backend: Option<String>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
+    #[command(flatten)]
+    trial: Trial,
 }
 
 /// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
@@ -119,13 +114,11 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let is_quick = arguments.quick || !arguments.bench;
-    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
-    let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
+    let extent = if arguments.trial.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
     let mut report = Report::new(&extent);
-    for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
+    for backend in arguments.trial.backends() {
         for &objects in extent.objects {
             report.scenarios.extend(scenario::measure(&extent, backend, objects, &progress)?);
         }
@@ -133,8 +126,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
-    if !is_quick {
+    if !arguments.trial.is_quick() {
         report.write()?;
     }
     Ok(())

@@ -67,6 +67,8 @@ mod stopwatch;
 mod studio;
 #[path = "shared/table.rs"]
 mod table;
+#[path = "shared/trial.rs"]
+mod trial;
 #[path = "record/technique.rs"]
 mod technique;
 #[path = "record/turns.rs"]
@@ -79,8 +81,8 @@ use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use allocations::Counting;
-use backends::BackendName;
 use report::Report;
+use trial::Trial;
 
 /// Those of the whole process.
 #[global_allocator]
@@ -92,15 +94,8 @@ pub const CAMERAS: usize = 4;
 /// Compares ways to record.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds and small scenes, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Measures on this backend only.
-    #[arg(long, value_parser = ["noop", "adapter"])]
-    backend: Option<String>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
+    #[command(flatten)]
+    trial: Trial,
 }
 
 /// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
@@ -129,19 +124,16 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let is_quick = arguments.quick || !arguments.bench;
-    let extent = if is_quick { Extent::QUICK } else { Extent::FULL };
-    let is_asked = |name: &str| arguments.backend.as_deref().is_none_or(|asked| asked == name);
+    let extent = if arguments.trial.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = ProgressBar::new(0);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
     let mut report = Report::new(&extent);
-    for &backend in BackendName::available().iter().filter(|backend| is_asked(backend.name())) {
+    for backend in arguments.trial.backends() {
         report.measured.push(turns::measure(&extent, backend, &progress)?);
     }
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
-    if !is_quick {
+    if !arguments.trial.is_quick() {
         report.write()?;
     }
     Ok(())

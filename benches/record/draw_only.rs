@@ -4,6 +4,7 @@ use drawloom::glam::Mat4;
 use drawloom::scene::{Mesh, SceneRef};
 use drawloom::wgpu;
 use drawloom::wgpu::util::{DeviceExt, RenderEncoder};
+use rayon::prelude::*;
 
 use crate::objects::{ObjectRecord, Sphere, colors};
 use crate::studio::Studio;
@@ -21,6 +22,9 @@ pub struct DrawOnly {
     pub records: Vec<ObjectRecord>,
     pub spheres: Vec<Sphere>,
 }
+
+/// Fewer are not worth another thread.
+const OBJECTS_AT_ONCE: usize = 512;
 
 struct MeshPlace {
     first_index: u32,
@@ -64,6 +68,15 @@ impl DrawOnly {
         let pipeline = studio.pipeline(&[&layout], include_str!("draw_only.wgsl"));
         let spheres = vec![Sphere::default(); scene.object_count()];
         Self { pipeline, vertices, indices, meshes, objects, cameras, records, spheres, studio }
+    }
+
+    /// Works out what the objects are, on all threads of the pool that this is called in, and uploads it.
+    pub fn prepare(&mut self, scene: &SceneRef<'_>) {
+        let objects = self.records.par_iter_mut().zip(&mut self.spheres).enumerate().with_min_len(OBJECTS_AT_ONCE);
+        objects.for_each(|(object, (record, sphere))| {
+            (*record, *sphere) = (ObjectRecord::new(scene, object), Sphere::new(scene, object));
+        });
+        self.write_objects();
     }
 
     /// Uploads a camera.

@@ -8,7 +8,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::CAMERAS;
 use crate::draw_only::DrawOnly;
-use crate::objects::{ObjectRecord, Sphere, clip_from_world};
+use crate::objects::clip_from_world;
 use crate::technique::{Failure, Technique};
 
 pub struct EncoderPerThread {
@@ -17,9 +17,6 @@ pub struct EncoderPerThread {
     threads: ThreadPool,
     drawn: usize,
 }
-
-/// Fewer are not worth another thread.
-const OBJECTS_AT_ONCE: usize = 512;
 
 impl EncoderPerThread {
     pub fn new(shared: DrawOnly) -> Result<Self, Failure> {
@@ -31,15 +28,7 @@ impl EncoderPerThread {
 impl Technique for EncoderPerThread {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
         let Self { shared, threads, drawn } = self;
-        let DrawOnly { records, spheres, .. } = &mut *shared;
-        threads.install(|| {
-            let objects = records.par_iter_mut().zip(spheres).enumerate().with_min_len(OBJECTS_AT_ONCE);
-            objects.for_each(|(object, (record, sphere))| {
-                *record = ObjectRecord::new(&scene, object);
-                *sphere = Sphere::new(&scene, object);
-            });
-        });
-        shared.write_objects();
+        threads.install(|| shared.prepare(&scene));
         let encode = |(index, camera): (usize, &Camera)| encode(shared, &scene, index, camera);
         let encoded: Vec<_> = threads.install(|| {
             let cameras = scene.cameras.par_iter().enumerate().with_max_len(1);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::draw_only::DrawOnly;
-use crate::objects::{ObjectRecord, Sphere, clip_from_world};
+use crate::objects::clip_from_world;
 use crate::technique::{Failure, Technique};
 
 /// Objects: fewer make bundles dear, more leave threads without work at the end.
@@ -32,13 +32,7 @@ impl Technique for Parallel {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
         let Self { shared, pool, drawn } = self;
         *drawn = pool.install(|| {
-            let chunks = shared.records.par_chunks_mut(CHUNK).zip(shared.spheres.par_chunks_mut(CHUNK));
-            chunks.enumerate().for_each(|(chunk, (records, spheres))| {
-                for (object, (record, sphere)) in (chunk * CHUNK..).zip(records.iter_mut().zip(spheres)) {
-                    (*record, *sphere) = (ObjectRecord::new(&scene, object), Sphere::new(&scene, object));
-                }
-            });
-            shared.write_objects();
+            shared.prepare(&scene);
             for (index, camera) in scene.cameras.iter().enumerate() {
                 shared.write_camera(index, &clip_from_world(camera));
             }
