@@ -30,11 +30,7 @@ impl<T: Clone> Blocks<T> {
 
     /// The parts of `range` that lie in one block each: which block, and which entries.
     pub fn parts(range: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
-        let blocks = range.start / Self::SIZE..range.end.div_ceil(Self::SIZE);
-        blocks.map(move |block| {
-            let (start, end) = (block * Self::SIZE, (block + 1) * Self::SIZE);
-            (block, range.start.max(start)..range.end.min(end))
-        })
+        parts(range, Self::SIZE)
     }
 
     /// A block to read; entry `index` is at `index % SIZE`.
@@ -52,6 +48,12 @@ impl<T: Clone> Blocks<T> {
     pub fn write(&self, block: usize) -> RwLockWriteGuard<'_, Box<[T]>> {
         self.blocks[block].write()
     }
+}
+
+/// The parts of `range` that lie in one block of `size` each: which block, and which entries. There is none of an empty range.
+pub(crate) fn parts(range: Range<usize>, size: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let blocks = if range.is_empty() { 0..0 } else { range.start / size..range.end.div_ceil(size) };
+    blocks.map(move |block| (block, range.start.max(block * size)..range.end.min((block + 1) * size)))
 }
 
 impl<T: Clone> Default for Blocks<T> {

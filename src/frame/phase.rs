@@ -148,18 +148,16 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode {
     }
 
     fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
-        match self.phase {
-            // Their parts were cut to be jobs.
-            Phase::Sort { .. } | Phase::Instance { .. } => 1,
-            _ => self.job_size(frame, self.phase.width(frame)),
-        }
+        if self.phase.can_be_cut() { self.job_size(frame, self.phase.width(frame)) } else { 1 }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
         let chunk = range.clone();
         let (result, took) = frame.clock.measure(self.phase.stage(), || self.work(frame, chunk, worker));
-        if frame.granularity == Granularity::Adaptive {
-            frame.costs.note(self.kind, self.phase.items(frame, range), took);
+        if frame.granularity == Granularity::Adaptive
+            && let Some(items) = self.phase.known_items(frame, range)
+        {
+            frame.costs.note(self.kind, items, took);
         }
         Ok(result?)
     }
@@ -195,17 +193,19 @@ impl Phase {
         }
     }
 
-    /// How many items of the kind that its costs are known of lie in a range. A part's share of the visible objects counts,
-    /// drawn or not, since as much is known when they are split; and to split them is nothing beside sorting them.
-    fn items<B: Backend>(self, frame: &FrameContext<'_, B>, range: Range<usize>) -> usize {
-        match self {
-            Self::Split { .. } => 0,
-            Self::Sort { pass } => {
-                let parts = frame.tables.passes[pass].split.read().part_count();
-                visible_count(frame, pass) * range.len() / parts
-            }
-            _ => range.len(),
+    /// Whether it is cut into jobs. What is sorted and merged was cut before, when it was split.
+    fn can_be_cut(self) -> bool {
+        matches!(self, Self::Objects | Self::Upload | Self::Visibility { .. } | Self::Fill { .. } | Self::Record { .. })
+    }
+
+    /// How many items lie in a range, where jobs are made as large as what their items are known to cost. To sort, a part's
+    /// share of the visible objects counts, drawn or not, since as much is known when they are split.
+    fn known_items<B: Backend>(self, frame: &FrameContext<'_, B>, range: Range<usize>) -> Option<usize> {
+        if let Self::Sort { pass } = self {
+            let parts = frame.tables.passes[pass].split.read().part_count();
+            return Some(visible_count(frame, pass) * range.len() / parts);
         }
+        self.can_be_cut().then(|| range.len())
     }
 
     fn stage(self) -> Stage {

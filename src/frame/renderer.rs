@@ -213,8 +213,8 @@ fn queues_of<B: Backend>(
     request: &FrameRequest<'_>,
     recordings: &mut [Recording<B>],
 ) -> Result<Vec<ViewQueue<B::Commands>>, FrameError> {
-    let pass_count = |view| request.passes.iter().filter(|pass| pass.view == view).count();
-    let queue = |view| ViewQueue { view, passes: Vec::with_capacity(pass_count(view)) };
+    // A process is in a view once at most.
+    let queue = |view| ViewQueue { view, passes: Vec::with_capacity(request.plan.processes().len()) };
     let mut queues: Vec<_> = (0..request.views.len()).map(queue).collect();
     for (&pass, recording) in request.passes.iter().zip(recordings) {
         let lost = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };

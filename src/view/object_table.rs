@@ -6,6 +6,7 @@ use glam::Quat;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::{FixedPosition, RejectionReason, Rejections, Spheres, WorldBounds};
+use crate::blocks::parts;
 use crate::command::{Cull, DrawState};
 use crate::scene::{Material, Mesh, SceneRef, is_unit};
 
@@ -61,13 +62,10 @@ impl ObjectTable {
 
     /// Fills in the objects of `range`.
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
-        let mut rest = range;
-        while !rest.is_empty() {
-            let index = rest.start / Self::BLOCK;
-            let end = ((index + 1) * Self::BLOCK).min(rest.end);
+        for (index, part) in parts(range, Self::BLOCK) {
             let mut block = self.blocks[index].write();
             let ObjectBlock { records, spheres, draws } = &mut **block;
-            for object in rest.start..end {
+            for object in part {
                 let entry = object % Self::BLOCK;
                 match describe(scene, object) {
                     Ok((record, bounds, draw)) => {
@@ -81,7 +79,6 @@ impl ObjectTable {
                     }
                 }
             }
-            rest.start = end;
         }
     }
 

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::RwLock;
 
+use crate::blocks::parts;
+
 /// The objects that a view sees, as a bit each, and how many come before each word of 64.
 ///
 /// Bits are set by whoever tested the object; which worker that was leaves no trace, so the compacted order is the order
@@ -28,15 +30,11 @@ impl VisibleSet {
     /// multiple of that, and answers with a bit each, from the lowest; further bits are left out. Ranges tested at the same
     /// time must not share objects, but may share words.
     pub fn test(&self, objects: Range<usize>, sees: impl Fn(Range<usize>) -> u64) {
-        let mut rest = objects;
-        while !rest.is_empty() {
-            let word = rest.start / Self::WORD;
-            let asked = rest.start..((word + 1) * Self::WORD).min(rest.end);
+        for (word, asked) in parts(objects, Self::WORD) {
             let known = u64::MAX >> (Self::WORD - asked.len());
             let bits = (sees(asked.clone()) & known) << (asked.start % Self::WORD);
             // Whoever reads the bits does so in a job that depends on this one, which orders the two.
             self.words[word].fetch_or(bits, Ordering::Relaxed);
-            rest.start = asked.end;
         }
     }
 

@@ -12,7 +12,6 @@ use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_ali
 use super::kept::Subdivided;
 use super::layouts::Layouts;
 use crate::backend::{BackendError, FrameRequest};
-use crate::blocks::Blocks;
 use crate::process::{Draws, Pass};
 use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
 
@@ -142,8 +141,8 @@ impl FrameBuffers {
 
     /// Uploads blocks of objects at once: every write costs the same again, however small.
     pub(super) fn write_objects(&self, queue: &wgpu::Queue, objects: &ObjectTable, blocks: Range<usize>) {
-        let first = blocks.start * Blocks::<ObjectRecord>::SIZE;
-        let end = objects.len().min(blocks.end * Blocks::<ObjectRecord>::SIZE);
+        let first = blocks.start * ObjectTable::BLOCK;
+        let end = objects.len().min(blocks.end * ObjectTable::BLOCK);
         let bytes = |objects: usize| objects * size_of::<ObjectRecord>();
         let size = NonZeroU64::new(bytes(end - first) as u64);
         let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
