@@ -10,6 +10,8 @@
 //!
 //! Written to `drawloom/delta.json` in the target folder too.
 
+#[path = "shared/draw_lists.rs"]
+mod draw_lists;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "nothing here has a direction")]
 mod random;
@@ -27,18 +29,14 @@ use std::error::Error;
 use std::hint::black_box;
 use std::mem;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use drawloom::Renderer;
-use drawloom::backend::NullBackend;
 use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
-use drawloom::process::Deferred;
-use drawloom::scene::{Scene, obj, sample};
-use drawloom::task::Scheduler;
+use drawloom::scene::{obj, sample};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use draw_lists::draw_lists;
 use random::Random;
 use report::{Report, Row};
 use stopwatch::median;
@@ -83,29 +81,18 @@ struct Case {
 
 fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
     let mut cases = vec![
-        Case { scene: "colonnade", lists: frame_of(&sample::colonnade()?)? },
+        Case { scene: "colonnade", lists: draw_lists(&sample::colonnade()?)? },
         Case { scene: "scattered", lists: vec![scattered(10_000)] },
     ];
     let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza/sponza_part.obj");
     if sponza.is_file() {
         let mut scene = obj::load(sponza)?.scene;
         scene.duplicate_objects(20);
-        cases.push(Case { scene: "sponza x 20", lists: frame_of(&scene)? });
+        cases.push(Case { scene: "sponza x 20", lists: draw_lists(&scene)? });
     } else {
         eprintln!("sponza is left out: there is no {}", sponza.display());
     }
     Ok(cases)
-}
-
-fn frame_of(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Box<dyn Error>> {
-    let scheduler = Arc::new(Scheduler::new(1)?);
-    let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
-    let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
-    let passes = submitted.submission.passes.iter();
-    let list = |process: &str, view| {
-        renderer.draw_list(process, view).map(|list| list.commands().copied().collect::<Vec<_>>())
-    };
-    Ok(passes.filter_map(|pass| list(&pass.process, pass.view)).filter(|commands| !commands.is_empty()).collect())
 }
 
 /// Objects of 64 meshes and 16 materials anywhere in a view, one in ten blended.

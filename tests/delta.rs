@@ -2,17 +2,17 @@
 //!
 //! The case that needs a shared scene is ignored, and never passes, where that is missing.
 
+#[path = "../benches/shared/draw_lists.rs"]
+mod draw_lists;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 
-use drawloom::Renderer;
-use drawloom::backend::NullBackend;
-use drawloom::command::{DeltaCommands, RenderCommand};
-use drawloom::process::Deferred;
+use drawloom::command::DeltaCommands;
 use drawloom::scene::{Scene, obj, sample};
-use drawloom::task::Scheduler;
 use libtest_mimic::{Arguments, Failed, Trial, run};
+
+use draw_lists::draw_lists;
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
@@ -52,16 +52,4 @@ fn check(scene: &Scene) -> Result<(), Failed> {
     println!("{count} commands in {} lists, {average:.2} bytes each", lists.len());
     // Not a single command would be NaN.
     if average <= MOST { Ok(()) } else { Err(format!("{average:.1} bytes a command").into()) }
-}
-
-/// What each process of a deferred pipeline draws in each view.
-fn draw_lists(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Failed> {
-    let scheduler = Arc::new(Scheduler::new(1)?);
-    let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
-    let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
-    let passes = submitted.submission.passes.iter();
-    let list = |process: &str, view| {
-        renderer.draw_list(process, view).map(|list| list.commands().copied().collect::<Vec<_>>())
-    };
-    Ok(passes.filter_map(|pass| list(&pass.process, pass.view)).filter(|commands| !commands.is_empty()).collect())
 }

@@ -1,0 +1,26 @@
+//! The sorted commands of a whole frame.
+
+use std::error::Error;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::NullBackend;
+use drawloom::command::RenderCommand;
+use drawloom::process::Deferred;
+use drawloom::scene::Scene;
+use drawloom::task::Scheduler;
+
+/// What each process of a deferred pipeline draws in each view, of those that draw something.
+///
+/// # Errors
+/// If the frame cannot be drawn.
+pub fn draw_lists(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Box<dyn Error>> {
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+    let passes = submitted.submission.passes.iter();
+    let list = |process: &str, view| {
+        renderer.draw_list(process, view).map(|list| list.commands().copied().collect::<Vec<_>>())
+    };
+    Ok(passes.filter_map(|pass| list(&pass.process, pass.view)).filter(|commands| !commands.is_empty()).collect())
+}
