@@ -26,7 +26,7 @@
 //! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
-//! - [`report`] tells how long a frame would take on more workers than the machine has.
+//! - [`timeline`] tells what ran where and when, and [`report`] why a frame took as long as it did.
 //! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
 //!
 //! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded Rendering"),
@@ -45,6 +45,7 @@
 
 // The rooms, each using only those above it; `tests/architecture.rs` sees to that.
 mod sync;
+pub mod timeline;
 pub mod task;
 pub mod blocks;
 pub mod graph;
@@ -59,8 +60,8 @@ mod frame;
 pub mod report;
 
 pub use frame::{
-    BuildError, FrameError, FrameMeasure, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder,
-    StageTimes, SubmitError, Submitted, Submitter, ViewQueue, ViewStatistics,
+    BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
+    Submitted, Submitter, ViewQueue, ViewStatistics,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

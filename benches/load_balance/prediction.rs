@@ -1,6 +1,7 @@
 //! What a frame would take with other numbers of workers.
 
 use std::error::Error;
+use std::sync::Arc;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::report::{Prices, Replay};
@@ -42,13 +43,16 @@ impl Prediction {
     ) -> Result<(), Box<dyn Error>> {
         let (_, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
         self.measured.push(time.processor.as_secs_f64());
-        let (recorded, measure) = renderer.record_measured(scene)?;
+        let timeline = Arc::clone(renderer.scheduler().timeline());
+        timeline.start();
+        let recorded = renderer.record(scene)?;
         let submitted = submitter.submit(recorded)?;
+        timeline.stop();
         submitted.submission.wait()?;
-        let replay = Replay::of_frame(&measure, self.prices);
+        let log = timeline.take();
+        let replay = Replay::of_frame(&log, log.frames[0].number, self.prices)?;
         for (workers, times) in &mut self.times {
-            let frame = replay.frame_time(*workers) + submitted.statistics.stages.submit;
-            times.push(frame.as_secs_f64());
+            times.push(replay.frame_time(*workers).as_secs_f64());
         }
         Ok(())
     }

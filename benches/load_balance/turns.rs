@@ -57,7 +57,9 @@ impl Block<'_> {
         let (warm_up, rounds) = (self.backend.of(self.extent.warm_up), self.backend.of(self.extent.rounds));
         self.progress.set_message(format!("{}, {}", self.case.name, self.backend.name()));
         self.progress.inc_length((2 * rounds * Mode::ALL.len()) as u64);
-        let (one, all) = (Arc::new(Scheduler::new(1)?), Arc::new(Scheduler::new(self.workers)?));
+        // With room for every draw as a job of its own.
+        let scheduler = |workers| Scheduler::builder().workers(workers).timeline_capacity(1 << 20).build();
+        let (one, all) = (Arc::new(scheduler(1)?), Arc::new(scheduler(self.workers)?));
         let open = |mode: &Mode| {
             let scheduler = if mode.is_serial { &one } else { &all };
             let builder = Renderer::builder(self.backend.open()?).deferred(Deferred::to_picture());

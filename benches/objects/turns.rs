@@ -7,6 +7,7 @@ use std::time::Duration;
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
+use drawloom::timeline::Run;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, RendererBuilder, Submitter};
 
@@ -69,9 +70,15 @@ impl Painter {
     /// If the frame cannot be drawn.
     pub fn serial_part(&mut self, world: &mut Moving) -> Result<f64, Box<dyn Error>> {
         world.step();
-        let (recorded, measure) = self.renderer.record_measured(world.as_scene_ref())?;
+        let timeline = Arc::clone(self.renderer.scheduler().timeline());
+        timeline.start();
+        let recorded = self.renderer.record(world.as_scene_ref())?;
         let submitted = self.submitter.submit(recorded)?;
+        timeline.stop();
         submitted.submission.wait()?;
-        Ok((measure.serial() + submitted.statistics.stages.submit).as_secs_f64())
+        let log = timeline.take();
+        let in_runs: Duration = log.runs.iter().map(Run::took).sum();
+        let in_spans: Duration = log.spans.iter().map(|span| span.ended - span.began).sum();
+        Ok((in_spans - in_runs).as_secs_f64())
     }
 }

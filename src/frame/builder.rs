@@ -83,7 +83,7 @@ impl<B: Backend> RendererBuilder<B> {
         }
         let plans = Plans::new(self.deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = Arc::new(self.backend);
-        let submitter = Submitter::new(Arc::clone(&backend));
+        let submitter = Submitter::new(Arc::clone(&backend), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, scheduler), submitter))
     }
 }

@@ -10,6 +10,7 @@ use crate::graph::{FrameGraph, ProcessId, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::Selection;
 use crate::scene::ViewKind;
+use crate::timeline::Labels;
 use crate::view::RenderView;
 
 /// What a frame's jobs are, for one plan and one list of views.
@@ -40,36 +41,39 @@ impl FrameJobs {
         }
 
         let mut nodes = Nodes::default();
-        let objects = nodes.add("objects".to_owned(), Phase::Objects, None, None);
-        nodes.add("upload objects".to_owned(), Phase::Upload, None, Some(objects));
+        let objects = nodes.add("objects".to_owned(), Phase::Objects, None, Labels::default(), None);
+        nodes.add("upload objects".to_owned(), Phase::Upload, None, Labels::default(), Some(objects));
 
         let mut compacted = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
             let process = &plan.processes()[pass.process].process;
             let view = pass.view;
             let view_name = format!("view {view} {:?}", views[view].name());
+            let of_view = Labels { view: Some(views[view].name().to_owned()), ..Labels::default() };
+            let of_pass = Labels { process: Some(process.name().to_owned()), ..of_view.clone() };
             let mut previous = None;
             if draws[pass.process].selection().is_some() {
                 let seen = *compacted[view].get_or_insert_with(|| {
                     let name = format!("visibility, {view_name}");
-                    let seen = nodes.add(name, Phase::Visibility { view }, None, Some(objects));
-                    nodes.add(format!("compact, {view_name}"), Phase::Compact { view }, None, Some(seen))
+                    let seen = nodes.add(name, Phase::Visibility { view }, None, of_view.clone(), Some(objects));
+                    let name = format!("compact, {view_name}");
+                    nodes.add(name, Phase::Compact { view }, None, of_view.clone(), Some(seen))
                 });
                 previous = Some(seen);
-                for (phase, name) in [
-                    (Phase::Fill { pass: index }, "fill"),
-                    (Phase::Split { pass: index }, "split"),
-                    (Phase::Sort { pass: index }, "sort"),
-                    (Phase::Instance { pass: index }, "instance"),
-                    (Phase::Prepare { pass: index }, "prepare"),
-                    (Phase::Record { pass: index }, "record"),
+                for phase in [
+                    Phase::Fill { pass: index },
+                    Phase::Split { pass: index },
+                    Phase::Sort { pass: index },
+                    Phase::Instance { pass: index },
+                    Phase::Prepare { pass: index },
+                    Phase::Record { pass: index },
                 ] {
-                    let name = format!("{}, {view_name}, {name}", process.name());
-                    previous = Some(nodes.add(name, phase, Some(pass.process), previous));
+                    let name = format!("{}, {view_name}, {}", process.name(), phase.name());
+                    previous = Some(nodes.add(name, phase, Some(pass.process), of_pass.clone(), previous));
                 }
             }
             let name = format!("{}, {view_name}, finish", process.name());
-            nodes.add(name, Phase::Finish { pass: index }, Some(pass.process), previous);
+            nodes.add(name, Phase::Finish { pass: index }, Some(pass.process), of_pass, previous);
         }
         let Nodes { graph, kinds, count } = nodes;
         let costs = CostModel::new(kinds.len(), count);
@@ -106,9 +110,16 @@ struct Nodes {
 }
 
 impl Nodes {
-    /// Adds a phase, of a process if it is of one, which comes after another. To split is to decide how large the jobs are that
+    /// Adds a phase, of a process if it is of one, which comes after another. The labels lack the phase. To split is to decide how large the jobs are that
     /// sort, so the two are of one kind.
-    fn add(&mut self, name: String, phase: Phase, process: Option<usize>, after: Option<ProcessId>) -> ProcessId {
+    fn add(
+        &mut self,
+        name: String,
+        phase: Phase,
+        process: Option<usize>,
+        labels: Labels,
+        after: Option<ProcessId>,
+    ) -> ProcessId {
         let known_as = match phase {
             Phase::Sort { pass } => Phase::Split { pass },
             other => other,
@@ -121,6 +132,7 @@ impl Nodes {
         });
         let id = self.graph.add(name, FrameNode { phase, node: self.count, kind: place });
         self.count += 1;
+        self.graph.label(id, Labels { phase: Some(phase.name().to_owned()), ..labels });
         self.graph.keep(id);
         if let Some(after) = after {
             self.graph.order(after, id);

@@ -172,6 +172,23 @@ impl FrameNode {
 }
 
 impl Phase {
+    /// What it is called in timelines.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Objects => "objects",
+            Self::Upload => "upload",
+            Self::Visibility { .. } => "visibility",
+            Self::Compact { .. } => "compact",
+            Self::Fill { .. } => "fill",
+            Self::Split { .. } => "split",
+            Self::Sort { .. } => "sort",
+            Self::Instance { .. } => "instance",
+            Self::Prepare { .. } => "prepare",
+            Self::Record { .. } => "record",
+            Self::Finish { .. } => "finish",
+        }
+    }
+
     fn width<B: Backend>(self, frame: &FrameContext<'_, B>) -> usize {
         let tables = frame.tables;
         match self {

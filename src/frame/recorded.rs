@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::{FrameStatistics, SubmitError};
 use crate::backend::Backend;
 use crate::process::Pass;
+use crate::timeline::Timeline;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. Dropped
 /// without being submitted, it leaves no trace.
@@ -16,12 +17,19 @@ pub struct Recorded<B: Backend> {
     pub(super) frame: B::Frame,
     pub(super) statistics: FrameStatistics,
     pub(super) backend: Arc<B>,
+    /// Which frame of the timeline it is, if that was on.
+    pub(super) frame_number: Option<u64>,
 }
 
 impl<B: Backend> Recorded<B> {
     /// What the frame is, in numbers.
     pub fn statistics(&self) -> &FrameStatistics {
         &self.statistics
+    }
+
+    /// The number of its frame in the [timeline](crate::timeline), if that was on when it was recorded.
+    pub fn frame_number(&self) -> Option<u64> {
+        self.frame_number
     }
 
     /// One queue for each view.
@@ -49,12 +57,13 @@ pub struct ViewQueue<T> {
 /// ```
 pub struct Submitter<B> {
     backend: Arc<B>,
+    timeline: Arc<Timeline>,
     stays_on_its_thread: PhantomData<*const ()>,
 }
 
 impl<B: Backend> Submitter<B> {
-    pub(super) fn new(backend: Arc<B>) -> Self {
-        Self { backend, stays_on_its_thread: PhantomData }
+    pub(super) fn new(backend: Arc<B>, timeline: Arc<Timeline>) -> Self {
+        Self { backend, timeline, stays_on_its_thread: PhantomData }
     }
 
     /// Submits a frame: the views' queues, merged into the order of the graph. Frames are to be submitted in the order they
@@ -68,6 +77,7 @@ impl<B: Backend> Submitter<B> {
         if !Arc::ptr_eq(&self.backend, &recorded.backend) {
             return Err(SubmitError::ForeignFrame);
         }
+        let _span_of_timeline = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
         let Recorded { queues, frame, mut statistics, .. } = recorded;
         let mut passes = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());

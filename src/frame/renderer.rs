@@ -1,19 +1,17 @@
 //! Recording: from a scene to queues that are ready to submit.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use parking_lot::RwLockReadGuard;
 
 use super::jobs::JobsCache;
-use super::phase::{FrameContext, FrameNode, FrameTables, Recording};
+use super::phase::{FrameContext, FrameTables, Recording};
 use super::plans::Plans;
 use super::recorded::{Recorded, ViewQueue};
 use super::statistics::{Stage, StageClock};
 use super::views::{ValidLights, views_of};
-use super::{BuildError, FrameError, FrameMeasure, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
+use super::{BuildError, FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, BackendError, FrameRequest};
-use crate::graph::{RunError, Schedule};
 use crate::process::{Deferred, FramePlan, Pass};
 use crate::queue::DrawList;
 use crate::scene::{SceneError, SceneRef};
@@ -82,34 +80,8 @@ impl<B: Backend> Renderer<B> {
     /// If the scene has no camera, a camera that cannot be, or slices of different lengths; if the device refuses
     /// something; if a process fails or panics. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
-        let run = |schedule: &mut Schedule<FrameNode>, scheduler: &Scheduler, context: &FrameContext<'_, B>| {
-            schedule.run(scheduler, context)
-        };
-        let (recorded, ()) = self.record_with(scene, run)?;
-        Ok(recorded)
-    }
-
-    /// As [`record`](Self::record), and says what each job of the frame took. That makes every job some 100 ns longer, and
-    /// takes memory.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    pub fn record_measured(&mut self, scene: SceneRef<'_>) -> Result<(Recorded<B>, FrameMeasure), FrameError> {
-        let start = Instant::now();
-        let (recorded, (began, jobs, ended)) = self.record_with(scene, |schedule, scheduler, context| {
-            let began = Instant::now();
-            let jobs = schedule.run_measured(scheduler, context)?;
-            Ok((began, jobs, Instant::now()))
-        })?;
-        Ok((recorded, FrameMeasure { jobs, before: began - start, after: ended.elapsed() }))
-    }
-
-    /// Records a frame whose jobs are run by `run`.
-    fn record_with<R>(
-        &mut self,
-        scene: SceneRef<'_>,
-        run: impl FnOnce(&mut Schedule<FrameNode>, &Scheduler, &FrameContext<'_, B>) -> Result<R, RunError>,
-    ) -> Result<(Recorded<B>, R), FrameError> {
+        let frame_number = self.scheduler.timeline().begin_frame();
+        let _span_of_timeline = self.scheduler.timeline().span("record");
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
         check(&scene)?;
@@ -154,17 +126,17 @@ impl<B: Backend> Renderer<B> {
             costs: &jobs.costs,
             workers: self.scheduler.workers(),
         };
-        let outcome = run(&mut jobs.schedule, &self.scheduler, &context);
+        let outcome = jobs.schedule.run(&self.scheduler, &context);
         match outcome {
-            Ok(_) => jobs.costs.learn(),
+            Ok(()) => jobs.costs.learn(),
             Err(_) => jobs.costs.forget_frame(),
         }
-        let ran = outcome?;
+        outcome?;
 
         let queues = queues_of(&request, &mut self.recordings)?;
         let statistics = statistics_of(&request, &self.tables, &clock);
         warn_of_changes(&statistics.rejections, &mut self.told);
-        Ok((Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend) }, ran))
+        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number })
     }
 
     /// Draws with another deferred pipeline from the next frame on: with other settings, or other steps. Pipelines that both
@@ -200,6 +172,11 @@ impl<B: Backend> Renderer<B> {
     /// The last frame's jobs as a graph in the DOT language; `None` before the first frame.
     pub fn jobs_to_dot(&self) -> Option<String> {
         self.jobs.latest().map(|jobs| jobs.schedule.to_dot())
+    }
+
+    /// The scheduler whose workers record, and whose [timeline](Scheduler::timeline) records them.
+    pub fn scheduler(&self) -> &Arc<Scheduler> {
+        &self.scheduler
     }
 
     /// What draws.

@@ -6,6 +6,8 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
+use crate::timeline::Labels;
+
 use super::error::GraphProblem;
 
 /// Processes, the resources they read and write, and the order that follows.
@@ -88,6 +90,7 @@ pub struct ResourceId {
 
 pub(super) struct Process<P> {
     pub(super) name: String,
+    pub(super) labels: Labels,
     pub(super) id: ProcessId,
     pub(super) kept: bool,
     pub(super) payload: P,
@@ -155,7 +158,8 @@ impl<P> FrameGraph<P> {
     pub fn add(&mut self, name: impl Into<String>, process: P) -> ProcessId {
         let id = ProcessId { graph: self.identity, serial: self.processes_added };
         self.processes_added += 1;
-        self.processes.push(Process { name: name.into(), id, kept: false, payload: process });
+        let labels = Labels::default();
+        self.processes.push(Process { name: name.into(), labels, id, kept: false, payload: process });
         id
     }
 
@@ -200,6 +204,14 @@ impl<P> FrameGraph<P> {
         match self.process_position(process) {
             Some(position) => self.processes[position].kept = true,
             None => self.misuses.push_back(GraphProblem::UnknownProcess { call: "keep(?)".to_owned() }),
+        }
+    }
+
+    /// Says what the process is a part of, for [timelines](crate::timeline) and spans.
+    pub fn label(&mut self, process: ProcessId, labels: Labels) {
+        match self.process_position(process) {
+            Some(position) => self.processes[position].labels = labels,
+            None => self.misuses.push_back(GraphProblem::UnknownProcess { call: "label(?)".to_owned() }),
         }
     }
 

@@ -14,7 +14,6 @@ use super::{
     edges::{self, Edges, Relation, Roles},
     error::{CompileError, GraphProblem},
     flow::Flow,
-    measure::Notes,
     order::{Walk, circle, in_order, places},
     progress::Progress,
     schedule::{Adjacency, Schedule},
@@ -229,12 +228,13 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     let flow = Flow::new(&dependencies);
     let mut schedule = Schedule {
         names: Vec::with_capacity(kept.len()),
+        labels: Vec::with_capacity(kept.len()),
         processes: Vec::with_capacity(kept.len()),
         indices: HashMap::with_capacity(kept.len()),
         progress: Progress::new(&flow),
         costs: Costs::new(flow.len()),
         sharing: Sharing::default(),
-        notes: Notes::default(),
+        graph: None,
         always_shares: false,
         flow,
         dependencies: Adjacency::new(dependencies),
@@ -243,6 +243,7 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     };
     for (index, process) in kept {
         schedule.names.push(process.name);
+        schedule.labels.push(process.labels);
         schedule.processes.push(process.payload);
         schedule.indices.insert(process.id, index);
     }

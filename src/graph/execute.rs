@@ -5,15 +5,16 @@ use std::{mem, ops::Range, time::Duration};
 use crate::{
     sync::{AtomicBool, Instant, Mutex, Ordering},
     task::{Chunks, JobPanic, Scheduler, Worker, catch, discard},
+    timeline::Ended,
 };
 
 use super::{
     costs::Clock,
     error::{NodeError, RunError},
-    measure::{Notebook, ProcessMeasure, RunMeasure},
     node::Node,
     schedule::Schedule,
     sharing::Way,
+    watch::{Turn, Watch},
 };
 
 impl<P> Schedule<P> {
@@ -32,40 +33,10 @@ impl<P> Schedule<P> {
         C: Sync + ?Sized,
         P: Node<C>,
     {
-        scheduler.seated(|worker| self.run_on(worker, context, false)).map(drop)
+        scheduler.seated(|worker| self.run_on(worker, context))
     }
 
-    /// As [`run`](Self::run), and notes of every chunk which worker ran it and when. That takes some 100 ns a chunk more, and
-    /// memory for what is returned.
-    ///
-    /// # Errors
-    ///
-    /// As [`run`](Self::run).
-    pub fn run_measured<C>(&mut self, scheduler: &Scheduler, context: &C) -> Result<RunMeasure, RunError>
-    where
-        C: Sync + ?Sized,
-        P: Node<C>,
-    {
-        self.notes.start(scheduler.workers());
-        let ran = scheduler.seated(|worker| self.run_on(worker, context, true))?;
-        let process = |index: usize| ProcessMeasure {
-            name: self.names[index].clone(),
-            dependencies: self.dependencies(index).to_vec(),
-            pinned: catch(|| self.processes[index].pinned()).unwrap_or(false),
-            ..ProcessMeasure::default()
-        };
-        let measure = RunMeasure {
-            workers: scheduler.workers(),
-            took: ran.took,
-            shared_from: ran.shared_from,
-            always_shares: self.always_shares,
-            processes: (0..self.len()).map(process).collect(),
-            chunks: Vec::new(),
-        };
-        Ok(measure.with_chunks(self.notes.take()))
-    }
-
-    fn run_on<C>(&mut self, worker: &Worker, context: &C, takes_notes: bool) -> Result<Ran, RunError>
+    fn run_on<C>(&mut self, worker: &Worker, context: &C) -> Result<(), RunError>
     where
         C: Sync + ?Sized,
         P: Node<C>,
@@ -79,12 +50,13 @@ impl<P> Schedule<P> {
         } else {
             self.sharing.choose(worker.wake_price())
         };
+        self.describe(worker);
         let start = Instant::now();
-        let run = Run {
+        let mut run = Run {
             schedule: &*self,
             context,
             clock: Clock::new((way == Way::Shared { is_measured: true }).then_some(&self.costs)),
-            notebook: takes_notes.then_some(Notebook { notes: &self.notes, start }),
+            watch: Watch::new(worker, self.graph.as_ref()),
             is_stopped: AtomicBool::new(false),
             failure: Mutex::new(None),
         };
@@ -93,13 +65,17 @@ impl<P> Schedule<P> {
                 None => (None, Ok(())),
                 Some(left) => {
                     let shared_from = start.elapsed();
-                    (Some(shared_from), run.share_rest(&left, worker))
+                    (Some(shared_from), run.share_rest(left, worker))
                 }
             },
             Way::Shared { .. } => (Some(Duration::ZERO), run.share(worker)),
         };
-        let failure = run.failure.lock().take();
         let took = start.elapsed();
+        let failure = run.failure.lock().take();
+        if let Some(watch) = run.watch.take() {
+            let failed = failure.is_some() || outcome.is_err();
+            watch.end(Ended { workers: worker.workers(), shared_from, always_shares: self.always_shares, failed });
+        }
         if failure.is_some() {
             self.costs.forget_work();
         }
@@ -120,7 +96,7 @@ impl<P> Schedule<P> {
         match (failure, outcome) {
             (Some(failure), _) => Err(failure.error),
             (None, Err(panic)) => Err(RunError::Scheduler(panic)),
-            (None, Ok(())) => Ok(Ran { took, shared_from }),
+            (None, Ok(())) => Ok(()),
         }
     }
 
@@ -139,20 +115,13 @@ impl<P> Schedule<P> {
     }
 }
 
-/// A run that has come to its end.
-struct Ran {
-    took: Duration,
-    /// When other workers were let in, since the run began; `None` where they were not.
-    shared_from: Option<Duration>,
-}
-
 /// One run: what all its jobs share.
 pub(super) struct Run<'run, P, C: ?Sized> {
     pub(super) schedule: &'run Schedule<P>,
     pub(super) context: &'run C,
     pub(super) clock: Clock<'run>,
-    /// Only in a run of which notes are taken.
-    notebook: Option<Notebook<'run>>,
+    /// `None` where nobody looks on.
+    pub(super) watch: Option<Watch<'run>>,
     is_stopped: AtomicBool,
     failure: Mutex<Option<Failure>>,
 }
@@ -206,6 +175,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         chunks: &Chunks,
         places: Range<usize>,
         worker: &Worker,
+        turn: &mut Option<Turn<'_>>,
     ) -> Result<(), NodeError> {
         for place in places {
             if self.is_stopped() {
@@ -214,9 +184,9 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             let range = chunks.range(place);
             position.item = range.start;
             let run = |range| self.node(position.process).run(self.context, range, worker);
-            match self.notebook {
+            match turn {
                 None => run(range),
-                Some(notebook) => notebook.write_down(position.process, range, worker.index(), run),
+                Some(turn) => turn.chunk(range, run),
             }?;
         }
         Ok(())

@@ -129,7 +129,6 @@ mod edges;
 mod error;
 mod execute;
 mod flow;
-mod measure;
 mod node;
 mod order;
 mod progress;
@@ -137,6 +136,7 @@ mod schedule;
 mod share;
 mod sharing;
 mod token;
+mod watch;
 
 #[cfg(all(test, drawloom_shuttle))]
 mod shuttle_tests;
@@ -144,7 +144,6 @@ mod shuttle_tests;
 pub use self::{
     builder::{FrameGraph, ProcessId, ResourceId},
     error::{CompileError, GraphProblem, NodeError, RunError},
-    measure::{ChunkMeasure, ProcessMeasure, RunMeasure},
     node::{Closure, Node},
     schedule::Schedule,
 };

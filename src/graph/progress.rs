@@ -15,7 +15,7 @@ use crate::{
     task::{Chunks, Tickets},
 };
 
-use super::flow::Flow;
+use super::{flow::Flow, watch::Opened};
 
 /// How far a run is.
 pub(super) struct Progress {
@@ -71,11 +71,18 @@ pub(super) struct OpenPass {
     chunks: Mutex<Chunks>,
     pub(super) tickets: Tickets,
     done: AtomicUsize,
+    /// Of use only while somebody looks on.
+    pub(super) opened: Opened,
 }
 
 impl OpenPass {
     fn new() -> Self {
-        Self { chunks: Mutex::new(Chunks::new(0, 1)), tickets: Tickets::new(), done: AtomicUsize::new(0) }
+        Self {
+            chunks: Mutex::new(Chunks::new(0, 1)),
+            tickets: Tickets::new(),
+            done: AtomicUsize::new(0),
+            opened: Opened::new(),
+        }
     }
 
     /// Sets a pass out of which so many chunks are done. Nobody else knows of it.

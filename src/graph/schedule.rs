@@ -1,8 +1,10 @@
 //! The graph as it is run.
 
-use std::{collections::HashMap, fmt, time::Duration};
+use std::{collections::HashMap, fmt, sync::Arc, time::Duration};
 
-use super::{builder::ProcessId, costs::Costs, flow::Flow, measure::Notes, progress::Progress, sharing::Sharing};
+use crate::timeline::{Graph, Labels};
+
+use super::{builder::ProcessId, costs::Costs, flow::Flow, progress::Progress, sharing::Sharing};
 
 /// A graph in the order it runs in, checked, and flat: compiled once and [run](Self::run) every frame.
 ///
@@ -11,6 +13,7 @@ use super::{builder::ProcessId, costs::Costs, flow::Flow, measure::Notes, progre
 /// the same schedule.
 pub struct Schedule<P> {
     pub(super) names: Vec<String>,
+    pub(super) labels: Vec<Labels>,
     pub(super) processes: Vec<P>,
     pub(super) indices: HashMap<ProcessId, usize>,
     pub(super) dependencies: Adjacency,
@@ -20,7 +23,8 @@ pub struct Schedule<P> {
     pub(super) progress: Progress,
     pub(super) costs: Costs,
     pub(super) sharing: Sharing,
-    pub(super) notes: Notes,
+    /// What is told of it to whoever looks on, once somebody did.
+    pub(super) graph: Option<Arc<Graph>>,
     pub(super) always_shares: bool,
 }
 
@@ -42,6 +46,7 @@ impl<P> Schedule<P> {
 
     /// The processes and their names, in order, to be changed between two runs.
     pub fn processes_mut(&mut self) -> impl ExactSizeIterator<Item = (&str, &mut P)> {
+        self.graph = None;
         self.names.iter().map(String::as_str).zip(&mut self.processes)
     }
 
@@ -57,6 +62,7 @@ impl<P> Schedule<P> {
 
     /// The process with that id, to be changed between two runs: `None` if it was dropped, or is of another graph.
     pub fn process_mut(&mut self, process: ProcessId) -> Option<&mut P> {
+        self.graph = None;
         self.index(process).map(|index| &mut self.processes[index])
     }
 

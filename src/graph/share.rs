@@ -18,7 +18,7 @@ use crate::{
     task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens},
 };
 
-use super::{alone::Left, execute::Run, node::Node, progress::OpenPass, schedule::Schedule, token::Token};
+use super::{alone::Left, execute::Run, node::Node, progress::OpenPass, schedule::Schedule, token::Token, watch::Turn};
 
 impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// Runs everything.
@@ -44,7 +44,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// # Errors
     ///
     /// As [`share`](Self::share).
-    pub(super) fn share_rest(&self, left: &Left, worker: &Worker) -> Result<(), JobPanic> {
+    pub(super) fn share_rest(&self, left: Left<'_>, worker: &Worker) -> Result<(), JobPanic> {
         let is_half_done = left.done < left.chunks.count();
         let first_open = if is_half_done { left.process } else { left.process + 1 };
         run_tokens(worker, self, |crew| {
@@ -57,7 +57,11 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
                 self.send(process, crew);
             }
             if is_half_done {
-                self.schedule.progress.pass(left.process).open(left.chunks, left.done);
+                let pass = self.schedule.progress.pass(left.process);
+                pass.open(left.chunks, left.done);
+                if let Some(turn) = left.turn {
+                    turn.leave(&pass.opened);
+                }
                 if self.join(left.process, crew) {
                     self.go_on_after(left.process, crew);
                 }
@@ -131,18 +135,26 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             return true;
         }
         let worker = crew.worker();
-        let pass = self.clock.work(|| {
+        let mut turn = self.watch.as_ref().map(|watch| watch.open(worker, process));
+        let chunks = self.clock.work(|| {
             self.attempt(process, |position| {
                 let chunks = self.chunks(process, worker);
                 if chunks.count() > 1 && !is_pinned {
                     return Ok(Some(chunks));
                 }
-                self.run_chunks(position, &chunks, 0..chunks.count(), worker)?;
+                self.run_chunks(position, &chunks, 0..chunks.count(), worker, &mut turn)?;
+                if let Some(turn) = turn.as_mut().filter(|_| chunks.count() == 0) {
+                    turn.end_empty();
+                }
                 Ok(None)
             })
         });
-        let Some(Some(chunks)) = pass else { return true };
-        self.schedule.progress.pass(process).open(chunks, 0);
+        let Some(Some(chunks)) = chunks else { return true };
+        let pass = self.schedule.progress.pass(process);
+        pass.open(chunks, 0);
+        if let Some(turn) = turn {
+            turn.leave(&pass.opened);
+        }
         self.join(process, crew)
     }
 
@@ -150,12 +162,26 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     fn join(&self, process: u32, crew: &Crew<'_>) -> bool {
         let pass = self.schedule.progress.pass(process);
         let chunks = pass.chunks();
-        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pass.tickets.join(), crew));
-        pass.finish(finished, &chunks)
+        let mut turn = self.watch.as_ref().map(|watch| watch.join(crew.worker(), process, &pass.opened));
+        let pace = pass.tickets.join();
+        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pace, crew, &mut turn));
+        let is_last = pass.finish(finished, &chunks);
+        if is_last && turn.is_some() {
+            pass.opened.close();
+        }
+        is_last
     }
 
     /// Runs chunks until none is left, and says how many. After a failure they are only counted.
-    fn take_chunks(&self, process: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
+    fn take_chunks(
+        &self,
+        process: u32,
+        pass: &OpenPass,
+        chunks: &Chunks,
+        mut pace: Pace,
+        crew: &Crew<'_>,
+        turn: &mut Option<Turn<'_>>,
+    ) -> usize {
         let worker = crew.worker();
         let mut finished = 0;
         loop {
@@ -178,7 +204,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if pass.tickets.invites(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
-            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker));
+            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, turn));
         }
     }
 
@@ -240,6 +266,9 @@ impl<'run, P: Node<C>, C: Sync + ?Sized> Ready<'run, P, C> {
 
     fn add(&mut self, process: u32) {
         let run = self.run;
+        if let Some(watch) = &run.watch {
+            watch.count_ready();
+        }
         if run.is_pinned(process) {
             self.crew.push_pinned(Token::StartPinned(process).encode());
             self.has_pinned = true;

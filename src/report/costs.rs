@@ -3,8 +3,8 @@
 use std::{ops::Range, time::Duration};
 
 use crate::{
-    graph::{ChunkMeasure, RunMeasure},
     task::Chunks,
+    timeline::{Chunk, Run},
 };
 
 use super::prices::Prices;
@@ -14,11 +14,15 @@ use super::prices::Prices;
 pub(super) struct Costs {
     pub(super) dependencies: Vec<Vec<usize>>,
     pub(super) processes: Vec<ProcessCosts>,
+    /// Whether it is to be shared however little work it is.
+    pub(super) always_shares: bool,
 }
 
 /// A process, and what its chunks cost, in nanoseconds.
 #[derive(Clone, Debug)]
 pub(super) struct ProcessCosts {
+    /// What it counts as where several are taken together.
+    group: String,
     pub(super) pinned: bool,
     pub(super) chunks: Chunks,
     /// What the first so many chunks cost together.
@@ -26,21 +30,31 @@ pub(super) struct ProcessCosts {
 }
 
 impl Costs {
-    pub(super) fn new(measure: &RunMeasure, prices: &Prices) -> Self {
-        let processes = measure.processes().iter().enumerate().map(|(index, process)| {
-            let chunks = measure.chunks_of(index);
+    /// Of a run that is complete.
+    pub(super) fn new(run: &Run, prices: &Prices) -> Self {
+        let processes = run.graph.processes.iter().enumerate().map(|(index, process)| {
+            let chunks = run.chunks_of(index);
+            let size = chunks.iter().map(|chunk| chunk.items.len()).max().unwrap_or(0);
             let sums = chunks.iter().scan(0, |sum, chunk| {
-                *sum += nanoseconds(ChunkMeasure::took(chunk).saturating_sub(prices.note));
+                *sum += nanoseconds(Chunk::took(chunk).saturating_sub(prices.note));
                 Some(*sum)
             });
             ProcessCosts {
+                group: process.group().to_owned(),
                 pinned: process.pinned,
-                chunks: Chunks::new(process.width, process.chunk),
+                chunks: Chunks::new(run.width(index), size),
                 sums: std::iter::once(0).chain(sums).collect(),
             }
         });
-        let dependencies = measure.processes().iter().map(|process| process.dependencies.clone());
-        Self { dependencies: dependencies.collect(), processes: processes.collect() }
+        let dependencies = run.graph.processes.iter().map(|process| process.dependencies.clone());
+        Self { dependencies: dependencies.collect(), processes: processes.collect(), always_shares: run.always_shares }
+    }
+
+    /// Takes all items off the processes of a group.
+    pub(super) fn empty(&mut self, group: &str) {
+        for process in self.processes.iter_mut().filter(|process| process.group == group) {
+            (process.chunks, process.sums) = (Chunks::new(0, 1), vec![0]);
+        }
     }
 
     /// What all chunks cost.

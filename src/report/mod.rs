@@ -1,7 +1,6 @@
 //! What a frame could be: its time on a machine of more workers than this one has.
 //!
-//! A run of a schedule is [measured](crate::graph::Schedule::run_measured) once: what every chunk took. A [`Replay`] then
-//! runs those chunks again on a clock of its own, on as many workers as are asked for, by the rules of this crate's own
+//! A frame is recorded by the [timeline](crate::timeline): what every chunk took. A [`Replay`] then runs those chunks again on a clock of its own, on as many workers as are asked for, by the rules of this crate's own
 //! scheduler: who takes what, who is woken when, and what each of that [costs](Prices).
 //!
 //! ```
@@ -22,8 +21,10 @@
 //! let mut schedule = graph.compile()?;
 //!
 //! let scheduler = Scheduler::new(1)?;
-//! let measure = schedule.run_measured(&scheduler, &())?;
-//! let replay = Replay::new(&measure, Prices::measure()?);
+//! scheduler.timeline().start();
+//! schedule.run(&scheduler, &())?;
+//! let log = scheduler.timeline().take();
+//! let replay = Replay::new(&log.runs[0], Prices::measure()?)?;
 //! for workers in [1, 2, 4, 8, 16] {
 //!     println!("on {workers} workers: {:?}", replay.frame_time(workers));
 //! }
@@ -38,6 +39,8 @@
 
 mod costs;
 mod crew;
+mod error;
+mod moments;
 mod prices;
 mod replay;
 mod run;
@@ -46,6 +49,7 @@ mod run;
 mod sketch;
 
 pub use self::{
+    error::ReportError,
     prices::Prices,
     replay::{Replay, Replayed},
 };

@@ -6,6 +6,7 @@ use crate::{
     graph::{Closure, FrameGraph, Schedule},
     sync::{Instant, spin_loop},
     task::{Chunks, Scheduler, SchedulerError, Tickets},
+    timeline::Run,
 };
 
 /// What the scheduler's own doings cost.
@@ -27,7 +28,7 @@ pub struct Prices {
     pub process: Duration,
     /// To start and complete a process in a run on one thread.
     pub process_alone: Duration,
-    /// How much longer a chunk seems in a [measured](Schedule::run_measured) run than it is.
+    /// How much longer a chunk seems in a [timeline](crate::timeline) than it is.
     pub note: Duration,
 }
 
@@ -38,7 +39,7 @@ const TRIES: usize = 31;
 const PROCESSES: usize = 256;
 const CHUNKS: usize = 2_048;
 
-/// Steps of a chunk of which notes are taken.
+/// Steps of a chunk that is recorded.
 const WORK: usize = 32;
 
 /// How long to wait until a worker that has nothing to do sleeps for certain.
@@ -144,8 +145,10 @@ fn chain() -> Option<Schedule<Closure<'static, ()>>> {
 fn note(alone: &Scheduler, chunk: Duration) -> Option<Duration> {
     let mut schedule = pass(WORK)?;
     let is = lowest((0..TRIES).filter_map(|_| time_of(alone, &mut schedule))) / CHUNKS as u32;
-    let measures = (0..TRIES).filter_map(|_| schedule.run_measured(alone, &()).ok());
-    let seems = lowest(measures.map(|measure| measure.work())) / CHUNKS as u32;
+    alone.timeline().start();
+    let _times: Vec<_> = (0..TRIES).filter_map(|_| time_of(alone, &mut schedule)).collect();
+    let log = alone.timeline().take();
+    let seems = lowest(log.runs.iter().filter(|run| run.complete).map(Run::work)) / CHUNKS as u32;
     Some((seems + chunk).saturating_sub(is))
 }
 

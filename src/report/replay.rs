@@ -3,30 +3,31 @@
 use std::time::Duration;
 
 use crate::{
-    frame::FrameMeasure,
-    graph::{Flow, RunMeasure, Sharing, Way},
+    graph::{Flow, Sharing, Way},
     task::Scheduler,
+    timeline::{Log, Run},
 };
 
 use super::{
     costs::Costs,
+    error::ReportError,
+    moments::{length, outermost, union},
     prices::Prices,
     run::{Outcome, Replays},
 };
 
-/// A measured run, to be run again by the scheduler's rules on a clock of its own, by any number of workers. The same
-/// measure and prices always give the same times.
+/// What was recorded of a frame, to be run again by the scheduler's rules on a clock of its own, by any number of workers. The
+/// same record and prices always give the same times.
 ///
-/// It stands for one of many such frames, one after another: workers are asleep when it begins, and the schedule has
-/// learnt what its processes cost and whether it is worth sharing.
+/// It stands for one of many such frames, one after another: workers are asleep when it begins, and schedules have
+/// learnt what their processes cost and whether they are worth sharing.
 ///
-/// In a measure of a run on several workers, chunks have waited for each other's locks and cache lines. So one of a run on one
-/// worker tells best what one worker takes, and what many could take at best; one of several workers tells better what those
-/// take. Where chunks are shorter than half a microsecond, notes of them disturb them, and all times come out too long.
+/// Where several workers ran, chunks have waited for each other's locks and cache lines. So a record of one worker tells best
+/// what one worker takes, and what many could take at best; one of several workers tells better what those take. Where chunks
+/// are shorter than half a microsecond, recording disturbs them, and all times come out too long.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    costs: Costs,
-    always_shares: bool,
+    runs: Vec<Costs>,
     serial: Duration,
     prices: Prices,
 }
@@ -37,7 +38,7 @@ pub struct Replay {
 pub struct Replayed {
     /// How long it takes, with what is [serial](Replay::serial).
     pub time: Duration,
-    /// Whether the calling thread runs it alone, as that is faster.
+    /// Whether the calling thread runs all of it alone, as that is faster.
     pub alone: bool,
     /// How long each worker is in chunks; what is serial is left out.
     pub busy: Vec<Duration>,
@@ -50,21 +51,55 @@ const RUNS_TO_SETTLE: usize = 64;
 const RUNS_TO_LEARN: usize = 3;
 
 impl Replay {
-    /// A replay of a run of a schedule.
-    pub fn new(measure: &RunMeasure, prices: Prices) -> Self {
-        let costs = Costs::new(measure, &prices);
-        Self { costs, always_shares: measure.always_shares, serial: Duration::ZERO, prices }
+    /// A replay of one run of a schedule.
+    ///
+    /// # Errors
+    ///
+    /// [`ReportError::Incomplete`] or [`ReportError::Failed`] if the run is.
+    pub fn new(run: &Run, prices: Prices) -> Result<Self, ReportError> {
+        Self::of_runs([run], Duration::ZERO, prices)
     }
 
-    /// A replay of a frame: of its jobs, with what comes before and after them. What submission takes
-    /// ([`StageTimes::submit`](crate::StageTimes::submit)) can be added as [`serial`](Self::serial).
-    pub fn of_frame(measure: &FrameMeasure, prices: Prices) -> Self {
-        Self::new(&measure.jobs, prices).serial(measure.serial())
+    /// A replay of the frame of that number: its runs one after another, and what its threads did outside of them.
+    ///
+    /// # Errors
+    ///
+    /// [`ReportError`], whose variants say when.
+    pub fn of_frame(log: &Log, frame: u64, prices: Prices) -> Result<Self, ReportError> {
+        let runs = outermost(log, frame);
+        if runs.is_empty() {
+            return Err(ReportError::NoRun { frame });
+        }
+        let of_runs: Vec<_> = runs.iter().map(|run| run.began..run.ended).collect();
+        let of_spans = log.spans_of(frame).map(|span| span.began..span.ended);
+        let all = union(of_spans.chain(of_runs.iter().cloned()));
+        let serial = length(&all).saturating_sub(length(&union(of_runs)));
+        Self::of_runs(runs, serial, prices)
     }
 
-    /// Adds what the calling thread does before the run or after it, while the others have nothing to do.
+    fn of_runs<'log>(
+        runs: impl IntoIterator<Item = &'log Run>,
+        serial: Duration,
+        prices: Prices,
+    ) -> Result<Self, ReportError> {
+        let costs = |run: &Run| match run {
+            Run { failed: true, frame, .. } => Err(ReportError::Failed { frame: *frame }),
+            Run { complete: false, frame, .. } => Err(ReportError::Incomplete { frame: *frame }),
+            _ => Ok(Costs::new(run, &prices)),
+        };
+        Ok(Self { runs: runs.into_iter().map(costs).collect::<Result<_, _>>()?, serial, prices })
+    }
+
+    /// Adds what the calling thread does before the runs or after them, while the others have nothing to do.
     pub fn serial(mut self, time: Duration) -> Self {
         self.serial += time;
+        self
+    }
+
+    /// The same frame with nothing to do for the processes of that [group](crate::timeline::Process::group), which is the name
+    /// of a render process, say. They are there still, and wait for what they depend on.
+    pub fn with_free(mut self, group: &str) -> Self {
+        self.runs.iter_mut().for_each(|run| run.empty(group));
         self
     }
 
@@ -76,32 +111,43 @@ impl Replay {
     /// The frame on so many workers: 0 is taken for 1, and more than [`Scheduler::MOST_WORKERS`] for that many.
     pub fn run(&self, workers: usize) -> Replayed {
         let workers = workers.clamp(1, Scheduler::MOST_WORKERS);
-        let alone = self.costs.alone(&self.prices);
+        let mut all = Replayed { time: self.serial, alone: true, busy: vec![Duration::ZERO; workers] };
+        for costs in &self.runs {
+            let one = self.run_one(costs, workers);
+            all.time += one.time;
+            all.alone &= one.alone;
+            all.busy.iter_mut().zip(one.busy).for_each(|(sum, busy)| *sum += busy);
+        }
+        all
+    }
+
+    fn run_one(&self, costs: &Costs, workers: usize) -> Replayed {
+        let alone = costs.alone(&self.prices);
         if workers > 1 {
-            let shared = self.share(workers);
-            if self.always_shares || !goes_alone(alone, shared.time, &self.prices) {
-                return self.replayed(false, shared.time, shared.busy);
+            let shared = self.share(costs, workers);
+            if costs.always_shares || !goes_alone(alone, shared.time, &self.prices) {
+                return replayed(false, shared.time, shared.busy);
             }
         }
         let mut busy = vec![0; workers];
-        busy[0] = self.costs.work();
-        self.replayed(true, alone, busy)
+        busy[0] = costs.work();
+        replayed(true, alone, busy)
     }
 
-    fn share(&self, workers: usize) -> Outcome {
-        let mut flow = Flow::new(&self.costs.dependencies);
-        let replays = Replays::new(&self.costs, &self.prices, workers);
+    fn share(&self, costs: &Costs, workers: usize) -> Outcome {
+        let mut flow = Flow::new(&costs.dependencies);
+        let replays = Replays::new(costs, &self.prices, workers);
         for _run in 0..RUNS_TO_LEARN {
             let costs: Vec<u64> = replays.run(&flow).processes.iter().map(|span| span.end - span.start).collect();
             flow.rank(&costs);
         }
         replays.run(&flow)
     }
+}
 
-    fn replayed(&self, alone: bool, time: u64, busy: Vec<u64>) -> Replayed {
-        let busy = busy.into_iter().map(Duration::from_nanos).collect();
-        Replayed { time: Duration::from_nanos(time) + self.serial, alone, busy }
-    }
+fn replayed(alone: bool, time: u64, busy: Vec<u64>) -> Replayed {
+    let busy = busy.into_iter().map(Duration::from_nanos).collect();
+    Replayed { time: Duration::from_nanos(time), alone, busy }
 }
 
 /// Whether a schedule that takes so many nanoseconds on one thread, or on all workers, comes to be run by one.
@@ -140,7 +186,7 @@ mod tests {
     }
 
     fn replay(sketch: &Sketch, prices: Prices) -> Replay {
-        Replay::new(&sketch.measure(&prices), prices)
+        Replay::new(&sketch.run(&prices), prices).unwrap()
     }
 
     fn times<const COUNT: usize>(replay: &Replay, workers: [usize; COUNT]) -> [Duration; COUNT] {
@@ -198,9 +244,9 @@ mod tests {
             busy[0] = micros(20);
             assert_eq!(replay(&small, dear_wakes()).run(workers), Replayed { time: micros(20), alone: true, busy });
         }
-        let mut shared = small.measure(&Prices::FREE);
+        let mut shared = small.run(&Prices::FREE);
         shared.always_shares = true;
-        assert!(!Replay::new(&shared, dear_wakes()).run(2).alone);
+        assert!(!Replay::new(&shared, dear_wakes()).unwrap().run(2).alone);
         assert!(!replay(&small, Prices::FREE).run(2).alone);
     }
 
@@ -261,9 +307,9 @@ mod tests {
 
     #[test]
     fn what_notes_take_is_left_out() {
-        let measure = Sketch::new().add(&[], &[10; 4]).measure(&Prices::FREE);
+        let run = Sketch::new().add(&[], &[10; 4]).run(&Prices::FREE);
         let prices = Prices { note: micros(1), ..Prices::FREE };
-        assert_eq!(Replay::new(&measure, prices).frame_time(1), micros(36));
+        assert_eq!(Replay::new(&run, prices).unwrap().frame_time(1), micros(36));
     }
 
     #[test]
@@ -331,8 +377,8 @@ mod tests {
             let [wake, waker, steal, silence, ticket, process] = prices;
             let prices = Prices { wake, waker, steal, silence, ticket, process, ..Prices::FREE };
             let work = micros(sketch.processes.iter().map(|process| sum(&process.chunks)).sum());
-            let measure = sketch.measure(&prices);
-            let replay = Replay::new(&measure, prices);
+            let mut run = sketch.run(&prices);
+            let replay = Replay::new(&run, prices).unwrap();
             let replayed = replay.run(workers);
             prop_assert_eq!(&replayed, &replay.run(workers), "another time");
             prop_assert_eq!(replayed.busy.iter().sum::<Duration>(), work);
@@ -343,11 +389,10 @@ mod tests {
             prop_assert!(replayed.time * workers as u32 >= work);
             // Who has the choice does not take a way that is much longer.
             prop_assert!(replayed.time <= replay.frame_time(1).mul_f64(1.25) + micros(1));
-            let mut measure = measure;
-            measure.always_shares = true;
-            let steps = (measure.processes().len() + measure.chunks().len() + workers) as u32;
+            run.always_shares = true;
+            let steps = (run.graph.processes.len() + run.chunks.len() + workers) as u32;
             let most = work + (wake + waker * 2 + steal + ticket + process) * steps;
-            prop_assert!(Replay::new(&measure, prices).frame_time(workers) <= most);
+            prop_assert!(Replay::new(&run, prices).unwrap().frame_time(workers) <= most);
         }
     }
 }

@@ -270,7 +270,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_process_starts_when_all_it_depends_on_has_ended(sketch in any_sketch(true), workers in 1..8_usize) {
-            let costs = Costs::new(&sketch.measure(&Prices::FREE), &Prices::FREE);
+            let costs = Costs::new(&sketch.run(&Prices::FREE), &Prices::FREE);
             let flow = Flow::new(&costs.dependencies);
             let outcome = Replays::new(&costs, &Prices::FREE, workers).run(&flow);
             for (process, span) in sketch.processes.iter().zip(&outcome.processes) {

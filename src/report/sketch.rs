@@ -1,11 +1,11 @@
-//! Measures made by hand, for tests.
+//! Runs made by hand, for tests.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use proptest::{collection::vec, prelude::*};
 
 use super::Prices;
-use crate::graph::{ChunkMeasure, ProcessMeasure, RunMeasure};
+use crate::timeline::{Chunk, Graph, Process, Run};
 
 /// A graph as plain data.
 #[derive(Clone, Debug, Default)]
@@ -38,35 +38,27 @@ impl Sketch {
         sketch
     }
 
-    /// The measure of a run on one thread, in which notes took what they do at these prices. Chunks are of three items.
-    pub(super) fn measure(&self, prices: &Prices) -> RunMeasure {
+    /// A run on one thread, in which notes took what they do at these prices. Chunks are of three items.
+    pub(super) fn run(&self, prices: &Prices) -> Run {
         let mut now = Duration::ZERO;
         let (mut processes, mut chunks) = (Vec::new(), Vec::new());
         for (index, process) in self.processes.iter().enumerate() {
-            processes.push(ProcessMeasure {
+            processes.push(Process {
                 name: format!("p{index}"),
                 dependencies: process.dependencies.clone(),
                 pinned: process.pinned,
-                ..ProcessMeasure::default()
+                ..Process::default()
             });
+            let opened = now;
             for (place, &cost) in process.chunks.iter().enumerate() {
                 let ended = now + Duration::from_micros(cost) + prices.note;
                 let items = place * 3..place * 3 + 3;
-                chunks.push(ChunkMeasure { process: index, items, worker: 0, began: now, ended });
+                chunks.push(Chunk { process: index, items, opened, started: now, ended, ..Chunk::default() });
                 now = ended;
             }
         }
-        let measure = RunMeasure {
-            workers: 1,
-            took: now,
-            shared_from: None,
-            always_shares: false,
-            processes,
-            chunks: Vec::new(),
-        };
-        // In no particular order, as workers leave them.
-        chunks.reverse();
-        measure.with_chunks(chunks)
+        let graph = Arc::new(Graph { processes });
+        Run { graph, workers: 1, ended: now, complete: true, chunks, ..Run::default() }
     }
 }
 

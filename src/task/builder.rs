@@ -1,10 +1,13 @@
 //! A scheduler to an engine's measure.
 
-use std::{fmt, io, iter, sync::mpsc, thread::available_parallelism, time::Duration};
+use std::{fmt, io, iter, mem, sync::mpsc, thread::available_parallelism, time::Duration};
 
 use thiserror::Error;
 
-use crate::sync::{Arc, thread};
+use crate::{
+    sync::{Arc, thread},
+    timeline::{Setup, Timeline},
+};
 
 use super::{
     affinity::AffinityMask,
@@ -41,6 +44,7 @@ pub struct SchedulerBuilder {
     on_stop: Option<Hook>,
     shuffle: Option<u64>,
     wake_price: Option<Duration>,
+    timeline: Setup,
 }
 
 /// Not the model checker's `Arc`, which cannot hold what has no size.
@@ -102,6 +106,20 @@ impl SchedulerBuilder {
         self
     }
 
+    /// For how many chunks and idle times each worker has room in the [timeline](Scheduler::timeline), 65,536 without this, of
+    /// 48 bytes each. It is rounded up to a power of two, and memory is asked for when the timeline is started.
+    pub fn timeline_capacity(mut self, events: usize) -> Self {
+        self.timeline.capacity = Some(events);
+        self
+    }
+
+    /// The clock that the [timeline](Scheduler::timeline) reads, instead of the system's: the time since some moment, which
+    /// never goes back, whichever thread asks.
+    pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
+        self.timeline.clock = Some(Box::new(clock));
+        self
+    }
+
     /// Starts the threads.
     ///
     /// # Errors
@@ -113,7 +131,7 @@ impl SchedulerBuilder {
 
     /// `spawn` starts a thread, or fails to.
     pub(super) fn build_with(
-        self,
+        mut self,
         mut spawn: impl FnMut(thread::Builder, Box<dyn FnOnce() + Send>) -> io::Result<thread::JoinHandle<()>>,
     ) -> Result<Scheduler, SchedulerError> {
         let workers = self.checked_workers()?;
@@ -121,12 +139,15 @@ impl SchedulerBuilder {
         let first = queues_of(0);
         let others: Vec<Box<Queues>> = (1..workers).map(queues_of).collect();
         let loot = iter::once(&first).chain(&others).map(|queues| queues.loot()).collect();
-        let shared = Arc::new(Shared::new(loot, first, self.shuffle.is_some()));
+        let names = (1..workers).map(|worker| self.checked_name(worker)).collect::<Result<Vec<_>, _>>()?;
+        let lanes = iter::once("caller".to_owned()).chain(names.iter().cloned()).collect();
+        let timeline = Timeline::new(lanes, mem::take(&mut self.timeline));
+        let shared = Arc::new(Shared::new(loot, first, timeline, self.shuffle.is_some()));
         // Where a thread cannot be started, the scheduler is dropped with those it has, and joins them.
         let mut scheduler = Scheduler::without_threads(Arc::clone(&shared));
         let (ready, is_ready) = mpsc::channel();
-        for (index, queues) in (1..).zip(others) {
-            let builder = thread::Builder::new().name(self.checked_name(index)?);
+        for ((index, queues), name) in (1..).zip(others).zip(names) {
+            let builder = thread::Builder::new().name(name);
             let affinity = self.affinity.as_ref().map(|affinity| affinity(index));
             let hooks = [&self.on_start, &self.on_stop].map(Clone::clone);
             let life = Life { index, affinity, hooks, ready: ready.clone(), shared: Arc::clone(&shared) };

@@ -6,7 +6,10 @@
 
 use std::time::Duration;
 
-use crate::sync::{Instant, spin_loop};
+use crate::{
+    sync::{Instant, spin_loop},
+    timeline::IdleKind,
+};
 
 use super::{
     queue::Band,
@@ -44,6 +47,7 @@ impl Idle {
     pub(super) fn go_on(&mut self, worker: &Worker, until: Until) {
         if self.looks == 0 {
             until.set_starves(true);
+            worker.timeline().start_idle(worker.index(), IdleKind::Searching);
         }
         if SLEEP_AT_ONCE {
             self.sleep(worker, until);
@@ -63,6 +67,7 @@ impl Idle {
     pub(super) fn end(&mut self, worker: &Worker, until: Until) {
         if self.looks > 0 {
             until.set_starves(false);
+            worker.timeline().end_idle(worker.index());
         }
         if self.is_searcher {
             worker.shared().sleep().end_search(|| worker.sees_loot(&Band::FRAME));
@@ -84,7 +89,9 @@ impl Idle {
 
     fn sleep(&mut self, worker: &Worker, until: Until) {
         let sleep = worker.shared().sleep();
+        worker.timeline().start_idle(worker.index(), IdleKind::Asleep);
         let is_searcher = sleep.sleep(worker.index(), until.wake_for(), self.is_searcher, || worker.sees_work(until));
+        worker.timeline().start_idle(worker.index(), IdleKind::Searching);
         // Awake it looks for a while again, as it was called for something.
         *self = Self { looks: 1, is_searcher, since: None };
     }

@@ -82,6 +82,8 @@ pub(super) struct Job {
     /// How many regions were open on the worker that queued it, which tells a worker that waits for the innermost
     /// which of its jobs belong there.
     pub(super) depth: u32,
+    /// Whether a worker has taken it out of another one's queue.
+    pub(super) is_stolen: bool,
 }
 
 impl Job {

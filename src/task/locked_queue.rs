@@ -22,6 +22,10 @@ impl<T> LockedQueue<T> {
         self.count.load(Ordering::Relaxed) == 0
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+
     pub(super) fn put(&self, item: T) {
         self.change(|items| items.push_back(item));
     }

@@ -84,11 +84,11 @@ impl Queues {
     /// gives back the first.
     pub(super) fn steal_from(&self, loot: &Loot, band: Band, depth: u32) -> Option<Job> {
         let loot = &loot.bands[band as usize];
-        let stolen = loot.steal();
-        if stolen.is_some() || loot.overflow.is_empty() {
-            return stolen;
+        let mut stolen = loot.steal();
+        if stolen.is_none() && !loot.overflow.is_empty() {
+            stolen = loot.overflow.take_oldest(|job| self.push(Job { depth, is_stolen: true, ..job }, band));
         }
-        loot.overflow.take_oldest(|job| self.push(Job { depth, ..job }, band))
+        stolen.map(|job| Job { is_stolen: true, ..job })
     }
 
     /// The newest job.
@@ -138,6 +138,11 @@ impl Queues {
         for (since_wait, before) in self.since_wait.iter().zip(before) {
             since_wait.set(before);
         }
+    }
+
+    /// How many jobs there are.
+    pub(super) fn len(&self) -> usize {
+        self.bands.iter().map(|queue| queue.deque.len() + queue.overflow.len()).sum()
     }
 
     /// One of so many, if there is a shuffle.
@@ -243,6 +248,10 @@ impl Overflow {
         self.jobs.is_empty()
     }
 
+    fn len(&self) -> usize {
+        self.jobs.len()
+    }
+
     fn put(&self, job: Job) {
         self.jobs.put(job);
     }
@@ -318,7 +327,7 @@ mod loom_tests {
             if number == early {
                 taken_early = token(queues.pop(Band::Normal));
             }
-            queues.push(Job { work: Work::Token(number), region, depth: 0 }, Band::Normal);
+            queues.push(Job { work: Work::Token(number), region, depth: 0, is_stolen: false }, Band::Normal);
         }
         let taken = std::iter::from_fn(|| token(queues.pop(Band::Normal))).collect();
         (taken_early, taken, thief.join().unwrap())

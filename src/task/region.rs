@@ -170,7 +170,7 @@ impl Region {
     /// counted.
     pub(super) fn post(&'static self, work: Work) {
         self.latch.add(1);
-        self.shared.mailbox(self.owner).put(Job { work, region: self, depth: 0 });
+        self.shared.mailbox(self.owner).put(Job { work, region: self, depth: 0, is_stolen: false });
         self.shared.sleep().wake_worker(self.owner);
     }
 

@@ -9,7 +9,10 @@ use std::{
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread};
+use crate::{
+    sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread},
+    timeline::Timeline,
+};
 
 use super::{
     background::{BackgroundJob, BackgroundQueue},
@@ -97,6 +100,11 @@ impl Scheduler {
     /// while the scheduler was built; 0 with a single worker. A graph whose work takes no longer than this is not shared.
     pub fn wake_price(&self) -> Duration {
         self.shared.wake_price()
+    }
+
+    /// What records which worker does what, once it is [started](Timeline::start).
+    pub fn timeline(&self) -> &std::sync::Arc<Timeline> {
+        self.shared.timeline()
     }
 
     /// Calls `body` with a scope, and returns what it returns when every job spawned in the scope has run and has been
@@ -227,6 +235,8 @@ pub(super) struct Shared {
     sleep: Sleep,
     placement: Placement,
     seat: Seat,
+    /// Not the model checker's `Arc`: who submits frames has a share as well.
+    timeline: std::sync::Arc<Timeline>,
     is_shuffled: bool,
     /// In nanoseconds.
     wake_price: AtomicUsize,
@@ -235,7 +245,7 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, is_shuffled: bool) -> Self {
+    pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, timeline: Timeline, is_shuffled: bool) -> Self {
         Self {
             mailboxes: loot.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
             strays: CachePadded::new(Mailbox::new()),
@@ -243,6 +253,7 @@ impl Shared {
             sleep: Sleep::new(loot.len()),
             placement: Placement::new(),
             seat: Seat::new(first),
+            timeline: std::sync::Arc::new(timeline),
             loot,
             is_shuffled,
             wake_price: AtomicUsize::new(0),
@@ -278,6 +289,11 @@ impl Shared {
 
     pub(super) fn placement(&self) -> &Placement {
         &self.placement
+    }
+
+    #[inline]
+    pub(super) fn timeline(&self) -> &std::sync::Arc<Timeline> {
+        &self.timeline
     }
 
     #[inline]

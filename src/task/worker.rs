@@ -2,7 +2,7 @@
 
 use std::{cell::Cell, fmt, marker::PhantomData, ptr, rc::Rc, time::Duration};
 
-use crate::sync::Arc;
+use crate::{sync::Arc, timeline::Timeline};
 
 use super::{
     background::Queued,
@@ -42,6 +42,8 @@ pub struct Worker {
     depth: Cell<u32>,
     /// Whether what runs is a background job.
     is_in_background: Cell<bool>,
+    /// Whether the job that has just begun was stolen, until somebody asks.
+    has_stolen: Cell<bool>,
     /// For how many jobs that are not there this worker is counted, and by which region. While there is credit, the
     /// region waits for it to come back; where there is none, a job of the region is running here.
     credit: Cell<usize>,
@@ -63,6 +65,7 @@ impl Worker {
             victim: Cell::new(0),
             depth: Cell::new(0),
             is_in_background: Cell::new(false),
+            has_stolen: Cell::new(false),
             credit: Cell::new(0),
             creditor: Cell::new(None),
             awaited: Cell::new(None),
@@ -94,6 +97,23 @@ impl Worker {
         self.shared.wake_price()
     }
 
+    /// What records what workers do.
+    #[inline]
+    pub(crate) fn timeline(&self) -> &Timeline {
+        self.shared.timeline()
+    }
+
+    /// Whether the job that runs has been stolen, which is said once.
+    #[inline]
+    pub(crate) fn take_stolen(&self) -> bool {
+        self.has_stolen.take()
+    }
+
+    /// How many jobs are in this worker's queues.
+    pub(crate) fn queued(&self) -> usize {
+        self.queues.len()
+    }
+
     /// Whether somebody sleeps who would have to be woken, and whom a worker may do without for what is not worth that.
     pub(super) fn may_be_alone(&self) -> bool {
         !self.is_shuffled() && !self.wake_price().is_zero() && self.shared.sleep().sleepers() > 0
@@ -121,7 +141,7 @@ impl Worker {
     /// Queues a job here, and wakes somebody for it. Only from within a counted job of the region, or its body.
     pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
         self.spend(region);
-        let job = Job { work, region, depth: self.depth.get() };
+        let job = Job { work, region, depth: self.depth.get(), is_stolen: false };
         let is_stray = self.awaited.get().is_some_and(|awaited| !awaited.is(region));
         if is_stray && !region.is_background() {
             // It belongs further out, and would be run too soon from here.
@@ -147,7 +167,8 @@ impl Worker {
     /// Hands a job to the owner of the region. Only from within a counted job of the region, or its body.
     pub(super) fn push_pinned(&self, region: &'static Region, work: Work) {
         self.spend(region);
-        self.shared.mailbox(region.owner()).put(Job { work, region, depth: self.depth.get() });
+        let job = Job { work, region, depth: self.depth.get(), is_stolen: false };
+        self.shared.mailbox(region.owner()).put(job);
         if region.owner() != self.index {
             self.shared.sleep().wake_worker(region.owner());
         }
@@ -281,6 +302,7 @@ impl Worker {
         let was_in_background = self.is_in_background.replace(region.is_background());
         // The owner of another region may wait for the credit that is left of it, and this job may wait for that owner.
         self.deal_with(region);
+        self.has_stolen.set(job.is_stolen);
         job.run(self);
         self.is_in_background.set(was_in_background);
         self.earn(region);

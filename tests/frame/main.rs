@@ -4,9 +4,9 @@ mod bad_input;
 mod changes;
 mod deferred;
 mod failing_process;
-mod measure;
 mod rules;
 mod same_result;
+mod timeline;
 mod views;
 #[path = "../scenes/mod.rs"]
 mod scenes;

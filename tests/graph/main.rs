@@ -3,12 +3,12 @@
 mod compile;
 mod dot;
 mod extremes;
-mod measure;
 mod oracle;
 mod problems;
 mod run;
 mod stops;
 mod stress;
+mod timeline;
 
 use std::sync::LazyLock;
 

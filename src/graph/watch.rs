@@ -1,0 +1,203 @@
+//! Who looks on while a run goes on: the scheduler's timeline, and subscribers of spans.
+//!
+//! Whether anybody does is found out once a run. Where nobody does, a chunk costs no more than to see that there is nobody.
+
+use std::{ops::Range, sync::Arc};
+
+use tracing::{
+    Level, Span,
+    level_filters::{LevelFilter, STATIC_MAX_LEVEL},
+    span::EnteredSpan,
+};
+
+use crate::{
+    sync::{AtomicUsize, Mutex, Ordering},
+    task::{Worker, catch},
+    timeline::{Ended, Graph, Lap, OpenRun, Process},
+};
+
+use super::{node::Node, schedule::Schedule};
+
+/// Where everything that is told of runs goes to.
+const TARGET: &str = "drawloom::graph";
+
+/// Whoever looks on at a run.
+pub(super) struct Watch<'run> {
+    recorded: Option<OpenRun<'run>>,
+    traced: Option<Traced<'run>>,
+}
+
+/// What subscribers of spans are told.
+struct Traced<'run> {
+    graph: &'run Graph,
+    /// The span in which the run was called for.
+    parent: Span,
+    /// Whether they are told of chunks and counters, too.
+    in_detail: bool,
+    /// How many processes are ready and have not been opened.
+    ready: AtomicUsize,
+}
+
+impl<P> Schedule<P> {
+    /// Makes up what is told of the schedule, if somebody looks on and it was not made up before.
+    pub(super) fn describe<C>(&mut self, worker: &Worker)
+    where
+        C: ?Sized,
+        P: Node<C>,
+    {
+        if self.graph.is_none() && (worker.timeline().is_on() || level() >= Level::DEBUG) {
+            self.graph = Some(Arc::new(self.described()));
+        }
+    }
+
+    /// What is told of the schedule.
+    fn described<C>(&self) -> Graph
+    where
+        C: ?Sized,
+        P: Node<C>,
+    {
+        let process = |index: usize| Process {
+            name: self.names[index].clone(),
+            labels: self.labels[index].clone(),
+            dependencies: self.dependencies(index).to_vec(),
+            pinned: catch(|| self.processes[index].pinned()).unwrap_or(false),
+        };
+        Graph { processes: (0..self.len()).map(process).collect() }
+    }
+}
+
+/// What subscribers of spans want to be told, at most.
+fn level() -> LevelFilter {
+    LevelFilter::current().min(STATIC_MAX_LEVEL)
+}
+
+impl<'run> Watch<'run> {
+    /// Finds out who looks on at a run that begins, of a schedule of which `graph` tells.
+    pub(super) fn new(worker: &'run Worker, graph: Option<&'run Arc<Graph>>) -> Option<Self> {
+        let (graph, level) = (graph?, level());
+        let recorded = worker.timeline().open_run(|| Arc::clone(graph));
+        let traced = (level >= Level::DEBUG).then(|| Traced {
+            graph,
+            parent: Span::current(),
+            in_detail: level >= Level::TRACE,
+            ready: AtomicUsize::new(0),
+        });
+        (recorded.is_some() || traced.is_some()).then_some(Self { recorded, traced })
+    }
+}
+
+impl Watch<'_> {
+    /// A worker opens a process.
+    pub(super) fn open(&self, worker: &Worker, process: u32) -> Turn<'_> {
+        if let Some(traced) = self.traced.as_ref().filter(|traced| traced.in_detail) {
+            // Relaxed: it is a count that somebody looks at.
+            let ready = traced.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
+            tracing::trace!(target: TARGET, ready, queued = worker.queued());
+        }
+        let stolen = worker.take_stolen();
+        self.turn(self.recorded.as_ref().map(|run| run.open(worker.index(), process, stolen)), self.span(process))
+    }
+
+    /// A worker joins others at a process that was opened.
+    pub(super) fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Turn<'_> {
+        let stolen = worker.take_stolen();
+        let Opening { at, span } = &*opened.0.lock();
+        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, stolen, *at));
+        self.turn(lap, span.clone())
+    }
+
+    /// A process has become ready.
+    pub(super) fn count_ready(&self) {
+        if let Some(traced) = &self.traced {
+            traced.ready.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The run has ended.
+    pub(super) fn end(self, how: Ended) {
+        if let Some(run) = self.recorded {
+            run.end(how);
+        }
+    }
+
+    fn turn<'watch>(&self, lap: Option<Lap<'watch>>, span: Span) -> Turn<'watch> {
+        let in_detail = self.traced.as_ref().is_some_and(|traced| traced.in_detail);
+        Turn { lap, span: span.entered(), in_detail }
+    }
+
+    /// The span of a process.
+    fn span(&self, process: u32) -> Span {
+        let Some(traced) = &self.traced else { return Span::none() };
+        let Process { name, labels, .. } = &traced.graph.processes[process as usize];
+        let [of, phase, view] = [&labels.process, &labels.phase, &labels.view].map(Option::as_deref);
+        tracing::debug_span!(target: TARGET, parent: &traced.parent, "process", name, process = of, phase, view)
+    }
+}
+
+/// A worker at a process while somebody looks on.
+pub(super) struct Turn<'run> {
+    lap: Option<Lap<'run>>,
+    span: EnteredSpan,
+    in_detail: bool,
+}
+
+impl Turn<'_> {
+    /// Runs a chunk.
+    pub(super) fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
+        let span = self.in_detail.then(|| {
+            let (start, end) = (items.start, items.end);
+            tracing::trace_span!(target: TARGET, "chunk", start, end).entered()
+        });
+        let result = run(items.clone());
+        drop(span);
+        if let Some(lap) = &mut self.lap {
+            lap.end_chunk(&items);
+        }
+        result
+    }
+
+    /// The process has no items.
+    pub(super) fn end_empty(&mut self) {
+        if let Some(lap) = &mut self.lap {
+            lap.end_empty();
+        }
+    }
+
+    /// The worker goes on with another process without a break, and opens it.
+    pub(super) fn go_on(&mut self, watch: &Watch<'_>, process: u32) {
+        if watch.traced.is_some() {
+            // Out of the old one first.
+            self.span = Span::none().entered();
+            self.span = watch.span(process).entered();
+        }
+        if let Some(lap) = &mut self.lap {
+            lap.go_on(process);
+        }
+    }
+
+    /// The worker leaves the process open for others.
+    pub(super) fn leave(self, opened: &Opened) {
+        let at = self.lap.as_ref().map_or(0, Lap::opened);
+        *opened.0.lock() = Opening { at, span: self.span.exit() };
+    }
+}
+
+/// What those who join others at a process have to know of its beginning.
+pub(super) struct Opened(Mutex<Opening>);
+
+struct Opening {
+    /// By the timeline's clock.
+    at: u64,
+    span: Span,
+}
+
+impl Opened {
+    pub(super) fn new() -> Self {
+        Self(Mutex::new(Opening { at: 0, span: Span::none() }))
+    }
+
+    /// Ends the process' span. All who took part are done.
+    pub(super) fn close(&self) {
+        self.0.lock().span = Span::none();
+    }
+}

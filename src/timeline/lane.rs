@@ -1,0 +1,202 @@
+//! What a worker writes.
+
+use std::{ops::Range, time::Duration};
+
+use crate::sync::{AtomicU64, Ordering};
+
+use super::{
+    clock::Clock,
+    log::{Chunk, Idle, IdleKind},
+    ring::{Event, Ring},
+};
+
+/// Where one worker writes. Only one thread at a time is that worker.
+pub(super) struct Lane {
+    ring: Ring,
+    /// What the worker has been passing its time with, and since when: 0 if it has something to do.
+    idle: AtomicU64,
+}
+
+/// What an event tells, in the lowest bits of one of its words; the others are when the process was opened.
+const TAGS: u32 = 3;
+const CHUNK: u64 = 0;
+const STOLEN_CHUNK: u64 = 1;
+const EMPTY: u64 = 2;
+const SEARCHING: u64 = 3;
+const ASLEEP: u64 = 4;
+
+/// An event, read.
+pub(super) enum Entry {
+    Chunk { run: u32, chunk: Chunk },
+    Empty { run: u32, chunk: Chunk },
+    Idle(Idle),
+}
+
+impl Lane {
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { ring: Ring::new(capacity), idle: AtomicU64::new(0) }
+    }
+
+    /// Asks for memory, unless it has it.
+    pub(super) fn make_room(&self) {
+        self.ring.make_room();
+    }
+
+    /// The worker has nothing to do from now on, or passes its time in another way. What that ends is written down if
+    /// `is_on`.
+    pub(super) fn start_idle(&self, kind: IdleKind, clock: &Clock, is_on: bool) {
+        let now = clock.now();
+        self.end_idle_at(now, is_on);
+        // Relaxed, here and below: it hands nothing over.
+        self.idle.store(now << TAGS | tag_of(kind), Ordering::Relaxed);
+    }
+
+    /// The worker has something to do.
+    pub(super) fn end_idle(&self, clock: &Clock, is_on: bool) {
+        // The looks spare most calls the clock.
+        if self.idle.load(Ordering::Relaxed) != 0 {
+            self.end_idle_at(if is_on { clock.now() } else { 0 }, is_on);
+        }
+    }
+
+    fn end_idle_at(&self, now: u64, is_on: bool) {
+        let idle = self.idle.load(Ordering::Relaxed);
+        self.idle.store(0, Ordering::Relaxed);
+        if idle != 0 && is_on {
+            self.ring.push([0, 0, 0, idle & mask(), idle >> TAGS, now]);
+        }
+    }
+
+    /// What the worker passes its time with at this moment.
+    pub(super) fn idle_until(&self, now: u64) -> Option<Idle> {
+        let idle = self.idle.load(Ordering::Relaxed);
+        let kind = kind_of(idle & mask())?;
+        Some(Idle { kind, began: time(idle >> TAGS), ended: time(now.max(idle >> TAGS)) })
+    }
+
+    /// Takes out all that was written, the oldest first, and says how much was dropped.
+    pub(super) fn drain(&self, worker: usize, mut take: impl FnMut(Entry)) -> u64 {
+        self.ring.drain(|event| take(read(event, worker)))
+    }
+}
+
+fn read(event: Event, worker: usize) -> Entry {
+    let [run_and_process, start, length, tagged, started, ended] = event;
+    let tag = tagged & mask();
+    let [started, ended] = [started, ended].map(time);
+    if let Some(kind) = kind_of(tag) {
+        return Entry::Idle(Idle { kind, began: started, ended });
+    }
+    let chunk = Chunk {
+        process: run_and_process as u32 as usize,
+        items: start as usize..start as usize + length as usize,
+        worker,
+        opened: time(tagged >> TAGS),
+        started,
+        ended,
+        stolen: tag == STOLEN_CHUNK,
+    };
+    let run = (run_and_process >> 32) as u32;
+    if tag == EMPTY { Entry::Empty { run, chunk } } else { Entry::Chunk { run, chunk } }
+}
+
+fn mask() -> u64 {
+    (1 << TAGS) - 1
+}
+
+fn tag_of(kind: IdleKind) -> u64 {
+    match kind {
+        IdleKind::Searching => SEARCHING,
+        IdleKind::Asleep => ASLEEP,
+    }
+}
+
+fn kind_of(tag: u64) -> Option<IdleKind> {
+    match tag {
+        SEARCHING => Some(IdleKind::Searching),
+        ASLEEP => Some(IdleKind::Asleep),
+        _ => None,
+    }
+}
+
+pub(super) fn time(nanoseconds: u64) -> Duration {
+    Duration::from_nanos(nanoseconds)
+}
+
+/// A worker at the chunks of one process, one after another.
+pub(crate) struct Lap<'run> {
+    lane: &'run Lane,
+    clock: &'run Clock,
+    run_and_process: u64,
+    opened: u64,
+    /// When the last chunk ended.
+    since: u64,
+    tag: u64,
+}
+
+impl<'run> Lap<'run> {
+    /// A worker begins with chunks of a process, of which it opens the first now.
+    #[inline]
+    pub(super) fn open(lane: &'run Lane, clock: &'run Clock, run: u32, process: u32, stolen: bool) -> Self {
+        let now = clock.now();
+        Self::new(lane, clock, run, process, stolen, now, now)
+    }
+
+    /// A worker joins others at a process that was opened at that moment.
+    #[inline]
+    pub(super) fn join(
+        lane: &'run Lane,
+        clock: &'run Clock,
+        run: u32,
+        process: u32,
+        stolen: bool,
+        opened: u64,
+    ) -> Self {
+        Self::new(lane, clock, run, process, stolen, opened, clock.now())
+    }
+
+    fn new(
+        lane: &'run Lane,
+        clock: &'run Clock,
+        run: u32,
+        process: u32,
+        stolen: bool,
+        opened: u64,
+        since: u64,
+    ) -> Self {
+        let tag = if stolen { STOLEN_CHUNK } else { CHUNK };
+        let run_and_process = u64::from(run) << 32 | u64::from(process);
+        Self { lane, clock, run_and_process, opened, since, tag }
+    }
+
+    /// When the process was opened.
+    pub(crate) fn opened(&self) -> u64 {
+        self.opened
+    }
+
+    /// The worker goes on with another process without a break, and opens it.
+    #[inline]
+    pub(crate) fn go_on(&mut self, process: u32) {
+        self.run_and_process = self.run_and_process >> 32 << 32 | u64::from(process);
+        self.opened = self.since;
+    }
+
+    /// A chunk of these items has ended.
+    #[inline]
+    pub(crate) fn end_chunk(&mut self, items: &Range<usize>) {
+        self.write(items, self.tag);
+    }
+
+    /// The process has turned out to have no items.
+    pub(crate) fn end_empty(&mut self) {
+        self.write(&(0..0), EMPTY);
+    }
+
+    #[inline]
+    fn write(&mut self, items: &Range<usize>, tag: u64) {
+        let now = self.clock.now();
+        let (start, length) = (items.start as u64, items.len() as u64);
+        self.lane.ring.push([self.run_and_process, start, length, self.opened << TAGS | tag, self.since, now]);
+        self.since = now;
+    }
+}

@@ -1,0 +1,410 @@
+//! The recorder: what workers and calling threads write into, and what takes it out.
+
+use std::{borrow::Cow, collections::HashMap, fmt, mem, sync::Arc, thread, time::Duration};
+
+use crossbeam_utils::CachePadded;
+
+use crate::sync::{AtomicBool, Instant, Mutex, Ordering};
+
+use super::{
+    clock::Clock,
+    lane::{Entry, Lane, Lap, time},
+    log::{Chunk, Counter, Frame, Graph, IdleKind, Log, Run, Span, WorkerLog},
+};
+
+/// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off is
+/// measured against a build without it.
+const RECORDS: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
+
+/// How many frames, runs, spans and readings of counters are kept at most, of each, until they are taken.
+const MOST_KEPT: usize = 1 << 16;
+
+/// Records what the workers of a [`Scheduler`](crate::task::Scheduler) do.
+///
+/// It is off at first. [`start`](Self::start) and [`stop`](Self::stop) may be called at any time, from any thread: a run of a
+/// schedule is recorded from its beginning to its end, or not at all.
+pub struct Timeline {
+    is_on: AtomicBool,
+    clock: Clock,
+    lanes: Box<[CachePadded<Lane>]>,
+    names: Box<[String]>,
+    book: Mutex<Book>,
+    /// Held by whoever takes a log.
+    taker: Mutex<()>,
+}
+
+/// How a timeline is to be.
+#[derive(Default)]
+pub(crate) struct Setup {
+    /// How many events each worker has room for.
+    pub(crate) capacity: Option<usize>,
+    /// What tells the time instead of the system.
+    pub(crate) clock: Option<Box<dyn Fn() -> Duration + Send + Sync>>,
+}
+
+impl Setup {
+    /// Room for the chunks of some hundred frames, in 3 MiB a worker.
+    const CAPACITY: usize = 1 << 16;
+}
+
+impl Timeline {
+    /// Off, for workers of these names.
+    pub(crate) fn new(names: Vec<String>, setup: Setup) -> Self {
+        let capacity = setup.capacity.unwrap_or(Setup::CAPACITY).max(1);
+        Self {
+            is_on: AtomicBool::new(false),
+            clock: setup.clock.map_or_else(|| Clock::System(Instant::now()), Clock::Other),
+            lanes: names.iter().map(|_| CachePadded::new(Lane::new(capacity))).collect(),
+            names: names.into(),
+            book: Mutex::new(Book::default()),
+            taker: Mutex::new(()),
+        }
+    }
+
+    /// Records from now on. The first time, memory for all workers is asked for.
+    pub fn start(&self) {
+        self.lanes.iter().for_each(|lane| lane.make_room());
+        // Relaxed: whoever writes finds the memory by itself, and drops what it writes if that is not there yet.
+        self.is_on.store(true, Ordering::Relaxed);
+    }
+
+    /// Records no further. What was recorded can still be [taken](Self::take).
+    pub fn stop(&self) {
+        self.is_on.store(false, Ordering::Relaxed);
+    }
+
+    /// Whether it records.
+    #[inline]
+    pub fn is_on(&self) -> bool {
+        RECORDS && self.is_on.load(Ordering::Relaxed)
+    }
+
+    /// The time on its axis: since the scheduler was built.
+    pub fn now(&self) -> Duration {
+        time(self.clock.now())
+    }
+
+    /// A frame begins. All that is recorded until the next one belongs to it.
+    ///
+    /// An engine that never calls this need not: then every [`Renderer::record`](crate::Renderer::record) begins one, and where
+    /// there is no renderer every run of a schedule does. One that does has frames of its own, with any number of both in each.
+    pub fn mark_frame(&self) {
+        if self.is_on() {
+            let now = self.now();
+            let mut book = self.book.lock();
+            book.marks = Marks::Engine;
+            book.begin_frame(now);
+        }
+    }
+
+    /// Names what the calling thread does until the guard is dropped: a span of its own among those of the frame.
+    ///
+    /// ```
+    /// # let scheduler = drawloom::task::Scheduler::new(1)?;
+    /// scheduler.timeline().start();
+    /// let simulated = scheduler.timeline().span("simulate");
+    /// // ... what the engine does ...
+    /// drop(simulated);
+    /// assert_eq!(scheduler.timeline().take().spans[0].name, "simulate");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use = "a span ends when this is dropped"]
+    pub fn span(&self, name: impl Into<Cow<'static, str>>) -> OpenSpan<'_> {
+        self.span_of(None, name)
+    }
+
+    /// As [`span`](Self::span), of that frame instead of the current one.
+    pub(crate) fn span_of(&self, frame: Option<u64>, name: impl Into<Cow<'static, str>>) -> OpenSpan<'_> {
+        let open = self.is_on().then(|| {
+            let frame = frame.unwrap_or_else(|| self.book.lock().frame());
+            (name.into(), frame, self.now())
+        });
+        OpenSpan { timeline: self, open }
+    }
+
+    /// Notes what a counter stands at. Its name is the same each time, and says the unit.
+    pub fn count(&self, name: impl Into<Cow<'static, str>>, value: f64) {
+        if self.is_on() {
+            let at = self.now();
+            self.book.lock().keep(|kept| &mut kept.counters, Counter { name: name.into().into_owned(), at, value });
+        }
+    }
+
+    /// Takes out all that was recorded since the last time.
+    ///
+    /// It may be called at any time, and keeps nobody waiting; but what a run writes that is going on meanwhile is lost, and
+    /// counted, and that run is not [complete](Run::complete). So the best moment is between two frames.
+    pub fn take(&self) -> Log {
+        let _taker = self.taker.lock();
+        let Kept { frames, runs, spans, counters, threads, dropped } = self.book.lock().take();
+        let mut log = Log { spans, counters, threads, dropped, ..Log::default() };
+        let mut places = HashMap::with_capacity(runs.len());
+        for (number, run) in runs {
+            places.insert(number, log.runs.len());
+            log.runs.push(run);
+        }
+        for (worker, lane) in self.lanes.iter().enumerate() {
+            let (drained, until) = self.drain(worker, lane, &places, &mut log.runs);
+            if let Some(until) = until {
+                log.runs.iter_mut().filter(|run| run.ended >= until).for_each(|run| run.complete = false);
+            }
+            log.workers.push(drained);
+        }
+        self.book.lock().cut_open_runs();
+        for run in &mut log.runs {
+            run.chunks.sort_unstable_by_key(|chunk| (chunk.process, chunk.items.start));
+            run.empty.sort_unstable_by_key(|chunk| chunk.process);
+        }
+        log.frames = frames_of(frames, &log);
+        log
+    }
+
+    /// Takes out what one worker has written. If something was dropped, also says until when everything is there.
+    fn drain(
+        &self,
+        worker: usize,
+        lane: &Lane,
+        places: &HashMap<u32, usize>,
+        runs: &mut [Run],
+    ) -> (WorkerLog, Option<Duration>) {
+        let mut log = WorkerLog { name: self.names[worker].clone(), ..WorkerLog::default() };
+        let (mut until, mut lost) = (Duration::ZERO, 0);
+        let mut put = |run: u32, chunk: Chunk, list: fn(&mut Run) -> &mut Vec<Chunk>| match places.get(&run) {
+            Some(&place) => list(&mut runs[place]).push(chunk),
+            None => lost += 1,
+        };
+        // Before the rest, so that it overlaps nothing that is taken out.
+        let now = lane.idle_until(self.clock.now());
+        let dropped = lane.drain(worker, |entry| match entry {
+            Entry::Idle(idle) => {
+                until = idle.ended;
+                log.idle.push(idle);
+            }
+            Entry::Chunk { run, chunk } => {
+                until = chunk.ended;
+                put(run, chunk, |run| &mut run.chunks);
+            }
+            Entry::Empty { run, chunk } => {
+                until = chunk.ended;
+                put(run, chunk, |run| &mut run.empty);
+            }
+        });
+        log.idle.extend(now.filter(|now| log.idle.last().is_none_or(|last| last.ended <= now.began)));
+        log.dropped = dropped + lost;
+        (log, (dropped > 0).then_some(until))
+    }
+
+    /// A frame begins, unless the engine marks its own. Says which it is; `None` if nothing is recorded.
+    pub(crate) fn begin_frame(&self) -> Option<u64> {
+        self.is_on().then(|| {
+            let now = self.now();
+            let mut book = self.book.lock();
+            if book.marks != Marks::Engine {
+                book.marks = Marks::Renderer;
+                book.begin_frame(now);
+            }
+            book.frame()
+        })
+    }
+
+    /// A run of a schedule begins, of which `graph` tells what it is of.
+    pub(crate) fn open_run(&self, graph: impl FnOnce() -> Arc<Graph>) -> Option<OpenRun<'_>> {
+        self.is_on().then(|| {
+            let graph = graph();
+            let began = self.now();
+            let mut book = self.book.lock();
+            let number = book.next_run;
+            book.next_run = number.wrapping_add(1);
+            if book.marks == Marks::Runs && book.open.is_empty() {
+                book.begin_frame(began);
+            }
+            book.open.push(number);
+            OpenRun { timeline: self, number, frame: book.frame(), graph, began }
+        })
+    }
+
+    /// The worker has nothing to do from now on.
+    ///
+    /// That it fell asleep is noted even while nothing is recorded: it may still sleep when something is.
+    pub(crate) fn start_idle(&self, worker: usize, kind: IdleKind) {
+        let is_on = self.is_on();
+        if is_on || (RECORDS && kind == IdleKind::Asleep) {
+            self.lanes[worker].start_idle(kind, &self.clock, is_on);
+        }
+    }
+
+    /// The worker has something to do.
+    pub(crate) fn end_idle(&self, worker: usize) {
+        if RECORDS {
+            self.lanes[worker].end_idle(&self.clock, self.is_on());
+        }
+    }
+}
+
+impl fmt::Debug for Timeline {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Timeline").field("is_on", &self.is_on()).finish_non_exhaustive()
+    }
+}
+
+/// A span that has not ended: see [`Timeline::span`].
+pub struct OpenSpan<'timeline> {
+    timeline: &'timeline Timeline,
+    open: Option<(Cow<'static, str>, u64, Duration)>,
+}
+
+impl Drop for OpenSpan<'_> {
+    fn drop(&mut self) {
+        if let Some((name, frame, began)) = self.open.take() {
+            let ended = self.timeline.now();
+            let mut book = self.timeline.book.lock();
+            let thread = book.this_thread();
+            book.keep(|kept| &mut kept.spans, Span { name: name.into_owned(), thread, frame, began, ended });
+        }
+    }
+}
+
+/// A run that is being recorded.
+pub(crate) struct OpenRun<'timeline> {
+    timeline: &'timeline Timeline,
+    number: u32,
+    frame: u64,
+    graph: Arc<Graph>,
+    began: Duration,
+}
+
+/// How a run has ended.
+pub(crate) struct Ended {
+    pub(crate) workers: usize,
+    /// How long it had gone on when others were let in.
+    pub(crate) shared_from: Option<Duration>,
+    pub(crate) always_shares: bool,
+    pub(crate) failed: bool,
+}
+
+impl OpenRun<'_> {
+    /// A worker opens a process of the run, and begins with its chunks.
+    #[inline]
+    pub(crate) fn open(&self, worker: usize, process: u32, stolen: bool) -> Lap<'_> {
+        Lap::open(&self.timeline.lanes[worker], &self.timeline.clock, self.number, process, stolen)
+    }
+
+    /// A worker joins those at a process of the run that was opened at that moment.
+    #[inline]
+    pub(crate) fn join(&self, worker: usize, process: u32, stolen: bool, opened: u64) -> Lap<'_> {
+        Lap::join(&self.timeline.lanes[worker], &self.timeline.clock, self.number, process, stolen, opened)
+    }
+
+    /// The run has ended.
+    pub(crate) fn end(self, how: Ended) {
+        let Self { timeline, number, frame, graph, began } = self;
+        let Ended { workers, shared_from, always_shares, failed } = how;
+        let ended = timeline.now();
+        let shared_from = shared_from.map(|after| began + after);
+        let mut book = timeline.book.lock();
+        book.open.retain(|&open| open != number);
+        let cut = book.cut.len();
+        book.cut.retain(|&cut| cut != number);
+        let complete = book.cut.len() == cut;
+        let (chunks, empty) = (Vec::new(), Vec::new());
+        let run =
+            Run { frame, graph, workers, began, ended, shared_from, always_shares, failed, complete, chunks, empty };
+        book.keep(|kept| &mut kept.runs, (number, run));
+    }
+}
+
+/// What is told of frames, runs and spans, which are few.
+#[derive(Default)]
+struct Book {
+    marks: Marks,
+    next_frame: u64,
+    next_run: u32,
+    /// The runs that are going on.
+    open: Vec<u32>,
+    /// Those of them of which something was lost as a log was taken.
+    cut: Vec<u32>,
+    kept: Kept,
+    threads: Vec<(thread::ThreadId, String)>,
+}
+
+/// Who says when a frame begins.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum Marks {
+    #[default]
+    Runs,
+    Renderer,
+    Engine,
+}
+
+/// What is kept until a log is taken.
+#[derive(Default)]
+struct Kept {
+    /// Their numbers, and when they began.
+    frames: Vec<(u64, Duration)>,
+    runs: Vec<(u32, Run)>,
+    spans: Vec<Span>,
+    counters: Vec<Counter>,
+    threads: Vec<String>,
+    dropped: u64,
+}
+
+impl Book {
+    /// The number of the current frame.
+    fn frame(&self) -> u64 {
+        self.next_frame.saturating_sub(1)
+    }
+
+    fn begin_frame(&mut self, now: Duration) {
+        let number = self.next_frame;
+        self.next_frame += 1;
+        self.keep(|kept| &mut kept.frames, (number, now));
+    }
+
+    /// Keeps something in one of the lists, if there is room.
+    fn keep<T>(&mut self, list: impl FnOnce(&mut Kept) -> &mut Vec<T>, value: T) {
+        let list = list(&mut self.kept);
+        if list.len() < MOST_KEPT {
+            list.push(value);
+        } else {
+            self.kept.dropped += 1;
+        }
+    }
+
+    /// The calling thread's place among those that have spans.
+    fn this_thread(&mut self) -> usize {
+        let this = thread::current();
+        let place = self.threads.iter().position(|(id, _)| *id == this.id());
+        place.unwrap_or_else(|| {
+            let name = this.name().map_or_else(|| format!("thread {}", self.threads.len()), str::to_owned);
+            self.threads.push((this.id(), name));
+            self.threads.len() - 1
+        })
+    }
+
+    fn take(&mut self) -> Kept {
+        self.kept.threads = self.threads.iter().map(|(_, name)| name.clone()).collect();
+        mem::take(&mut self.kept)
+    }
+
+    /// What is going on, and what has ended while chunks were taken out, is not complete any more.
+    fn cut_open_runs(&mut self) {
+        self.cut.clone_from(&self.open);
+        self.kept.runs.iter_mut().for_each(|(_, run)| run.complete = false);
+    }
+}
+
+/// The frames that were marked, and those that anything else belongs to.
+fn frames_of(marked: Vec<(u64, Duration)>, log: &Log) -> Vec<Frame> {
+    let mut frames: Vec<_> = marked.into_iter().map(|(number, began)| Frame { number, began, ended: began }).collect();
+    let runs = log.runs.iter().map(|run| (run.frame, run.began, run.ended));
+    let spans = log.spans.iter().map(|span| (span.frame, span.began, span.ended));
+    for (number, began, ended) in runs.chain(spans) {
+        let place = frames.partition_point(|frame| frame.number < number);
+        if frames.get(place).is_none_or(|frame| frame.number != number) {
+            frames.insert(place, Frame { number, began, ended });
+        }
+        let frame = &mut frames[place];
+        (frame.began, frame.ended) = (frame.began.min(began), frame.ended.max(ended));
+    }
+    frames
+}

@@ -1,0 +1,104 @@
+//! What a timeline says of frames, and that it changes nothing of them.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use drawloom::report::{Prices, Replay, ReportError};
+use drawloom::{FrameError, Granularity};
+
+use crate::renderer;
+use crate::scenes::field;
+
+#[test]
+fn a_recorded_frame_draws_the_same() {
+    let scene = field(500);
+    for workers in [1, 2] {
+        let (mut renderer, submitter) = renderer(workers, Granularity::Chunk(64));
+        let plain = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        renderer.scheduler().timeline().start();
+        let recorded = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        assert_eq!(recorded.submission.passes, plain.submission.passes);
+        assert_eq!(recorded.statistics.views, plain.statistics.views);
+    }
+}
+
+#[test]
+fn a_log_accounts_for_whole_frames() {
+    let scene = field(2_000);
+    for workers in [1, 2] {
+        let (mut renderer, submitter) = renderer(workers, Granularity::Chunk(64));
+        renderer.scheduler().timeline().start();
+        let start = Instant::now();
+        for number in 0..3 {
+            let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+            assert_eq!(recorded.frame_number(), Some(number));
+            submitter.submit(recorded).unwrap();
+        }
+        let took = start.elapsed();
+        let log = renderer.scheduler().timeline().take();
+        assert_eq!(log.frames.iter().map(|frame| frame.number).collect::<Vec<_>>(), [0, 1, 2]);
+        assert!(log.frames[2].ended - log.frames[0].began <= took);
+        for (frame, run) in log.frames.iter().zip(&log.runs) {
+            assert_eq!((run.frame, run.workers, run.complete), (frame.number, workers, true));
+            let spans: Vec<_> = log.spans_of(frame.number).collect();
+            assert_eq!(spans.iter().map(|span| span.name.as_str()).collect::<Vec<_>>(), ["record", "submit"]);
+            assert!(frame.began <= spans[0].began && spans[0].began < run.began && run.ended < spans[0].ended);
+            assert!(spans[0].ended <= spans[1].began && spans[1].ended == frame.ended);
+
+            // Objects are counted by whoever looks at them, whatever the size of a job.
+            let processes = run.graph.processes.iter().enumerate();
+            let seen = processes.filter(|(_, process)| process.labels.phase.as_deref() == Some("visibility"));
+            let seen: Vec<_> = seen.map(|(index, _)| run.width(index)).collect();
+            assert_eq!(seen, vec![2_000; scene.cameras.len()]);
+
+            let replay = Replay::of_frame(&log, frame.number, Prices::FREE).unwrap();
+            let serial = (spans[0].ended - spans[0].began) - run.took() + (spans[1].ended - spans[1].began);
+            assert_eq!(replay.frame_time(1), run.work() + serial);
+            assert!(replay.frame_time(8) < replay.frame_time(1));
+        }
+    }
+}
+
+#[test]
+fn every_job_says_which_process_phase_and_view_it_is_of() {
+    let scene = field(300);
+    let (mut renderer, _submitter) = renderer(1, Granularity::default());
+    renderer.scheduler().timeline().start();
+    let _recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let log = renderer.scheduler().timeline().take();
+    let labels = || log.runs[0].graph.processes.iter().map(|process| &process.labels);
+    let plan = renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
+    let processes: BTreeSet<_> = labels().filter_map(|labels| labels.process.clone()).collect();
+    assert_eq!(processes, plan.collect::<BTreeSet<_>>());
+    let views: BTreeSet<_> = labels().filter_map(|labels| labels.view.as_deref()).collect();
+    assert!(scene.cameras.iter().all(|camera| views.contains(camera.name.as_str())), "{views:?}");
+    let phases: BTreeSet<_> = labels().map(|labels| labels.phase.as_deref().unwrap()).collect();
+    let expected = [
+        "compact",
+        "fill",
+        "finish",
+        "instance",
+        "objects",
+        "prepare",
+        "record",
+        "sort",
+        "split",
+        "upload",
+        "visibility",
+    ];
+    assert_eq!(phases, BTreeSet::from(expected));
+}
+
+#[test]
+fn a_frame_that_was_not_recorded_cannot_be_reported_on() {
+    let (mut renderer, _submitter) = renderer(1, Granularity::default());
+    let mut scene = field(10);
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    assert_eq!(recorded.frame_number(), None);
+    renderer.scheduler().timeline().start();
+    scene.cameras.clear();
+    assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::NoView)));
+    let log = renderer.scheduler().timeline().take();
+    assert_eq!((log.frames.len(), log.runs.len()), (1, 0));
+    assert_eq!(Replay::of_frame(&log, 0, Prices::FREE).unwrap_err(), ReportError::NoRun { frame: 0 });
+}

@@ -1,0 +1,246 @@
+//! What a timeline says of a run: every item of every process once, in an order that keeps every dependency.
+
+use std::{
+    hint::black_box,
+    ops::Range,
+    sync::{LazyLock, Mutex},
+    time::Duration,
+};
+
+use drawloom::{
+    graph::{Closure, FrameGraph, Node, NodeError, Schedule},
+    task::{Scheduler, Worker},
+    timeline::{Chunk, IdleKind, Log},
+};
+use proptest::{collection::vec, prelude::*};
+
+use crate::oracle::sound_sketch;
+
+/// A process of so many items, each of which takes some time. The chunk is the caller's.
+#[derive(Clone, Copy, Debug)]
+struct Busy {
+    width: usize,
+    pinned: bool,
+}
+
+/// What a run is lent.
+struct Call {
+    chunk: usize,
+    fails: bool,
+}
+
+impl Node<Call> for Busy {
+    fn width(&self, _call: &Call) -> usize {
+        self.width
+    }
+
+    fn chunk(&self, call: &Call) -> usize {
+        call.chunk
+    }
+
+    fn pinned(&self) -> bool {
+        self.pinned
+    }
+
+    fn run(&self, call: &Call, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+        range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
+        if call.fails { Err("it was to fail".into()) } else { Ok(()) }
+    }
+}
+
+/// What must hold of the record of the only run of the schedule, in chunks of that size.
+fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
+    let [run] = log.runs.as_slice() else { panic!("{} runs", log.runs.len()) };
+    assert!(run.complete && !run.failed);
+    assert_eq!((run.workers, log.workers.len(), log.all_dropped()), (workers, workers, 0));
+    assert_eq!(run.graph.processes.len(), schedule.len());
+    assert!(workers > 1 || run.shared_from.is_none());
+    assert!(run.shared_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
+    for (index, (process, (name, busy))) in run.graph.processes.iter().zip(schedule.processes()).enumerate() {
+        assert_eq!(process.name, name);
+        assert_eq!(process.dependencies, schedule.dependencies(index));
+        assert_eq!(process.pinned, busy.pinned);
+        let mut next = 0;
+        let empty = run.empty.iter().filter(|empty| empty.process == index);
+        let parts: Vec<&Chunk> = run.chunks_of(index).iter().chain(empty).collect();
+        for part in &parts {
+            assert_eq!((part.process, part.items.clone()), (index, next..(next + chunk).min(busy.width)));
+            next = part.items.end;
+            assert!(part.opened <= part.started && part.started < part.ended);
+            assert!(run.began <= part.opened && part.ended <= run.ended);
+            assert_eq!(part.opened, parts[0].opened, "all chunks of a process are opened at once");
+            assert!(part.worker < workers && !(busy.pinned && part.worker != 0));
+            assert!(!(part.stolen && (workers == 1 || busy.pinned)), "{part:?}");
+            for &dependency in &process.dependencies {
+                let before = run.chunks_of(dependency).iter();
+                before.for_each(|before| assert!(before.ended <= part.opened, "{before:?} and {part:?}"));
+            }
+            let is_alone = run.shared_from.is_none_or(|from| part.started < from);
+            assert!(!is_alone || part.worker == 0, "{part:?} of a worker that was not let in");
+        }
+        assert_eq!(next, busy.width);
+        assert_eq!((parts.is_empty(), run.width(index)), (false, busy.width));
+    }
+    assert_eq!(run.chunks.len(), (0..schedule.len()).map(|index| run.chunks_of(index).len()).sum::<usize>());
+    assert_eq!(run.work(), run.chunks.iter().map(Chunk::took).sum());
+    for (worker, record) in log.workers.iter().enumerate() {
+        let chunks = run.chunks.iter().chain(&run.empty).filter(|chunk| chunk.worker == worker);
+        let idle = record.idle.iter().map(|idle| (idle.began, idle.ended));
+        let mut spans: Vec<_> = chunks.map(|chunk| (chunk.started, chunk.ended)).chain(idle).collect();
+        spans.sort_unstable();
+        assert!(spans.windows(2).all(|pair| pair[0].1 <= pair[1].0), "worker {worker} did two things at once");
+    }
+}
+
+/// What the timeline says of one run.
+fn recorded(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, call: &Call) -> Log {
+    let timeline = scheduler.timeline();
+    timeline.take();
+    timeline.start();
+    _ = schedule.run(scheduler, call);
+    timeline.stop();
+    timeline.take()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    #[test]
+    fn each_item_is_in_one_chunk_and_chunks_keep_all_dependencies(
+        sketch in sound_sketch(),
+        processes in vec((0..90_usize, prop::bool::weighted(0.2)), 24),
+        chunks in vec(1..40_usize, 3),
+        always_shares in any::<bool>(),
+    ) {
+        let graph = sketch.graph(|process| Busy { width: processes[process].0, pinned: processes[process].1 });
+        let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        schedule.always_share(always_shares);
+        for scheduler in &*RECORDED {
+            for &chunk in &chunks {
+                let log = recorded(&mut schedule, scheduler, &Call { chunk, fails: false });
+                check(&log, &schedule, chunk, scheduler.workers());
+                // One that is not recorded leaves nothing in the next.
+                schedule.run(scheduler, &Call { chunk: 1, fails: false }).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
+    let scheduler = Scheduler::new(2).unwrap();
+    let mut schedule = one_process(Busy { width: 20_000, pinned: false });
+    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
+    check(&log, &schedule, 16, 2);
+    assert!(log.runs[0].shared_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].shared_from);
+    schedule.always_share(true);
+    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
+    assert_eq!(log.runs[0].shared_from, Some(log.runs[0].began));
+}
+
+#[test]
+fn a_run_that_failed_says_so_and_leaves_nothing_in_the_next() {
+    let scheduler = Scheduler::new(2).unwrap();
+    let mut schedule = one_process(Busy { width: 50, pinned: false });
+    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 1, fails: true });
+    assert!(log.runs[0].failed && log.runs[0].complete);
+    assert!((1..50).contains(&log.runs[0].chunks.len()), "{} chunks", log.runs[0].chunks.len());
+    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 7, fails: false });
+    check(&log, &schedule, 7, 2);
+}
+
+#[test]
+fn what_there_is_no_room_for_is_counted_and_the_run_is_not_complete() {
+    let scheduler = Scheduler::builder().workers(1).timeline_capacity(64).build().unwrap();
+    let mut schedule = one_process(Busy { width: 100, pinned: false });
+    scheduler.timeline().start();
+    for chunk in [4, 1, 4] {
+        schedule.run(&scheduler, &Call { chunk, fails: false }).unwrap();
+    }
+    let log = scheduler.timeline().take();
+    assert_eq!(log.runs.iter().map(|run| run.chunks.len()).collect::<Vec<_>>(), [25, 39, 0]);
+    assert_eq!(log.runs.iter().map(|run| run.complete).collect::<Vec<_>>(), [true, false, false]);
+    assert_eq!((log.workers[0].dropped, log.all_dropped()), (61 + 25, 61 + 25));
+    // There is room again.
+    schedule.run(&scheduler, &Call { chunk: 4, fails: false }).unwrap();
+    check(&scheduler.timeline().take(), &schedule, 4, 1);
+}
+
+#[test]
+fn a_run_amid_which_a_log_is_taken_is_not_complete_and_what_is_lost_is_counted() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let early = Mutex::new(None);
+    let mut graph = FrameGraph::new();
+    let look = Closure::new(|_: &(), range: Range<usize>, _worker| {
+        if range.start == 5 {
+            *early.lock().unwrap() = Some(scheduler.timeline().take());
+        }
+        Ok(())
+    });
+    let process = graph.add("look", look.with_width(|_| 9));
+    graph.keep(process);
+    let mut schedule = graph.compile().unwrap();
+    scheduler.timeline().start();
+    schedule.run(&scheduler, &()).unwrap();
+    let early = early.lock().unwrap().take().unwrap();
+    assert_eq!((early.runs.len(), early.all_dropped()), (0, 5));
+    let late = scheduler.timeline().take();
+    assert_eq!((late.runs[0].complete, late.runs[0].chunks.len()), (false, 4));
+    schedule.run(&scheduler, &()).unwrap();
+    assert!(!scheduler.timeline().take().runs[0].complete);
+}
+
+#[test]
+fn frames_are_runs_unless_the_engine_marks_its_own() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let timeline = scheduler.timeline();
+    timeline.mark_frame();
+    assert_eq!(timeline.take().frames, [], "it is off");
+    timeline.start();
+    let mut run = || schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    run();
+    run();
+    let log = timeline.take();
+    assert_eq!(log.runs.iter().map(|run| run.frame).collect::<Vec<_>>(), [0, 1]);
+    assert_eq!(log.frames.iter().map(|frame| frame.number).collect::<Vec<_>>(), [0, 1]);
+    timeline.mark_frame();
+    run();
+    let simulated = timeline.span("simulate");
+    run();
+    drop(simulated);
+    timeline.count("objects", 3.0);
+    timeline.mark_frame();
+    let log = timeline.take();
+    assert_eq!(log.runs.iter().map(|run| run.frame).collect::<Vec<_>>(), [2, 2]);
+    assert_eq!(log.frames.iter().map(|frame| frame.number).collect::<Vec<_>>(), [2, 3]);
+    assert!(log.frames[0].began <= log.runs[0].began && log.frames[0].ended == log.spans[0].ended);
+    assert_eq!((log.spans[0].name.as_str(), log.spans[0].frame), ("simulate", 2));
+    assert!(log.threads[log.spans[0].thread].contains("frames_are_runs"));
+    assert_eq!((log.counters[0].name.as_str(), log.counters[0].value), ("objects", 3.0));
+}
+
+#[test]
+fn who_slept_before_it_was_started_is_seen_asleep() {
+    let scheduler = Scheduler::new(2).unwrap();
+    let asleep = |log: &Log| log.workers[1].idle.iter().any(|idle| idle.kind == IdleKind::Asleep);
+    let is_seen = (0..10_000).any(|_look| {
+        std::thread::sleep(Duration::from_millis(1));
+        asleep(&scheduler.timeline().take())
+    });
+    assert!(is_seen);
+    scheduler.timeline().start();
+    let log = scheduler.timeline().take();
+    assert!(asleep(&log) && log.workers[1].idle[0].began < log.workers[1].idle[0].ended);
+}
+
+fn one_process(busy: Busy) -> Schedule<Busy> {
+    let mut graph = FrameGraph::new();
+    let process = graph.add("busy", busy);
+    graph.keep(process);
+    graph.compile().unwrap()
+}
+
+/// Those of the other tests are busy with other tests' runs, which would be recorded too.
+static RECORDED: LazyLock<[Scheduler; 3]> =
+    LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));
