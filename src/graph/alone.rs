@@ -12,31 +12,35 @@ use super::{
     error::NodeError,
     execute::{Position, Run},
     node::Node,
-    watch::Turn,
+    watch::Onlooker,
 };
 
 /// Where a run stood when it took too long for one thread: all before this process is done.
-pub(super) struct Left<'run> {
+pub(super) struct Left<O> {
     pub(super) process: u32,
     pub(super) chunks: Chunks,
     /// How many of the process' chunks are done.
     pub(super) done: usize,
-    /// The worker at it, where somebody looks on.
-    pub(super) turn: Option<Turn<'run>>,
+    /// Who looks on at it.
+    pub(super) onlooker: O,
 }
 
 impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
-    /// Runs everything, unless it takes longer than `at_most`; then it says where it stopped.
-    pub(super) fn go_alone(&self, worker: &Worker, start: Instant, at_most: Option<Duration>) -> Option<Left<'_>> {
-        let mut patience = at_most.map(|at_most| Patience { start, at_most, chunks: 0, next_look: 1 });
+    /// Runs everything, unless it takes longer than a limit since some moment; then it says where it stopped.
+    pub(super) fn go_alone<O: Onlooker>(
+        &self,
+        worker: &Worker,
+        limit: Option<(Instant, Duration)>,
+        mut onlooker: O,
+    ) -> Option<Left<O>> {
+        let mut patience = limit.map(|(start, at_most)| Patience { start, at_most, chunks: 0, next_look: 1 });
         // One attempt for all: an attempt a process would cost more than the rest of what is done for it.
         let left = self.attempt(0, |position| {
-            let mut turn = None;
             for process in 0..self.schedule.flow.len() as u32 {
                 *position = Position { process, item: 0 };
-                self.open_alone(process, worker, &mut turn);
-                if let Some((chunks, done)) = self.run_alone(position, worker, patience.as_mut(), &mut turn)? {
-                    return Ok(Some(Left { process, chunks, done, turn }));
+                onlooker.go_on(process);
+                if let Some((chunks, done)) = self.run_alone(position, worker, patience.as_mut(), &mut onlooker)? {
+                    return Ok(Some(Left { process, chunks, done, onlooker }));
                 }
             }
             Ok(None)
@@ -44,39 +48,30 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         left.flatten()
     }
 
-    /// The process is opened, if somebody looks on.
-    #[inline]
-    fn open_alone<'run>(&'run self, process: u32, worker: &Worker, turn: &mut Option<Turn<'run>>) {
-        let Some(watch) = &self.watch else { return };
-        match turn {
-            None => *turn = Some(watch.open(worker, process)),
-            Some(turn) => turn.go_on(watch, process),
-        }
-    }
-
-    /// Runs one process, unless the time is over: then it says how many of which chunks are done. Whoever may run a pinned one has begun it, and ends it.
+    /// Runs one process, unless the time is over: then it says how many of which chunks are done. Whoever may run a pinned one
+    /// has begun it, and ends it.
     #[inline]
     fn run_alone(
         &self,
         position: &mut Position,
         worker: &Worker,
         mut patience: Option<&mut Patience>,
-        turn: &mut Option<Turn<'_>>,
+        onlooker: &mut impl Onlooker,
     ) -> Result<Option<(Chunks, usize)>, NodeError> {
         let process = position.process;
         // Of no use here, unless the time is over; but what fails is to fail on one thread as on many.
         let is_pinned = self.node(process).pinned();
         let chunks = self.chunks(process, worker);
+        if chunks.count() == 0 {
+            onlooker.end_empty();
+        }
         for place in 0..chunks.count() {
             let done = place + 1;
-            self.run_chunks(position, &chunks, place..done, worker, turn)?;
+            self.run_chunks(position, &chunks, place..done, worker, onlooker)?;
             let is_over = patience.as_mut().is_some_and(|patience| patience.is_over());
             if is_over && (done == chunks.count() || !is_pinned) {
                 return Ok(Some((chunks, done)));
             }
-        }
-        if let Some(turn) = turn.as_mut().filter(|_| chunks.count() == 0) {
-            turn.end_empty();
         }
         Ok(None)
     }

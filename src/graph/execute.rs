@@ -14,7 +14,7 @@ use super::{
     node::Node,
     schedule::Schedule,
     sharing::Way,
-    watch::{Turn, Watch},
+    watch::{Nobody, Onlooker, Watch},
 };
 
 impl<P> Schedule<P> {
@@ -61,13 +61,13 @@ impl<P> Schedule<P> {
             failure: Mutex::new(None),
         };
         let (shared_from, outcome) = match way {
-            Way::Alone { at_most } => match run.go_alone(worker, start, at_most) {
-                None => (None, Ok(())),
-                Some(left) => {
-                    let shared_from = start.elapsed();
-                    (Some(shared_from), run.share_rest(left, worker))
+            Way::Alone { at_most } => {
+                let limit = at_most.map(|at_most| (start, at_most));
+                match &run.watch {
+                    None => run.go_alone_first(worker, limit, Nobody),
+                    Some(watch) => run.go_alone_first(worker, limit, watch.go_alone(worker)),
                 }
-            },
+            }
             Way::Shared { .. } => (Some(Duration::ZERO), run.share(worker)),
         };
         let took = start.elapsed();
@@ -140,6 +140,22 @@ pub(super) struct Position {
 }
 
 impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
+    /// Runs all alone, or, from where that takes too long, with the others: says how long it had gone on then.
+    fn go_alone_first(
+        &self,
+        worker: &Worker,
+        limit: Option<(Instant, Duration)>,
+        onlooker: impl Onlooker,
+    ) -> (Option<Duration>, Result<(), JobPanic>) {
+        match (self.go_alone(worker, limit, onlooker), limit) {
+            (Some(left), Some((start, _))) => {
+                let shared_from = start.elapsed();
+                (Some(shared_from), self.share_rest(left, worker))
+            }
+            _ => (None, Ok(())),
+        }
+    }
+
     /// Calls what is a user's, beginning with this process, and stops the run if it fails: then there is no result. `call`
     /// keeps its position up to date.
     #[inline]
@@ -175,7 +191,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         chunks: &Chunks,
         places: Range<usize>,
         worker: &Worker,
-        turn: &mut Option<Turn<'_>>,
+        onlooker: &mut impl Onlooker,
     ) -> Result<(), NodeError> {
         for place in places {
             if self.is_stopped() {
@@ -184,10 +200,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             let range = chunks.range(place);
             position.item = range.start;
             let run = |range| self.node(position.process).run(self.context, range, worker);
-            match turn {
-                None => run(range),
-                Some(turn) => turn.chunk(range, run),
-            }?;
+            onlooker.chunk(range, run)?;
         }
         Ok(())
     }

@@ -15,10 +15,18 @@ use std::ops::Range;
 
 use crate::{
     sync::Instant,
-    task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens},
+    task::{Band, Chunks, Crew, JobPanic, Tokens, Worker, run_tokens},
 };
 
-use super::{alone::Left, execute::Run, node::Node, progress::OpenPass, schedule::Schedule, token::Token, watch::Turn};
+use super::{
+    alone::Left,
+    execute::Run,
+    node::Node,
+    progress::OpenPass,
+    schedule::Schedule,
+    token::Token,
+    watch::{Nobody, Onlooker},
+};
 
 impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// Runs everything.
@@ -44,7 +52,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// # Errors
     ///
     /// As [`share`](Self::share).
-    pub(super) fn share_rest(&self, left: Left<'_>, worker: &Worker) -> Result<(), JobPanic> {
+    pub(super) fn share_rest(&self, left: Left<impl Onlooker>, worker: &Worker) -> Result<(), JobPanic> {
         let is_half_done = left.done < left.chunks.count();
         let first_open = if is_half_done { left.process } else { left.process + 1 };
         run_tokens(worker, self, |crew| {
@@ -59,9 +67,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if is_half_done {
                 let pass = self.schedule.progress.pass(left.process);
                 pass.open(left.chunks, left.done);
-                if let Some(turn) = left.turn {
-                    turn.leave(&pass.opened);
-                }
+                left.onlooker.leave(&pass.opened);
                 if self.join(left.process, crew) {
                     self.go_on_after(left.process, crew);
                 }
@@ -107,7 +113,11 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         while let Some((process, is_pinned)) = next {
             self.schedule.progress.arm(process, self.schedule.flow.dependency_count(process));
             self.clock.start(process);
-            if !self.work_on(process, is_pinned, crew) {
+            let is_done = match &self.watch {
+                None => self.work_on(process, is_pinned, crew, Nobody),
+                Some(watch) => self.work_on(process, is_pinned, crew, watch.open(crew.worker(), process)),
+            };
+            if !is_done {
                 return;
             }
             next = self.complete(process, crew).map(|next| (next, false));
@@ -130,31 +140,28 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
 
     /// Runs a process that has just started. True if it is done, and false if whoever finishes its last chunk is to
     /// complete it.
-    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
+    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>, mut onlooker: impl Onlooker) -> bool {
         if self.is_stopped() {
             return true;
         }
         let worker = crew.worker();
-        let mut turn = self.watch.as_ref().map(|watch| watch.open(worker, process));
         let chunks = self.clock.work(|| {
             self.attempt(process, |position| {
                 let chunks = self.chunks(process, worker);
                 if chunks.count() > 1 && !is_pinned {
                     return Ok(Some(chunks));
                 }
-                self.run_chunks(position, &chunks, 0..chunks.count(), worker, &mut turn)?;
-                if let Some(turn) = turn.as_mut().filter(|_| chunks.count() == 0) {
-                    turn.end_empty();
+                if chunks.count() == 0 {
+                    onlooker.end_empty();
                 }
+                self.run_chunks(position, &chunks, 0..chunks.count(), worker, &mut onlooker)?;
                 Ok(None)
             })
         });
         let Some(Some(chunks)) = chunks else { return true };
         let pass = self.schedule.progress.pass(process);
         pass.open(chunks, 0);
-        if let Some(turn) = turn {
-            turn.leave(&pass.opened);
-        }
+        onlooker.leave(&pass.opened);
         self.join(process, crew)
     }
 
@@ -162,11 +169,14 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     fn join(&self, process: u32, crew: &Crew<'_>) -> bool {
         let pass = self.schedule.progress.pass(process);
         let chunks = pass.chunks();
-        let mut turn = self.watch.as_ref().map(|watch| watch.join(crew.worker(), process, &pass.opened));
-        let pace = pass.tickets.join();
-        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pace, crew, &mut turn));
+        let finished = self.clock.work(|| match &self.watch {
+            None => self.take_chunks(process, pass, &chunks, crew, Nobody),
+            Some(watch) => {
+                self.take_chunks(process, pass, &chunks, crew, watch.join(crew.worker(), process, &pass.opened))
+            }
+        });
         let is_last = pass.finish(finished, &chunks);
-        if is_last && turn.is_some() {
+        if is_last && self.watch.is_some() {
             pass.opened.close();
         }
         is_last
@@ -178,11 +188,11 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         process: u32,
         pass: &OpenPass,
         chunks: &Chunks,
-        mut pace: Pace,
         crew: &Crew<'_>,
-        turn: &mut Option<Turn<'_>>,
+        mut onlooker: impl Onlooker,
     ) -> usize {
         let worker = crew.worker();
+        let mut pace = pass.tickets.join();
         let mut finished = 0;
         loop {
             if finished > 0 && crew.has_pinned() {
@@ -204,7 +214,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if pass.tickets.invites(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
-            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, turn));
+            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, &mut onlooker));
         }
     }
 

@@ -95,7 +95,8 @@ impl Watch<'_> {
             tracing::trace!(target: TARGET, ready, queued = worker.queued());
         }
         let stolen = worker.take_stolen();
-        self.turn(self.recorded.as_ref().map(|run| run.open(worker.index(), process, stolen)), self.span(process))
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, stolen));
+        Turn { watch: self, lap, span: self.span(process).entered() }
     }
 
     /// A worker joins others at a process that was opened.
@@ -103,7 +104,13 @@ impl Watch<'_> {
         let stolen = worker.take_stolen();
         let Opening { at, span } = &*opened.0.lock();
         let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, stolen, *at));
-        self.turn(lap, span.clone())
+        Turn { watch: self, lap, span: span.clone().entered() }
+    }
+
+    /// A worker is to go through all processes by itself.
+    pub(super) fn go_alone(&self, worker: &Worker) -> Turn<'_> {
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), 0, false));
+        Turn { watch: self, lap, span: Span::none().entered() }
     }
 
     /// A process has become ready.
@@ -120,11 +127,6 @@ impl Watch<'_> {
         }
     }
 
-    fn turn<'watch>(&self, lap: Option<Lap<'watch>>, span: Span) -> Turn<'watch> {
-        let in_detail = self.traced.as_ref().is_some_and(|traced| traced.in_detail);
-        Turn { lap, span: span.entered(), in_detail }
-    }
-
     /// The span of a process.
     fn span(&self, process: u32) -> Span {
         let Some(traced) = &self.traced else { return Span::none() };
@@ -134,17 +136,51 @@ impl Watch<'_> {
     }
 }
 
-/// A worker at a process while somebody looks on.
-pub(super) struct Turn<'run> {
-    lap: Option<Lap<'run>>,
-    span: EnteredSpan,
-    in_detail: bool,
+/// Who looks on while a worker is at a process: somebody, or [`Nobody`], and then it costs nothing.
+pub(super) trait Onlooker {
+    /// Runs a chunk.
+    fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R;
+
+    /// The process has no items.
+    fn end_empty(&mut self);
+
+    /// The worker goes on with another process without a break, and opens it.
+    fn go_on(&mut self, process: u32);
+
+    /// The worker leaves the process open for others.
+    fn leave(self, opened: &Opened);
 }
 
-impl Turn<'_> {
-    /// Runs a chunk.
-    pub(super) fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
-        let span = self.in_detail.then(|| {
+/// Nobody looks on.
+pub(super) struct Nobody;
+
+impl Onlooker for Nobody {
+    #[inline]
+    fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
+        run(items)
+    }
+
+    #[inline]
+    fn end_empty(&mut self) {}
+
+    #[inline]
+    fn go_on(&mut self, _process: u32) {}
+
+    #[inline]
+    fn leave(self, _opened: &Opened) {}
+}
+
+/// A worker at a process while somebody looks on.
+pub(super) struct Turn<'run> {
+    watch: &'run Watch<'run>,
+    lap: Option<Lap<'run>>,
+    span: EnteredSpan,
+}
+
+impl Onlooker for Turn<'_> {
+    fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
+        let in_detail = self.watch.traced.as_ref().is_some_and(|traced| traced.in_detail);
+        let span = in_detail.then(|| {
             let (start, end) = (items.start, items.end);
             tracing::trace_span!(target: TARGET, "chunk", start, end).entered()
         });
@@ -156,27 +192,24 @@ impl Turn<'_> {
         result
     }
 
-    /// The process has no items.
-    pub(super) fn end_empty(&mut self) {
+    fn end_empty(&mut self) {
         if let Some(lap) = &mut self.lap {
             lap.end_empty();
         }
     }
 
-    /// The worker goes on with another process without a break, and opens it.
-    pub(super) fn go_on(&mut self, watch: &Watch<'_>, process: u32) {
-        if watch.traced.is_some() {
+    fn go_on(&mut self, process: u32) {
+        if self.watch.traced.is_some() {
             // Out of the old one first.
             self.span = Span::none().entered();
-            self.span = watch.span(process).entered();
+            self.span = self.watch.span(process).entered();
         }
         if let Some(lap) = &mut self.lap {
             lap.go_on(process);
         }
     }
 
-    /// The worker leaves the process open for others.
-    pub(super) fn leave(self, opened: &Opened) {
+    fn leave(self, opened: &Opened) {
         let at = self.lap.as_ref().map_or(0, Lap::opened);
         *opened.0.lock() = Opening { at, span: self.span.exit() };
     }

@@ -1,0 +1,90 @@
+//! Instructions a chunk, with the recorder off and without one.
+
+use std::env;
+use std::error::Error;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use indicatif::ProgressBar;
+use serde_json::Value;
+
+use crate::report::Counted;
+use crate::shape::{CHUNKS, Shape};
+
+type Failure = Box<dyn Error + Send + Sync>;
+
+/// How many frames are run, few and many: what start and end of the program take is in both, and in no difference. Few are
+/// enough for a schedule to have learnt what its processes cost.
+const FRAMES: [usize; 2] = [100, 300];
+
+/// How often each is counted. How many chunks are taken at once depends on the clock, so of several counts the least is right.
+const TRIES: usize = 5;
+
+/// Counts all shapes, in this program and in one that was built without a recorder.
+///
+/// # Errors
+/// If there is no valgrind, if the other program does not build, or if one of them fails.
+pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
+    progress.set_message("building without a recorder");
+    let without = build_without_recorder()?;
+    let with = env::current_exe()?;
+    let mut counted = Vec::new();
+    for &shape in Shape::ALL {
+        progress.set_message(format!("counting {}", shape.name()));
+        let [off, without] = [&with, &without].map(|program| instructions_a_chunk(program, shape));
+        counted.push(Counted { shape, off: off?, without: without? });
+    }
+    Ok(counted)
+}
+
+/// Builds this program once more, and says where it is.
+fn build_without_recorder() -> Result<PathBuf, Failure> {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("without_timeline");
+    let flags = env::var("RUSTFLAGS").unwrap_or_default() + " --cfg drawloom_without_timeline";
+    let arguments = ["bench", "--no-run", "--bench", "timeline", "--no-default-features", "--message-format", "json"];
+    let output = run(Command::new(env!("CARGO"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("CARGO_TARGET_DIR", target)
+        .env("RUSTFLAGS", flags))?;
+    let text = String::from_utf8(output.stdout)?;
+    let programs = text.lines().filter_map(|line| {
+        let message: Value = serde_json::from_str(line).ok()?;
+        (message["target"]["name"] == "timeline").then(|| message["executable"].as_str().map(PathBuf::from))?
+    });
+    programs.last().ok_or_else(|| "cargo built no program without a recorder".into())
+}
+
+fn instructions_a_chunk(program: &Path, shape: Shape) -> Result<f64, Failure> {
+    let [few, many] = FRAMES.map(|frames| least_instructions(program, shape, frames));
+    Ok((many? - few?) as f64 / ((FRAMES[1] - FRAMES[0]) * CHUNKS) as f64)
+}
+
+fn least_instructions(program: &Path, shape: Shape, frames: usize) -> Result<u64, Failure> {
+    let counts = (0..TRIES).map(|_| instructions(program, shape, frames));
+    Ok(counts.collect::<Result<Vec<_>, _>>()?.into_iter().min().unwrap_or_default())
+}
+
+fn instructions(program: &Path, shape: Shape, frames: usize) -> Result<u64, Failure> {
+    let output = run(Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(program)
+        .args(["--shape", shape.name(), "--frames", &frames.to_string()]))?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    let collected = text.lines().find_map(|line| line.split("Collected :").nth(1));
+    let count = collected.ok_or("valgrind says nothing of what it has counted")?;
+    Ok(count.trim().parse()?)
+}
+
+/// # Errors
+/// If the program is not there, or ends with another status than 0.
+fn run(command: &mut Command) -> Result<Output, Failure> {
+    let name = Path::new(command.get_program()).file_name().unwrap_or(OsStr::new("?")).display().to_string();
+    let output = command.output().map_err(|error| format!("{name} could not be started: {error}"))?;
+    if output.status.success() {
+        return Ok(output);
+    }
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    Err(format!("{name} failed, {}:\n{words}", output.status).into())
+}
