@@ -1,7 +1,10 @@
-//! What a frame could be: its time on a machine of more workers than this one has.
+//! What a frame was, and what it could be: why it took as long as it did, and its time on a machine of more workers than
+//! this one has.
 //!
-//! A frame is recorded by the [timeline](crate::timeline): what every chunk took. A [`Replay`] then runs those chunks again on a clock of its own, on as many workers as are asked for, by the rules of this crate's own
-//! scheduler: who takes what, who is woken when, and what each of that [costs](Prices).
+//! A frame is recorded by the [timeline](crate::timeline): what every chunk took. A [`FrameReport`] tells from that which
+//! processes are to blame for its time. A [`Replay`] runs those chunks again on a clock of its own, on as many workers as are
+//! asked for, by the rules of this crate's own scheduler: who takes what, who is woken when, and what each of that
+//! [costs](Prices).
 //!
 //! ```
 //! use drawloom::{
@@ -39,17 +42,24 @@
 
 mod costs;
 mod crew;
+mod critical_path;
 mod error;
+mod frame_report;
 mod moments;
 mod prices;
+mod queue_waits;
 mod replay;
 mod run;
+mod steps;
+mod words;
+mod worker_times;
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod sketch;
 
 pub use self::{
     error::ReportError,
+    frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
     prices::Prices,
     replay::{Replay, Replayed},
 };

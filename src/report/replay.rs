@@ -11,7 +11,7 @@ use crate::{
 use super::{
     costs::Costs,
     error::ReportError,
-    moments::{length, outermost, union},
+    moments::{length, outermost, own_time, union},
     prices::Prices,
     run::{Outcome, Replays},
 };
@@ -70,10 +70,8 @@ impl Replay {
         if runs.is_empty() {
             return Err(ReportError::NoRun { frame });
         }
-        let of_runs: Vec<_> = runs.iter().map(|run| run.began..run.ended).collect();
-        let of_spans = log.spans_of(frame).map(|span| span.began..span.ended);
-        let all = union(of_spans.chain(of_runs.iter().cloned()));
-        let serial = length(&all).saturating_sub(length(&union(of_runs)));
+        let of_runs = union(runs.iter().map(|run| run.began..run.ended));
+        let serial = length(&own_time(log, frame, &runs)).saturating_sub(length(&of_runs));
         Self::of_runs(runs, serial, prices)
     }
 

@@ -1,0 +1,270 @@
+//! Reports of frames made by hand, whose answers are known.
+
+use std::{ops::Range, sync::Arc, time::Duration};
+
+use drawloom::{
+    report::{FrameReport, Prices, ReportError},
+    timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog},
+};
+
+fn micros(count: u64) -> Duration {
+    Duration::from_micros(count)
+}
+
+fn chunk(process: usize, item: usize, worker: usize, times: Range<u64>) -> Chunk {
+    let [started, ended] = [times.start, times.end].map(micros);
+    Chunk { process, items: item..item + 1, worker, opened: started, started, ended, stolen: worker == 1 }
+}
+
+fn process(name: &str, group: &str, dependencies: &[usize]) -> Process {
+    let labels = Labels { process: Some(group.to_owned()), ..Labels::default() };
+    Process { name: name.to_owned(), labels, dependencies: dependencies.to_vec(), pinned: false }
+}
+
+fn span(name: &str, times: Range<u64>) -> Span {
+    let [began, ended] = [times.start, times.end].map(micros);
+    Span { name: name.to_owned(), thread: 0, frame: 12, began, ended }
+}
+
+/// A frame of two workers, from 1,000 µs on: `record` with a run in it, and `submit` after a while.
+///
+/// ```text
+/// caller    | record 100 | cull 200 | lighting 500          |  end 20, record 80 |   | submit 100 |
+/// worker 1               |  asleep  | . shadow 300 | bloom 200|  searching
+/// ```
+fn log() -> Log {
+    let processes = vec![
+        process("cull", "visibility", &[]),
+        process("lighting, record", "lighting", &[0]),
+        process("shadows, record", "shadows", &[0]),
+        process("bloom", "post", &[2]),
+        process("nothing", "post", &[1, 3]),
+    ];
+    let run = Run {
+        frame: 12,
+        graph: Arc::new(Graph { processes }),
+        workers: 2,
+        began: micros(1_100),
+        ended: micros(1_820),
+        shared_from: Some(micros(1_100)),
+        always_shares: true,
+        complete: true,
+        chunks: vec![
+            chunk(0, 0, 0, 1_100..1_200),
+            chunk(0, 1, 0, 1_200..1_300),
+            chunk(1, 0, 0, 1_300..1_800),
+            chunk(2, 0, 1, 1_350..1_600),
+            chunk(3, 0, 1, 1_600..1_700),
+        ],
+        empty: vec![Chunk { items: 0..0, ..chunk(4, 0, 0, 1_800..1_800) }],
+        ..Run::default()
+    };
+    let idle = |kind, times: Range<u64>| Idle { kind, began: micros(times.start), ended: micros(times.end) };
+    let workers = vec![
+        WorkerLog { name: "caller".to_owned(), ..WorkerLog::default() },
+        WorkerLog {
+            name: "worker 1".to_owned(),
+            idle: vec![idle(IdleKind::Asleep, 900..1_330), idle(IdleKind::Searching, 1_700..1_950)],
+            dropped: 0,
+        },
+    ];
+    Log {
+        workers,
+        threads: vec!["main".to_owned()],
+        runs: vec![run],
+        spans: vec![span("record", 1_000..1_900), span("submit", 2_000..2_100), span("extract", 1_020..1_050)],
+        ..Log::default()
+    }
+}
+
+fn report_of(log: &Log) -> FrameReport {
+    FrameReport::new(log, 12, &Prices::FREE).unwrap()
+}
+
+#[test]
+fn of_a_frame_made_by_hand_all_is_known() {
+    let report = report_of(&log());
+    assert_eq!((report.frame, report.began, report.took), (12, micros(1_000), micros(1_000)));
+    let steps = report.critical_path.iter();
+    let steps: Vec<_> =
+        steps.map(|step| (step.name.as_str(), step.process, step.ready, step.started, step.ended)).collect();
+    let step = |name, process: Option<usize>, ready, started, ended| {
+        (name, process.map(|process| (0, process)), micros(ready), micros(started), micros(ended))
+    };
+    let expected = [
+        step("record, before its jobs", None, 1_000, 1_000, 1_020),
+        step("extract", None, 1_020, 1_020, 1_050),
+        step("record, before its jobs", None, 1_050, 1_050, 1_100),
+        step("cull", Some(0), 1_100, 1_100, 1_300),
+        step("lighting, record", Some(1), 1_300, 1_300, 1_800),
+        step("nothing", Some(4), 1_800, 1_800, 1_800),
+        step("end of the run", None, 1_800, 1_800, 1_820),
+        step("record, after its jobs", None, 1_820, 1_820, 1_900),
+        step("submit", None, 2_000, 2_000, 2_100),
+    ];
+    assert_eq!(steps, expected);
+    let shares: Vec<_> = report.shares.iter().map(|share| (share.group.as_str(), share.took())).collect();
+    let expected = [
+        ("lighting", 500),
+        ("visibility", 200),
+        ("record", 150),
+        ("submit", 100),
+        ("extract", 30),
+        ("end of the run", 20),
+    ];
+    assert_eq!(shares[..6], expected.map(|(group, took)| (group, micros(took))));
+    assert_eq!(report.slack.iter().map(|slack| slack.time).collect::<Vec<_>>(), [0, 0, 100, 100, 0].map(micros));
+    let worker = |index: usize| {
+        let worker = &report.workers[index];
+        let times = [worker.busy, worker.searching, worker.asleep, worker.other];
+        (times, worker.chunks, worker.stolen)
+    };
+    assert_eq!(worker(0), ([700, 0, 0, 300].map(micros), 3, 0));
+    assert_eq!(worker(1), ([350, 200, 330, 120].map(micros), 2, 2));
+    let [wait] = report.queue_waits.as_slice() else { panic!("{:?}", report.queue_waits) };
+    assert_eq!((wait.name.as_str(), wait.waited()), ("shadows, record", micros(50)));
+    assert_eq!(wait.meanwhile, [("lighting".to_owned(), micros(50))]);
+    // On paper nobody is late: 280 µs outside of the run, then cull's two chunks side by side, then lighting.
+    assert_eq!(report.replayed, micros(280 + 100 + 500));
+    let what_if: Vec<_> = report.what_if.iter().map(|what_if| (what_if.group.as_str(), what_if.saved)).collect();
+    // Without lighting, shadows and bloom take 350 µs.
+    assert_eq!(what_if[..2], [("lighting", micros(150)), ("visibility", micros(100))]);
+    assert!(what_if[2..].iter().all(|(_, saved)| saved.is_zero()) && what_if.len() == 4, "{what_if:?}");
+    assert_eq!(report.on_workers, [(1, 1_330), (2, 880), (4, 880), (8, 880), (16, 880)].map(|(w, t)| (w, micros(t))));
+}
+
+#[test]
+fn its_words_say_what_is_to_blame_first() {
+    let words = report_of(&log()).to_string();
+    assert_eq!(words, include_str!("report.txt"));
+}
+
+#[test]
+fn a_run_amid_a_chunk_of_another_counts_once() {
+    let mut log = log();
+    let inner = Run {
+        graph: Arc::new(Graph { processes: vec![process("inner", "inner", &[])] }),
+        began: micros(1_400),
+        ended: micros(1_500),
+        chunks: vec![chunk(0, 0, 0, 1_420..1_480)],
+        empty: Vec::new(),
+        ..log.runs[0].clone()
+    };
+    log.runs.insert(0, inner);
+    // The calling thread waits for the others inside of the chunk.
+    log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: micros(1_480), ended: micros(1_500) });
+    let (report, without) = (report_of(&log), report_of(&self::log()));
+    let names = |report: &FrameReport| report.critical_path.iter().map(|step| step.name.clone()).collect::<Vec<_>>();
+    assert_eq!((report.took, names(&report)), (without.took, names(&without)));
+    assert_eq!(report.critical_path[3].process, Some((1, 0)), "its run is the log's second");
+    let caller = &report.workers[0];
+    assert_eq!([caller.busy, caller.searching, caller.other], [680, 20, 300].map(micros));
+    assert_eq!((caller.chunks, report.what_if), (4, without.what_if));
+}
+
+#[test]
+fn of_two_threads_the_one_that_began_last_counts() {
+    let mut log = log();
+    log.spans.push(span("stream", 1_880..1_950));
+    let path = report_of(&log).critical_path;
+    let last: Vec<_> = path[7..].iter().map(|step| (step.name.as_str(), step.took())).collect();
+    assert_eq!(
+        last,
+        [("record, after its jobs", 60), ("stream", 70), ("submit", 100)].map(|(name, took)| (name, micros(took)))
+    );
+}
+
+#[test]
+fn between_runs_a_span_says_so() {
+    let mut log = log();
+    let later = |time: Duration| time + micros(740);
+    let mut second = log.runs[0].clone();
+    (second.began, second.ended) = (later(second.began), later(second.ended));
+    for chunk in second.chunks.iter_mut().chain(&mut second.empty) {
+        (chunk.opened, chunk.started, chunk.ended) = (chunk.opened, later(chunk.started), later(chunk.ended));
+    }
+    log.runs.push(second);
+    log.spans = vec![span("record", 1_090..2_600)];
+    let report = report_of(&log);
+    let outside = report.critical_path.iter().filter(|step| step.process.is_none());
+    let outside: Vec<_> = outside.map(|step| (step.name.as_str(), step.took())).collect();
+    let expected = [
+        ("record, before its jobs", 10),
+        ("end of the run", 20),
+        ("record, between its jobs", 20),
+        ("end of the run", 20),
+        ("record, after its jobs", 40),
+    ];
+    assert_eq!(outside, expected.map(|(name, took)| (name, micros(took))));
+}
+
+#[test]
+fn what_is_not_whole_is_not_reported_on() {
+    let report = |log: &Log, frame| FrameReport::new(log, frame, &Prices::FREE).map(|_| ());
+    assert_eq!(report(&log(), 13), Err(ReportError::NoRun { frame: 13 }));
+    let mut incomplete = log();
+    incomplete.runs[0].complete = false;
+    assert_eq!(report(&incomplete, 12), Err(ReportError::Incomplete { frame: 12 }));
+    let mut failed = log();
+    failed.runs[0].failed = true;
+    assert_eq!(report(&failed, 12), Err(ReportError::Failed { frame: 12 }));
+}
+
+#[test]
+fn a_log_that_makes_no_sense_is_reported_on_all_the_same() {
+    let range = |start, end| Range { start, end };
+    let mut log = log();
+    let run = &mut log.runs[0];
+    run.chunks[3] = chunk(3, 0, 99, 1..2);
+    run.chunks.push(chunk(77, 0, 1, range(1_400, 1_300)));
+    run.ended = micros(1_500);
+    log.spans.push(span("backwards", range(1_500, 1_400)));
+    log.workers[1].idle.push(Idle { kind: IdleKind::Asleep, began: micros(1_500), ended: micros(1_200) });
+    let mut beside = log.runs[0].clone();
+    (beside.began, beside.ended) = (micros(1_400), micros(1_850));
+    log.runs.push(beside);
+    let backwards = |times: Range<u64>| {
+        let [began, ended] = [times.start, times.end].map(micros);
+        Run { frame: 12, began, ended, complete: true, ..Run::default() }
+    };
+    log.runs.push(backwards(range(1_880, 1_860)));
+    let report = report_of(&log);
+    assert_eq!(report.critical_path.iter().map(|step| step.took()).sum::<Duration>(), report.took);
+    let times = |worker: &drawloom::report::WorkerReport| worker.busy + worker.searching + worker.asleep + worker.other;
+    assert!(report.workers.iter().all(|worker| times(worker) == report.took));
+    let report = report_of(&Log { runs: vec![backwards(range(5, 3))], ..Log::default() });
+    assert_eq!((report.took, report.critical_path), (Duration::ZERO, vec![]));
+}
+
+#[test]
+fn words_are_few_and_keep_to_their_lines_whatever_the_names() {
+    let mut log = log();
+    let names = (0..200).map(|index| format!("{index}\n\u{1b}[31m{}", "x".repeat(10_000)));
+    let processes = names.enumerate().map(|(index, name)| {
+        let before = index.checked_sub(1 + index % 2);
+        process(&name, &name, before.as_slice())
+    });
+    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    log.runs[0].empty.clear();
+    log.runs[0].chunks =
+        (0..200).map(|index| chunk(index, 0, index % 2, 1_100 + index as u64 * 3..1_103 + index as u64 * 3)).collect();
+    log.workers = vec![WorkerLog { name: "w\t".repeat(100), ..WorkerLog::default() }; 100];
+    let words = report_of(&log).to_string();
+    assert!(words.lines().count() < 110, "{words}");
+    let longest = words.lines().map(|line| line.chars().count()).max().unwrap();
+    assert!(longest <= 200, "{longest}");
+    assert!(!words.chars().any(|character| character.is_control() && character != '\n'));
+    assert!(words.contains("shorter steps") && words.contains("more in between") && words.contains("and 84 workers"));
+}
+
+#[test]
+fn many_steps_of_one_group_are_one_line() {
+    let mut log = log();
+    let processes = (0..30).map(|index: usize| process(&format!("p{index}"), "chain", index.checked_sub(1).as_slice()));
+    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    log.runs[0].empty.clear();
+    log.runs[0].chunks =
+        (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();
+    let words = report_of(&log).to_string();
+    assert!(words.contains("  0.100       0.300           -  chain, 30 steps\n"), "{words}");
+}
