@@ -33,8 +33,8 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 }
 
 fn open(adapter: &wgpu::Adapter, required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    // Not needed, but with it there is one more way to record.
-    let welcome = adapter.features() & WgpuBackend::OPTIONAL_FEATURES;
+    // Not needed, but with them there is one more way to record, and passes can be timed.
+    let welcome = adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES);
     let descriptor = wgpu::DeviceDescriptor {
         required_features: WgpuBackend::REQUIRED_FEATURES | welcome,
         required_limits,

@@ -12,7 +12,9 @@ use crate::task::Worker;
 use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 #[cfg(feature = "wgpu")]
-pub use self::wgpu::{Encode, Picture, Record, WgpuBackend, WgpuPass, WgpuResources, WgpuSubmission};
+pub use self::wgpu::{
+    DeviceClock, Encode, PassTime, PassTimes, Picture, Record, WgpuBackend, WgpuPass, WgpuResources, WgpuSubmission,
+};
 pub use null::{NullBackend, NullPass, NullSubmission};
 
 /// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
@@ -182,6 +184,9 @@ pub enum BackendError {
         /// The name asked for.
         target: String,
     },
+    /// When the device drew a pass was asked, and it had not been told to write that down.
+    #[error("passes are not timed: see `WgpuBackend::time_passes`")]
+    NotTimed,
     /// What was handed over breaks a rule of the frame: an error of Drawloom's own.
     #[error("broken rule: {rule}")]
     BrokenRule {

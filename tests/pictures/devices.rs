@@ -18,6 +18,7 @@ pub const CASES: &[Case] = &[
     ("noop_takes_every_frame", noop),
     ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
     ("a_way_to_record_that_the_device_lacks_a_feature_for_is_refused_by_the_features_name", no_indirect_draws),
+    ("times_of_passes_on_a_device_that_writes_none_are_refused_by_the_features_name", no_timestamps),
     ("indirect_draws_that_wgpu_panics_over_are_an_error", indirect_draws_on_noop),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
     ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
@@ -63,6 +64,23 @@ fn no_indirect_draws() -> Result<(), Failed> {
         Some(BackendError::MissingFeature { missing }) if missing.contains("INDIRECT_FIRST_INSTANCE") => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
+}
+
+fn no_timestamps() -> Result<(), Failed> {
+    let scheduler = Scheduler::new(1)?;
+    // wgpu's own backend claims every feature.
+    for (features, reason) in [(wgpu::Features::empty(), ""), (WgpuBackend::TIMING_FEATURES, "noop")] {
+        let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, features)?;
+        let clock = WgpuBackend::new(device.clone(), queue.clone())?.device_clock(scheduler.timeline());
+        for refused in [clock.err(), WgpuBackend::new(device, queue)?.time_passes().err()] {
+            match refused {
+                Some(BackendError::MissingFeature { missing })
+                    if missing.contains("TIMESTAMP_QUERY") && missing.contains(reason) => {}
+                other => return Err(format!("{features:?}: {other:?}").into()),
+            }
+        }
+    }
+    Ok(())
 }
 
 /// On wgpu's own backend its check of indirect draws panics as a pass is finished, on whatever thread that is.

@@ -7,6 +7,7 @@
 #[path = "../../examples/frame/adapter.rs"]
 mod adapter;
 mod changes;
+mod device_times;
 mod devices;
 mod extremes;
 mod geometry;
@@ -61,6 +62,7 @@ fn main() {
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),
         (shadows::CASES, Needs::Adapter),
+        (device_times::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];
     for (cases, needs) in cases {

@@ -42,7 +42,7 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
         };
         let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|error| error.to_string())?;
         let descriptor = wgpu::DeviceDescriptor {
-            required_features: adapter.features() & WgpuBackend::OPTIONAL_FEATURES,
+            required_features: adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES),
             required_limits: adapter.limits(),
             ..wgpu::DeviceDescriptor::default()
         };
@@ -52,13 +52,13 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
 }
 
 /// The techniques that the adapter has.
-fn techniques() -> Result<Vec<(Record, Encode)>, Failed> {
+pub fn techniques() -> Result<Vec<(Record, Encode)>, Failed> {
     let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
     let records = RECORDS.into_iter().filter(|record| has_indirect || *record != Record::Indirect);
     Ok(records.flat_map(|record| ENCODES.map(|encode| (record, encode))).collect())
 }
 
-fn studio_of(backend: WgpuBackend) -> Result<Studio, Failed> {
+pub fn studio_of(backend: WgpuBackend) -> Result<Studio, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     // Small maps are soon drawn, and hold as many draws as large ones.
     let deferred = Deferred::to_picture().shadow_maps(Some(ShadowMaps { side: 64, ..ShadowMaps::default() }));
@@ -73,7 +73,7 @@ fn studio(record: Record, encode: Encode) -> Result<Studio, Failed> {
 }
 
 /// Every main view's picture, and the light in it.
-fn pictures(studio: &Studio, recorded: Recorded<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+pub fn pictures(studio: &Studio, recorded: Recorded<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
     let submission = studio.submit(recorded)?;
     let targets = (0..scene.cameras.len()).flat_map(|view| [(view, "picture"), (view, "radiance")]);
     Ok(targets.map(|(view, target)| submission.read(view, target)).collect::<Result<_, _>>()?)
@@ -85,7 +85,7 @@ fn draw(studio: &mut Studio, scene: &Scene) -> Result<Vec<Picture>, Failed> {
 }
 
 /// What a renderer draws that has drawn nothing before.
-fn drawn_anew(scene: &Scene) -> Result<Vec<Picture>, Failed> {
+pub fn drawn_anew(scene: &Scene) -> Result<Vec<Picture>, Failed> {
     draw(&mut studio(Record::Bundles, Encode::PerPass)?, scene)
 }
 

@@ -29,6 +29,9 @@ impl WgpuBackend {
         checked(&self.device, "the frame's buffers", || {
             let mut buffers = self.buffers.take();
             buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
+            if let Some(timing) = &self.timing {
+                buffers.begin_timestamps(&self.device, request, timing.times_raw)?;
+            }
             // Frames are counted, and nothing is ordered by it.
             let number = self.frames.fetch_add(1, Ordering::Relaxed);
             let background = scene.background.as_dvec3().to_array();

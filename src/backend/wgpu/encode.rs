@@ -7,6 +7,7 @@ use super::chooser::Chooser;
 use super::error_scope::{caught, checked};
 use super::frame::{Commands, Part};
 use super::frame_pass::FramePass;
+use super::ways::Share;
 use super::{Record, WgpuBackend, WgpuCommands, WgpuFrame, WgpuPart, WgpuSubmission, record};
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
@@ -27,16 +28,16 @@ impl WgpuBackend {
     ) -> Result<wgpu::CommandEncoder, BackendError> {
         let FramePass { pass, way, .. } = *frame.pass(index);
         self.encoded(frame, index, |encoder| match &request.draws[pass.process] {
-            Draws::Raw(raw) => record::raw(&self.device, encoder, frame, request, pass, *raw),
+            Draws::Raw(raw) => record::raw(&self.device, encoder, frame, request, index, *raw),
             Draws::Commands(_) if matches!(way.record, Record::Direct | Record::Indirect) => {
-                record::batches(encoder, frame, request, index, list, 0..list.bundle_count())
+                record::batches(encoder, frame, request, index, Share::WHOLE, list, 0..list.bundle_count())
             }
             Draws::Commands(_) => {
                 let bundles = parts.iter().filter_map(|part| match &part.0 {
                     Part::Bundle(bundle) => Some(bundle),
                     Part::Encoder(_) => None,
                 });
-                record::bundles(encoder, frame, request, index, true, bundles);
+                record::bundles(encoder, frame, request, index, Share::WHOLE, bundles);
                 Ok(())
             }
             _ => record::fixed(encoder, frame, request, index),
@@ -57,15 +58,15 @@ impl WgpuBackend {
     ) -> Result<Part, BackendError> {
         let way = frame.pass(index).way;
         let bundles = way.bundles_of(list, part);
+        let share = way.share_of(list, part);
         let encoder = match way.record {
-            Record::Direct | Record::Indirect => {
-                self.encoded(frame, index, |encoder| record::batches(encoder, frame, request, index, list, bundles))
-            }
+            Record::Direct | Record::Indirect => self
+                .encoded(frame, index, |encoder| record::batches(encoder, frame, request, index, share, list, bundles)),
             Record::Bundles | Record::Kept => {
                 let recorded = bundles.map(|place| record::bundle(&self.device, frame, index, list, place));
                 let recorded = recorded.collect::<Result<Vec<_>, _>>()?;
                 self.encoded(frame, index, |encoder| {
-                    record::bundles(encoder, frame, request, index, part == 0, &recorded);
+                    record::bundles(encoder, frame, request, index, share, &recorded);
                     Ok(())
                 })
             }
@@ -99,9 +100,14 @@ impl WgpuBackend {
             }
         }
         let submission = checked(&self.device, "the frame", || {
-            let index = self.queue.submit(finished);
-            WgpuSubmission::new(self.device.clone(), self.queue.clone(), index, Arc::clone(&frame.targets))
-        })?;
+            let times = frame.buffers.timestamps().zip(self.timing.as_ref());
+            let times = times.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
+            let (copied, times) = times.unzip();
+            let index = self.queue.submit(finished.into_iter().chain(copied));
+            let (device, queue) = (self.device.clone(), self.queue.clone());
+            Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), times))
+        })
+        .flatten()?;
         self.note(frame);
         Ok(submission)
     }

@@ -11,6 +11,7 @@ use super::frame_pass::FramePass;
 use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_aligned, check_storage, roomy};
 use super::kept::Subdivided;
 use super::layouts::Layouts;
+use super::timestamps::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
 use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
@@ -124,6 +125,25 @@ impl FrameBuffers {
         Ok(())
     }
 
+    /// Has the frame's passes timed.
+    ///
+    /// # Errors
+    /// If the device has no room. Then they are not to be used any more.
+    pub(super) fn begin_timestamps(
+        &mut self,
+        device: &wgpu::Device,
+        request: &FrameRequest<'_>,
+        times_raw: bool,
+    ) -> Result<(), BackendError> {
+        let Buffers { timestamps, passes, .. } = &mut self.buffers;
+        timestamps.get_or_insert_default().begin(device, request, passes, times_raw)
+    }
+
+    /// `None` where passes are not timed.
+    pub(super) fn timestamps(&self) -> Option<&Timestamps> {
+        self.buffers.timestamps.as_ref()
+    }
+
     /// The passes in the order they are submitted.
     pub(super) fn passes(&self) -> &[FramePass] {
         &self.buffers.passes
@@ -176,6 +196,7 @@ struct Buffers {
     key: GroupsKey,
     next_key: GroupsKey,
     subdivided: RwLock<Subdivided>,
+    timestamps: Option<Timestamps>,
     /// How many frames went by that had others.
     unused: u32,
 }
@@ -203,6 +224,7 @@ impl Default for Buffers {
             key: GroupsKey::default(),
             next_key: GroupsKey::default(),
             subdivided: RwLock::default(),
+            timestamps: None,
             unused: 0,
         }
     }

@@ -17,6 +17,8 @@ pub(super) struct FramePass {
     pub(super) label: String,
     /// Where its objects are among all that are drawn; none for a pass without commands.
     pub(super) drawn_place: Option<usize>,
+    /// Where its times are among those of all passes; none for a pass that is not timed.
+    pub(super) timed_place: Option<usize>,
     /// Where its parameters are, and how many bytes; none for a pass without.
     pub(super) parameters: Option<(usize, usize)>,
     /// `@group(0)`.
@@ -39,6 +41,7 @@ impl Default for FramePass {
             pass: Pass { process: 0, view: 0 },
             label: String::new(),
             drawn_place: None,
+            timed_place: None,
             parameters: None,
             frame_group: None,
             process_group: None,

@@ -18,6 +18,7 @@ mod arguments;
 mod assets;
 mod begin;
 mod chooser;
+mod device_clock;
 mod encode;
 mod error_scope;
 mod frame;
@@ -27,6 +28,7 @@ mod growing_buffer;
 mod kept;
 mod layouts;
 mod light_meshes;
+mod pass_times;
 mod picture;
 mod pipelines;
 mod record;
@@ -34,6 +36,7 @@ mod subdivisions;
 mod targets;
 mod texels;
 mod textures;
+mod timestamps;
 mod ways;
 
 use std::collections::HashMap;
@@ -53,13 +56,16 @@ use self::light_meshes::LightMeshes;
 use self::pipelines::ProcessPipelines;
 use self::subdivisions::Subdivisions;
 use self::targets::TargetCache;
+use self::timestamps::Timing;
 use self::ways::Ways;
 use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::task::Worker;
 use crate::view::ObjectTable;
 
+pub use device_clock::DeviceClock;
 pub use frame::{WgpuCommands, WgpuFrame, WgpuPart};
+pub use pass_times::{PassTime, PassTimes};
 pub use picture::{Picture, WgpuSubmission};
 pub use ways::{Encode, Record, WgpuPass};
 
@@ -90,6 +96,8 @@ pub struct WgpuBackend {
     workers: AtomicUsize,
     /// The passes of commands of the frame that was submitted last.
     latest: Mutex<Vec<WgpuPass>>,
+    /// `None` where passes are not timed.
+    timing: Option<Timing>,
 }
 
 impl WgpuBackend {
@@ -98,6 +106,11 @@ impl WgpuBackend {
 
     /// Features that are used where a device has them: for [`Record::Indirect`].
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
+
+    /// Features that [`WgpuBackend::time_passes`] has a use for. It needs `TIMESTAMP_QUERY`; with the other one it times passes
+    /// that encode themselves as well.
+    pub const TIMING_FEATURES: wgpu::Features =
+        wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
     /// The limits a device must have. Higher ones are used where it has them: for larger pictures, and for more objects.
     pub const REQUIRED_LIMITS: wgpu::Limits = wgpu::Limits::downlevel_defaults();
@@ -137,6 +150,7 @@ impl WgpuBackend {
             frames: AtomicU64::new(0),
             workers: AtomicUsize::new(1),
             latest: Mutex::default(),
+            timing: None,
         })
     }
 
@@ -157,6 +171,17 @@ impl WgpuBackend {
     /// Encodes every pass this way, instead of the one that was measured to be the cheapest.
     pub fn encode(self, encode: Encode) -> Self {
         Self { ways: self.ways.only_encode(encode), ..self }
+    }
+
+    /// Has the device write down when it begins and ends each pass: see [`WgpuSubmission::pass_times`], and [`DeviceClock`] for
+    /// how they get into a log. Of [raw passes](crate::process::RawPass) it does so only where it has
+    /// `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
+    ///
+    /// # Errors
+    /// If the device lacks `TIMESTAMP_QUERY`, or is wgpu's `noop` backend, which has it and writes nothing.
+    pub fn time_passes(self) -> Result<Self, BackendError> {
+        let timing = Some(Timing::new(&self.device, &self.queue)?);
+        Ok(Self { timing, ..self })
     }
 
     /// How the passes of commands of the frame that was submitted last were recorded, in the order of submission.
@@ -397,6 +422,11 @@ impl Backend for WgpuBackend {
     }
 
     fn submit(&self, frame: WgpuFrame, passes: Vec<(Pass, WgpuCommands)>) -> Result<WgpuSubmission, BackendError> {
-        self.submit_frame(&frame, passes).inspect_err(|_| self.buffers.forget())
+        self.submit_frame(&frame, passes).inspect_err(|_| {
+            self.buffers.forget();
+            if let Some(timing) = &self.timing {
+                timing.readbacks.forget();
+            }
+        })
     }
 }

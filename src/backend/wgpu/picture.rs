@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use super::error_scope::checked;
+use super::pass_times::PassTimes;
 use super::targets::{FrameTargets, Target};
+use super::timestamps::Readback;
 use crate::backend::BackendError;
 use crate::process::Format;
 
@@ -13,6 +15,7 @@ pub struct WgpuSubmission {
     queue: wgpu::Queue,
     index: wgpu::SubmissionIndex,
     targets: Arc<FrameTargets>,
+    times: Option<Readback>,
 }
 
 /// A target's pixels.
@@ -34,8 +37,19 @@ impl WgpuSubmission {
         queue: wgpu::Queue,
         index: wgpu::SubmissionIndex,
         targets: Arc<FrameTargets>,
+        times: Option<Readback>,
     ) -> Self {
-        Self { device, queue, index, targets }
+        Self { device, queue, index, targets, times }
+    }
+
+    /// Waits until the device has drawn the frame, and says when it drew which pass.
+    ///
+    /// # Errors
+    /// If the backend was not told to [time passes](super::WgpuBackend::time_passes), or the device is lost.
+    pub fn pass_times(&self) -> Result<PassTimes, BackendError> {
+        let times = self.times.as_ref().ok_or(BackendError::NotTimed)?;
+        self.wait()?;
+        times.read(&self.device)
     }
 
     /// One of a view's targets, to show or to copy; of a target that views share, the texture of all of them. The next frame

@@ -11,7 +11,7 @@ use super::frame::{Part, WgpuFrame, WgpuPart};
 use super::frame_pass::FramePass;
 use super::kept::Subdivided;
 use super::pipelines::fixed_state;
-use super::ways::Record;
+use super::ways::{Record, Share};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawState;
 use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
@@ -151,6 +151,7 @@ pub(super) fn batches(
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
     index: usize,
+    share: Share,
     list: &DrawList,
     bundles: Range<usize>,
 ) -> Result<(), BackendError> {
@@ -161,7 +162,7 @@ pub(super) fn batches(
     let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
     let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
     let batches = &list.batches[first..end.min(list.batches.len())];
-    let mut render_pass = begin_pass(encoder, frame, request, index, bundles.start == 0);
+    let mut render_pass = begin_pass(encoder, frame, request, index, share);
     if batches.is_empty() {
         return Ok(());
     }
@@ -188,10 +189,10 @@ pub(super) fn bundles<'a>(
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
     index: usize,
-    is_first: bool,
+    share: Share,
     bundles: impl IntoIterator<Item = &'a wgpu::RenderBundle>,
 ) {
-    begin_pass(encoder, frame, request, index, is_first).execute_bundles(bundles);
+    begin_pass(encoder, frame, request, index, share).execute_bundles(bundles);
 }
 
 /// Encodes a pass that draws lights, or a full-screen triangle.
@@ -212,7 +213,7 @@ pub(super) fn fixed(
     let pipeline = pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?;
     let subdivided = Subdivided::new();
     let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
-    let mut render_pass = begin_pass(encoder, frame, request, index, true);
+    let mut render_pass = begin_pass(encoder, frame, request, index, Share::WHOLE);
     render_pass.set_pipeline(pipeline);
     prepared.set_groups(&mut render_pass);
     match draws {
@@ -239,14 +240,23 @@ pub(super) fn raw(
     encoder: &mut wgpu::CommandEncoder,
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
-    pass: Pass,
+    index: usize,
     raw: &dyn RawPass,
 ) -> Result<(), BackendError> {
+    let &FramePass { pass, timed_place, .. } = frame.pass(index);
     let textures = |name: &str| frame.targets.find(pass.view, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
     let size = request.views[pass.view].camera.size;
     let resources = Resolved { device, view: pass.view, size, textures: &textures, layered: &layered };
-    raw.encode(encoder, &resources).map_err(BackendError::RawPass)
+    let times = timed_place.and_then(|place| frame.buffers.timestamps()?.of_pass(place));
+    if let Some((set, [began, _])) = times {
+        encoder.write_timestamp(set, began);
+    }
+    raw.encode(encoder, &resources).map_err(BackendError::RawPass)?;
+    if let Some((set, [_, ended])) = times {
+        encoder.write_timestamp(set, ended);
+    }
+    Ok(())
 }
 
 /// Where the mesh of a batch lies in the arenas.
@@ -267,7 +277,7 @@ fn begin_pass<'a>(
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
     index: usize,
-    is_first: bool,
+    share: Share,
 ) -> wgpu::RenderPass<'a> {
     let pass = frame.pass(index);
     let Pass { process, view } = pass.pass;
@@ -275,7 +285,7 @@ fn begin_pass<'a>(
     let mut colors = [const { None }; MOST_COLORS];
     let mut count = 0;
     for (color, (name, clear)) in colors.iter_mut().zip(declaration.colors()) {
-        let clear = clear.filter(|_| is_first);
+        let clear = clear.filter(|_| share.is_first);
         *color = frame.targets.find(view, name).map(|target| wgpu::RenderPassColorAttachment {
             view: &target.view,
             depth_slice: None,
@@ -286,7 +296,7 @@ fn begin_pass<'a>(
     }
     let depth = declaration.depth().and_then(|(name, access)| {
         let target = frame.targets.find(view, name)?;
-        let is_kept = access == Access::DrawDepth || !is_first;
+        let is_kept = access == Access::DrawDepth || !share.is_first;
         // Reversed: 0 is infinitely far away.
         let load = if is_kept { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
         Some(wgpu::RenderPassDepthStencilAttachment {
@@ -299,6 +309,7 @@ fn begin_pass<'a>(
         label: Some(&pass.label),
         color_attachments: &colors[..count],
         depth_stencil_attachment: depth,
+        timestamp_writes: pass.timed_place.and_then(|place| frame.buffers.timestamps()?.of_share(place, share)),
         ..wgpu::RenderPassDescriptor::default()
     })
 }

@@ -91,6 +91,23 @@ impl Way {
         let encoders = self.encoders(bundles);
         encoder * bundles / encoders..(encoder + 1) * bundles / encoders
     }
+
+    /// Which share of a pass one of several encoders has.
+    pub(super) fn share_of(self, list: &DrawList, encoder: usize) -> Share {
+        Share { is_first: encoder == 0, is_last: encoder + 1 == self.encoders(list.bundle_count()) }
+    }
+}
+
+/// Which share of a pass an encoder has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Share {
+    pub(super) is_first: bool,
+    pub(super) is_last: bool,
+}
+
+impl Share {
+    /// All of it.
+    pub(super) const WHOLE: Self = Self { is_first: true, is_last: true };
 }
 
 /// The ways that passes may be recorded: one, or several of which each pass takes the cheapest.
@@ -175,6 +192,10 @@ mod tests {
                 assert_eq!(shared, (0..list.bundle_count()).collect::<Vec<_>>());
                 assert_eq!(encoders > 1, batches > 512);
                 assert!(encoders <= 8);
+                for encoder in 0..encoders {
+                    let expected = Share { is_first: encoder == 0, is_last: encoder == encoders - 1 };
+                    assert_eq!(way.share_of(&list, encoder), expected);
+                }
                 if encoders > 1 {
                     assert_eq!(way.parts(&list), encoders);
                     assert!((0..encoders).all(|encoder| !way.bundles_of(&list, encoder).is_empty()));
