@@ -40,17 +40,21 @@
 //! That all workers share caches, memory and clock rate, and what a process itself makes them wait for: locks, counters.
 //! The more workers, the more a prediction is what could be at best.
 
+mod chrome_trace;
 mod costs;
 mod crew;
 mod critical_path;
 mod error;
 mod frame_report;
 mod moments;
+mod nested_lanes;
+mod passages;
 mod prices;
 mod queue_waits;
 mod replay;
 mod run;
 mod steps;
+mod trace_events;
 mod words;
 mod worker_times;
 
@@ -58,6 +62,7 @@ mod worker_times;
 mod sketch;
 
 pub use self::{
+    chrome_trace::write_chrome_trace,
     error::ReportError,
     frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
     prices::Prices,

@@ -1,4 +1,8 @@
-//! What timelines record, and what is reported of it.
+//! What timelines record, and what is made of it for those who look at one.
 
+mod chrome;
+mod chrome_by_hand;
+mod chrome_golden;
 mod report;
 mod report_properties;
+mod trace;

@@ -1,0 +1,51 @@
+//! A whole trace, letter by letter.
+
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    thread,
+    time::Duration,
+};
+
+use drawloom::{
+    graph::{Closure, FrameGraph},
+    report::write_chrome_trace,
+    task::Scheduler,
+};
+
+#[test]
+fn a_frame_makes_the_golden_trace() {
+    // What calls has a name of its own, since a test's thread has the one that the harness gives it.
+    let trace = thread::Builder::new().name("engine".to_owned()).spawn(trace_of_a_frame).unwrap().join().unwrap();
+    let golden = include_str!("golden_trace.json");
+    assert!(trace == golden, "golden_trace.json is another one:\n{trace}");
+}
+
+/// Four processes, one of them without items, within a span, on a clock that goes on by a microsecond a look.
+fn trace_of_a_frame() -> String {
+    let looks = AtomicU64::new(0);
+    let clock = move || Duration::from_nanos(looks.fetch_add(1_001, Ordering::Relaxed));
+    let scheduler = Scheduler::builder().workers(1).timeline_clock(clock).build().unwrap();
+    let mut graph = FrameGraph::new();
+    let mut add = |name: &str, width: usize| {
+        let items = Closure::new(|_: &(), _range, _worker| Ok(())).with_width(move |_| width).with_chunk(8);
+        let process = graph.add(name, items);
+        graph.keep(process);
+        process
+    };
+    let [cull, shadows, fill, sort] =
+        [("cull", 20), ("shadows", 0), ("fill \"all\"", 8), ("sort", 1)].map(|(name, width)| add(name, width));
+    for (before, after) in [(cull, fill), (shadows, fill), (fill, sort), (cull, sort)] {
+        graph.order(before, after);
+    }
+    let mut schedule = graph.compile().unwrap();
+    let timeline = scheduler.timeline();
+    timeline.start();
+    timeline.mark_frame();
+    let span = timeline.span("frame");
+    schedule.run(&scheduler, &()).unwrap();
+    timeline.count("objects", 20.0);
+    drop(span);
+    let mut trace = Vec::new();
+    write_chrome_trace(&timeline.take(), &mut trace).unwrap();
+    String::from_utf8(trace).unwrap()
+}
