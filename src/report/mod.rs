@@ -41,30 +41,14 @@
 //! The more workers, the more a prediction is what could be at best.
 
 mod chrome_trace;
-mod costs;
-mod crew;
-mod critical_path;
 mod error;
 mod frame_report;
 mod moments;
-mod nested_lanes;
-mod passages;
-mod prices;
-mod queue_waits;
 mod replay;
-mod run;
-mod steps;
-mod trace_events;
-mod words;
-mod worker_times;
-
-#[cfg(all(test, not(drawloom_loom)))]
-mod sketch;
 
 pub use self::{
     chrome_trace::write_chrome_trace,
     error::ReportError,
     frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
-    prices::Prices,
-    replay::{Replay, Replayed},
+    replay::{Prices, Replay, Replayed},
 };

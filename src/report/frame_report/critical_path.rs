@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::timeline::{Log, Run};
 
-use super::frame_report::Slack;
+use super::Slack;
 
 /// A run, and when its processes ran.
 pub(super) struct RunTimes<'log> {

@@ -2,12 +2,12 @@
 
 use std::{ops::Range, time::Duration};
 
-use crate::timeline::{Chunk, IdleKind, Log, Run, WorkerLog};
-
-use super::{
-    frame_report::WorkerReport,
-    moments::{length, union},
+use crate::{
+    report::moments::{length, union},
+    timeline::{Chunk, IdleKind, Log, Run, WorkerLog},
 };
+
+use super::WorkerReport;
 
 /// What a worker ran.
 #[derive(Clone, Default)]

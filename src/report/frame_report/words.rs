@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use super::frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport};
+use super::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport};
 
 /// How long a list may be, for somebody to read it.
 const MOST_LINES: usize = 10;

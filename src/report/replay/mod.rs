@@ -1,5 +1,13 @@
 //! The time of a frame on so many workers.
 
+mod costs;
+mod crew;
+mod prices;
+mod run;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod sketch;
+
 use std::time::Duration;
 
 use crate::{
@@ -8,13 +16,16 @@ use crate::{
     timeline::{Log, Run},
 };
 
-use super::{
+use self::{
     costs::Costs,
-    error::ReportError,
-    moments::{length, outermost, own_time, union},
-    prices::Prices,
     run::{Outcome, Replays},
 };
+use super::{
+    error::ReportError,
+    moments::{length, outermost, own_time, union},
+};
+
+pub use self::prices::Prices;
 
 /// What was recorded of a frame, to be run again by the scheduler's rules on a clock of its own, by any number of workers. The
 /// same record and prices always give the same times.
@@ -171,8 +182,8 @@ mod tests {
 
     use proptest::prelude::*;
 
+    use super::sketch::{Sketch, any_sketch};
     use super::{Prices, Replay, Replayed, Scheduler};
-    use crate::report::sketch::{Sketch, any_sketch};
 
     fn micros(count: u64) -> Duration {
         Duration::from_micros(count)

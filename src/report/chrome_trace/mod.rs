@@ -1,5 +1,9 @@
 //! A log as a trace that Perfetto and `chrome://tracing` open.
 
+mod events;
+mod nested_lanes;
+mod passages;
+
 use std::{
     cmp::Reverse,
     io::{self, BufWriter},
@@ -8,10 +12,10 @@ use std::{
 
 use crate::timeline::{Chunk, DeviceLog, IdleKind, Log, Process, Run};
 
-use super::{
+use self::{
+    events::{Events, Lane, microseconds},
     nested_lanes::nested_lanes,
     passages::{Passage, Passages, slices},
-    trace_events::{Events, Lane, microseconds},
 };
 
 /// The numbers of the processes of a trace: what ran on workers and threads, and what ran on the device.

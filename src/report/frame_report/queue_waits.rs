@@ -2,7 +2,7 @@
 
 use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
 
-use super::{critical_path::RunTimes, frame_report::QueueWait};
+use super::{QueueWait, critical_path::RunTimes};
 
 /// How many waits are told.
 const MOST: usize = 10;

@@ -264,8 +264,8 @@ impl Run<'_> {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::sketch::any_sketch;
     use super::{Costs, Flow, Prices, Replays};
-    use crate::report::sketch::any_sketch;
 
     proptest! {
         #[test]

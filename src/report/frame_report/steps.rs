@@ -2,13 +2,12 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap, ops::Range, time::Duration};
 
-use crate::timeline::{Log, Span};
-
-use super::{
-    critical_path::RunTimes,
-    frame_report::Step,
-    moments::{union, without},
+use crate::{
+    report::moments::{union, without},
+    timeline::{Log, Span},
 };
+
+use super::{Step, critical_path::RunTimes};
 
 /// What a run's time is called from the end of its last process on: workers find that nothing is left, and the calling
 /// thread is woken if it sleeps.

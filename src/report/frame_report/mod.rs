@@ -1,5 +1,11 @@
 //! Why a frame took as long as it did.
 
+mod critical_path;
+mod queue_waits;
+mod steps;
+mod words;
+mod worker_times;
+
 use std::{
     cmp::Reverse,
     collections::{BTreeMap, HashMap},
@@ -8,15 +14,11 @@ use std::{
 
 use crate::timeline::Log;
 
+use self::{critical_path::RunTimes, queue_waits::queue_waits, steps::steps, worker_times::worker_times};
 use super::{
-    critical_path::RunTimes,
     error::ReportError,
     moments::{length, outermost, own_time},
-    prices::Prices,
-    queue_waits::queue_waits,
-    replay::Replay,
-    steps::steps,
-    worker_times::worker_times,
+    replay::{Prices, Replay},
 };
 
 /// Why a frame took as long as it did. Times of moments are those of the [`Log`]. Printed, it is words for a terminal.
