@@ -49,11 +49,11 @@ fn build_without_recorder() -> Result<PathBuf, Failure> {
         .env("CARGO_TARGET_DIR", target)
         .env("RUSTFLAGS", flags))?;
     let text = String::from_utf8(output.stdout)?;
-    let programs = text.lines().filter_map(|line| {
+    let mut programs = text.lines().rev().filter_map(|line| {
         let message: Value = serde_json::from_str(line).ok()?;
         (message["target"]["name"] == "timeline").then(|| message["executable"].as_str().map(PathBuf::from))?
     });
-    programs.last().ok_or_else(|| "cargo built no program without a recorder".into())
+    programs.next().ok_or_else(|| "cargo built no program without a recorder".into())
 }
 
 fn instructions_a_chunk(program: &Path, shape: Shape) -> Result<f64, Failure> {

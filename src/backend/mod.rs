@@ -35,6 +35,11 @@ pub trait Backend: Send + Sync + 'static {
     /// What draws, as reports print it.
     fn adapter(&self) -> String;
 
+    /// How many bytes were uploaded to the device since the backend was made: 0 where nothing is.
+    fn uploaded(&self) -> u64 {
+        0
+    }
+
     /// Starts a frame: uploads what changed of meshes, materials and textures, and makes targets and pipelines.
     ///
     /// # Errors

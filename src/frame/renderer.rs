@@ -111,6 +111,7 @@ impl<B: Backend> Renderer<B> {
             rejections: self.tables.objects.rejections(),
         };
 
+        let uploaded_before = self.backend.uploaded();
         let frame = clock.measure(Stage::Record, || self.backend.begin(&request)).0?;
         self.recordings.resize_with(request.passes.len(), Recording::default);
         self.recordings.iter_mut().for_each(|recording| drop(recording.take()));
@@ -134,7 +135,9 @@ impl<B: Backend> Renderer<B> {
         outcome?;
 
         let queues = queues_of(&request, &mut self.recordings)?;
-        let statistics = statistics_of(&request, &self.tables, &clock);
+        let uploaded = self.backend.uploaded() - uploaded_before;
+        self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
+        let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
         warn_of_changes(&statistics.rejections, &mut self.told);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number })
     }
@@ -200,7 +203,12 @@ fn queues_of<B: Backend>(
     Ok(queues)
 }
 
-fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &StageClock) -> FrameStatistics {
+fn statistics_of(
+    request: &FrameRequest<'_>,
+    tables: &FrameTables,
+    uploaded: u64,
+    clock: &StageClock,
+) -> FrameStatistics {
     let of_view = |(index, view): (usize, &RenderView)| {
         let mut statistics = ViewStatistics {
             name: view.name().to_owned(),
@@ -223,6 +231,7 @@ fn statistics_of(request: &FrameRequest<'_>, tables: &FrameTables, clock: &Stage
         objects: request.scene.object_count(),
         lights: request.scene.lights.len(),
         views: request.views.iter().enumerate().map(of_view).collect(),
+        uploaded,
         stages: clock.times(),
         rejections: request.rejections.list(),
     }

@@ -15,6 +15,8 @@ pub struct FrameStatistics {
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,
+    /// Bytes that were uploaded to the device.
+    pub uploaded: u64,
     /// Where the time went.
     pub stages: StageTimes,
     /// What was left out, and why.

@@ -1,5 +1,6 @@
 //! One buffer for many things that come and go.
 
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 
 /// A buffer that is filled from its start. What a range held is never overwritten: a frame that was recorded but not yet
@@ -35,10 +36,10 @@ impl Arena {
     }
 
     /// Appends bytes, whose number is a multiple of 4, and says where they begin. There must be room.
-    pub(super) fn append(&mut self, queue: &wgpu::Queue, bytes: &[u8]) -> u64 {
+    pub(super) fn append(&mut self, uploads: &Uploads, bytes: &[u8]) -> u64 {
         let start = self.used;
         if let Some(buffer) = &self.buffer {
-            queue.write_buffer(buffer, start, bytes);
+            uploads.write_buffer(buffer, start, bytes);
         }
         self.used += bytes.len() as u64;
         start
@@ -77,12 +78,12 @@ pub(super) fn new_buffer(
 /// If the device allows no buffer of that size.
 pub(super) fn filled_buffer(
     device: &wgpu::Device,
-    queue: &wgpu::Queue,
+    uploads: &Uploads,
     label: &'static str,
     bytes: &[u8],
     usage: wgpu::BufferUsages,
 ) -> Result<wgpu::Buffer, BackendError> {
     let buffer = new_buffer(device, label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
-    queue.write_buffer(&buffer, 0, bytes);
+    uploads.write_buffer(&buffer, 0, bytes);
     Ok(buffer)
 }

@@ -6,6 +6,7 @@ use wgpu::util::DrawIndexedIndirectArgs;
 use super::assets::AssetSnapshot;
 use super::growing_buffer::MirroredBuffer;
 use super::record::mesh_of;
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 use crate::queue::Batch;
 
@@ -35,7 +36,7 @@ impl Arguments {
     pub(super) fn upload(
         &self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         assets: &AssetSnapshot,
         batches: &[Batch],
     ) -> Result<(), BackendError> {
@@ -59,7 +60,7 @@ impl Arguments {
             };
             bytes.extend_from_slice(arguments.as_bytes());
         }
-        buffer.upload(device, queue).map(|_| ())
+        buffer.upload(device, uploads).map(|_| ())
     }
 
     /// The buffer while it is drawn from.

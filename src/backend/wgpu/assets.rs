@@ -6,6 +6,7 @@ use super::arena::{Arena, filled_buffer};
 use super::growing_buffer::check_storage;
 use super::layouts::Layouts;
 use super::textures::{TextureArrays, TexturePlace};
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 use crate::scene::{Assets, Material, Mesh, Vertex};
 use crate::view::{RejectionReason, Rejections};
@@ -64,7 +65,7 @@ impl AssetCache {
     pub(super) fn update(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         layouts: &Layouts,
         assets: &Assets,
         rejections: &Rejections,
@@ -83,9 +84,9 @@ impl AssetCache {
                 self.rejected.clear();
                 // Until the new snapshot is whole there is none: an error must not leave half of one behind.
                 self.current = None;
-                self.update_meshes(device, queue, assets)?;
-                self.textures.update(device, queue, assets, &mut self.rejected);
-                let snapshot = Arc::new(self.snapshot(device, queue, layouts, assets)?);
+                self.update_meshes(device, uploads, assets)?;
+                self.textures.update(device, uploads, assets, &mut self.rejected);
+                let snapshot = Arc::new(self.snapshot(device, uploads, layouts, assets)?);
                 self.current = Some(wanted);
                 self.snapshot = Some(Arc::clone(&snapshot));
                 snapshot
@@ -97,12 +98,7 @@ impl AssetCache {
         Ok(snapshot)
     }
 
-    fn update_meshes(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        assets: &Assets,
-    ) -> Result<(), BackendError> {
+    fn update_meshes(&mut self, device: &wgpu::Device, uploads: &Uploads, assets: &Assets) -> Result<(), BackendError> {
         self.meshes.resize(assets.meshes.slot_count(), None);
         let mut live = vec![false; self.meshes.len()];
         let mut changed = Vec::new();
@@ -133,8 +129,8 @@ impl AssetCache {
                 .collect();
         }
         for (slot, revision, mesh) in changed {
-            let vertices = self.vertices.append(queue, bytemuck::cast_slice(mesh.vertices()));
-            let indices = self.indices.append(queue, bytemuck::cast_slice(mesh.indices()));
+            let vertices = self.vertices.append(uploads, bytemuck::cast_slice(mesh.vertices()));
+            let indices = self.indices.append(uploads, bytemuck::cast_slice(mesh.indices()));
             self.meshes[slot] = Some(MeshRange {
                 base_vertex: (vertices / size_of::<Vertex>() as u64) as i32,
                 first_index: (indices / 4) as u32,
@@ -148,7 +144,7 @@ impl AssetCache {
     fn snapshot(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         layouts: &Layouts,
         assets: &Assets,
     ) -> Result<AssetSnapshot, BackendError> {
@@ -159,7 +155,7 @@ impl AssetCache {
         }
         let bytes: &[u8] = bytemuck::cast_slice(&records);
         check_storage(device, bytes.len())?;
-        let materials = filled_buffer(device, queue, "materials", bytes, wgpu::BufferUsages::STORAGE)?;
+        let materials = filled_buffer(device, uploads, "materials", bytes, wgpu::BufferUsages::STORAGE)?;
 
         let views = self.textures.views(device);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {

@@ -23,12 +23,12 @@ impl WgpuBackend {
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin(scene.assets);
         let assets = checked(&self.device, "meshes, materials and textures", || {
-            self.assets.lock().update(&self.device, &self.queue, &self.layouts, scene.assets, rejections)
+            self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, rejections)
         })??;
         let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
         checked(&self.device, "the frame's buffers", || {
             let mut buffers = self.buffers.take();
-            buffers.begin(&self.device, &self.queue, &self.layouts, request)?;
+            buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
             if let Some(timing) = &self.timing {
                 buffers.begin_timestamps(&self.device, request, timing.times_raw)?;
             }
@@ -105,7 +105,7 @@ impl WgpuBackend {
         for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
             let halvings = batch.state.halvings();
             let assets = request.scene.assets;
-            let mesh = self.subdivisions.find(&self.device, &self.queue, assets, batch.mesh, halvings)?;
+            let mesh = self.subdivisions.find(&self.device, &self.uploads, assets, batch.mesh, halvings)?;
             if mesh.is_coarse {
                 for rank in batch.first..batch.first + batch.count {
                     request.rejections.count_once(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);

@@ -103,8 +103,8 @@ impl WgpuBackend {
             let times = frame.buffers.timestamps().zip(self.timing.as_ref());
             let times = times.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copied, times) = times.unzip();
-            let index = self.queue.submit(finished.into_iter().chain(copied));
-            let (device, queue) = (self.device.clone(), self.queue.clone());
+            let index = self.queue().submit(finished.into_iter().chain(copied));
+            let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), times))
         })
         .flatten()?;

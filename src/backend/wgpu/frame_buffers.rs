@@ -12,6 +12,7 @@ use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_ali
 use super::kept::Subdivided;
 use super::layouts::Layouts;
 use super::timestamps::Timestamps;
+use super::uploads::Uploads;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
 use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
@@ -88,7 +89,7 @@ impl FrameBuffers {
     pub(super) fn begin(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         layouts: &Layouts,
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
@@ -113,7 +114,7 @@ impl FrameBuffers {
         let mut renewed = buffers.objects.reserve(device, object_bytes)?;
         renewed |= buffers.drawn.reserve(device, drawn_count * stride)?;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
-            renewed |= mirrored.upload(device, queue)?;
+            renewed |= mirrored.upload(device, uploads)?;
         }
         if renewed || buffers.key != buffers.next_key {
             mem::swap(&mut buffers.key, &mut buffers.next_key);
@@ -160,13 +161,13 @@ impl FrameBuffers {
     }
 
     /// Uploads blocks of objects at once: every write costs the same again, however small.
-    pub(super) fn write_objects(&self, queue: &wgpu::Queue, objects: &ObjectTable, blocks: Range<usize>) {
+    pub(super) fn write_objects(&self, uploads: &Uploads, objects: &ObjectTable, blocks: Range<usize>) {
         let first = blocks.start * ObjectTable::BLOCK;
         let end = objects.len().min(blocks.end * ObjectTable::BLOCK);
         let bytes = |objects: usize| objects * size_of::<ObjectRecord>();
         let size = NonZeroU64::new(bytes(end - first) as u64);
         let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
-        let Some(mut staged) = queue.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
+        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
         for block in blocks {
             let (start, records) = objects.records_of(block);
             let place = bytes(start - first)..bytes(start - first + records.len());
@@ -174,9 +175,9 @@ impl FrameBuffers {
         }
     }
 
-    pub(super) fn write_drawn(&self, queue: &wgpu::Queue, pass: usize, objects: &[u32]) {
+    pub(super) fn write_drawn(&self, uploads: &Uploads, pass: usize, objects: &[u32]) {
         if let Some(place) = self.buffers.passes[pass].drawn_place {
-            self.buffers.drawn.write(queue, place * self.buffers.key.drawn_stride, bytemuck::cast_slice(objects));
+            self.buffers.drawn.write(uploads, place * self.buffers.key.drawn_stride, bytemuck::cast_slice(objects));
         }
     }
 }

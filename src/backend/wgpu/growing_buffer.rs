@@ -1,6 +1,7 @@
 //! Buffers that are replaced by larger ones when they are too small.
 
 use super::arena::new_buffer;
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 
 /// Every device takes multiples of this as offsets into uniform and storage buffers.
@@ -43,9 +44,9 @@ impl GrowingBuffer {
         Ok(true)
     }
 
-    pub(super) fn write(&self, queue: &wgpu::Queue, offset: usize, bytes: &[u8]) {
+    pub(super) fn write(&self, uploads: &Uploads, offset: usize, bytes: &[u8]) {
         if let Some(buffer) = self.buffer.as_ref().filter(|_| !bytes.is_empty()) {
-            queue.write_buffer(buffer, offset as u64, bytes);
+            uploads.write_buffer(buffer, offset as u64, bytes);
         }
     }
 
@@ -79,10 +80,10 @@ impl MirroredBuffer {
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(super) fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<bool, BackendError> {
+    pub(super) fn upload(&mut self, device: &wgpu::Device, uploads: &Uploads) -> Result<bool, BackendError> {
         let renewed = self.on_device.reserve(device, self.next.len())?;
         if renewed || self.next != self.written {
-            self.on_device.write(queue, 0, &self.next);
+            self.on_device.write(uploads, 0, &self.next);
             std::mem::swap(&mut self.next, &mut self.written);
         }
         Ok(renewed)

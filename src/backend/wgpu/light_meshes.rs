@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::arena::filled_buffer;
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 use crate::process::LightVolume;
 use crate::scene::LightKind;
@@ -18,7 +19,7 @@ impl LightMeshes {
 
     /// # Errors
     /// If the device has no room.
-    pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Self, BackendError> {
+    pub(super) fn new(device: &wgpu::Device, uploads: &Uploads) -> Result<Self, BackendError> {
         let mut corners: Vec<[f32; 3]> = Vec::new();
         let ranges = Self::VOLUMES.map(|volume| {
             let first = corners.len() as u32;
@@ -26,7 +27,7 @@ impl LightMeshes {
             first..corners.len() as u32
         });
         let bytes = bytemuck::cast_slice(&corners);
-        let corners = filled_buffer(device, queue, "light volumes", bytes, wgpu::BufferUsages::VERTEX)?;
+        let corners = filled_buffer(device, uploads, "light volumes", bytes, wgpu::BufferUsages::VERTEX)?;
         Ok(Self { corners, ranges })
     }
 

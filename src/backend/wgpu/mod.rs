@@ -37,6 +37,7 @@ mod targets;
 mod texels;
 mod textures;
 mod timestamps;
+mod uploads;
 mod ways;
 
 use std::collections::HashMap;
@@ -57,6 +58,7 @@ use self::pipelines::ProcessPipelines;
 use self::subdivisions::Subdivisions;
 use self::targets::TargetCache;
 use self::timestamps::Timing;
+use self::uploads::Uploads;
 use self::ways::Ways;
 use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, FramePlan, Pass};
@@ -79,7 +81,7 @@ pub use ways::{Encode, Record, WgpuPass};
 /// without a word; the next [`WgpuSubmission::wait`] or [`WgpuSubmission::read`] tells, and so does the next frame.
 pub struct WgpuBackend {
     device: wgpu::Device,
-    queue: wgpu::Queue,
+    uploads: Uploads,
     layouts: Layouts,
     /// For each plan by its identity.
     pipelines: Mutex<HashMap<u64, PlanPipelines>>,
@@ -138,7 +140,7 @@ impl WgpuBackend {
         let tries_indirect = has_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
         Ok(Self {
             device,
-            queue,
+            uploads: Uploads::new(queue),
             layouts,
             pipelines: Mutex::default(),
             light_meshes: Mutex::default(),
@@ -180,7 +182,7 @@ impl WgpuBackend {
     /// # Errors
     /// If the device lacks `TIMESTAMP_QUERY`, or is wgpu's `noop` backend, which has it and writes nothing.
     pub fn time_passes(self) -> Result<Self, BackendError> {
-        let timing = Some(Timing::new(&self.device, &self.queue)?);
+        let timing = Some(Timing::new(&self.device, self.queue())?);
         Ok(Self { timing, ..self })
     }
 
@@ -196,7 +198,7 @@ impl WgpuBackend {
 
     /// The device's queue.
     pub fn queue(&self) -> &wgpu::Queue {
-        &self.queue
+        self.uploads.queue()
     }
 
     /// What is kept on the device from frame to frame, beside the scene's own meshes and textures.
@@ -255,7 +257,7 @@ impl WgpuBackend {
         }
         let mut kept = self.light_meshes.lock();
         if kept.is_none() {
-            let make = || LightMeshes::new(&self.device, &self.queue);
+            let make = || LightMeshes::new(&self.device, &self.uploads);
             *kept = Some(Arc::new(checked(&self.device, "the geometry of lights", make)??));
         }
         Ok(kept.clone())
@@ -310,6 +312,10 @@ impl Backend for WgpuBackend {
         format!("{} ({})", info.name, info.backend)
     }
 
+    fn uploaded(&self) -> u64 {
+        self.uploads.bytes()
+    }
+
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         self.start(request).inspect_err(|_| self.forget())
     }
@@ -321,7 +327,7 @@ impl Backend for WgpuBackend {
         objects: &ObjectTable,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        checked(&self.device, "objects", || frame.buffers.write_objects(&self.queue, objects, blocks))
+        checked(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, objects, blocks))
             .inspect_err(|_| self.buffers.forget())
     }
 
@@ -335,12 +341,12 @@ impl Backend for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.spent.set_size(list.batches.len(), list.bundle_count(), pass.way.parts(list));
         let made = checked(&self.device, &pass.label, || {
-            frame.buffers.write_drawn(&self.queue, index, &list.objects);
+            frame.buffers.write_drawn(&self.uploads, index, &list.objects);
             self.subdivide(frame, request, list)?;
             match pass.way.record {
                 Record::Kept => pass.kept.set_count(list.bundle_count()),
                 Record::Indirect => {
-                    let upload = || pass.arguments.upload(&self.device, &self.queue, &frame.assets, &list.batches);
+                    let upload = || pass.arguments.upload(&self.device, &self.uploads, &frame.assets, &list.batches);
                     pass.spent.alone(upload)?;
                 }
                 Record::Direct | Record::Bundles => {}

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use parking_lot::Mutex;
 
 use super::arena::filled_buffer;
+use super::uploads::Uploads;
 use crate::backend::BackendError;
 use crate::scene::{Assets, Mesh};
 
@@ -60,7 +61,7 @@ impl Subdivisions {
     pub(super) fn find(
         &self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         assets: &Assets,
         slot: u32,
         halvings: u32,
@@ -74,7 +75,7 @@ impl Subdivisions {
             Some(kept) => kept,
             None => {
                 // Two passes may do this at once, and then one of them was in vain: better than waiting for each other.
-                let made = Arc::new(SubdividedMesh::new(device, queue, mesh, halvings)?);
+                let made = Arc::new(SubdividedMesh::new(device, uploads, mesh, halvings)?);
                 Arc::clone(self.kept.lock().entry(key).or_insert(made))
             }
         };
@@ -84,11 +85,11 @@ impl Subdivisions {
 }
 
 impl SubdividedMesh {
-    fn new(device: &wgpu::Device, queue: &wgpu::Queue, mesh: &Mesh, halvings: u32) -> Result<Self, BackendError> {
+    fn new(device: &wgpu::Device, uploads: &Uploads, mesh: &Mesh, halvings: u32) -> Result<Self, BackendError> {
         // A little more, lest halves that were rounded up are halved again.
         let longest = mesh.longest_edge() / (1_u64 << halvings) as f32 * 1.001;
         let subdivided = mesh.subdivided(longest, Subdivisions::MOST_TRIANGLES);
-        let upload = |label, bytes, usage| filled_buffer(device, queue, label, bytes, usage);
+        let upload = |label, bytes, usage| filled_buffer(device, uploads, label, bytes, usage);
         let vertices = bytemuck::cast_slice(subdivided.vertices());
         let indices = bytemuck::cast_slice(subdivided.indices());
         Ok(Self {

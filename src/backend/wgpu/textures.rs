@@ -1,6 +1,7 @@
 //! Textures on the device, in arrays by size, so that no texture is ever bound for a single batch.
 
 use super::texels::mip_chain;
+use super::uploads::Uploads;
 use crate::scene::{Assets, Texture};
 use crate::view::RejectionReason;
 
@@ -41,7 +42,7 @@ impl TextureArrays {
     pub(super) fn update(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         assets: &Assets,
         rejected: &mut Vec<(RejectionReason, usize)>,
     ) {
@@ -60,7 +61,7 @@ impl TextureArrays {
                 let beyond = wanted.split_off(most_layers as usize);
                 rejected.extend(beyond.iter().map(|(slot, ..)| (RejectionReason::TextureLimit, *slot as usize)));
             }
-            entry.update(device, queue, side, &wanted, most_layers);
+            entry.update(device, uploads, side, &wanted, most_layers);
         }
     }
 
@@ -88,7 +89,7 @@ impl Array {
     fn update(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        uploads: &Uploads,
         side: u32,
         wanted: &[(u32, u64, &Texture)],
         most_layers: u32,
@@ -110,7 +111,7 @@ impl Array {
         let Some(array) = &self.texture else { return };
         for &(slot, revision, texture) in wanted {
             if self.layers.iter().all(|(other, ..)| *other != slot) {
-                write_layer(queue, array, self.used, side, texture);
+                write_layer(uploads, array, self.used, side, texture);
                 self.layers.push((slot, revision, self.used));
                 self.used += 1;
             }
@@ -136,10 +137,10 @@ fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::Texture {
     })
 }
 
-fn write_layer(queue: &wgpu::Queue, array: &wgpu::Texture, layer: u32, side: u32, texture: &Texture) {
+fn write_layer(uploads: &Uploads, array: &wgpu::Texture, layer: u32, side: u32, texture: &Texture) {
     for (level, pixels) in (0..).zip(mip_chain(texture, side)) {
         let side = side >> level;
-        queue.write_texture(
+        uploads.write_texture(
             wgpu::TexelCopyTextureInfo {
                 texture: array,
                 mip_level: level,
