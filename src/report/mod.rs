@@ -44,11 +44,13 @@ mod chrome_trace;
 mod error;
 mod frame_report;
 mod moments;
+mod page;
 mod replay;
 
 pub use self::{
     chrome_trace::write_chrome_trace,
     error::ReportError,
     frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
+    page::write_page,
     replay::{Prices, Replay, Replayed},
 };

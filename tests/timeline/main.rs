@@ -3,6 +3,8 @@
 mod chrome;
 mod chrome_by_hand;
 mod chrome_golden;
+mod hostile;
+mod page;
 mod report;
 mod report_properties;
 mod trace;

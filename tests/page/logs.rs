@@ -1,0 +1,135 @@
+//! Logs to show.
+
+use std::{hint::black_box, sync::Arc, time::Duration};
+
+use drawloom::{
+    graph::{Closure, FrameGraph},
+    task::Scheduler,
+    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, WorkerLog},
+};
+use libtest_mimic::Failed;
+
+/// Numbers without a pattern that anybody sees: a linear congruence's upper bits.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self, sides: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % sides
+    }
+}
+
+/// What a random graph does on two workers, five times.
+pub fn of_a_real_run() -> Result<Log, Failed> {
+    let mut dice = Dice(7);
+    let mut graph = FrameGraph::new();
+    let mut processes = Vec::new();
+    for index in 0..40 {
+        let width = dice.roll(400);
+        let body = Closure::new(|_: &(), range, _worker| {
+            range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
+            Ok(())
+        });
+        let process = graph.add(format!("process {index}"), body.with_width(move |_| width).with_chunk(16));
+        let phase = Some(["cull", "fill", "sort"][index % 3].to_owned());
+        graph.label(process, Labels { phase, ..Labels::default() });
+        for _ in 0..dice.roll(3).min(processes.len()) {
+            graph.order(processes[dice.roll(processes.len())], process);
+        }
+        graph.keep(process);
+        processes.push(process);
+    }
+    let mut schedule = graph.compile().map_err(|error| error.to_string())?;
+    schedule.always_share(true);
+    let scheduler = Scheduler::new(2)?;
+    scheduler.timeline().start();
+    for _ in 0..5 {
+        let _span = scheduler.timeline().span("frame");
+        schedule.run(&scheduler, &())?;
+    }
+    Ok(scheduler.timeline().take())
+}
+
+/// So many chunks on eight workers, in so many frames: a chain of passes with gaps between them.
+pub fn of_chunks(count: usize, frames: usize) -> Log {
+    const WORKERS: usize = 8;
+    const CHUNKS: usize = 250;
+    let passes = count / frames / CHUNKS;
+    let process = |index: usize| Process {
+        name: format!("pass {index}"),
+        labels: Labels { phase: Some(format!("phase {}", index % 9)), ..Labels::default() },
+        dependencies: index.checked_sub(1).into_iter().collect(),
+        ..Process::default()
+    };
+    let graph = Arc::new(Graph { processes: (0..passes).map(process).collect() });
+    let mut dice = Dice(1);
+    let mut log = Log::default();
+    log.workers.resize(WORKERS, WorkerLog { name: "worker".to_owned(), ..WorkerLog::default() });
+    let mut now = Duration::from_secs(5);
+    for number in 0..frames as u64 {
+        let began = now;
+        let mut chunks = Vec::new();
+        for process in 0..passes {
+            let opened = now;
+            let mut free = [now; WORKERS];
+            for place in 0..CHUNKS {
+                let worker = (0..WORKERS).min_by_key(|&worker| free[worker]).unwrap_or_default();
+                let started = free[worker];
+                let ended = started + Duration::from_nanos(500 + dice.roll(9_000) as u64);
+                let items = place * 16..place * 16 + 16;
+                chunks.push(Chunk { process, items, worker, opened, started, ended, stolen: worker > 0 });
+                free[worker] = ended;
+            }
+            now = free.into_iter().max().unwrap_or(now) + Duration::from_micros(2);
+            for (worker, &began) in free.iter().enumerate() {
+                let kind = if worker % 2 == 0 { IdleKind::Searching } else { IdleKind::Asleep };
+                log.workers[worker].idle.push(Idle { kind, began, ended: now });
+            }
+        }
+        let graph = Arc::clone(&graph);
+        let run =
+            Run { frame: number, graph, workers: WORKERS, began, ended: now, complete: true, chunks, ..Run::default() };
+        log.runs.push(run);
+        log.frames.push(Frame { number, began, ended: now });
+    }
+    log
+}
+
+/// Three frames, the second twice as long as the others. In each a process, two that wait for it, the second of which ends
+/// later, and one that waits for both, in two chunks.
+pub fn of_diamonds() -> Log {
+    let process = |name: &str, dependencies: &[usize]| Process {
+        name: name.to_owned(),
+        dependencies: dependencies.to_vec(),
+        ..Process::default()
+    };
+    let processes = vec![process("root", &[]), process("left", &[0]), process("right", &[0]), process("end", &[1, 2])];
+    let graph = Arc::new(Graph { processes });
+    let workers = ["caller", "other"].map(|name| WorkerLog { name: name.to_owned(), ..WorkerLog::default() });
+    let mut log = Log { workers: workers.into(), ..Log::default() };
+    let starts = [(0, 100), (100, 200), (300, 100)];
+    for (number, (start, length)) in (0_u64..).zip(starts) {
+        let at = |share: u64| Duration::from_micros(start + length * share / 100);
+        let chunk = |process, items, worker, opened, started, ended| Chunk {
+            process,
+            items,
+            worker,
+            opened: at(opened),
+            started: at(started),
+            ended: at(ended),
+            stolen: worker > 0,
+        };
+        let chunks = vec![
+            chunk(0, 0..1, 0, 5, 5, 20),
+            chunk(1, 0..1, 0, 20, 20, 40),
+            chunk(2, 0..1, 1, 25, 25, 60),
+            chunk(3, 0..10, 1, 62, 62, 80),
+            chunk(3, 10..20, 0, 62, 70, 95),
+        ];
+        let (began, ended) = (at(0), at(99));
+        let graph = Arc::clone(&graph);
+        log.runs.push(Run { frame: number, graph, workers: 2, began, ended, complete: true, chunks, ..Run::default() });
+        log.frames.push(Frame { number, began, ended });
+    }
+    log
+}
