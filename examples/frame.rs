@@ -2,13 +2,18 @@
 //!
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
+//!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
 
 #[path = "frame/adapter.rs"]
 mod adapter;
 #[path = "frame/arguments.rs"]
 mod arguments;
+#[path = "frame/device.rs"]
+mod device;
 #[path = "frame/report.rs"]
 mod report;
+#[path = "frame/timeline.rs"]
+mod timeline;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -19,10 +24,12 @@ use drawloom::backend::{Backend, NullBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::{Scene, obj, sample};
 use drawloom::task::Scheduler;
+use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use arguments::{Arguments, BackendName};
+use device::{Device, NoDevice, WgpuDevice};
 use report::Report;
 
 fn main() -> ExitCode {
@@ -38,20 +45,28 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let scene = load_scene(arguments)?;
-    let report = match arguments.backend {
-        BackendName::Null => draw(arguments, &scene, NullBackend, |_| Ok(()))?.1,
+    let (report, log) = match arguments.backend {
+        BackendName::Null => {
+            let drawn = draw(arguments, &scene, NullBackend, NoDevice)?;
+            (drawn.report, drawn.log)
+        }
         BackendName::Noop => {
             let backend = wgpu_backend(arguments, adapter::noop_device()?)?;
-            draw(arguments, &scene, backend, WgpuSubmission::wait)?.1
+            let drawn = draw(arguments, &scene, backend, WgpuDevice::timed(false))?;
+            (drawn.report, drawn.log)
         }
         BackendName::Wgpu => {
             let backend = wgpu_backend(arguments, adapter::device()?)?;
-            let (last, report) = draw(arguments, &scene, backend, WgpuSubmission::wait)?;
-            save(arguments, &last.submission)?;
-            report
+            let is_timed = arguments.html.is_some() || arguments.timeline.is_some();
+            let can_be_timed = backend.device().features().contains(wgpu::Features::TIMESTAMP_QUERY);
+            let backend = if is_timed && can_be_timed { backend.time_passes()? } else { backend };
+            let drawn = draw(arguments, &scene, backend, WgpuDevice::timed(is_timed && can_be_timed))?;
+            save(arguments, &drawn.last.submission)?;
+            (drawn.report, drawn.log)
         }
     };
     report.print();
+    timeline::tell(arguments, &log)?;
     match &arguments.report {
         Some(path) => report.write(path),
         None => Ok(()),
@@ -96,16 +111,25 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
     Ok(scene)
 }
 
-/// Draws all frames, and returns the last, and the report on all of them.
+/// What came of drawing all frames.
+struct Drawn<B: Backend> {
+    last: Submitted<B>,
+    report: Report,
+    /// Empty unless somebody asked for it.
+    log: Log,
+}
+
+/// Draws all frames.
 fn draw<B: Backend>(
     arguments: &Arguments,
     scene: &Scene,
     backend: B,
-    wait: impl Fn(&B::Submission) -> Result<(), drawloom::backend::BackendError>,
-) -> Result<(Submitted<B>, Report), Box<dyn Error>> {
+    mut device: impl Device<B>,
+) -> Result<Drawn<B>, Box<dyn Error>> {
+    let builder = Scheduler::builder().timeline_capacity(timeline::CAPACITY);
     let scheduler = Arc::new(match arguments.workers {
-        Some(workers) => Scheduler::new(workers.get())?,
-        None => Scheduler::with_available_parallelism()?,
+        Some(workers) => builder.workers(workers.get()).build()?,
+        None => builder.build()?,
     });
     let workers = scheduler.workers();
     let deferred =
@@ -113,18 +137,24 @@ fn draw<B: Backend>(
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?;
 
+    let timeline = Arc::clone(renderer.scheduler().timeline());
     let frames = arguments.frames;
     let progress = ProgressBar::new(u64::from(frames));
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left")?);
     let mut measured: Vec<(Duration, FrameStatistics)> = Vec::new();
     let mut last = None;
-    for _ in 0..frames {
+    for number in 0..frames {
+        if timeline::begins_at(arguments) == Some(number) {
+            timeline.start();
+            device.start(renderer.backend(), &timeline)?;
+        }
         let start = Instant::now();
         let recorded = renderer.record(scene.as_scene_ref())?;
+        let frame_number = recorded.frame_number();
         let submitted = submitter.submit(recorded)?;
         let cpu = start.elapsed();
         // The next frame is not to be measured against a device that is still busy with this one.
-        wait(&submitted.submission)?;
+        device.wait(&submitted.submission, frame_number)?;
         measured.push((cpu, submitted.statistics.clone()));
         last = Some(submitted);
         progress.inc(1);
@@ -135,8 +165,10 @@ fn draw<B: Backend>(
             .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
     }
 
+    timeline.stop();
+    let log = Log { device: device.end(renderer.backend(), &timeline)?, ..timeline.take() };
     let report = Report::new(renderer.backend().adapter(), arguments, workers, &measured);
-    Ok((last.ok_or("no frame was drawn")?, report))
+    Ok(Drawn { last: last.ok_or("no frame was drawn")?, report, log })
 }
 
 fn save(arguments: &Arguments, submission: &WgpuSubmission) -> Result<(), Box<dyn Error>> {

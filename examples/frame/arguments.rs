@@ -62,6 +62,18 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     pub graph: Option<PathBuf>,
 
+    /// Says in words why a frame took as long as it did: the one in the middle of the last 60.
+    #[arg(long)]
+    pub explain: bool,
+
+    /// Writes the timeline of the last 60 frames as a page to look at in a browser.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+
+    /// Writes the timeline of the last 60 frames as a Chrome trace, which Perfetto reads.
+    #[arg(long, value_name = "FILE")]
+    pub timeline: Option<PathBuf>,
+
     /// Writes the figures as JSON.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
