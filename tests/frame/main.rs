@@ -7,6 +7,8 @@ mod failing_process;
 mod rules;
 mod same_result;
 mod timeline;
+#[cfg(feature = "wgpu")]
+mod uploads;
 mod views;
 #[path = "../scenes/mod.rs"]
 mod scenes;

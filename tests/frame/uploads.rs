@@ -1,0 +1,47 @@
+//! What a frame says it has uploaded, on wgpu's backend that does nothing else.
+
+#[path = "../../examples/frame/adapter.rs"]
+#[expect(dead_code, reason = "the other half is for the frame example")]
+mod adapter;
+
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::WgpuBackend;
+use drawloom::process::Deferred;
+use drawloom::task::Scheduler;
+use drawloom::view::ObjectRecord;
+
+use crate::scenes::field;
+
+#[test]
+fn a_frame_says_how_many_bytes_it_uploaded_and_so_does_its_timeline() {
+    let (device, queue) = adapter::noop_device().unwrap();
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
+    let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
+    let scene = field(600);
+    scheduler.timeline().start();
+    let mut uploaded = Vec::new();
+    for _ in 0..4 {
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        uploaded.push(submitted.statistics);
+    }
+    let mut used: Vec<_> = scene.as_scene_ref().meshes.to_vec();
+    used.sort_unstable_by_key(|mesh| mesh.index());
+    used.dedup();
+    let meshes = used.into_iter().map(|mesh| scene.assets().get(mesh).unwrap());
+    let meshes: usize = meshes.map(|mesh| size_of_val(mesh.vertices()) + size_of_val(mesh.indices())).sum();
+    for (place, statistics) in uploaded.iter().enumerate() {
+        // What all objects are, and four bytes for each that is drawn.
+        let commands: usize = statistics.views.iter().map(|view| view.commands).sum();
+        let every_frame = (600 * size_of::<ObjectRecord>() + commands * 4) as u64;
+        assert!(statistics.uploaded >= every_frame, "{} of {every_frame}", statistics.uploaded);
+        let assets = statistics.uploaded - every_frame;
+        assert_eq!(place == 0, assets > meshes as u64, "frame {place} uploaded {assets} bytes beside what it must");
+    }
+    let log = scheduler.timeline().take();
+    let counted: Vec<_> = log.counters.iter().map(|counter| (counter.name.as_str(), counter.value)).collect();
+    let expected: Vec<_> = uploaded.iter().map(|statistics| ("bytes uploaded", statistics.uploaded as f64)).collect();
+    assert_eq!(counted, expected);
+}
