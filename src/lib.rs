@@ -41,7 +41,24 @@
 //!
 //! # Spans
 //!
-//! Spans and warnings go through `tracing` under the target `drawloom`. The crate installs no subscriber.
+//! Spans and events go through `tracing`. The crate installs no subscriber. These targets, names, levels and fields stay
+//! as they are; more may come.
+//!
+//! | target | what | level | fields |
+//! | --- | --- | --- | --- |
+//! | `drawloom` | span `record`, as long as [`Renderer::record`] takes | debug | `objects` |
+//! | `drawloom` | span `submit`, as long as [`Submitter::submit`] takes | debug | |
+//! | `drawloom` | an event for each reason why something is not drawn as asked | warn | `count`, `first`, `message` |
+//! | `drawloom::graph` | span `process`: a process of a [schedule](graph::Schedule) in one run | debug | `name`; where it has [labels](timeline::Labels), `process`, `phase`, `view` |
+//! | `drawloom::graph` | span `chunk`, inside that of its process: some of its items, run by one worker | trace | `start`, `end` |
+//! | `drawloom::graph` | event `taken`: a worker takes up a process, in a run on several workers | trace | `ready`: how many others wait for a worker; `queued`: the jobs in that worker's queues |
+//!
+//! A process has one span a run, whose parent is the span in which the run was called for: `record`, in a frame. Each worker
+//! enters it that runs chunks of it, leaves it before the process counts as done, and it is closed before anything begins
+//! that waits for the process. What panics, or fails, is left as well.
+//!
+//! Workers are threads of their own. A subscriber that is to hear of all of them is the global default, or is set on each by
+//! [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the run fails.
 
 // The rooms, each using only those above it; `tests/architecture.rs` sees to that.
 mod sync;

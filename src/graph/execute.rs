@@ -111,6 +111,8 @@ impl<P> Schedule<P> {
     fn rearm(&mut self) {
         for process in 0..self.flow.len() as u32 {
             self.progress.arm(process, self.flow.dependency_count(process));
+            // Where a subscriber of spans panicked, one may have been left behind.
+            discard(self.progress.pass(process).opened.close());
         }
     }
 }

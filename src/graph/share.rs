@@ -56,6 +56,8 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         let is_half_done = left.done < left.chunks.count();
         let first_open = if is_half_done { left.process } else { left.process + 1 };
         run_tokens(worker, self, |crew| {
+            // It is left before anything that waits for it begins.
+            let half_done = is_half_done.then_some(left.onlooker);
             // All are armed before the first of them can be counted down.
             let rest = left.process + 1..self.schedule.flow.len() as u32;
             for process in rest.clone() {
@@ -64,10 +66,10 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             for process in rest.filter(|&process| self.open_dependencies(process, first_open) == 0) {
                 self.send(process, crew);
             }
-            if is_half_done {
+            if let Some(onlooker) = half_done {
                 let pass = self.schedule.progress.pass(left.process);
                 pass.open(left.chunks, left.done);
-                left.onlooker.leave(&pass.opened);
+                onlooker.leave(&pass.opened);
                 if self.join(left.process, crew) {
                     self.go_on_after(left.process, crew);
                 }
@@ -83,6 +85,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
 
     /// Pushes a process that is ready.
     fn send(&self, process: u32, crew: &Crew<'_>) {
+        self.count_ready();
         if self.is_pinned(process) {
             crew.push_pinned(Token::StartPinned(process).encode());
         } else {
@@ -115,7 +118,12 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             self.clock.start(process);
             let is_done = match &self.watch {
                 None => self.work_on(process, is_pinned, crew, Nobody),
-                Some(watch) => self.work_on(process, is_pinned, crew, watch.open(crew.worker(), process)),
+                Some(watch) => {
+                    watch.count_taken(crew.worker());
+                    let is_done = self.work_on(process, is_pinned, crew, watch.open(crew.worker(), process));
+                    crew.worker().forget_stolen();
+                    is_done
+                }
             };
             if !is_done {
                 return;
@@ -170,28 +178,32 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         let pass = self.schedule.progress.pass(process);
         let chunks = pass.chunks();
         let finished = self.clock.work(|| match &self.watch {
-            None => self.take_chunks(process, pass, &chunks, crew, Nobody),
+            None => self.take_chunks(process, pass, &chunks, crew, || Nobody),
             Some(watch) => {
-                self.take_chunks(process, pass, &chunks, crew, watch.join(crew.worker(), process, &pass.opened))
+                let join = || watch.join(crew.worker(), process, &pass.opened);
+                let finished = self.take_chunks(process, pass, &chunks, crew, join);
+                crew.worker().forget_stolen();
+                finished
             }
         });
         let is_last = pass.finish(finished, &chunks);
         if is_last && self.watch.is_some() {
-            pass.opened.close();
+            drop(pass.opened.close());
         }
         is_last
     }
 
-    /// Runs chunks until none is left, and says how many. After a failure they are only counted.
-    fn take_chunks(
+    /// Runs chunks until none is left, and says how many. After a failure they are only counted. Who looks on does so from the
+    /// first chunk on: who gets none has no part in the process, and may come when it is done.
+    fn take_chunks<O: Onlooker>(
         &self,
         process: u32,
         pass: &OpenPass,
         chunks: &Chunks,
         crew: &Crew<'_>,
-        mut onlooker: impl Onlooker,
+        look_on: impl Fn() -> O,
     ) -> usize {
-        let worker = crew.worker();
+        let (worker, mut onlooker) = (crew.worker(), None);
         let mut pace = pass.tickets.join();
         let mut finished = 0;
         loop {
@@ -214,7 +226,8 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if pass.tickets.invites(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
-            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, &mut onlooker));
+            let onlooker = onlooker.get_or_insert_with(&look_on);
+            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, onlooker));
         }
     }
 
@@ -235,6 +248,13 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// Whether the process is one for the calling thread. If that failed, nobody is to run it.
     fn is_pinned(&self, process: u32) -> bool {
         self.attempt(process, |_position| Ok(self.node(process).pinned())).unwrap_or(false)
+    }
+
+    #[inline]
+    fn count_ready(&self) {
+        if let Some(watch) = &self.watch {
+            watch.count_ready();
+        }
     }
 
     fn band(&self, process: u32) -> Band {
@@ -276,9 +296,7 @@ impl<'run, P: Node<C>, C: Sync + ?Sized> Ready<'run, P, C> {
 
     fn add(&mut self, process: u32) {
         let run = self.run;
-        if let Some(watch) = &run.watch {
-            watch.count_ready();
-        }
+        run.count_ready();
         if run.is_pinned(process) {
             self.crew.push_pinned(Token::StartPinned(process).encode());
             self.has_pinned = true;

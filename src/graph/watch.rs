@@ -2,7 +2,7 @@
 //!
 //! Whether anybody does is found out once a run. Where nobody does, a chunk costs no more than to see that there is nobody.
 
-use std::{ops::Range, sync::Arc};
+use std::{mem, ops::Range, sync::Arc};
 
 use tracing::{
     Level, Span,
@@ -89,22 +89,15 @@ impl<'run> Watch<'run> {
 impl Watch<'_> {
     /// A worker opens a process.
     pub(super) fn open(&self, worker: &Worker, process: u32) -> Turn<'_> {
-        if let Some(traced) = self.traced.as_ref().filter(|traced| traced.in_detail) {
-            // Relaxed: it is a count that somebody looks at.
-            let ready = traced.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
-            tracing::trace!(target: TARGET, ready, queued = worker.queued());
-        }
-        let stolen = worker.take_stolen();
-        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, stolen));
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, worker.has_stolen()));
         Turn { watch: self, lap, span: self.span(process).entered() }
     }
 
     /// A worker joins others at a process that was opened.
     pub(super) fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Turn<'_> {
-        let stolen = worker.take_stolen();
-        let Opening { at, span } = &*opened.0.lock();
-        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, stolen, *at));
-        Turn { watch: self, lap, span: span.clone().entered() }
+        let Opening { at, span } = opened.0.lock().clone();
+        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, worker.has_stolen(), at));
+        Turn { watch: self, lap, span: span.entered() }
     }
 
     /// A worker is to go through all processes by itself.
@@ -113,10 +106,19 @@ impl Watch<'_> {
         Turn { watch: self, lap, span: Span::none().entered() }
     }
 
-    /// A process has become ready.
+    /// A process has become ready, in a run that is shared.
     pub(super) fn count_ready(&self) {
-        if let Some(traced) = &self.traced {
+        if let Some(traced) = self.traced_in_detail() {
+            // Relaxed, here and below: it is a count that somebody looks at.
             traced.ready.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// A worker has taken up a process that was ready, in a run that is shared.
+    pub(super) fn count_taken(&self, worker: &Worker) {
+        if let Some(traced) = self.traced_in_detail() {
+            let ready = traced.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
+            tracing::trace!(name: "taken", target: TARGET, ready, queued = worker.queued());
         }
     }
 
@@ -125,6 +127,10 @@ impl Watch<'_> {
         if let Some(run) = self.recorded {
             run.end(how);
         }
+    }
+
+    fn traced_in_detail(&self) -> Option<&Traced<'_>> {
+        self.traced.as_ref().filter(|traced| traced.in_detail)
     }
 
     /// The span of a process.
@@ -179,8 +185,7 @@ pub(super) struct Turn<'run> {
 
 impl Onlooker for Turn<'_> {
     fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
-        let in_detail = self.watch.traced.as_ref().is_some_and(|traced| traced.in_detail);
-        let span = in_detail.then(|| {
+        let span = self.watch.traced_in_detail().map(|_| {
             let (start, end) = (items.start, items.end);
             tracing::trace_span!(target: TARGET, "chunk", start, end).entered()
         });
@@ -211,13 +216,15 @@ impl Onlooker for Turn<'_> {
 
     fn leave(self, opened: &Opened) {
         let at = self.lap.as_ref().map_or(0, Lap::opened);
-        *opened.0.lock() = Opening { at, span: self.span.exit() };
+        let span = self.span.exit();
+        *opened.0.lock() = Opening { at, span };
     }
 }
 
 /// What those who join others at a process have to know of its beginning.
 pub(super) struct Opened(Mutex<Opening>);
 
+#[derive(Clone)]
 struct Opening {
     /// By the timeline's clock.
     at: u64,
@@ -229,8 +236,8 @@ impl Opened {
         Self(Mutex::new(Opening { at: 0, span: Span::none() }))
     }
 
-    /// Ends the process' span. All who took part are done.
-    pub(super) fn close(&self) {
-        self.0.lock().span = Span::none();
+    /// Gives the process' span away, which ends when it is dropped: all who took part are done.
+    pub(super) fn close(&self) -> Span {
+        mem::replace(&mut self.0.lock().span, Span::none())
     }
 }

@@ -42,7 +42,7 @@ pub struct Worker {
     depth: Cell<u32>,
     /// Whether what runs is a background job.
     is_in_background: Cell<bool>,
-    /// Whether the job that has just begun was stolen, until somebody asks.
+    /// Whether the job that runs was stolen, until it is [past](Self::forget_stolen) what it was stolen for.
     has_stolen: Cell<bool>,
     /// For how many jobs that are not there this worker is counted, and by which region. While there is credit, the
     /// region waits for it to come back; where there is none, a job of the region is running here.
@@ -103,10 +103,16 @@ impl Worker {
         self.shared.timeline()
     }
 
-    /// Whether the job that runs has been stolen, which is said once.
+    /// Whether what the worker does was stolen by it.
     #[inline]
-    pub(crate) fn take_stolen(&self) -> bool {
-        self.has_stolen.take()
+    pub(crate) fn has_stolen(&self) -> bool {
+        self.has_stolen.get()
+    }
+
+    /// What the job was stolen for is done, and what it goes on with was not stolen.
+    #[inline]
+    pub(crate) fn forget_stolen(&self) {
+        self.has_stolen.set(false);
     }
 
     /// How many jobs are in this worker's queues.

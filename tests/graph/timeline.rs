@@ -3,7 +3,7 @@
 use std::{
     hint::black_box,
     ops::Range,
-    sync::{LazyLock, Mutex},
+    sync::{Barrier, LazyLock, Mutex},
     time::Duration,
 };
 
@@ -136,6 +136,35 @@ fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
     schedule.always_share(true);
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
     assert_eq!(log.runs[0].shared_from, Some(log.runs[0].began));
+}
+
+#[test]
+fn who_joins_in_a_process_of_another_worker_has_stolen_all_its_chunks() {
+    let scheduler = Scheduler::new(2).unwrap();
+    let barrier = Barrier::new(2);
+    let mut graph = FrameGraph::new();
+    let meet = Closure::new(|_: &(), _range, _worker| {
+        barrier.wait();
+        Ok(())
+    });
+    // Two chunks are never taken by one ticket.
+    let wide = graph.add("wide", meet.with_width(|_| 2));
+    let after = graph.add("after", Closure::new(|_: &(), _range, _worker| Ok(())));
+    graph.order(wide, after);
+    graph.keep(after);
+    graph.keep(wide);
+    let mut schedule = graph.compile().unwrap();
+    schedule.always_share(true);
+    scheduler.timeline().start();
+    for _run in 0..20 {
+        schedule.run(&scheduler, &()).unwrap();
+    }
+    for run in scheduler.timeline().take().runs {
+        let wide = run.chunks_of(0);
+        assert!((0..2).all(|worker| wide.iter().any(|chunk| chunk.worker == worker)));
+        assert!(wide.iter().all(|chunk| chunk.stolen == (chunk.worker == 1)), "{wide:?}");
+        assert!(!run.chunks_of(1)[0].stolen, "who ends the one before goes on with it");
+    }
 }
 
 #[test]

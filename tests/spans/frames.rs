@@ -1,0 +1,99 @@
+//! The spans of a frame, as any subscriber gets them.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::{Arc, Mutex};
+
+use drawloom::backend::NullBackend;
+use drawloom::process::Deferred;
+use drawloom::scene::sample;
+use drawloom::task::Scheduler;
+use drawloom::{Granularity, Renderer};
+use serde_json::Value;
+use tracing::level_filters::LevelFilter;
+use tracing::{Dispatch, Level, dispatcher};
+use tracing_chrome::ChromeLayerBuilder;
+
+use crate::recorder::{Origin, Recorder, scheduler, subscriber};
+
+/// Draws two frames of the project's own scene, and returns how many objects it has and the names of its jobs.
+fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<String>) {
+    let scheduler = Arc::new(scheduler(Scheduler::builder().workers(workers), dispatch));
+    dispatcher::with_default(dispatch, || {
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+        let (mut renderer, submitter) = builder.granularity(Granularity::Chunk(16)).build(scheduler).unwrap();
+        let scene = sample::colonnade().unwrap();
+        let timeline = Arc::clone(renderer.scheduler());
+        timeline.timeline().start();
+        for _frame in 0..2 {
+            submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        }
+        let log = timeline.timeline().take();
+        let names = log.runs[0].graph.processes.iter().map(|process| process.name.clone()).collect();
+        (scene.as_scene_ref().object_count(), names)
+    })
+}
+
+#[test]
+fn a_frame_is_recorded_and_submitted_in_spans_with_its_jobs_inside() {
+    for workers in [1, 2, 4] {
+        let recorder = Recorder::default();
+        let (objects, names) = draw_two_frames(workers, &subscriber(recorder.clone(), LevelFilter::DEBUG));
+        let record = recorder.take();
+        record.check_nesting();
+        let frames: Vec<_> = record.named("record").collect();
+        assert_eq!((frames.len(), record.named("submit").count()), (2, 2));
+        let parts = ["record", "submit"].map(|name| Origin { target: "drawloom", name, level: Level::DEBUG });
+        for span in record.spans.iter().filter(|span| span.parent.is_none()) {
+            assert!(parts.contains(&span.origin), "{span:?}");
+        }
+        for &frame in &frames {
+            assert_eq!(record.spans[frame].fields["objects"], objects.to_string());
+            let jobs = record.spans.iter().filter(|span| span.parent == Some(frame));
+            let told: Vec<_> = jobs.map(|job| job.fields["name"].clone()).collect();
+            assert_eq!(told.len(), names.len());
+            assert_eq!(told.into_iter().collect::<BTreeSet<_>>(), names);
+        }
+        let phases: BTreeSet<_> = record.spans.iter().filter_map(|span| span.fields.get("phase")).collect();
+        for phase in ["visibility", "fill", "sort", "record"] {
+            assert!(phases.iter().any(|told| told.contains(phase)), "{phase} is not among {phases:?}");
+        }
+        assert!(record.spans.iter().any(|span| span.fields.get("view").is_some_and(|view| view == "main")));
+        assert!(record.spans.iter().any(|span| span.fields.contains_key("process")));
+    }
+}
+
+/// A file in memory.
+#[derive(Clone, Default)]
+struct Memory(Arc<Mutex<Vec<u8>>>);
+
+impl io::Write for Memory {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn tracing_chrome_writes_them_into_a_trace() {
+    let file = Memory::default();
+    let (layer, written) = ChromeLayerBuilder::new().writer(file.clone()).include_args(true).build();
+    let (_objects, names) = draw_two_frames(2, &subscriber(layer, LevelFilter::TRACE));
+    drop(written);
+    let trace: Vec<Value> = serde_json::from_slice(&file.0.lock().unwrap()).unwrap();
+    let begun = |name: &str| trace.iter().filter(|event| event["ph"] == "B" && event["name"] == name).count();
+    let ended = |name: &str| trace.iter().filter(|event| event["ph"] == "E" && event["name"] == name).count();
+    for name in ["record", "submit", "process", "chunk"] {
+        assert!(begun(name) >= 2 && begun(name) == ended(name), "{name}: {} and {}", begun(name), ended(name));
+    }
+    // It writes strings with the quotes of Rust.
+    let told: BTreeSet<_> = trace.iter().filter_map(|event| event["args"]["name"].as_str()).collect();
+    let missing: Vec<_> = names
+        .iter()
+        .filter(|name| !told.contains(format!("{name:?}").as_str()) && !told.contains(name.as_str()))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?} are not among {told:?}");
+}

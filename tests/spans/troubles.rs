@@ -1,0 +1,109 @@
+//! Processes that fail, and subscribers that panic: nothing hangs, nothing stays entered, and the next run is as good as new.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicIsize, Ordering};
+
+use proptest::prelude::*;
+use tracing::level_filters::LevelFilter;
+use tracing::span::{Attributes, Id};
+use tracing::{Subscriber, dispatcher};
+use tracing_subscriber::layer::{Context, Layer};
+use tracing_subscriber::registry::LookupSpan;
+
+use crate::recorder::{MoveKind, Recorder, scheduler, subscriber};
+use crate::work::{Call, Trouble, Way, schedules};
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+
+    #[test]
+    fn what_fails_is_left_and_closed(mut schedule in schedules(), number in 0..12_usize, panics in any::<bool>()) {
+        let number = number % schedule.len();
+        let trouble = if panics { Trouble::Panic(number) } else { Trouble::Error(number) };
+        let is_empty = schedule.processes().any(|(_, work)| work.number == number && work.width == 0);
+        for workers in [1, 2, 4] {
+            for way in Way::ALL {
+                way.set(&mut schedule);
+                let recorder = Recorder::default();
+                let dispatch = subscriber(recorder.clone(), LevelFilter::TRACE);
+                let scheduler = scheduler(way.scheduler(workers), &dispatch);
+                dispatcher::with_default(&dispatch, || for trouble in [trouble, Trouble::None, trouble] {
+                    let call = Call { trouble, ..Call::default() };
+                    let outcome = schedule.run(&scheduler, &call);
+                    assert_eq!(outcome.is_ok(), trouble == Trouble::None || is_empty);
+                    let record = recorder.take();
+                    record.check_nesting();
+                    assert_eq!(record.named("chunk").count(), call.book.into_inner().unwrap().len());
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_subscriber_that_panics_fails_the_run_and_no_more(mut schedule in schedules(), at in 1..30_isize) {
+        for kind in [MoveKind::New, MoveKind::Enter, MoveKind::Exit, MoveKind::Close] {
+            for workers in [1, 2, 4] {
+                for way in Way::ALL {
+                    way.set(&mut schedule);
+                    let fuse = Arc::new(AtomicIsize::new(isize::MAX));
+                    let recorder = Recorder::default();
+                    let layer = recorder.clone().and_then(Grumbler { kind, fuse: Arc::clone(&fuse) });
+                    let dispatch = subscriber(layer, LevelFilter::TRACE);
+                    let scheduler = scheduler(way.scheduler(workers), &dispatch);
+                    dispatcher::with_default(&dispatch, || {
+                        for left in [at, isize::MAX] {
+                            fuse.store(left, Ordering::Relaxed);
+                            let call = Call::default();
+                            let outcome = catch_unwind(AssertUnwindSafe(|| schedule.run(&scheduler, &call)));
+                            let panicked = fuse.load(Ordering::Relaxed) <= 0;
+                            let record = recorder.take();
+                            // What it was in the midst of making or entering, it has itself left behind.
+                            if !panicked && [MoveKind::Exit, MoveKind::Close].contains(&kind) {
+                                record.check_nesting();
+                            }
+                            assert_eq!(matches!(outcome, Ok(Ok(()))), !panicked, "{kind:?}: {outcome:?}");
+                            let done: usize = call.book.into_inner().unwrap().iter().map(|entry| entry.items.len()).sum();
+                            let all: usize = schedule.processes().map(|(_, work)| work.width).sum();
+                            assert!(panicked || done == all, "{done} items of {all}");
+                        }
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// Panics once, when it is told that for the how-manieth time.
+struct Grumbler {
+    kind: MoveKind,
+    fuse: Arc<AtomicIsize>,
+}
+
+impl Grumbler {
+    fn hear(&self, kind: MoveKind) {
+        let is_over = kind == self.kind && self.fuse.fetch_sub(1, Ordering::Relaxed) == 1;
+        assert!(!is_over, "as planned");
+    }
+}
+
+impl<S> Layer<S> for Grumbler
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+{
+    fn on_new_span(&self, _attributes: &Attributes<'_>, _id: &Id, _context: Context<'_, S>) {
+        self.hear(MoveKind::New);
+    }
+
+    fn on_enter(&self, _id: &Id, _context: Context<'_, S>) {
+        self.hear(MoveKind::Enter);
+    }
+
+    fn on_exit(&self, _id: &Id, _context: Context<'_, S>) {
+        self.hear(MoveKind::Exit);
+    }
+
+    fn on_close(&self, _id: Id, _context: Context<'_, S>) {
+        self.hear(MoveKind::Close);
+    }
+}

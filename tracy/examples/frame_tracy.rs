@@ -1,0 +1,95 @@
+//! Renders frames for Tracy to look at. It waits for a viewer first.
+//!
+//!     cargo run --release -p drawloom-tracy --example frame_tracy
+//!     cargo run --release -p drawloom-tracy --example frame_tracy -- --frames 60 --no-wait
+
+#[path = "../../examples/frame/adapter.rs"]
+mod adapter;
+
+use std::{error::Error, num::NonZeroUsize, sync::Arc, thread, time::Duration};
+
+use clap::Parser;
+use drawloom::{
+    Renderer,
+    backend::{Backend, WgpuBackend},
+    process::{Deferred, Fxaa, ToneMapping},
+    scene::sample,
+    task::Scheduler,
+    wgpu,
+};
+use drawloom_tracy::Zones;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Renders frames for Tracy to look at.
+#[derive(Parser)]
+struct Arguments {
+    /// How many frames to render. Ctrl-C ends it sooner.
+    #[arg(long, default_value_t = 600)]
+    frames: u64,
+    /// How many workers there are: as many as the machine runs threads at once, if not given.
+    #[arg(long)]
+    workers: Option<NonZeroUsize>,
+    /// Begin at once, whether a viewer is connected or not.
+    #[arg(long)]
+    no_wait: bool,
+    /// Show every chunk of every process.
+    #[arg(long)]
+    chunks: bool,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    drawloom_tracy::install(if arguments.chunks { Zones::Chunks } else { Zones::Processes })?;
+    drawloom_tracy::name_worker(0);
+    let builder = Scheduler::builder().on_start(drawloom_tracy::name_worker);
+    let scheduler = match arguments.workers {
+        Some(workers) => builder.workers(workers.get()),
+        None => builder,
+    };
+    let scheduler = Arc::new(scheduler.build()?);
+    let (device, queue) = device()?;
+    let backend = WgpuBackend::new(device, queue)?;
+    println!("Rendering on {} with {} workers.", backend.adapter(), scheduler.workers());
+    let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+    let scene = sample::colonnade()?;
+
+    if !arguments.no_wait {
+        wait_for_viewer()?;
+    }
+    let progress = ProgressBar::new(arguments.frames);
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}")?);
+    for _frame in 0..arguments.frames {
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+        // So that the device is never more than a frame behind.
+        submitted.submission.wait()?;
+        drawloom_tracy::mark_frame();
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    println!("{} frames rendered.", arguments.frames);
+    Ok(())
+}
+
+/// The machine's adapter, or one that draws nothing: what the workers do is the same.
+fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    adapter::device().or_else(|error| {
+        eprintln!("{error}; going on with a device that draws nothing");
+        adapter::noop_device()
+    })
+}
+
+fn wait_for_viewer() -> Result<(), Box<dyn Error>> {
+    let spinner = ProgressBar::new_spinner();
+    spinner.set_style(ProgressStyle::with_template("{spinner} {msg}")?);
+    if spinner.is_hidden() {
+        eprintln!("Waiting for a viewer: start Tracy 0.14 on this machine and press Connect.");
+    }
+    spinner.set_message("Waiting for a viewer: start Tracy 0.14 on this machine and press Connect.");
+    while !drawloom_tracy::is_connected() {
+        spinner.tick();
+        thread::sleep(Duration::from_millis(100));
+    }
+    spinner.finish_and_clear();
+    Ok(())
+}

@@ -1,0 +1,10 @@
+//! Only one subscriber can be the whole program's, so this is a program of its own.
+
+use drawloom_tracy::{InstallError, Zones};
+
+#[test]
+fn a_second_subscriber_is_an_error() {
+    assert_eq!(drawloom_tracy::install(Zones::Processes), Ok(()));
+    assert_eq!(drawloom_tracy::install(Zones::Chunks), Err(InstallError));
+    assert!(InstallError.to_string().contains("drawloom_tracy::layer"));
+}
