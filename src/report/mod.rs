@@ -50,7 +50,7 @@ mod replay;
 pub use self::{
     chrome_trace::write_chrome_trace,
     error::ReportError,
-    frame_report::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
+    frame_report::{FrameReport, HeldBy, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
     page::write_page,
     replay::{Prices, Replay, Replayed},
 };

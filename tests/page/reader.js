@@ -77,8 +77,9 @@ async function read() {
     press("Escape");
     tell("escape-lets-go", dataset.chain === "" && state.selected === -1);
 
-    const path = criticalPath().map(({ beside }) => nameOf(beside));
-    tell("the-critical-path-goes-by-what-was-waited-for", [...new Set(path)].join() === "root,right,end");
+    const path = criticalPath().map(({ beside }) => `${nameOf(beside)} on ${lanes[slices.lane[beside]].label}`);
+    const expected = "root on caller,right on other,end on caller";
+    tell("the-critical-path-goes-through-its-workers", [...new Set(path)].join() === expected);
     part("critical").click();
 
     part("search").value = "LEFT";

@@ -12,7 +12,7 @@ use std::{
 
 use drawloom::{
     graph::{Closure, FrameGraph, Schedule},
-    report::{FrameReport, Prices, Replay, Step},
+    report::{FrameReport, HeldBy, Prices, Replay, Slack, Step},
     task::Scheduler,
     timeline::{Chunk, Labels, Log, Run},
 };
@@ -94,32 +94,107 @@ fn frame_of(schedule: &mut Schedule<Closure<'_, Call>>, scheduler: &Scheduler, c
     (log, frame)
 }
 
-/// When each process ended, and how long after it could have begun.
-fn ends_and_weights(run: &Run) -> Vec<(Duration, Duration)> {
-    let mut all: Vec<(Duration, Duration)> = Vec::new();
-    for (index, process) in run.graph.processes.iter().enumerate() {
-        let ready = process.dependencies.iter().map(|&dependency| all[dependency].0).max().unwrap_or(run.began);
-        let chunks = run.chunks.iter().chain(&run.empty).filter(|chunk| chunk.process == index);
-        let ended = chunks.map(|chunk| chunk.ended).max().expect("a process has chunks, or has none to be seen");
-        all.push((ended, ended - ready));
-    }
-    all
+/// A worker's stay at a process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stay {
+    process: usize,
+    worker: usize,
+    started: Duration,
+    ended: Duration,
 }
 
-/// The longest of all ways that end with the process.
-fn longest_way(run: &Run, weights: &[(Duration, Duration)], process: usize) -> Duration {
-    let before = run.graph.processes[process].dependencies.iter();
-    weights[process].1 + before.map(|&before| longest_way(run, weights, before)).max().unwrap_or_default()
+/// When each process could have begun, and when it did.
+fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
+    let chunks_of = |process| run.chunks.iter().chain(&run.empty).filter(move |chunk| chunk.process == process);
+    let ended = |process| chunks_of(process).map(|chunk| chunk.ended).max().expect("it has chunks, or none to be seen");
+    let processes = run.graph.processes.iter().enumerate();
+    let times = processes.map(|(index, process)| {
+        let ready = process.dependencies.iter().map(|&dependency| ended(dependency)).max().unwrap_or(run.began);
+        (ready, chunks_of(index).map(|chunk| chunk.started).min().unwrap())
+    });
+    times.collect()
 }
 
-/// When the last process ends if one of them ends so much later.
-fn end_if_late(run: &Run, weights: &[(Duration, Duration)], late: usize, by: Duration) -> Duration {
-    let mut ends: Vec<Duration> = Vec::new();
-    for (index, process) in run.graph.processes.iter().enumerate() {
-        let ready = process.dependencies.iter().map(|&dependency| ends[dependency]).max().unwrap_or(run.began);
-        ends.push(ready + weights[index].1 + if index == late { by } else { Duration::ZERO });
+/// All stays in the order in which they ended, and which of them had to end before which.
+fn stays_and_edges(run: &Run) -> (Vec<Stay>, Vec<[usize; 2]>) {
+    let mut chunks: Vec<_> = run.chunks.iter().chain(&run.empty).collect();
+    chunks.sort_by_key(|chunk| (chunk.ended, chunk.started, chunk.process));
+    let mut stays: Vec<Stay> = Vec::new();
+    for chunk in chunks {
+        let &Chunk { process, worker, started, ended, .. } = chunk;
+        match stays.iter_mut().rfind(|stay| stay.worker == worker) {
+            Some(last) if last.process == process => last.ended = ended,
+            _ => stays.push(Stay { process, worker, started, ended }),
+        }
     }
-    ends.into_iter().max().unwrap()
+    stays.sort_by_key(|stay| (stay.ended, stay.started, stay.process));
+    let mut edges = Vec::new();
+    for (to, stay) in stays.iter().enumerate() {
+        let dependencies = &run.graph.processes[stay.process].dependencies;
+        let is_before = |&from: &usize| dependencies.contains(&stays[from].process);
+        edges.extend((0..stays.len()).filter(is_before).map(|from| [from, to]));
+        let previous = (0..to).rfind(|&from| stays[from].worker == stay.worker);
+        edges.extend(previous.map(|from| [from, to]));
+    }
+    (stays, edges)
+}
+
+/// When each stay ends that begins when it can and takes so long; each no earlier than it has to.
+fn ends(run: &Run, weights: &[Duration], edges: &[[usize; 2]], at_least: impl Fn(usize) -> Duration) -> Vec<Duration> {
+    let mut ends: Vec<_> = (0..weights.len()).map(|stay| at_least(stay).max(run.began + weights[stay])).collect();
+    loop {
+        let before = ends.clone();
+        for &[from, to] in edges {
+            ends[to] = ends[to].max(ends[from] + weights[to]);
+        }
+        if ends == before {
+            return ends;
+        }
+    }
+}
+
+fn check_run(run: &Run, path: &[&Step], slack: &[Slack]) -> Result<(), TestCaseError> {
+    let (stays, edges) = stays_and_edges(run);
+    let ready = |stay: usize| {
+        let before = edges.iter().filter(|[_, to]| *to == stay);
+        before.map(|&[from, _]| stays[from].ended).max().unwrap_or(run.began)
+    };
+    let weights: Vec<_> = (0..stays.len()).map(|stay| stays[stay].ended - ready(stay).max(run.began)).collect();
+    let end = stays.iter().map(|stay| stay.ended).max().unwrap();
+    let longest = ends(run, &weights, &edges, |_| Duration::ZERO).into_iter().max().unwrap();
+    prop_assert_eq!(longest, end);
+    prop_assert_eq!(path.iter().map(|step| step.took()).sum::<Duration>(), end - run.began);
+    let mut places = Vec::new();
+    for step in path {
+        let (_, process) = step.process.unwrap();
+        let stay = Stay { process, worker: step.worker.unwrap(), started: step.started, ended: step.ended };
+        places.extend(stays.iter().position(|other| *other == stay));
+        prop_assert!(slack[process].time.is_zero());
+    }
+    prop_assert_eq!(places.len(), path.len());
+    prop_assert_eq!(path[0].held_by, HeldBy::Start);
+    for (pair, steps) in places.windows(2).zip(path.windows(2)) {
+        prop_assert!(edges.iter().any(|edge| edge == pair), "{:?}", steps);
+        let [from, to] = [stays[pair[0]], stays[pair[1]]];
+        let depends = run.graph.processes[to.process].dependencies.contains(&from.process);
+        prop_assert_eq!(steps[1].held_by, if depends { HeldBy::Dependency } else { HeldBy::Worker });
+        prop_assert!(depends || from.worker == to.worker);
+    }
+    if run.workers == 1 {
+        let all = (0..stays.len()).filter(|&stay| !weights[stay].is_zero()).collect::<Vec<_>>();
+        places.retain(|&stay| !weights[stay].is_zero());
+        prop_assert_eq!(places, all);
+    }
+    for (process, slack) in slack.iter().enumerate() {
+        let end_if_late = |by| {
+            let late = |stay: usize| stays[stay].process == process;
+            let at_least = |stay| if late(stay) { stays[stay].ended + by } else { Duration::ZERO };
+            ends(run, &weights, &edges, at_least).into_iter().max().unwrap()
+        };
+        prop_assert_eq!(end_if_late(slack.time), end);
+        prop_assert!(end_if_late(slack.time + Duration::from_nanos(1)) > end);
+    }
+    Ok(())
 }
 
 fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
@@ -134,22 +209,15 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
         prop_assert!(pair[0].ended == pair[1].ready || is_pause, "{:?}", pair);
     }
     prop_assert_eq!(report.shares.iter().map(|share| share.took()).sum::<Duration>(), took);
-    let mut slack = report.slack.iter();
+    let mut slack = report.slack.as_slice();
     for (place, run) in log.runs.iter().enumerate() {
-        let weights = ends_and_weights(run);
-        let steps = || path.iter().filter(|step| step.process.is_some_and(|(run, _)| run == place));
-        let longest = (0..weights.len()).map(|process| longest_way(run, &weights, process)).max().unwrap();
-        prop_assert_eq!(steps().map(Step::took).sum::<Duration>(), longest);
-        let critical: BTreeSet<_> = steps().filter_map(|step| step.process).collect();
-        let end = weights.iter().map(|&(end, _)| end).max().unwrap();
-        for (index, slack) in slack.by_ref().take(weights.len()).enumerate() {
-            prop_assert_eq!(slack.process, (place, index));
-            prop_assert!(slack.time.is_zero() || !critical.contains(&slack.process));
-            prop_assert_eq!(end_if_late(run, &weights, index, slack.time), end);
-            prop_assert!(end_if_late(run, &weights, index, slack.time + Duration::from_nanos(1)) > end);
-        }
+        let steps = path.iter().filter(|step| step.process.is_some_and(|(run, _)| run == place));
+        let (of_run, rest) = slack.split_at(run.graph.processes.len());
+        prop_assert!(of_run.iter().enumerate().all(|(index, slack)| slack.process == (place, index)));
+        check_run(run, &steps.collect::<Vec<_>>(), of_run)?;
+        slack = rest;
     }
-    prop_assert_eq!(slack.len(), 0);
+    prop_assert!(slack.is_empty());
     let all = || log.runs.iter().flat_map(|run| run.chunks.iter().chain(&run.empty));
     for (index, worker) in report.workers.iter().enumerate() {
         prop_assert_eq!(worker.busy + worker.searching + worker.asleep + worker.other, took);
@@ -160,10 +228,7 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
     prop_assert_eq!(report.workers.iter().map(|worker| worker.chunks).sum::<usize>(), chunks);
     let mut waits: Vec<Duration> = Vec::new();
     for run in &log.runs {
-        for (index, (ended, weight)) in ends_and_weights(run).into_iter().enumerate() {
-            let started = run.chunks.iter().chain(&run.empty).filter(|chunk| chunk.process == index);
-            waits.push(started.map(|chunk| chunk.started).min().unwrap() - (ended - weight));
-        }
+        waits.extend(ready_and_started(run).into_iter().map(|(ready, started)| started - ready));
     }
     waits.retain(|wait| !wait.is_zero());
     waits.sort_unstable_by_key(|&wait| std::cmp::Reverse(wait));

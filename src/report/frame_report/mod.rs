@@ -2,6 +2,7 @@
 
 mod critical_path;
 mod queue_waits;
+mod stays;
 mod steps;
 mod words;
 mod worker_times;
@@ -53,11 +54,12 @@ pub struct FrameReport {
     pub on_workers: Vec<(usize, Duration)>,
 }
 
-/// A step of the critical path: a process of a run, or what a thread did outside of all runs.
+/// A step of the critical path: a worker's stay at a process of a run, or what a thread did outside of all runs.
 ///
-/// A process is *ready* when the last of what it waits for has ended, and from when its run began on if it waits for nothing. It
-/// starts with its first chunk and ends with its last. So the step before a process is that of its dependencies which ended
-/// last, and the first step of a run begins with the run: nothing lies between one step and the next.
+/// A stay is the chunks of one process that a worker ran with none of the run's others in between. It could not begin before
+/// the last of what its process waits for had ended, nor before the worker's stay before had. What ended last of these is what
+/// it was [held by](Self::held_by), and the step before it. The first step of a run begins with the run: nothing lies between
+/// one step and the next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// What it is called.
@@ -67,12 +69,27 @@ pub struct Step {
     /// The index of the run in the log, and of the process in its graph; `None` for what a thread did outside of all runs, and
     /// for what a run took to end after its last process.
     pub process: Option<(usize, usize)>,
+    /// The worker whose stay it is; `None` where there is no process, or nothing is known of it.
+    pub worker: Option<usize>,
+    /// What it had to wait for.
+    pub held_by: HeldBy,
     /// When it could have begun: when the step before ended.
     pub ready: Duration,
-    /// When it began: from `ready` until then it waited for a worker.
+    /// When it began: from `ready` until then a worker had yet to come, which had to be woken, say, or to look for work.
     pub started: Duration,
     /// When it ended.
     pub ended: Duration,
+}
+
+/// What a step of the critical path had to wait for: what the step before it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldBy {
+    /// Nothing but its run, of which it is the first; or it is no process.
+    Start,
+    /// A process that its own waits for.
+    Dependency,
+    /// Its worker, which was at something else until then.
+    Worker,
 }
 
 /// How much of the critical path is a group's.
@@ -82,7 +99,7 @@ pub struct Share {
     pub group: String,
     /// How long its steps ran, from each one's start to its end.
     pub ran: Duration,
-    /// How long they waited for a worker before that.
+    /// How long they waited before that for a worker to come.
     pub waited: Duration,
 }
 
@@ -93,9 +110,10 @@ pub struct Slack {
     pub process: (usize, usize),
     /// What the process is called.
     pub name: String,
-    /// How much later it could have ended without its run's last process ending later, if all that depends on it, directly or
-    /// not, took as long from ready to end as it did. Zero on the critical path. It is the total float of the critical path
-    /// method (Kelley and Walker, "Critical-Path Planning and Scheduling", 1959).
+    /// How much later all its stays could have ended without its run's last one ending later, if all stays that had to wait
+    /// for them, directly or not, took as long from ready to end as they did: those of its dependents, and those of the same
+    /// workers. Zero on the critical path. It is the total float of the critical path method (Kelley and Walker,
+    /// "Critical-Path Planning and Scheduling", 1959), on a graph of [stays](Step).
     pub time: Duration,
 }
 
@@ -206,7 +224,7 @@ impl Step {
         self.ended.saturating_sub(self.ready)
     }
 
-    /// How long it waited for a worker.
+    /// How long it waited for a worker to come.
     pub fn waited(&self) -> Duration {
         self.started.saturating_sub(self.ready)
     }

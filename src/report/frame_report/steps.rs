@@ -7,7 +7,7 @@ use crate::{
     timeline::{Log, Span},
 };
 
-use super::{Step, critical_path::RunTimes};
+use super::{HeldBy, Step, critical_path::RunTimes, stays::Stay};
 
 /// What a run's time is called from the end of its last process on: workers find that nothing is left, and the calling
 /// thread is woken if it sleeps.
@@ -31,22 +31,20 @@ pub(super) fn steps(log: &Log, frame: u64, own_time: &[Range<Duration>], runs: &
 }
 
 fn steps_of_run(times: &RunTimes<'_>) -> Vec<Step> {
-    let path = times.critical_path();
-    let mut steps: Vec<_> = path
-        .into_iter()
-        .map(|index| {
-            let process = &times.run.graph.processes[index];
-            let at = times.processes[index];
-            Step {
-                name: process.name.clone(),
-                group: process.group().to_owned(),
-                process: Some((times.place, index)),
-                ready: at.ready,
-                started: at.started,
-                ended: at.ended,
-            }
-        })
-        .collect();
+    let step = |stay: &Stay| {
+        let process = &times.run.graph.processes[stay.process];
+        Step {
+            name: process.name.clone(),
+            group: process.group().to_owned(),
+            process: Some((times.place, stay.process)),
+            worker: stay.worker,
+            held_by: stay.held_by,
+            ready: stay.ready,
+            started: stay.started,
+            ended: stay.ended,
+        }
+    };
+    let mut steps: Vec<_> = times.critical_path().into_iter().map(step).collect();
     let end = steps.last().map_or(times.run.began, |step| step.ended);
     if end < times.run.ended {
         steps.push(outside_of_processes(END_OF_RUN.to_owned(), END_OF_RUN, end..times.run.ended));
@@ -114,5 +112,6 @@ fn name_of(span: &Span, part: &Range<Duration>, runs: &[RunTimes<'_>]) -> String
 
 fn outside_of_processes(name: String, group: &str, time: Range<Duration>) -> Step {
     let Range { start, end } = time;
-    Step { name, group: group.to_owned(), process: None, ready: start, started: start, ended: end }
+    let (group, held_by) = (group.to_owned(), HeldBy::Start);
+    Step { name, group, process: None, worker: None, held_by, ready: start, started: start, ended: end }
 }

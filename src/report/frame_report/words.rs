@@ -6,17 +6,25 @@ use std::{
     time::Duration,
 };
 
-use super::{FrameReport, QueueWait, Share, Slack, Step, WhatIf, WorkerReport};
+use super::{FrameReport, HeldBy, QueueWait, Slack, Step, WhatIf, WorkerReport};
 
 /// How long a list may be, for somebody to read it.
 const MOST_LINES: usize = 10;
+const MOST_QUEUE_WAITS: usize = 5;
 
-/// How many workers, and how many groups that they were at meanwhile, may be listed.
+/// How many workers may be listed, how many groups that they were at meanwhile, and how many that the path was most.
 const MOST_WORKERS: usize = 16;
 const MOST_AT_ONCE: usize = 3;
+const MOST_OF_PATH: usize = 3;
 
-/// How many characters a name may have.
+/// How many characters a line may have, a name, a worker's name, and a name where several stand in a line.
+const LONGEST_LINE: usize = 120;
 const LONGEST_NAME: usize = 60;
+const LONGEST_OF_WORKER: usize = 40;
+const LONGEST_OF_SEVERAL: usize = 17;
+
+/// Which part of the frame is the least that is worth saving: one in so many.
+const LEAST_SAVED: u32 = 200;
 
 /// The report in words: what is to blame first, then each list of it, no longer than somebody reads.
 impl Display for FrameReport {
@@ -37,13 +45,17 @@ impl FrameReport {
         let Self { frame, took, .. } = self;
         let workers = counted(self.workers.len(), "worker", "workers");
         writeln!(to, "frame {frame} took {} ms on {workers}", Milliseconds(*took))?;
-        let waited: Duration = self.critical_path.iter().map(Step::waited).sum();
-        if let Some(Share { group, ran, .. }) = self.shares.iter().max_by_key(|share| share.ran) {
-            let [ran, waited] = [*ran, waited].map(|part| percent(part, *took));
-            let group = shown(group);
-            writeln!(to, "its critical path: {ran}% of it ran {group}, {waited}% of it waited for a worker")?;
+        let mut ran: Vec<_> = self.shares.iter().filter(|share| !share.ran.is_zero()).collect();
+        ran.sort_by_key(|share| Reverse(share.ran));
+        if !ran.is_empty() {
+            let most = ran.iter().take(MOST_OF_PATH);
+            let group = |group| shortened(&shown(group), LONGEST_OF_SEVERAL);
+            let most = most.map(|share| format!("{}% {}", percent(share.ran, *took), group(&share.group)));
+            let waited = percent(self.critical_path.iter().map(Step::waited).sum(), *took);
+            let most = most.collect::<Vec<_>>().join(", ");
+            writeln!(to, "its critical path: {most}; {waited}% waited for workers to come")?;
         }
-        if let Some(WhatIf { group, saved, .. }) = self.what_if.first().filter(|first| !first.saved.is_zero()) {
+        if let Some(WhatIf { group, saved, .. }) = self.worth_saving().first() {
             writeln!(to, "most could be saved in {}: {} ms", shown(group), Milliseconds(*saved))?;
         }
         Ok(())
@@ -61,10 +73,13 @@ impl FrameReport {
         longest_first.sort_by_key(|&place| Reverse(lines[place].took));
         let left_out = longest_first.split_off(lines.len().min(MOST_LINES));
         longest_first.sort_unstable();
-        writeln!(to, "\ncritical path\n{:>12}{:>12}{:>12}  step", "from ms", "took ms", "waited ms")?;
-        for Line { name, ready, took, waited, .. } in longest_first.into_iter().map(|place| &lines[place]) {
+        write!(to, "\ncritical path\n{:>12}{:>12}{:>12}", "from ms", "took ms", "waited ms")?;
+        writeln!(to, "  {:<12} step", "held by")?;
+        for Line { name, held_by, ready, took, waited, .. } in longest_first.into_iter().map(|place| &lines[place]) {
             let from = Milliseconds(ready.saturating_sub(self.began));
-            writeln!(to, "{from:>12}{:>12}{:>12}  {name}", Milliseconds(*took), MillisecondsIfAny(*waited))?;
+            let (took, waited, held_by) = (Milliseconds(*took), MillisecondsIfAny(*waited), in_words(*held_by));
+            let line = format!("{from:>12}{took:>12}{waited:>12}  {held_by:<12} {name}");
+            writeln!(to, "{}", shortened(&line, LONGEST_LINE))?;
         }
         let rest = left_out.iter().map(|&place| lines[place].took).sum();
         write_more(to, left_out.len(), ["shorter step", "shorter steps"], rest)
@@ -86,7 +101,7 @@ impl FrameReport {
     }
 
     fn write_what_if(&self, to: &mut Formatter<'_>) -> fmt::Result {
-        let saving: Vec<_> = self.what_if.iter().filter(|what_if| !what_if.saved.is_zero()).collect();
+        let saving = self.worth_saving();
         if saving.is_empty() {
             return Ok(());
         }
@@ -103,10 +118,16 @@ impl FrameReport {
                 Milliseconds(*time)
             )?;
         }
-        match saving.len() - lines.len() {
+        match self.what_if.len() - lines.len() {
             0 => Ok(()),
             more => writeln!(to, "  and {} that would save less", counted(more, "group", "groups")),
         }
+    }
+
+    /// Those with which it would make a difference, the most first.
+    fn worth_saving(&self) -> &[WhatIf] {
+        let is_worth = |what_if: &WhatIf| what_if.saved >= self.replayed / LEAST_SAVED && !what_if.saved.is_zero();
+        &self.what_if[..self.what_if.partition_point(is_worth)]
     }
 
     fn write_numbers_of_workers(&self, to: &mut Formatter<'_>) -> fmt::Result {
@@ -146,7 +167,7 @@ impl FrameReport {
             return Ok(());
         }
         writeln!(to, "\nlongest waits for a worker, and how many workers were at what meanwhile")?;
-        for wait @ QueueWait { name, meanwhile, .. } in &self.queue_waits {
+        for wait @ QueueWait { name, meanwhile, .. } in self.queue_waits.iter().take(MOST_QUEUE_WAITS) {
             let workers = |time: Duration| time.as_secs_f64() / wait.waited().as_secs_f64().max(f64::MIN_POSITIVE);
             let at_once = meanwhile.iter().map(|(group, time)| (group, workers(*time)));
             // Those that are not rounded to nobody.
@@ -162,14 +183,16 @@ impl FrameReport {
                 }
                 _ => (),
             }
-            writeln!(to, "{:>12} ms  {}: {}", Milliseconds(wait.waited()), shown(name), words.join(", "))?;
+            let line = format!("{:>12} ms  {}: {}", Milliseconds(wait.waited()), shown(name), words.join(", "));
+            writeln!(to, "{}", shortened(&line, LONGEST_LINE))?;
         }
         Ok(())
     }
 
     fn write_workers(&self, to: &mut Formatter<'_>) -> fmt::Result {
+        let listed = self.workers.iter().take(MOST_WORKERS);
         let listed: Vec<_> =
-            self.workers.iter().take(MOST_WORKERS).map(|worker| (shown(&worker.name), worker)).collect();
+            listed.map(|worker| (shortened(&shown(&worker.name), LONGEST_OF_WORKER), worker)).collect();
         let width = listed.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("worker".len());
         write!(to, "\n  {:<width$}{:>12}{:>6}", "worker", "busy ms", "")?;
         writeln!(to, "{:>14}{:>12}{:>12}{:>8}{:>8}", "searching ms", "asleep ms", "other ms", "chunks", "stolen")?;
@@ -195,6 +218,7 @@ impl FrameReport {
 struct Line {
     name: String,
     group: String,
+    held_by: HeldBy,
     ready: Duration,
     took: Duration,
     waited: Duration,
@@ -203,13 +227,13 @@ struct Line {
 
 impl Line {
     fn new(step: &Step) -> Self {
-        let Step { name, group, ready, .. } = step;
-        let (name, group) = (shown(name), group.clone());
-        Self { name, group, ready: *ready, took: step.took(), waited: step.waited(), steps: 1 }
+        let Step { name, group, held_by, ready, .. } = step;
+        let (name, group, held_by, ready) = (shown(name), group.clone(), *held_by, *ready);
+        Self { name, group, held_by, ready, took: step.took(), waited: step.waited(), steps: 1 }
     }
 }
 
-/// One line for neighbours of one group.
+/// One line for neighbours of one group. It is held by what its first step is held by.
 fn merge(lines: Vec<Line>) -> Vec<Line> {
     let mut merged: Vec<Line> = Vec::new();
     for line in lines {
@@ -244,12 +268,25 @@ impl Display for MillisecondsIfAny {
     }
 }
 
+fn in_words(held_by: HeldBy) -> &'static str {
+    match held_by {
+        HeldBy::Start => "-",
+        HeldBy::Dependency => "dependency",
+        HeldBy::Worker => "same worker",
+    }
+}
+
 /// A name from somewhere, which may be of any length and have anything in it, as it fits into a line.
 fn shown(name: &str) -> String {
-    let is_long = name.chars().nth(LONGEST_NAME).is_some();
-    let kept = if is_long { LONGEST_NAME - 1 } else { LONGEST_NAME };
     let plain = |character: char| if character.is_control() { char::REPLACEMENT_CHARACTER } else { character };
-    name.chars().take(kept).map(plain).chain(is_long.then_some('…')).collect()
+    shortened(name, LONGEST_NAME).chars().map(plain).collect()
+}
+
+/// So many characters of it at most.
+fn shortened(text: &str, most: usize) -> String {
+    let is_long = text.chars().nth(most).is_some();
+    let kept = if is_long { most - 1 } else { most };
+    text.chars().take(kept).chain(is_long.then_some('…')).collect()
 }
 
 fn percent(part: Duration, of: Duration) -> u64 {

@@ -12,7 +12,7 @@ const PASS = 3;
 const CHUNK_NUMBERS = 8;
 const SPAN_NUMBERS = 5;
 const PASS_NUMBERS = 5;
-const STEP_NUMBERS = 6;
+const STEP_NUMBERS = 7;
 const IDLE_NUMBERS = 3;
 
 // All that is drawn in lanes, a column for each of its numbers: objects would take ten times the memory.

@@ -94,25 +94,34 @@ function criticalPath() {
         const points = [];
         let beside = -1;
         for (let at = 0; at < frame.path.length; at += STEP_NUMBERS) {
-            const [name, run, process, ready, waited, took] = frame.path.slice(at, at + STEP_NUMBERS);
+            const [name, run, process, worker, ready, waited, took] = frame.path.slice(at, at + STEP_NUMBERS);
             const [began, ended] = [ready + waited, ready + waited + took];
-            const facts = run >= 0 ? factsOf(runs[run]) : null;
-            const first = facts ? facts.first[process] : spanAt(name, began, ended);
-            const last = facts ? facts.last[process] : first;
-            const from = first >= 0 ? first : beside;
-            const to = last >= 0 ? last : beside;
-            const crossing = Math.min(Math.max(to >= 0 ? slices.began[to] : began, began), ended);
-            points.push({ moment: ready, beside, isWait: true }, { moment: began, beside: from, isWait: true });
+            const found = run < 0 ? spanAt(name, began, ended) : stayAt(run, process, worker, began, ended);
             // What a thread did that nobody named has no slice to run beside.
-            const isWait = first < 0;
-            points.push({ moment: crossing, beside: to, isWait }, { moment: ended, beside: to, isWait });
-            beside = to;
+            const isWait = found < 0;
+            points.push({ moment: ready, beside, isWait: true });
+            beside = isWait ? beside : found;
+            points.push({ moment: began, beside, isWait: true }, { moment: ended, beside, isWait });
         }
         const known = points.find((point) => point.beside >= 0)?.beside ?? -1;
         points.forEach((point) => (point.beside = point.beside < 0 ? known : point.beside));
         frame.points = known < 0 ? [] : points;
     }
     return frame.points;
+}
+
+// The first slice of a worker's stay at a process, if there is one.
+function stayAt(run, process, worker, began, ended) {
+    const rows = lanes[data.threads.length + worker]?.rows ?? [];
+    for (const row of rows) {
+        // Half a nanosecond before, as a process without items may take no time.
+        for (let at = firstAfter(row, began - 0.5); at < row.length && slices.began[row[at]] <= ended; at += 1) {
+            if (isOfRun(row[at]) && slices.run[row[at]] === run && slices.process[row[at]] === process) {
+                return row[at];
+            }
+        }
+    }
+    return -1;
 }
 
 // The span of that name in that time, if there is one.
