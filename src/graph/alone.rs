@@ -12,7 +12,7 @@ use super::{
     error::NodeError,
     execute::{Position, Run},
     node::Node,
-    watch::Onlooker,
+    watch::{Onlooker, Watching},
 };
 
 /// Where a run stood when it took too long for one thread: all before this process is done.
@@ -25,14 +25,10 @@ pub(super) struct Left<O> {
     pub(super) onlooker: O,
 }
 
-impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
+impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     /// Runs everything, unless it takes longer than a limit since some moment; then it says where it stopped.
-    pub(super) fn go_alone<O: Onlooker>(
-        &self,
-        worker: &Worker,
-        limit: Option<(Instant, Duration)>,
-        mut onlooker: O,
-    ) -> Option<Left<O>> {
+    pub(super) fn go_alone(&self, worker: &Worker, limit: Option<(Instant, Duration)>) -> Option<Left<W::Turn<'_>>> {
+        let mut onlooker = self.watch.go_alone(worker);
         let mut patience = limit.map(|(start, at_most)| Patience { start, at_most, chunks: 0, next_look: 1 });
         // One attempt for all: an attempt a process would cost more than the rest of what is done for it.
         let left = self.attempt(0, |position| {

@@ -14,7 +14,7 @@ use super::{
     node::Node,
     schedule::Schedule,
     sharing::Way,
-    watch::{Nobody, Onlooker, Watch},
+    watch::{Nobody, Onlooker, Watch, Watching},
 };
 
 impl<P> Schedule<P> {
@@ -51,38 +51,18 @@ impl<P> Schedule<P> {
             self.sharing.choose(worker.wake_price())
         };
         self.describe(worker);
-        let start = Instant::now();
-        let mut run = Run {
-            schedule: &*self,
-            context,
-            clock: Clock::new((way == Way::Shared { is_measured: true }).then_some(&self.costs)),
-            watch: Watch::new(worker, self.graph.as_ref()),
-            is_stopped: AtomicBool::new(false),
-            failure: Mutex::new(None),
+        let ran = match Watch::new(worker, self.graph.as_ref()) {
+            Some(watch) => self.go(way, worker, context, watch),
+            None => self.go(way, worker, context, Nobody),
         };
-        let (shared_from, outcome) = match way {
-            Way::Alone { at_most } => {
-                let limit = at_most.map(|at_most| (start, at_most));
-                match &run.watch {
-                    None => run.go_alone_first(worker, limit, Nobody),
-                    Some(watch) => run.go_alone_first(worker, limit, watch.go_alone(worker)),
-                }
-            }
-            Way::Shared { .. } => (Some(Duration::ZERO), run.share(worker)),
-        };
-        let took = start.elapsed();
-        let failure = run.failure.lock().take();
-        if let Some(watch) = run.watch.take() {
-            let failed = failure.is_some() || outcome.is_err();
-            watch.end(Ended { workers: worker.workers(), shared_from, always_shares: self.always_shares, failed });
-        }
+        let Ran { took, is_shared, failure, outcome } = ran;
         if failure.is_some() {
             self.costs.forget_work();
         }
         // What a cancelled run took says nothing.
         if failure.is_none() {
             match way {
-                Way::Alone { .. } if shared_from.is_some() => self.sharing.gave_up(),
+                Way::Alone { .. } if is_shared => self.sharing.gave_up(),
                 Way::Alone { .. } => self.sharing.went_alone(took),
                 Way::Shared { is_measured } => {
                     let work = is_measured.then(|| self.learn());
@@ -98,6 +78,35 @@ impl<P> Schedule<P> {
             (None, Err(panic)) => Err(RunError::Scheduler(panic)),
             (None, Ok(())) => Ok(()),
         }
+    }
+
+    fn go<C, W>(&self, way: Way, worker: &Worker, context: &C, watch: W) -> Ran
+    where
+        C: Sync + ?Sized,
+        P: Node<C>,
+        W: Watching,
+    {
+        let start = Instant::now();
+        let run = Run {
+            schedule: self,
+            context,
+            clock: Clock::new((way == Way::Shared { is_measured: true }).then_some(&self.costs)),
+            watch,
+            is_stopped: AtomicBool::new(false),
+            failure: Mutex::new(None),
+        };
+        let (is_shared, outcome) = match way {
+            Way::Alone { at_most } => match run.go_alone(worker, at_most.map(|at_most| (start, at_most))) {
+                Some(left) => (true, run.share_rest(left, worker)),
+                None => (false, Ok(())),
+            },
+            Way::Shared { .. } => (true, run.share(worker)),
+        };
+        let took = start.elapsed();
+        let failure = run.failure.lock().take();
+        let failed = failure.is_some() || outcome.is_err();
+        run.watch.end(Ended { workers: worker.workers(), always_shares: self.always_shares, failed });
+        Ran { took, is_shared, failure, outcome }
     }
 
     /// Takes in what the processes cost in a measured run, and says how much work they were.
@@ -117,13 +126,21 @@ impl<P> Schedule<P> {
     }
 }
 
-/// One run: what all its jobs share.
-pub(super) struct Run<'run, P, C: ?Sized> {
+/// A run that has come to its end.
+struct Ran {
+    took: Duration,
+    /// Whether others than the calling thread were let in.
+    is_shared: bool,
+    failure: Option<Failure>,
+    outcome: Result<(), JobPanic>,
+}
+
+/// One run: what all its jobs share. `W` is who looks on.
+pub(super) struct Run<'run, P, C: ?Sized, W> {
     pub(super) schedule: &'run Schedule<P>,
     pub(super) context: &'run C,
     pub(super) clock: Clock<'run>,
-    /// `None` where nobody looks on.
-    pub(super) watch: Option<Watch<'run>>,
+    pub(super) watch: W,
     is_stopped: AtomicBool,
     failure: Mutex<Option<Failure>>,
 }
@@ -141,23 +158,7 @@ pub(super) struct Position {
     pub(super) item: usize,
 }
 
-impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
-    /// Runs all alone, or, from where that takes too long, with the others: says how long it had gone on then.
-    fn go_alone_first(
-        &self,
-        worker: &Worker,
-        limit: Option<(Instant, Duration)>,
-        onlooker: impl Onlooker,
-    ) -> (Option<Duration>, Result<(), JobPanic>) {
-        match (self.go_alone(worker, limit, onlooker), limit) {
-            (Some(left), Some((start, _))) => {
-                let shared_from = start.elapsed();
-                (Some(shared_from), self.share_rest(left, worker))
-            }
-            _ => (None, Ok(())),
-        }
-    }
-
+impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     /// Calls what is a user's, beginning with this process, and stops the run if it fails: then there is no result. `call`
     /// keeps its position up to date.
     #[inline]

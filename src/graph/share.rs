@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use crate::{
     sync::Instant,
-    task::{Band, Chunks, Crew, JobPanic, Tokens, Worker, run_tokens},
+    task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens},
 };
 
 use super::{
@@ -25,16 +25,17 @@ use super::{
     progress::OpenPass,
     schedule::Schedule,
     token::Token,
-    watch::{Nobody, Onlooker},
+    watch::{Onlooker, Watching},
 };
 
-impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
+impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     /// Runs everything.
     ///
     /// # Errors
     ///
     /// A panic outside of every process.
     pub(super) fn share(&self, worker: &Worker) -> Result<(), JobPanic> {
+        self.watch.let_others_in();
         run_tokens(worker, self, |crew| {
             let flow = &self.schedule.flow;
             let mut ready = Ready::new(self, flow.edges() as u32, crew);
@@ -52,9 +53,10 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     /// # Errors
     ///
     /// As [`share`](Self::share).
-    pub(super) fn share_rest(&self, left: Left<impl Onlooker>, worker: &Worker) -> Result<(), JobPanic> {
+    pub(super) fn share_rest(&self, left: Left<W::Turn<'_>>, worker: &Worker) -> Result<(), JobPanic> {
         let is_half_done = left.done < left.chunks.count();
         let first_open = if is_half_done { left.process } else { left.process + 1 };
+        self.watch.let_others_in();
         run_tokens(worker, self, |crew| {
             // It is left before anything that waits for it begins.
             let half_done = is_half_done.then_some(left.onlooker);
@@ -85,7 +87,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
 
     /// Pushes a process that is ready.
     fn send(&self, process: u32, crew: &Crew<'_>) {
-        self.count_ready();
+        self.watch.count_ready();
         if self.is_pinned(process) {
             crew.push_pinned(Token::StartPinned(process).encode());
         } else {
@@ -112,19 +114,14 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     ///
     /// It is a loop and no recursion, so that a chain of processes may be as long as memory lasts.
     fn start(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) {
+        let worker = crew.worker();
         let mut next = Some((process, is_pinned));
         while let Some((process, is_pinned)) = next {
             self.schedule.progress.arm(process, self.schedule.flow.dependency_count(process));
             self.clock.start(process);
-            let is_done = match &self.watch {
-                None => self.work_on(process, is_pinned, crew, Nobody),
-                Some(watch) => {
-                    watch.count_taken(crew.worker());
-                    let is_done = self.work_on(process, is_pinned, crew, watch.open(crew.worker(), process));
-                    crew.worker().forget_stolen();
-                    is_done
-                }
-            };
+            self.watch.count_taken(worker);
+            let is_done = self.work_on(process, is_pinned, crew);
+            self.watch.forget_stolen(worker);
             if !is_done {
                 return;
             }
@@ -148,11 +145,12 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
 
     /// Runs a process that has just started. True if it is done, and false if whoever finishes its last chunk is to
     /// complete it.
-    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>, mut onlooker: impl Onlooker) -> bool {
+    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
         if self.is_stopped() {
             return true;
         }
         let worker = crew.worker();
+        let mut onlooker = self.watch.open(worker, process);
         let chunks = self.clock.work(|| {
             self.attempt(process, |position| {
                 let chunks = self.chunks(process, worker);
@@ -177,34 +175,20 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
     fn join(&self, process: u32, crew: &Crew<'_>) -> bool {
         let pass = self.schedule.progress.pass(process);
         let chunks = pass.chunks();
-        let finished = self.clock.work(|| match &self.watch {
-            None => self.take_chunks(process, pass, &chunks, crew, || Nobody),
-            Some(watch) => {
-                let join = || watch.join(crew.worker(), process, &pass.opened);
-                let finished = self.take_chunks(process, pass, &chunks, crew, join);
-                crew.worker().forget_stolen();
-                finished
-            }
-        });
+        let pace = pass.tickets.join();
+        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pace, crew));
+        self.watch.forget_stolen(crew.worker());
         let is_last = pass.finish(finished, &chunks);
-        if is_last && self.watch.is_some() {
-            drop(pass.opened.close());
+        if is_last {
+            self.watch.close(&pass.opened);
         }
         is_last
     }
 
     /// Runs chunks until none is left, and says how many. After a failure they are only counted. Who looks on does so from the
     /// first chunk on: who gets none has no part in the process, and may come when it is done.
-    fn take_chunks<O: Onlooker>(
-        &self,
-        process: u32,
-        pass: &OpenPass,
-        chunks: &Chunks,
-        crew: &Crew<'_>,
-        look_on: impl Fn() -> O,
-    ) -> usize {
+    fn take_chunks(&self, process: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
         let (worker, mut onlooker) = (crew.worker(), None);
-        let mut pace = pass.tickets.join();
         let mut finished = 0;
         loop {
             if finished > 0 && crew.has_pinned() {
@@ -226,7 +210,7 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
             if pass.tickets.invites(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(process).encode(), self.band(process));
             }
-            let onlooker = onlooker.get_or_insert_with(&look_on);
+            let onlooker = onlooker.get_or_insert_with(|| self.watch.join(worker, process, &pass.opened));
             self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, onlooker));
         }
     }
@@ -250,19 +234,12 @@ impl<P: Node<C>, C: Sync + ?Sized> Run<'_, P, C> {
         self.attempt(process, |_position| Ok(self.node(process).pinned())).unwrap_or(false)
     }
 
-    #[inline]
-    fn count_ready(&self) {
-        if let Some(watch) = &self.watch {
-            watch.count_ready();
-        }
-    }
-
     fn band(&self, process: u32) -> Band {
         if self.schedule.flow.is_urgent(process) { Band::Urgent } else { Band::Normal }
     }
 }
 
-impl<P: Node<C>, C: Sync + ?Sized> Tokens for Run<'_, P, C> {
+impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Tokens for Run<'_, P, C, W> {
     fn run(&self, token: u64, crew: &Crew<'_>) {
         match Token::decode(token) {
             Token::Ready(places) => self.start_one_of(places, crew),
@@ -278,8 +255,8 @@ impl<P: Node<C>, C: Sync + ?Sized> Tokens for Run<'_, P, C> {
 }
 
 /// Processes that became ready by one and the same.
-struct Ready<'run, P, C: ?Sized> {
-    run: &'run Run<'run, P, C>,
+struct Ready<'run, P, C: ?Sized, W> {
+    run: &'run Run<'run, P, C, W>,
     crew: &'run Crew<'run>,
     /// Where those stand that have not been pushed: all of one band.
     places: Range<u32>,
@@ -288,15 +265,15 @@ struct Ready<'run, P, C: ?Sized> {
     has_pinned: bool,
 }
 
-impl<'run, P: Node<C>, C: Sync + ?Sized> Ready<'run, P, C> {
+impl<'run, P: Node<C>, C: Sync + ?Sized, W: Watching> Ready<'run, P, C, W> {
     /// None. They are to stand at the places from this one on.
-    fn new(run: &'run Run<'run, P, C>, place: u32, crew: &'run Crew<'run>) -> Self {
+    fn new(run: &'run Run<'run, P, C, W>, place: u32, crew: &'run Crew<'run>) -> Self {
         Self { run, crew, places: place..place, kept: None, has_pinned: false }
     }
 
     fn add(&mut self, process: u32) {
         let run = self.run;
-        run.count_ready();
+        run.watch.count_ready();
         if run.is_pinned(process) {
             self.crew.push_pinned(Token::StartPinned(process).encode());
             self.has_pinned = true;

@@ -1,6 +1,6 @@
 //! Who looks on while a run goes on: the scheduler's timeline, and subscribers of spans.
 //!
-//! Whether anybody does is found out once a run. Where nobody does, a chunk costs no more than to see that there is nobody.
+//! Whether anybody does is found out once a run, and is a type from there on: where nobody does, it costs nothing.
 
 use std::{mem, ops::Range, sync::Arc};
 
@@ -82,51 +82,9 @@ impl<'run> Watch<'run> {
             in_detail: level >= Level::TRACE,
             ready: AtomicUsize::new(0),
         });
-        (recorded.is_some() || traced.is_some()).then_some(Self { recorded, traced })
-    }
-}
-
-impl Watch<'_> {
-    /// A worker opens a process.
-    pub(super) fn open(&self, worker: &Worker, process: u32) -> Turn<'_> {
-        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, worker.has_stolen()));
-        Turn { watch: self, lap, span: self.span(process).entered() }
-    }
-
-    /// A worker joins others at a process that was opened.
-    pub(super) fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Turn<'_> {
-        let Opening { at, span } = opened.0.lock().clone();
-        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, worker.has_stolen(), at));
-        Turn { watch: self, lap, span: span.entered() }
-    }
-
-    /// A worker is to go through all processes by itself.
-    pub(super) fn go_alone(&self, worker: &Worker) -> Turn<'_> {
-        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), 0, false));
-        Turn { watch: self, lap, span: Span::none().entered() }
-    }
-
-    /// A process has become ready, in a run that is shared.
-    pub(super) fn count_ready(&self) {
-        if let Some(traced) = self.traced_in_detail() {
-            // Relaxed, here and below: it is a count that somebody looks at.
-            traced.ready.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    /// A worker has taken up a process that was ready, in a run that is shared.
-    pub(super) fn count_taken(&self, worker: &Worker) {
-        if let Some(traced) = self.traced_in_detail() {
-            let ready = traced.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
-            tracing::trace!(name: "taken", target: TARGET, ready, queued = worker.queued());
-        }
-    }
-
-    /// The run has ended.
-    pub(super) fn end(self, how: Ended) {
-        if let Some(run) = self.recorded {
-            run.end(how);
-        }
+        // What it costs is measured against a build that has none.
+        let is_wanted = (recorded.is_some() || traced.is_some()) && !cfg!(drawloom_without_timeline);
+        is_wanted.then_some(Self { recorded, traced })
     }
 
     fn traced_in_detail(&self) -> Option<&Traced<'_>> {
@@ -139,6 +97,98 @@ impl Watch<'_> {
         let Process { name, labels, .. } = &traced.graph.processes[process as usize];
         let [of, phase, view] = [&labels.process, &labels.phase, &labels.view].map(Option::as_deref);
         tracing::debug_span!(target: TARGET, parent: &traced.parent, "process", name, process = of, phase, view)
+    }
+}
+
+/// Who looks on at a run: a [`Watch`], or [`Nobody`].
+pub(super) trait Watching: Sync {
+    /// What looks on while a worker is at a process.
+    type Turn<'watch>: Onlooker
+    where
+        Self: 'watch;
+
+    /// A worker opens a process.
+    fn open(&self, worker: &Worker, process: u32) -> Self::Turn<'_>;
+
+    /// A worker joins others at a process that was opened.
+    fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Self::Turn<'_>;
+
+    /// A worker is to go through all processes by itself.
+    fn go_alone(&self, worker: &Worker) -> Self::Turn<'_>;
+
+    /// A process that several have joined is done.
+    fn close(&self, opened: &Opened);
+
+    /// A process has become ready, in a run that is shared.
+    fn count_ready(&self);
+
+    /// A worker has taken up a process that was ready, in a run that is shared.
+    fn count_taken(&self, worker: &Worker);
+
+    /// What the worker's job was stolen for is done, and what it goes on with was not stolen.
+    fn forget_stolen(&self, worker: &Worker);
+
+    /// Other workers can take part from now on.
+    fn let_others_in(&self);
+
+    /// The run has ended.
+    fn end(self, how: Ended);
+}
+
+impl Watching for Watch<'_> {
+    type Turn<'watch>
+        = Turn<'watch>
+    where
+        Self: 'watch;
+
+    fn open(&self, worker: &Worker, process: u32) -> Turn<'_> {
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, worker.has_stolen()));
+        Turn { watch: self, lap, span: self.span(process).entered() }
+    }
+
+    fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Turn<'_> {
+        let Opening { at, span } = opened.0.lock().clone();
+        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, worker.has_stolen(), at));
+        Turn { watch: self, lap, span: span.entered() }
+    }
+
+    fn go_alone(&self, worker: &Worker) -> Turn<'_> {
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), 0, false));
+        Turn { watch: self, lap, span: Span::none().entered() }
+    }
+
+    fn close(&self, opened: &Opened) {
+        drop(opened.close());
+    }
+
+    fn count_ready(&self) {
+        if let Some(traced) = self.traced_in_detail() {
+            // Relaxed, here and below: it is a count that somebody looks at.
+            traced.ready.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn count_taken(&self, worker: &Worker) {
+        if let Some(traced) = self.traced_in_detail() {
+            let ready = traced.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
+            tracing::trace!(name: "taken", target: TARGET, ready, queued = worker.queued());
+        }
+    }
+
+    fn forget_stolen(&self, worker: &Worker) {
+        worker.forget_stolen();
+    }
+
+    fn let_others_in(&self) {
+        if let Some(run) = &self.recorded {
+            run.let_others_in();
+        }
+    }
+
+    fn end(self, how: Ended) {
+        if let Some(run) = self.recorded {
+            run.end(how);
+        }
     }
 }
 
@@ -160,19 +210,43 @@ pub(super) trait Onlooker {
 /// Nobody looks on.
 pub(super) struct Nobody;
 
+impl Watching for Nobody {
+    type Turn<'watch> = Self;
+
+    fn open(&self, _worker: &Worker, _process: u32) -> Self {
+        Self
+    }
+
+    fn join(&self, _worker: &Worker, _process: u32, _opened: &Opened) -> Self {
+        Self
+    }
+
+    fn go_alone(&self, _worker: &Worker) -> Self {
+        Self
+    }
+
+    fn close(&self, _opened: &Opened) {}
+
+    fn count_ready(&self) {}
+
+    fn count_taken(&self, _worker: &Worker) {}
+
+    fn forget_stolen(&self, _worker: &Worker) {}
+
+    fn let_others_in(&self) {}
+
+    fn end(self, _how: Ended) {}
+}
+
 impl Onlooker for Nobody {
-    #[inline]
     fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
         run(items)
     }
 
-    #[inline]
     fn end_empty(&mut self) {}
 
-    #[inline]
     fn go_on(&mut self, _process: u32) {}
 
-    #[inline]
     fn leave(self, _opened: &Opened) {}
 }
 

@@ -1,11 +1,11 @@
 //! What a worker writes.
 
-use std::{ops::Range, time::Duration};
+use std::ops::Range;
 
 use crate::sync::{AtomicU64, Ordering};
 
 use super::{
-    clock::Clock,
+    clock::{Clock, Reader},
     log::{Chunk, Idle, IdleKind},
     ring::{Event, Ring},
 };
@@ -42,48 +42,46 @@ impl Lane {
         self.ring.make_room();
     }
 
-    /// The worker has nothing to do from now on, or passes its time in another way. What that ends is written down if
-    /// `is_on`.
-    pub(super) fn start_idle(&self, kind: IdleKind, clock: &Clock, is_on: bool) {
-        let now = clock.now();
-        self.end_idle_at(now, is_on);
+    /// The worker has nothing to do from this mark on, or passes its time in another way. Without a mark nothing is recorded,
+    /// but if it is asleep still when something is, it has been so for all of that time.
+    pub(super) fn start_idle(&self, kind: IdleKind, now: Option<u64>) {
+        self.end_idle(now);
         // Relaxed, here and below: it hands nothing over.
-        self.idle.store(now << TAGS | tag_of(kind), Ordering::Relaxed);
+        self.idle.store(now.unwrap_or(0) << TAGS | tag_of(kind), Ordering::Relaxed);
     }
 
-    /// The worker has something to do.
-    pub(super) fn end_idle(&self, clock: &Clock, is_on: bool) {
-        // The looks spare most calls the clock.
-        if self.idle.load(Ordering::Relaxed) != 0 {
-            self.end_idle_at(if is_on { clock.now() } else { 0 }, is_on);
-        }
+    /// Whether the worker had nothing to do.
+    pub(super) fn is_idle(&self) -> bool {
+        self.idle.load(Ordering::Relaxed) != 0
     }
 
-    fn end_idle_at(&self, now: u64, is_on: bool) {
+    /// The worker has something to do from this mark on. Without one nothing is recorded.
+    pub(super) fn end_idle(&self, now: Option<u64>) {
         let idle = self.idle.load(Ordering::Relaxed);
         self.idle.store(0, Ordering::Relaxed);
-        if idle != 0 && is_on {
+        if let Some(now) = now.filter(|_| idle != 0) {
             self.ring.push([0, 0, 0, idle & mask(), idle >> TAGS, now]);
         }
     }
 
     /// What the worker passes its time with at this moment.
-    pub(super) fn idle_until(&self, now: u64) -> Option<Idle> {
+    pub(super) fn idle_until(&self, now: u64, clock: &Clock) -> Option<Idle> {
         let idle = self.idle.load(Ordering::Relaxed);
         let kind = kind_of(idle & mask())?;
-        Some(Idle { kind, began: time(idle >> TAGS), ended: time(now.max(idle >> TAGS)) })
+        let since = idle >> TAGS;
+        Some(Idle { kind, began: clock.time(since), ended: clock.time(now.max(since)) })
     }
 
     /// Takes out all that was written, the oldest first, and says how much was dropped.
-    pub(super) fn drain(&self, worker: usize, mut take: impl FnMut(Entry)) -> u64 {
-        self.ring.drain(|event| take(read(event, worker)))
+    pub(super) fn drain(&self, worker: usize, clock: &Clock, mut take: impl FnMut(Entry)) -> u64 {
+        self.ring.drain(|event| take(read(event, worker, clock)))
     }
 }
 
-fn read(event: Event, worker: usize) -> Entry {
+fn read(event: Event, worker: usize, clock: &Clock) -> Entry {
     let [run_and_process, start, length, tagged, started, ended] = event;
     let tag = tagged & mask();
-    let [started, ended] = [started, ended].map(time);
+    let [started, ended] = [started, ended].map(|mark| clock.time(mark));
     if let Some(kind) = kind_of(tag) {
         return Entry::Idle(Idle { kind, began: started, ended });
     }
@@ -91,7 +89,7 @@ fn read(event: Event, worker: usize) -> Entry {
         process: run_and_process as u32 as usize,
         items: start as usize..start as usize + length as usize,
         worker,
-        opened: time(tagged >> TAGS),
+        opened: clock.time(tagged >> TAGS),
         started,
         ended,
         stolen: tag == STOLEN_CHUNK,
@@ -119,14 +117,10 @@ fn kind_of(tag: u64) -> Option<IdleKind> {
     }
 }
 
-pub(super) fn time(nanoseconds: u64) -> Duration {
-    Duration::from_nanos(nanoseconds)
-}
-
 /// A worker at the chunks of one process, one after another.
 pub(crate) struct Lap<'run> {
     lane: &'run Lane,
-    clock: &'run Clock,
+    reader: Reader<'run>,
     run_and_process: u64,
     opened: u64,
     /// When the last chunk ended.
@@ -135,38 +129,19 @@ pub(crate) struct Lap<'run> {
 }
 
 impl<'run> Lap<'run> {
-    /// A worker begins with chunks of a process, of which it opens the first now.
+    /// A worker begins with chunks of a process: of one that was opened at that mark, or else it opens it now.
     #[inline]
-    pub(super) fn open(lane: &'run Lane, clock: &'run Clock, run: u32, process: u32, stolen: bool) -> Self {
-        let now = clock.now();
-        Self::new(lane, clock, run, process, stolen, now, now)
-    }
-
-    /// A worker joins others at a process that was opened at that moment.
-    #[inline]
-    pub(super) fn join(
+    pub(super) fn new(
         lane: &'run Lane,
-        clock: &'run Clock,
-        run: u32,
-        process: u32,
+        reader: Reader<'run>,
+        [run, process]: [u32; 2],
         stolen: bool,
-        opened: u64,
+        opened: Option<u64>,
     ) -> Self {
-        Self::new(lane, clock, run, process, stolen, opened, clock.now())
-    }
-
-    fn new(
-        lane: &'run Lane,
-        clock: &'run Clock,
-        run: u32,
-        process: u32,
-        stolen: bool,
-        opened: u64,
-        since: u64,
-    ) -> Self {
+        let since = reader.in_order();
         let tag = if stolen { STOLEN_CHUNK } else { CHUNK };
         let run_and_process = u64::from(run) << 32 | u64::from(process);
-        Self { lane, clock, run_and_process, opened, since, tag }
+        Self { lane, reader, run_and_process, opened: opened.unwrap_or(since), since, tag }
     }
 
     /// When the process was opened.
@@ -194,7 +169,8 @@ impl<'run> Lap<'run> {
 
     #[inline]
     fn write(&mut self, items: &Range<usize>, tag: u64) {
-        let now = self.clock.now();
+        // A reading out of order may be of a moment before the last one.
+        let now = self.reader.read().max(self.since);
         let (start, length) = (items.start as u64, items.len() as u64);
         self.lane.ring.push([self.run_and_process, start, length, self.opened << TAGS | tag, self.since, now]);
         self.since = now;

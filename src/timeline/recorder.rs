@@ -1,15 +1,22 @@
 //! The recorder: what workers and calling threads write into, and what takes it out.
 
-use std::{borrow::Cow, collections::HashMap, fmt, mem, sync::Arc, thread, time::Duration};
+use std::{
+    borrow::Cow,
+    collections::HashMap,
+    fmt, mem,
+    sync::{Arc, OnceLock},
+    thread,
+    time::Duration,
+};
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{AtomicBool, Instant, Mutex, Ordering};
+use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
 use super::{
-    clock::Clock,
-    lane::{Entry, Lane, Lap, time},
-    log::{Chunk, Counter, Frame, Graph, IdleKind, Log, Run, Span, WorkerLog},
+    clock::{Clock, Reader},
+    lane::{Entry, Lane, Lap},
+    log::{Chunk, Counter, Frame, Graph, Idle, IdleKind, Log, Run, Span, WorkerLog},
 };
 
 /// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off is
@@ -25,6 +32,8 @@ const MOST_KEPT: usize = 1 << 16;
 /// schedule is recorded from its beginning to its end, or not at all.
 pub struct Timeline {
     is_on: AtomicBool,
+    /// The mark of when it was last switched on.
+    started: AtomicU64,
     clock: Clock,
     lanes: Box<[CachePadded<Lane>]>,
     names: Box<[String]>,
@@ -53,7 +62,8 @@ impl Timeline {
         let capacity = setup.capacity.unwrap_or(Setup::CAPACITY).max(1);
         Self {
             is_on: AtomicBool::new(false),
-            clock: setup.clock.map_or_else(|| Clock::System(Instant::now()), Clock::Other),
+            started: AtomicU64::new(0),
+            clock: setup.clock.map_or_else(Clock::of_this_machine, Clock::Other),
             lanes: names.iter().map(|_| CachePadded::new(Lane::new(capacity))).collect(),
             names: names.into(),
             book: Mutex::new(Book::default()),
@@ -61,8 +71,14 @@ impl Timeline {
         }
     }
 
-    /// Records from now on. The first time, memory for all workers is asked for.
+    /// Records from now on. The first time, memory for all workers is asked for; and for the processor's counter to be known well
+    /// enough, the scheduler has to be 10 ms old: so long it waits at most.
     pub fn start(&self) {
+        // What a tick is takes its time to find out, so nobody is to do that amid a run.
+        let reader = self.clock.reader();
+        if !self.is_on() {
+            self.started.store(reader.in_order(), Ordering::Relaxed);
+        }
         self.lanes.iter().for_each(|lane| lane.make_room());
         // Relaxed: whoever writes finds the memory by itself, and drops what it writes if that is not there yet.
         self.is_on.store(true, Ordering::Relaxed);
@@ -81,7 +97,7 @@ impl Timeline {
 
     /// The time on its axis: since the scheduler was built.
     pub fn now(&self) -> Duration {
-        time(self.clock.now())
+        self.clock.now()
     }
 
     /// A frame begins. All that is recorded until the next one belongs to it.
@@ -173,12 +189,18 @@ impl Timeline {
             Some(&place) => list(&mut runs[place]).push(chunk),
             None => lost += 1,
         };
+        // Who fell asleep while nothing was recorded has not said when.
+        let started = self.clock.time(self.started.load(Ordering::Relaxed));
+        let since_when = |idle: Idle, until: Duration| match idle.began {
+            Duration::ZERO => Idle { began: until.max(started).min(idle.ended), ..idle },
+            _ => idle,
+        };
         // Before the rest, so that it overlaps nothing that is taken out.
-        let now = lane.idle_until(self.clock.now());
-        let dropped = lane.drain(worker, |entry| match entry {
+        let now = lane.idle_until(self.clock.reader().in_order(), &self.clock);
+        let dropped = lane.drain(worker, &self.clock, |entry| match entry {
             Entry::Idle(idle) => {
+                log.idle.push(since_when(idle, until));
                 until = idle.ended;
-                log.idle.push(idle);
             }
             Entry::Chunk { run, chunk } => {
                 until = chunk.ended;
@@ -189,6 +211,7 @@ impl Timeline {
                 put(run, chunk, |run| &mut run.empty);
             }
         });
+        let now = now.map(|now| since_when(now, until));
         log.idle.extend(now.filter(|now| log.idle.last().is_none_or(|last| last.ended <= now.began)));
         log.dropped = dropped + lost;
         (log, (dropped > 0).then_some(until))
@@ -219,7 +242,15 @@ impl Timeline {
                 book.begin_frame(began);
             }
             book.open.push(number);
-            OpenRun { timeline: self, number, frame: book.frame(), graph, began }
+            OpenRun {
+                timeline: self,
+                reader: self.clock.reader(),
+                number,
+                frame: book.frame(),
+                graph,
+                began,
+                shared_from: OnceLock::new(),
+            }
         })
     }
 
@@ -227,17 +258,21 @@ impl Timeline {
     ///
     /// That it fell asleep is noted even while nothing is recorded: it may still sleep when something is.
     pub(crate) fn start_idle(&self, worker: usize, kind: IdleKind) {
-        let is_on = self.is_on();
-        if is_on || (RECORDS && kind == IdleKind::Asleep) {
-            self.lanes[worker].start_idle(kind, &self.clock, is_on);
+        let now = self.mark_if_on();
+        if now.is_some() || (RECORDS && kind == IdleKind::Asleep) {
+            self.lanes[worker].start_idle(kind, now);
         }
     }
 
     /// The worker has something to do.
     pub(crate) fn end_idle(&self, worker: usize) {
-        if RECORDS {
-            self.lanes[worker].end_idle(&self.clock, self.is_on());
+        if RECORDS && self.lanes[worker].is_idle() {
+            self.lanes[worker].end_idle(self.mark_if_on());
         }
+    }
+
+    fn mark_if_on(&self) -> Option<u64> {
+        self.is_on().then(|| self.clock.reader().in_order())
     }
 }
 
@@ -267,17 +302,17 @@ impl Drop for OpenSpan<'_> {
 /// A run that is being recorded.
 pub(crate) struct OpenRun<'timeline> {
     timeline: &'timeline Timeline,
+    reader: Reader<'timeline>,
     number: u32,
     frame: u64,
     graph: Arc<Graph>,
     began: Duration,
+    shared_from: OnceLock<Duration>,
 }
 
 /// How a run has ended.
 pub(crate) struct Ended {
     pub(crate) workers: usize,
-    /// How long it had gone on when others were let in.
-    pub(crate) shared_from: Option<Duration>,
     pub(crate) always_shares: bool,
     pub(crate) failed: bool,
 }
@@ -286,21 +321,31 @@ impl OpenRun<'_> {
     /// A worker opens a process of the run, and begins with its chunks.
     #[inline]
     pub(crate) fn open(&self, worker: usize, process: u32, stolen: bool) -> Lap<'_> {
-        Lap::open(&self.timeline.lanes[worker], &self.timeline.clock, self.number, process, stolen)
+        self.lap(worker, process, stolen, None)
     }
 
     /// A worker joins those at a process of the run that was opened at that moment.
     #[inline]
     pub(crate) fn join(&self, worker: usize, process: u32, stolen: bool, opened: u64) -> Lap<'_> {
-        Lap::join(&self.timeline.lanes[worker], &self.timeline.clock, self.number, process, stolen, opened)
+        self.lap(worker, process, stolen, Some(opened))
+    }
+
+    /// Other workers than the calling thread can take part from now on.
+    pub(crate) fn let_others_in(&self) {
+        self.shared_from.get_or_init(|| self.timeline.now());
+    }
+
+    #[inline]
+    fn lap(&self, worker: usize, process: u32, stolen: bool, opened: Option<u64>) -> Lap<'_> {
+        Lap::new(&self.timeline.lanes[worker], self.reader, [self.number, process], stolen, opened)
     }
 
     /// The run has ended.
     pub(crate) fn end(self, how: Ended) {
-        let Self { timeline, number, frame, graph, began } = self;
-        let Ended { workers, shared_from, always_shares, failed } = how;
+        let Self { timeline, number, frame, graph, began, shared_from, .. } = self;
+        let Ended { workers, always_shares, failed } = how;
         let ended = timeline.now();
-        let shared_from = shared_from.map(|after| began + after);
+        let shared_from = shared_from.into_inner();
         let mut book = timeline.book.lock();
         book.open.retain(|&open| open != number);
         let cut = book.cut.len();

@@ -66,7 +66,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
         for part in &parts {
             assert_eq!((part.process, part.items.clone()), (index, next..(next + chunk).min(busy.width)));
             next = part.items.end;
-            assert!(part.opened <= part.started && part.started < part.ended);
+            assert!(part.opened <= part.started && part.started <= part.ended);
             assert!(run.began <= part.opened && part.ended <= run.ended);
             assert_eq!(part.opened, parts[0].opened, "all chunks of a process are opened at once");
             assert!(part.worker < workers && !(busy.pinned && part.worker != 0));
@@ -135,7 +135,7 @@ fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
     assert!(log.runs[0].shared_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].shared_from);
     schedule.always_share(true);
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
-    assert_eq!(log.runs[0].shared_from, Some(log.runs[0].began));
+    assert!(log.runs[0].shared_from <= log.runs[0].chunks.iter().map(|chunk| chunk.opened).min());
 }
 
 #[test]
