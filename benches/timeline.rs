@@ -4,7 +4,7 @@
 //!     cargo bench --bench timeline -- --quick
 //!
 //! *Off* is counted rather than timed: instructions a chunk, under callgrind, of this build and of one that is built with
-//! `--cfg drawloom_without_timeline`, so without a recorder. That wants valgrind and builds the crate once more. *On* is timed: frames
+//! `--cfg drawloom_without_timeline`, so without a recorder. That wants valgrind and builds the crate twice more. *On* is timed: frames
 //! with the recorder off and on take turns, in the scheduler benchmark's row `frame` and with chunks that do nothing. A *span*
 //! is what a process gives subscribers of `tracing`, where there is none. What was measured is written to
 //! `drawloom/timeline.json` in the target folder too.

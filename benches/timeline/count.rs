@@ -21,14 +21,15 @@ const FRAMES: [usize; 2] = [100, 300];
 /// How often each is counted. How many chunks are taken at once depends on the clock, so of several counts the least is right.
 const TRIES: usize = 5;
 
-/// Counts all shapes, in this program and in one that was built without a recorder.
+/// Counts all shapes, in a program with a recorder and in one that was built without.
 ///
 /// # Errors
 /// If there is no valgrind, if the other program does not build, or if one of them fails.
 pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
+    progress.set_message("building with a recorder");
+    let with = build("with_timeline", "")?;
     progress.set_message("building without a recorder");
-    let without = build_without_recorder()?;
-    let with = env::current_exe()?;
+    let without = build("without_timeline", "--cfg drawloom_without_timeline")?;
     let mut counted = Vec::new();
     for &shape in Shape::ALL {
         progress.set_message(format!("counting {}", shape.name()));
@@ -38,14 +39,16 @@ pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
     Ok(counted)
 }
 
-/// Builds this program once more, and says where it is.
-fn build_without_recorder() -> Result<PathBuf, Failure> {
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("without_timeline");
-    let flags = env::var("RUSTFLAGS").unwrap_or_default() + " --cfg drawloom_without_timeline";
+/// Builds this program once more with these flags, and says where it is. Both are built alike but for that, and in one piece:
+/// how the compiler cuts a crate to pieces decides what it inlines, and that is not to be in the difference.
+fn build(folder: &str, flag: &str) -> Result<PathBuf, Failure> {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
+    let flags = env::var("RUSTFLAGS").unwrap_or_default() + " " + flag;
     let arguments = ["bench", "--no-run", "--bench", "timeline", "--no-default-features", "--message-format", "json"];
     let output = run(Command::new(env!("CARGO"))
         .args(arguments)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("CARGO_PROFILE_BENCH_CODEGEN_UNITS", "1")
         .env("CARGO_TARGET_DIR", target)
         .env("RUSTFLAGS", flags))?;
     let text = String::from_utf8(output.stdout)?;
@@ -53,7 +56,7 @@ fn build_without_recorder() -> Result<PathBuf, Failure> {
         let message: Value = serde_json::from_str(line).ok()?;
         (message["target"]["name"] == "timeline").then(|| message["executable"].as_str().map(PathBuf::from))?
     });
-    programs.next().ok_or_else(|| "cargo built no program without a recorder".into())
+    programs.next().ok_or_else(|| "cargo built no program".into())
 }
 
 fn instructions_a_chunk(program: &Path, shape: Shape) -> Result<f64, Failure> {
