@@ -64,11 +64,18 @@ impl Idle {
     }
 
     /// There is something, or it is time to stop.
+    #[inline]
     pub(super) fn end(&mut self, worker: &Worker, until: Until) {
         if self.looks > 0 {
-            until.set_starves(false);
-            worker.timeline().end_idle(worker.index());
+            self.end_looking(worker, until);
         }
+    }
+
+    // Apart, so that one job after another costs no call.
+    #[cold]
+    fn end_looking(&mut self, worker: &Worker, until: Until) {
+        until.set_starves(false);
+        worker.timeline().end_idle(worker.index());
         if self.is_searcher {
             worker.shared().sleep().end_search(|| worker.sees_loot(&Band::FRAME));
         }
