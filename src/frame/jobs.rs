@@ -110,8 +110,8 @@ struct Nodes {
 }
 
 impl Nodes {
-    /// Adds a phase, of a process if it is of one, which comes after another. The labels lack the phase. To split is to decide how large the jobs are that
-    /// sort, so the two are of one kind.
+    /// Adds a phase, of a process if it is of one, which comes after another. The labels lack the phase. To split is to
+    /// decide how large the jobs are that sort, so the two are of one kind.
     fn add(
         &mut self,
         name: String,

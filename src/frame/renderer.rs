@@ -81,7 +81,7 @@ impl<B: Backend> Renderer<B> {
     /// something; if a process fails or panics. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
-        let _span_of_timeline = self.scheduler.timeline().span("record");
+        let _span_of_timeline = self.scheduler.timeline().span_of(frame_number, "record");
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
         check(&scene)?;
@@ -135,7 +135,7 @@ impl<B: Backend> Renderer<B> {
         outcome?;
 
         let queues = queues_of(&request, &mut self.recordings)?;
-        let uploaded = self.backend.uploaded() - uploaded_before;
+        let uploaded = self.backend.uploaded().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
         warn_of_changes(&statistics.rejections, &mut self.told);

@@ -35,7 +35,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     ///
     /// A panic outside of every process.
     pub(super) fn share(&self, worker: &Worker) -> Result<(), JobPanic> {
-        self.watch.let_others_in();
+        self.let_others_in(worker);
         run_tokens(worker, self, |crew| {
             let flow = &self.schedule.flow;
             let mut ready = Ready::new(self, flow.edges() as u32, crew);
@@ -56,7 +56,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     pub(super) fn share_rest(&self, left: Left<W::Turn<'_>>, worker: &Worker) -> Result<(), JobPanic> {
         let is_half_done = left.done < left.chunks.count();
         let first_open = if is_half_done { left.process } else { left.process + 1 };
-        self.watch.let_others_in();
+        self.let_others_in(worker);
         run_tokens(worker, self, |crew| {
             // It is left before anything that waits for it begins.
             let half_done = is_half_done.then_some(left.onlooker);
@@ -77,6 +77,12 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
                 }
             }
         })
+    }
+
+    fn let_others_in(&self, worker: &Worker) {
+        // A job that was stolen may have called for the run, and then that is its own.
+        self.watch.forget_stolen(worker);
+        self.watch.let_others_in();
     }
 
     /// How many of the processes that one waits for stand at `first_open` or after it.

@@ -75,13 +75,14 @@ impl<'run> Watch<'run> {
     /// Finds out who looks on at a run that begins, of a schedule of which `graph` tells.
     pub(super) fn new(worker: &'run Worker, graph: Option<&'run Arc<Graph>>) -> Option<Self> {
         let (graph, level) = (graph?, level());
-        let recorded = worker.timeline().open_run(|| Arc::clone(graph));
         let traced = (level >= Level::DEBUG).then(|| Traced {
             graph,
             parent: Span::current(),
             in_detail: level >= Level::TRACE,
             ready: AtomicUsize::new(0),
         });
+        // Last, as a subscriber may panic, and a run that was opened is to be ended.
+        let recorded = worker.timeline().open_run(|| Arc::clone(graph));
         // What it costs is measured against a build that has none.
         let is_wanted = (recorded.is_some() || traced.is_some()) && !cfg!(drawloom_without_timeline);
         is_wanted.then_some(Self { recorded, traced })

@@ -107,14 +107,15 @@ impl SchedulerBuilder {
     }
 
     /// For how many chunks and idle times each worker has room in the [timeline](Scheduler::timeline), 65,536 without this, of
-    /// 48 bytes each. It is rounded up to a power of two, and memory is asked for when the timeline is started.
+    /// 48 bytes each. It is rounded up to a power of two, to 16,777,216 at most, and memory is asked for when the timeline is
+    /// started.
     pub fn timeline_capacity(mut self, events: usize) -> Self {
         self.timeline.capacity = Some(events);
         self
     }
 
     /// The clock that the [timeline](Scheduler::timeline) reads, instead of the system's: the time since some moment, which
-    /// never goes back, whichever thread asks.
+    /// never goes back, whichever thread asks. It must not panic.
     pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
         self.timeline.clock = Some(Box::new(clock));
         self

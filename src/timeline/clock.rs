@@ -131,11 +131,12 @@ impl Reader<'_> {
     }
 }
 
-/// More than 584 years are not told from that many.
+/// More than 73 years are not told from that many: three bits of a mark are for something else.
 #[inline]
 fn nanoseconds(time: Duration) -> u64 {
     // Without the detour over 128 bits, which costs more than the rest.
-    time.as_secs().saturating_mul(1_000_000_000).saturating_add(u64::from(time.subsec_nanos()))
+    let nanoseconds = time.as_secs().saturating_mul(1_000_000_000).saturating_add(u64::from(time.subsec_nanos()));
+    nanoseconds.min(u64::MAX >> 3)
 }
 
 #[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]

@@ -1,6 +1,6 @@
 //! What a worker writes.
 
-use std::ops::Range;
+use std::{ops::Range, time::Duration};
 
 use crate::sync::{AtomicU64, Ordering};
 
@@ -65,11 +65,11 @@ impl Lane {
     }
 
     /// What the worker passes its time with at this moment.
-    pub(super) fn idle_until(&self, now: u64, clock: &Clock) -> Option<Idle> {
+    pub(super) fn idle_until(&self, now: Duration, clock: &Clock) -> Option<Idle> {
         let idle = self.idle.load(Ordering::Relaxed);
         let kind = kind_of(idle & mask())?;
-        let since = idle >> TAGS;
-        Some(Idle { kind, began: clock.time(since), ended: clock.time(now.max(since)) })
+        let since = clock.time(idle >> TAGS);
+        Some(Idle { kind, began: since, ended: now.max(since) })
     }
 
     /// Takes out all that was written, the oldest first, and says how much was dropped.

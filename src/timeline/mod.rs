@@ -29,8 +29,9 @@
 //! # What it costs
 //!
 //! While it is off, a look at a flag for every run and every worker that falls asleep. While it is on, a reading of the clock
-//! for every chunk and another for every process (of the processor's counter, on x86-64), and 48 bytes a chunk out of a ring whose size is
-//! [set](crate::task::SchedulerBuilder::timeline_capacity) beforehand. What does not fit is dropped and counted.
+//! for every chunk and another for every process (of the processor's counter, on x86-64), and 48 bytes a chunk out of a ring
+//! whose size is [set](crate::task::SchedulerBuilder::timeline_capacity) beforehand. What does not fit is dropped and
+//! counted.
 
 mod clock;
 mod lane;

@@ -3,7 +3,9 @@
 use std::{
     borrow::Cow,
     collections::HashMap,
-    fmt, mem,
+    fmt,
+    marker::PhantomData,
+    mem,
     sync::{Arc, OnceLock},
     thread,
     time::Duration,
@@ -19,8 +21,8 @@ use super::{
     log::{Chunk, Counter, Frame, Graph, Idle, IdleKind, Log, Run, Span, WorkerLog},
 };
 
-/// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off is
-/// measured against a build without it.
+/// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off
+/// is measured against a build without it.
 const RECORDS: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
 
 /// How many frames, runs, spans and readings of counters are kept at most, of each, until they are taken.
@@ -38,8 +40,8 @@ pub struct Timeline {
     lanes: Box<[CachePadded<Lane>]>,
     names: Box<[String]>,
     book: Mutex<Book>,
-    /// Held by whoever takes a log.
-    taker: Mutex<()>,
+    /// Held by whoever takes a log: until when the last one told of each worker.
+    taker: Mutex<Box<[Duration]>>,
 }
 
 /// How a timeline is to be.
@@ -54,20 +56,23 @@ pub(crate) struct Setup {
 impl Setup {
     /// Room for the chunks of some hundred frames, in 3 MiB a worker.
     const CAPACITY: usize = 1 << 16;
+
+    /// 768 MiB a worker.
+    const MOST_CAPACITY: usize = 1 << 24;
 }
 
 impl Timeline {
     /// Off, for workers of these names.
     pub(crate) fn new(names: Vec<String>, setup: Setup) -> Self {
-        let capacity = setup.capacity.unwrap_or(Setup::CAPACITY).max(1);
+        let capacity = setup.capacity.unwrap_or(Setup::CAPACITY).clamp(1, Setup::MOST_CAPACITY);
         Self {
             is_on: AtomicBool::new(false),
             started: AtomicU64::new(0),
             clock: setup.clock.map_or_else(Clock::of_this_machine, Clock::Other),
             lanes: names.iter().map(|_| CachePadded::new(Lane::new(capacity))).collect(),
+            taker: Mutex::new(names.iter().map(|_| Duration::ZERO).collect()),
             names: names.into(),
             book: Mutex::new(Book::default()),
-            taker: Mutex::new(()),
         }
     }
 
@@ -78,6 +83,7 @@ impl Timeline {
         let reader = self.clock.reader();
         if !self.is_on() {
             self.started.store(reader.in_order(), Ordering::Relaxed);
+            self.book.lock().frame = None;
         }
         self.lanes.iter().for_each(|lane| lane.make_room());
         // Relaxed: whoever writes finds the memory by itself, and drops what it writes if that is not there yet.
@@ -95,7 +101,8 @@ impl Timeline {
         RECORDS && self.is_on.load(Ordering::Relaxed)
     }
 
-    /// The time on its axis: since the scheduler was built.
+    /// The time on its axis: since the scheduler was built, unless an engine's clock says it. The first time, it waits as
+    /// [`start`](Self::start) does.
     pub fn now(&self) -> Duration {
         self.clock.now()
     }
@@ -103,12 +110,13 @@ impl Timeline {
     /// A frame begins. All that is recorded until the next one belongs to it.
     ///
     /// An engine that never calls this need not: then every [`Renderer::record`](crate::Renderer::record) begins one, and where
-    /// there is no renderer every run of a schedule does. One that does has frames of its own, with any number of both in each.
+    /// there is no renderer every run of a schedule that begins while no other goes on. One that does, also while nothing is
+    /// recorded, has frames of its own, with any number of both in each.
     pub fn mark_frame(&self) {
-        if self.is_on() {
-            let now = self.now();
-            let mut book = self.book.lock();
-            book.marks = Marks::Engine;
+        let now = self.is_on().then(|| self.now());
+        let mut book = self.book.lock();
+        book.marks = Marks::Engine;
+        if let Some(now) = now {
             book.begin_frame(now);
         }
     }
@@ -132,10 +140,10 @@ impl Timeline {
     /// As [`span`](Self::span), of that frame instead of the current one.
     pub(crate) fn span_of(&self, frame: Option<u64>, name: impl Into<Cow<'static, str>>) -> OpenSpan<'_> {
         let open = self.is_on().then(|| {
-            let frame = frame.unwrap_or_else(|| self.book.lock().frame());
+            let frame = frame.unwrap_or_else(|| self.book.lock().current_frame());
             (name.into(), frame, self.now())
         });
-        OpenSpan { timeline: self, open }
+        OpenSpan { timeline: self, open, stays_on_its_thread: PhantomData }
     }
 
     /// Notes what a counter stands at. Its name is the same each time, and says the unit.
@@ -151,7 +159,7 @@ impl Timeline {
     /// It may be called at any time, and keeps nobody waiting; but what a run writes that is going on meanwhile is lost, and
     /// counted, and that run is not [complete](Run::complete). So the best moment is between two frames.
     pub fn take(&self) -> Log {
-        let _taker = self.taker.lock();
+        let mut told = self.taker.lock();
         let Kept { frames, runs, spans, counters, threads, dropped } = self.book.lock().take();
         let mut log = Log { spans, counters, threads, dropped, ..Log::default() };
         let mut places = HashMap::with_capacity(runs.len());
@@ -160,7 +168,7 @@ impl Timeline {
             log.runs.push(run);
         }
         for (worker, lane) in self.lanes.iter().enumerate() {
-            let (drained, until) = self.drain(worker, lane, &places, &mut log.runs);
+            let (drained, until) = self.drain(worker, lane, &mut told[worker], &places, &mut log.runs);
             if let Some(until) = until {
                 log.runs.iter_mut().filter(|run| run.ended >= until).for_each(|run| run.complete = false);
             }
@@ -175,11 +183,13 @@ impl Timeline {
         log
     }
 
-    /// Takes out what one worker has written. If something was dropped, also says until when everything is there.
+    /// Takes out what one worker has written, and its idle times from where the last log ended. If something was
+    /// dropped, also says until when everything is there.
     fn drain(
         &self,
         worker: usize,
         lane: &Lane,
+        told: &mut Duration,
         places: &HashMap<u32, usize>,
         runs: &mut [Run],
     ) -> (WorkerLog, Option<Duration>) {
@@ -191,15 +201,16 @@ impl Timeline {
         };
         // Who fell asleep while nothing was recorded has not said when.
         let started = self.clock.time(self.started.load(Ordering::Relaxed));
-        let since_when = |idle: Idle, until: Duration| match idle.began {
-            Duration::ZERO => Idle { began: until.max(started).min(idle.ended), ..idle },
-            _ => idle,
+        let since_when = |idle: Idle, until: Duration| {
+            let began = if idle.began.is_zero() { until.max(started) } else { idle.began };
+            Idle { began: began.max(*told).min(idle.ended), ..idle }
         };
         // Before the rest, so that it overlaps nothing that is taken out.
-        let now = lane.idle_until(self.clock.reader().in_order(), &self.clock);
+        let now = lane.idle_until(self.now(), &self.clock);
         let dropped = lane.drain(worker, &self.clock, |entry| match entry {
             Entry::Idle(idle) => {
-                log.idle.push(since_when(idle, until));
+                // The last log may have told of all of it, where it ended as that was taken.
+                log.idle.extend((idle.ended >= *told).then(|| since_when(idle, until)));
                 until = idle.ended;
             }
             Entry::Chunk { run, chunk } => {
@@ -212,7 +223,9 @@ impl Timeline {
             }
         });
         let now = now.map(|now| since_when(now, until));
-        log.idle.extend(now.filter(|now| log.idle.last().is_none_or(|last| last.ended <= now.began)));
+        let now = now.filter(|now| log.idle.last().is_none_or(|last| last.ended <= now.began));
+        *told = until.max(now.map_or(*told, |now| now.ended));
+        log.idle.extend(now);
         log.dropped = dropped + lost;
         (log, (dropped > 0).then_some(until))
     }
@@ -226,7 +239,7 @@ impl Timeline {
                 book.marks = Marks::Renderer;
                 book.begin_frame(now);
             }
-            book.frame()
+            book.current_frame()
         })
     }
 
@@ -242,11 +255,12 @@ impl Timeline {
                 book.begin_frame(began);
             }
             book.open.push(number);
+            let frame = book.current_frame();
             OpenRun {
                 timeline: self,
                 reader: self.clock.reader(),
                 number,
-                frame: book.frame(),
+                frame,
                 graph,
                 began,
                 shared_from: OnceLock::new(),
@@ -282,10 +296,17 @@ impl fmt::Debug for Timeline {
     }
 }
 
-/// A span that has not ended: see [`Timeline::span`].
+/// A span that has not ended: see [`Timeline::span`]. It is of the thread that began it, and stays there:
+///
+/// ```compile_fail
+/// let scheduler = drawloom::task::Scheduler::new(1).unwrap();
+/// let span = scheduler.timeline().span("simulate");
+/// std::thread::scope(|scope| _ = scope.spawn(move || drop(span)));
+/// ```
 pub struct OpenSpan<'timeline> {
     timeline: &'timeline Timeline,
     open: Option<(Cow<'static, str>, u64, Duration)>,
+    stays_on_its_thread: PhantomData<*const ()>,
 }
 
 impl Drop for OpenSpan<'_> {
@@ -293,7 +314,8 @@ impl Drop for OpenSpan<'_> {
         if let Some((name, frame, began)) = self.open.take() {
             let ended = self.timeline.now();
             let mut book = self.timeline.book.lock();
-            let thread = book.this_thread();
+            // Without room for its span, a thread takes none either.
+            let thread = if book.kept.spans.len() < MOST_KEPT { book.this_thread() } else { 0 };
             book.keep(|kept| &mut kept.spans, Span { name: name.into_owned(), thread, frame, began, ended });
         }
     }
@@ -362,6 +384,8 @@ impl OpenRun<'_> {
 #[derive(Default)]
 struct Book {
     marks: Marks,
+    /// The current frame, once something belongs to it.
+    frame: Option<u64>,
     next_frame: u64,
     next_run: u32,
     /// The runs that are going on.
@@ -369,6 +393,7 @@ struct Book {
     /// Those of them of which something was lost as a log was taken.
     cut: Vec<u32>,
     kept: Kept,
+    /// Those that have spans which are kept.
     threads: Vec<(thread::ThreadId, String)>,
 }
 
@@ -394,14 +419,18 @@ struct Kept {
 }
 
 impl Book {
-    /// The number of the current frame.
-    fn frame(&self) -> u64 {
-        self.next_frame.saturating_sub(1)
+    /// The number of the current frame. What comes before the first mark since the timeline was started has one of its own.
+    fn current_frame(&mut self) -> u64 {
+        *self.frame.get_or_insert_with(|| {
+            let number = self.next_frame;
+            self.next_frame += 1;
+            number
+        })
     }
 
     fn begin_frame(&mut self, now: Duration) {
-        let number = self.next_frame;
-        self.next_frame += 1;
+        self.frame = None;
+        let number = self.current_frame();
         self.keep(|kept| &mut kept.frames, (number, now));
     }
 
@@ -427,7 +456,7 @@ impl Book {
     }
 
     fn take(&mut self) -> Kept {
-        self.kept.threads = self.threads.iter().map(|(_, name)| name.clone()).collect();
+        self.kept.threads = mem::take(&mut self.threads).into_iter().map(|(_, name)| name).collect();
         mem::take(&mut self.kept)
     }
 

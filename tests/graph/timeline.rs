@@ -3,7 +3,8 @@
 use std::{
     hint::black_box,
     ops::Range,
-    sync::{Barrier, LazyLock, Mutex},
+    sync::{Barrier, LazyLock, Mutex, mpsc},
+    thread,
     time::Duration,
 };
 
@@ -224,8 +225,6 @@ fn frames_are_runs_unless_the_engine_marks_its_own() {
     let scheduler = Scheduler::new(1).unwrap();
     let mut schedule = one_process(Busy { width: 5, pinned: false });
     let timeline = scheduler.timeline();
-    timeline.mark_frame();
-    assert_eq!(timeline.take().frames, [], "it is off");
     timeline.start();
     let mut run = || schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
     run();
@@ -250,17 +249,115 @@ fn frames_are_runs_unless_the_engine_marks_its_own() {
 }
 
 #[test]
+fn an_engine_that_marks_frames_has_its_own_whenever_it_is_started() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let timeline = scheduler.timeline();
+    timeline.mark_frame();
+    assert_eq!(timeline.take().frames, [], "it is off");
+    // Amid the engine's frame.
+    timeline.start();
+    for _run in 0..2 {
+        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    }
+    timeline.mark_frame();
+    schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    let log = timeline.take();
+    assert_eq!(log.runs.iter().map(|run| run.frame).collect::<Vec<_>>(), [0, 0, 1]);
+    assert_eq!(log.frames.len(), 2);
+}
+
+#[test]
 fn who_slept_before_it_was_started_is_seen_asleep() {
     let scheduler = Scheduler::new(2).unwrap();
     let asleep = |log: &Log| log.workers[1].idle.iter().any(|idle| idle.kind == IdleKind::Asleep);
     let is_seen = (0..10_000).any(|_look| {
-        std::thread::sleep(Duration::from_millis(1));
+        thread::sleep(Duration::from_millis(1));
         asleep(&scheduler.timeline().take())
     });
     assert!(is_seen);
     scheduler.timeline().start();
     let log = scheduler.timeline().take();
     assert!(asleep(&log) && log.workers[1].idle[0].began < log.workers[1].idle[0].ended);
+}
+
+#[test]
+fn what_a_stolen_job_runs_itself_was_not_stolen() {
+    let scheduler = Scheduler::new(2).unwrap();
+    let mut schedule = one_process(Busy { width: 1, pinned: false });
+    schedule.always_share(true);
+    let (done, is_done) = mpsc::channel();
+    scheduler.timeline().start();
+    scheduler
+        .scope(|scope| {
+            scope.spawn(|_scope, _worker| {
+                (0..2).for_each(|_run| schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap());
+                done.send(()).unwrap();
+            });
+            // So the other worker takes the job.
+            is_done.recv().unwrap();
+        })
+        .unwrap();
+    let log = scheduler.timeline().take();
+    let chunks: Vec<_> = log.runs.iter().flat_map(|run| &run.chunks).collect();
+    assert_eq!(chunks.iter().map(|chunk| (chunk.worker, chunk.stolen)).collect::<Vec<_>>(), [(1, false); 2]);
+}
+
+#[test]
+fn what_follows_a_new_start_is_of_no_frame_before_it() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let timeline = scheduler.timeline();
+    timeline.start();
+    drop(timeline.span("load"));
+    timeline.mark_frame();
+    drop(timeline.span("draw"));
+    timeline.stop();
+    timeline.start();
+    drop(timeline.span("the rest of a later frame"));
+    let log = timeline.take();
+    assert_eq!(log.spans.iter().map(|span| span.frame).collect::<Vec<_>>(), [0, 1, 2]);
+    assert!(log.frames.windows(2).all(|pair| pair[0].ended <= pair[1].began), "{:?}", log.frames);
+}
+
+#[test]
+fn threads_are_forgotten_with_the_log_that_names_them() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let timeline = scheduler.timeline();
+    timeline.start();
+    for round in ["first", "second"] {
+        let thread = thread::Builder::new().name(round.to_owned());
+        thread::scope(|scope| _ = thread.spawn_scoped(scope, || drop(timeline.span("span"))).unwrap());
+        let log = timeline.take();
+        assert_eq!((log.threads, log.spans[0].thread), (vec![round.to_owned()], 0));
+    }
+    // Nor is a thread remembered for whose spans there is no room.
+    (0..1 << 16).for_each(|_span| drop(timeline.span("span")));
+    thread::scope(|scope| _ = scope.spawn(|| drop(timeline.span("late"))));
+    let log = timeline.take();
+    assert_eq!((log.threads.len(), log.dropped), (1, 1));
+}
+
+#[test]
+fn each_idle_time_is_in_one_log() {
+    let scheduler = Scheduler::new(2).unwrap();
+    scheduler.timeline().start();
+    let mut until = Duration::ZERO;
+    for _look in 0..20 {
+        thread::sleep(Duration::from_millis(1));
+        for idle in &scheduler.timeline().take().workers[1].idle {
+            assert!(until <= idle.began && idle.began <= idle.ended, "{idle:?} after {until:?}");
+            until = idle.ended;
+        }
+    }
+    assert!(until > Duration::ZERO);
+}
+
+#[test]
+fn room_for_more_than_there_can_be_is_no_reason_to_panic() {
+    for capacity in [0, usize::MAX] {
+        let scheduler = Scheduler::builder().workers(1).timeline_capacity(capacity).build().unwrap();
+        assert!(!scheduler.timeline().is_on());
+    }
 }
 
 fn one_process(busy: Busy) -> Schedule<Busy> {
