@@ -33,6 +33,7 @@
 //! whose size is [set](crate::task::SchedulerBuilder::timeline_capacity) beforehand. What does not fit is dropped and
 //! counted.
 
+mod book;
 mod clock;
 mod lane;
 mod log;

@@ -5,9 +5,7 @@ use std::{
     collections::HashMap,
     fmt,
     marker::PhantomData,
-    mem,
     sync::{Arc, OnceLock},
-    thread,
     time::Duration,
 };
 
@@ -16,17 +14,15 @@ use crossbeam_utils::CachePadded;
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
 use super::{
+    book::{Book, Kept, Marks, frames_of},
     clock::{Clock, Reader},
     lane::{Entry, Lane, Lap},
-    log::{Chunk, Counter, Frame, Graph, Idle, IdleKind, Log, Run, Span, WorkerLog},
+    log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog},
 };
 
 /// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off
 /// is measured against a build without it.
 const RECORDS: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
-
-/// How many frames, runs, spans and readings of counters are kept at most, of each, until they are taken.
-const MOST_KEPT: usize = 1 << 16;
 
 /// Records what the workers of a [`Scheduler`](crate::task::Scheduler) do.
 ///
@@ -83,7 +79,7 @@ impl Timeline {
         let reader = self.clock.reader();
         if !self.is_on() {
             self.started.store(reader.in_order(), Ordering::Relaxed);
-            self.book.lock().frame = None;
+            self.book.lock().forget_frame();
         }
         self.lanes.iter().for_each(|lane| lane.make_room());
         // Relaxed: whoever writes finds the memory by itself, and drops what it writes if that is not there yet.
@@ -114,11 +110,7 @@ impl Timeline {
     /// recorded, has frames of its own, with any number of both in each.
     pub fn mark_frame(&self) {
         let now = self.is_on().then(|| self.now());
-        let mut book = self.book.lock();
-        book.marks = Marks::Engine;
-        if let Some(now) = now {
-            book.begin_frame(now);
-        }
+        self.book.lock().mark(Marks::Engine, now);
     }
 
     /// Names what the calling thread does until the guard is dropped: a span of its own among those of the frame.
@@ -235,10 +227,7 @@ impl Timeline {
         self.is_on().then(|| {
             let now = self.now();
             let mut book = self.book.lock();
-            if book.marks != Marks::Engine {
-                book.marks = Marks::Renderer;
-                book.begin_frame(now);
-            }
+            book.mark(Marks::Renderer, Some(now));
             book.current_frame()
         })
     }
@@ -248,14 +237,7 @@ impl Timeline {
         self.is_on().then(|| {
             let graph = graph();
             let began = self.now();
-            let mut book = self.book.lock();
-            let number = book.next_run;
-            book.next_run = number.wrapping_add(1);
-            if book.marks == Marks::Runs && book.open.is_empty() {
-                book.begin_frame(began);
-            }
-            book.open.push(number);
-            let frame = book.current_frame();
+            let (number, frame) = self.book.lock().open_run(began);
             OpenRun {
                 timeline: self,
                 reader: self.clock.reader(),
@@ -313,10 +295,7 @@ impl Drop for OpenSpan<'_> {
     fn drop(&mut self) {
         if let Some((name, frame, began)) = self.open.take() {
             let ended = self.timeline.now();
-            let mut book = self.timeline.book.lock();
-            // Without room for its span, a thread takes none either.
-            let thread = if book.kept.spans.len() < MOST_KEPT { book.this_thread() } else { 0 };
-            book.keep(|kept| &mut kept.spans, Span { name: name.into_owned(), thread, frame, began, ended });
+            self.timeline.book.lock().add_span(name.into_owned(), frame, began..ended);
         }
     }
 }
@@ -368,117 +347,10 @@ impl OpenRun<'_> {
         let Ended { workers, always_shares, failed } = how;
         let ended = timeline.now();
         let shared_from = shared_from.into_inner();
-        let mut book = timeline.book.lock();
-        book.open.retain(|&open| open != number);
-        let cut = book.cut.len();
-        book.cut.retain(|&cut| cut != number);
-        let complete = book.cut.len() == cut;
         let (chunks, empty) = (Vec::new(), Vec::new());
+        let complete = true;
         let run =
             Run { frame, graph, workers, began, ended, shared_from, always_shares, failed, complete, chunks, empty };
-        book.keep(|kept| &mut kept.runs, (number, run));
+        timeline.book.lock().end_run(number, run);
     }
-}
-
-/// What is told of frames, runs and spans, which are few.
-#[derive(Default)]
-struct Book {
-    marks: Marks,
-    /// The current frame, once something belongs to it.
-    frame: Option<u64>,
-    next_frame: u64,
-    next_run: u32,
-    /// The runs that are going on.
-    open: Vec<u32>,
-    /// Those of them of which something was lost as a log was taken.
-    cut: Vec<u32>,
-    kept: Kept,
-    /// Those that have spans which are kept.
-    threads: Vec<(thread::ThreadId, String)>,
-}
-
-/// Who says when a frame begins.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-enum Marks {
-    #[default]
-    Runs,
-    Renderer,
-    Engine,
-}
-
-/// What is kept until a log is taken.
-#[derive(Default)]
-struct Kept {
-    /// Their numbers, and when they began.
-    frames: Vec<(u64, Duration)>,
-    runs: Vec<(u32, Run)>,
-    spans: Vec<Span>,
-    counters: Vec<Counter>,
-    threads: Vec<String>,
-    dropped: u64,
-}
-
-impl Book {
-    /// The number of the current frame. What comes before the first mark since the timeline was started has one of its own.
-    fn current_frame(&mut self) -> u64 {
-        *self.frame.get_or_insert_with(|| {
-            let number = self.next_frame;
-            self.next_frame += 1;
-            number
-        })
-    }
-
-    fn begin_frame(&mut self, now: Duration) {
-        self.frame = None;
-        let number = self.current_frame();
-        self.keep(|kept| &mut kept.frames, (number, now));
-    }
-
-    /// Keeps something in one of the lists, if there is room.
-    fn keep<T>(&mut self, list: impl FnOnce(&mut Kept) -> &mut Vec<T>, value: T) {
-        let list = list(&mut self.kept);
-        if list.len() < MOST_KEPT {
-            list.push(value);
-        } else {
-            self.kept.dropped += 1;
-        }
-    }
-
-    /// The calling thread's place among those that have spans.
-    fn this_thread(&mut self) -> usize {
-        let this = thread::current();
-        let place = self.threads.iter().position(|(id, _)| *id == this.id());
-        place.unwrap_or_else(|| {
-            let name = this.name().map_or_else(|| format!("thread {}", self.threads.len()), str::to_owned);
-            self.threads.push((this.id(), name));
-            self.threads.len() - 1
-        })
-    }
-
-    fn take(&mut self) -> Kept {
-        self.kept.threads = mem::take(&mut self.threads).into_iter().map(|(_, name)| name).collect();
-        mem::take(&mut self.kept)
-    }
-
-    /// What is going on, and what has ended while chunks were taken out, is not complete any more.
-    fn cut_open_runs(&mut self) {
-        self.cut.clone_from(&self.open);
-        self.kept.runs.iter_mut().for_each(|(_, run)| run.complete = false);
-    }
-}
-
-/// The frames that were marked, and those that anything else belongs to.
-fn frames_of(marked: Vec<(u64, Duration)>, log: &Log) -> Vec<Frame> {
-    let mut frames: Vec<_> = marked.into_iter().map(|(number, began)| Frame { number, began, ended: began }).collect();
-    let runs = log.runs.iter().map(|run| (run.frame, run.began, run.ended));
-    let spans = log.spans.iter().map(|span| (span.frame, span.began, span.ended));
-    for (number, began, ended) in runs.chain(spans) {
-        let place = frames.partition_point(|frame| frame.number < number);
-        if frames.get(place).is_none_or(|frame| frame.number != number) {
-            frames.insert(place, Frame { number, began, ended });
-        }
-        let frame = &mut frames[place];
-        (frame.began, frame.ended) = (frame.began.min(began), frame.ended.max(ended));
-    }
-    frames
 }
