@@ -71,7 +71,7 @@ impl Device<WgpuBackend> for WgpuDevice {
 
     fn wait(&mut self, submission: &WgpuSubmission, number: Option<u64>) -> Result<(), Box<dyn Error>> {
         submission.wait()?;
-        if let Some(number) = number.filter(|_| self.is_timed) {
+        if let Some(number) = number.filter(|_| self.clock.is_some()) {
             self.times.push((number, submission.pass_times()?));
         }
         Ok(())

@@ -5,7 +5,7 @@ use std::{hint::black_box, sync::Arc, time::Duration};
 use drawloom::{
     graph::{Closure, FrameGraph},
     task::Scheduler,
-    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, WorkerLog},
+    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog},
 };
 use libtest_mimic::Failed;
 
@@ -96,7 +96,7 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
 }
 
 /// Three frames, the second twice as long as the others. In each a process, two that wait for it, the second of which ends
-/// later, and one that waits for both, in two chunks.
+/// later, and one that waits for both, in two chunks; and a thread at work before that and after.
 pub fn of_diamonds() -> Log {
     let process = |name: &str, dependencies: &[usize]| Process {
         name: name.to_owned(),
@@ -106,7 +106,7 @@ pub fn of_diamonds() -> Log {
     let processes = vec![process("root", &[]), process("left", &[0]), process("right", &[0]), process("end", &[1, 2])];
     let graph = Arc::new(Graph { processes });
     let workers = ["caller", "other"].map(|name| WorkerLog { name: name.to_owned(), ..WorkerLog::default() });
-    let mut log = Log { workers: workers.into(), ..Log::default() };
+    let mut log = Log { workers: workers.into(), threads: vec!["main".to_owned()], ..Log::default() };
     let starts = [(0, 100), (100, 200), (300, 100)];
     for (number, (start, length)) in (0_u64..).zip(starts) {
         let at = |share: u64| Duration::from_micros(start + length * share / 100);
@@ -126,9 +126,11 @@ pub fn of_diamonds() -> Log {
             chunk(3, 0..10, 1, 62, 62, 80),
             chunk(3, 10..20, 0, 62, 70, 95),
         ];
-        let (began, ended) = (at(0), at(99));
         let graph = Arc::clone(&graph);
+        let (began, ended) = (at(2), at(97));
         log.runs.push(Run { frame: number, graph, workers: 2, began, ended, complete: true, chunks, ..Run::default() });
+        let (began, ended) = (at(0), at(99));
+        log.spans.push(Span { name: "work".to_owned(), thread: 0, frame: number, began, ended });
         log.frames.push(Frame { number, began, ended });
     }
     log

@@ -78,8 +78,10 @@ async function read() {
     tell("escape-lets-go", dataset.chain === "" && state.selected === -1);
 
     const path = criticalPath().map(({ beside }) => `${nameOf(beside)} on ${lanes[slices.lane[beside]].label}`);
-    const expected = "root on caller,right on other,end on caller";
+    const expected = "work on main,root on caller,right on other,end on caller";
     tell("the-critical-path-goes-through-its-workers", [...new Set(path)].join() === expected);
+    const isWork = ({ beside, isWait }) => nameOf(beside) === "work" && !isWait;
+    tell("it-begins-and-ends-with-the-thread-at-work", [2, -1].every((at) => isWork(criticalPath().at(at))));
     part("critical").click();
 
     part("search").value = "LEFT";

@@ -315,3 +315,18 @@ fn many_steps_of_one_group_are_one_line() {
     let words = report_of(&log).to_string();
     assert!(words.contains("  0.100       0.300           -  -            chain, 30 steps\n"), "{words}");
 }
+
+#[test]
+fn a_line_of_many_steps_says_what_their_names_have_in_common() {
+    let mut log = log();
+    let name = |index: usize| format!("shadows, view {} \"sun\", phase {index}", index / 15);
+    let group = |index: usize| if index / 15 == 0 { "one" } else { "other" };
+    let processes = (0..30).map(|index: usize| process(&name(index), group(index), index.checked_sub(1).as_slice()));
+    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    log.runs[0].empty.clear();
+    log.runs[0].chunks =
+        (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();
+    let words = report_of(&log).to_string();
+    assert!(words.contains("  shadows, view 0 \"sun\", 15 steps\n"), "{words}");
+    assert!(words.contains("  shadows, view 1 \"sun\", 15 steps\n"), "{words}");
+}

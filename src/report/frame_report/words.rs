@@ -217,6 +217,8 @@ impl FrameReport {
 /// A line of the critical path: some steps.
 struct Line {
     name: String,
+    /// What the names of all its steps begin with.
+    common: String,
     group: String,
     held_by: HeldBy,
     ready: Duration,
@@ -229,7 +231,7 @@ impl Line {
     fn new(step: &Step) -> Self {
         let Step { name, group, held_by, ready, .. } = step;
         let (name, group, held_by, ready) = (shown(name), group.clone(), *held_by, *ready);
-        Self { name, group, held_by, ready, took: step.took(), waited: step.waited(), steps: 1 }
+        Self { common: name.clone(), name, group, held_by, ready, took: step.took(), waited: step.waited(), steps: 1 }
     }
 }
 
@@ -242,12 +244,20 @@ fn merge(lines: Vec<Line>) -> Vec<Line> {
                 last.steps += line.steps;
                 last.took += line.took;
                 last.waited += line.waited;
-                last.name = format!("{}, {} steps", shown(&last.group), last.steps);
+                last.common = common_parts(&last.common, &line.name);
+                let common = if last.common.is_empty() { shown(&last.group) } else { last.common.clone() };
+                last.name = format!("{common}, {} steps", last.steps);
             }
             _ => merged.push(line),
         }
     }
     merged
+}
+
+/// What two names begin with, as far as a comma: the render process and the view, say.
+fn common_parts(one: &str, other: &str) -> String {
+    let pairs = one.split(", ").zip(other.split(", "));
+    pairs.map_while(|(one, other)| (one == other).then_some(one)).collect::<Vec<_>>().join(", ")
 }
 
 /// In milliseconds, to the microsecond.

@@ -44,7 +44,12 @@ fn all_ran(log: &Log, frame: u64, own_time: &[Range<Duration>]) -> Vec<Ran> {
 /// Chunks lie inside of each other where one has run a schedule of its own, and idle times in chunks where one waits for
 /// others. So times are put together before they are measured.
 fn worker_report(worker: &WorkerLog, ran: Ran, own_time: &[Range<Duration>]) -> WorkerReport {
-    let idle = |kind| worker.idle.iter().filter(move |idle| idle.kind == kind).map(|idle| idle.began..idle.ended);
+    // A log may be of many frames: only those that this one touches.
+    let until = own_time.last().map_or(Duration::ZERO, |time| time.end);
+    let since = own_time.first().map_or(until, |time| time.start);
+    let rest = &worker.idle[worker.idle.partition_point(|idle| idle.ended <= since)..];
+    let of_frame = &rest[..rest.partition_point(|idle| idle.began < until)];
+    let idle = |kind| of_frame.iter().filter(move |idle| idle.kind == kind).map(|idle| idle.began..idle.ended);
     let searching = union(idle(IdleKind::Searching));
     let idle = union(idle(IdleKind::Asleep).chain(searching.iter().cloned()));
     let known = union(ran.times.into_iter().chain(idle.iter().cloned()));

@@ -39,7 +39,8 @@ struct Frame {
     ended: i64,
     /// The report in words, or why there is none.
     words: usize,
-    /// The critical path. Name, run, process and worker (−1 for what a thread did outside of all runs), ready, waited, took.
+    /// The critical path. Group, which is the span's name where it is no process; run, process and worker (−1 for what a thread
+    /// did outside of all runs), ready, waited, took.
     path: Vec<i64>,
 }
 
@@ -102,7 +103,7 @@ impl Data {
                 let (run, process) = step.process.map_or((-1, -1), |(run, process)| (run as i64, process as i64));
                 let worker = step.worker.map_or(-1, |worker| worker as i64);
                 let (waited, took) = (between(step.ready, step.started), between(step.started, step.ended));
-                [texts.add(&step.name) as i64, run, process, worker, between(start, step.ready), waited, took]
+                [texts.add(&step.group) as i64, run, process, worker, between(start, step.ready), waited, took]
             });
             Frame {
                 path: path.collect(),

@@ -94,10 +94,10 @@ function criticalPath() {
         const points = [];
         let beside = -1;
         for (let at = 0; at < frame.path.length; at += STEP_NUMBERS) {
-            const [name, run, process, worker, ready, waited, took] = frame.path.slice(at, at + STEP_NUMBERS);
+            const [group, run, process, worker, ready, waited, took] = frame.path.slice(at, at + STEP_NUMBERS);
             const [began, ended] = [ready + waited, ready + waited + took];
-            const found = run < 0 ? spanAt(name, began, ended) : stayAt(run, process, worker, began, ended);
-            // What a thread did that nobody named has no slice to run beside.
+            const found = run < 0 ? spanAt(group, began, ended) : stayAt(run, process, worker, began, ended);
+            // The end of a run has no slice to run beside.
             const isWait = found < 0;
             points.push({ moment: ready, beside, isWait: true });
             beside = isWait ? beside : found;
