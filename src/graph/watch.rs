@@ -82,7 +82,7 @@ impl<'run> Watch<'run> {
             ready: AtomicUsize::new(0),
         });
         // Last, as a subscriber may panic, and a run that was opened is to be ended.
-        let recorded = worker.timeline().open_run(|| Arc::clone(graph));
+        let recorded = worker.timeline().open_run(worker.is_in_background(), || Arc::clone(graph));
         // What it costs is measured against a build that has none.
         let is_wanted = (recorded.is_some() || traced.is_some()) && !cfg!(drawloom_without_timeline);
         is_wanted.then_some(Self { recorded, traced })

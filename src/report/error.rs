@@ -20,6 +20,13 @@ pub enum ReportError {
         /// The frame's number.
         frame: u64,
     },
+    /// What the log says of one of its runs cannot be: a process waits for a later one, or a chunk is of a process or a worker
+    /// that is not there. No timeline records that.
+    #[error("what the log says of frame {frame} contradicts itself")]
+    Contradictory {
+        /// The frame's number.
+        frame: u64,
+    },
     /// A process of one of its runs failed, so that the rest was cancelled.
     #[error("a process of frame {frame} failed, so the frame did not run to its end")]
     Failed {

@@ -4,9 +4,9 @@ use std::{ops::Range, time::Duration};
 
 use crate::timeline::{Log, Run};
 
-/// The runs of a frame that are not part of another one's chunks, by when they began.
+/// The runs that a frame waits for and that are not part of another one's chunks, by when they began.
 pub(super) fn outermost(log: &Log, frame: u64) -> Vec<&Run> {
-    let mut runs: Vec<_> = log.runs_of(frame).collect();
+    let mut runs: Vec<_> = log.runs_of(frame).filter(|run| !run.in_background).collect();
     runs.sort_by_key(|run| (run.began, std::cmp::Reverse(run.ended)));
     let mut until = None;
     runs.retain(|run| {

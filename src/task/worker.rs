@@ -136,7 +136,8 @@ impl Worker {
         self.queues.draw(count)
     }
 
-    pub(super) fn is_in_background(&self) -> bool {
+    /// Whether what runs is a background job.
+    pub(crate) fn is_in_background(&self) -> bool {
         self.is_in_background.get()
     }
 

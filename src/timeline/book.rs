@@ -15,8 +15,9 @@ pub(super) struct Book {
     frame: Option<u64>,
     next_frame: u64,
     next_run: u32,
-    /// The runs that are going on.
+    /// The runs that are going on, and how many of them a frame waits for.
     open: Vec<u32>,
+    awaited: usize,
     /// Those of them of which something was lost as a log was taken.
     cut: Vec<u32>,
     kept: Kept,
@@ -71,11 +72,14 @@ impl Book {
     }
 
     /// A run begins. Gives its number, and its frame's.
-    pub(super) fn open_run(&mut self, now: Duration) -> (u32, u64) {
+    pub(super) fn open_run(&mut self, now: Duration, in_background: bool) -> (u32, u64) {
         let number = self.next_run;
         self.next_run = number.wrapping_add(1);
-        if self.open.is_empty() {
-            self.mark(Marks::Runs, Some(now));
+        if !in_background {
+            if self.awaited == 0 {
+                self.mark(Marks::Runs, Some(now));
+            }
+            self.awaited += 1;
         }
         self.open.push(number);
         (number, self.current_frame())
@@ -84,14 +88,16 @@ impl Book {
     /// A run has ended.
     pub(super) fn end_run(&mut self, number: u32, mut run: Run) {
         run.complete = !self.cut.contains(&number);
+        self.awaited -= usize::from(!run.in_background);
         for list in [&mut self.open, &mut self.cut] {
             list.retain(|&other| other != number);
         }
         self.keep(|kept| &mut kept.runs, (number, run));
     }
 
-    /// The calling thread has ended a span.
-    pub(super) fn add_span(&mut self, name: String, frame: u64, time: Range<Duration>) {
+    /// The calling thread has ended a span, of that frame if it is given.
+    pub(super) fn add_span(&mut self, name: String, frame: Option<u64>, time: Range<Duration>) {
+        let frame = frame.unwrap_or_else(|| self.current_frame());
         // Without room for its span, a thread takes none either.
         let thread = if self.kept.spans.len() < MOST_KEPT { self.this_thread() } else { 0 };
         let span = Span { name, thread, frame, began: time.start, ended: time.end };
@@ -134,7 +140,7 @@ impl Book {
 /// The frames that were marked, and those that anything else belongs to.
 pub(super) fn frames_of(marked: Vec<(u64, Duration)>, log: &Log) -> Vec<Frame> {
     let mut frames: Vec<_> = marked.into_iter().map(|(number, began)| Frame { number, began, ended: began }).collect();
-    let runs = log.runs.iter().map(|run| (run.frame, run.began, run.ended));
+    let runs = log.runs.iter().filter(|run| !run.in_background).map(|run| (run.frame, run.began, run.ended));
     let spans = log.spans.iter().map(|span| (span.frame, span.began, span.ended));
     for (number, began, ended) in runs.chain(spans) {
         let place = frames.partition_point(|frame| frame.number < number);

@@ -63,6 +63,8 @@ pub struct Run {
     pub shared_from: Option<Duration>,
     /// Whether it was to be shared however little work it is.
     pub always_shares: bool,
+    /// Whether a background job called for it, which no frame waits for. Its frame is the one in which it began.
+    pub in_background: bool,
     /// Whether a process failed, so that the rest was cancelled. What panicked is not among the chunks.
     pub failed: bool,
     /// Whether every chunk that ran is here: there was room for all of them, and no log was taken meanwhile.

@@ -113,7 +113,8 @@ impl Timeline {
         self.book.lock().mark(Marks::Engine, now);
     }
 
-    /// Names what the calling thread does until the guard is dropped: a span of its own among those of the frame.
+    /// Names what the calling thread does until the guard is dropped: a span of its own among those of the frame in which it
+    /// ends.
     ///
     /// ```
     /// # let scheduler = drawloom::task::Scheduler::new(1)?;
@@ -129,12 +130,9 @@ impl Timeline {
         self.span_of(None, name)
     }
 
-    /// As [`span`](Self::span), of that frame instead of the current one.
+    /// As [`span`](Self::span), of that frame if it is given.
     pub(crate) fn span_of(&self, frame: Option<u64>, name: impl Into<Cow<'static, str>>) -> OpenSpan<'_> {
-        let open = self.is_on().then(|| {
-            let frame = frame.unwrap_or_else(|| self.book.lock().current_frame());
-            (name.into(), frame, self.now())
-        });
+        let open = self.is_on().then(|| (name.into(), frame, self.now()));
         OpenSpan { timeline: self, open, stays_on_its_thread: PhantomData }
     }
 
@@ -233,11 +231,11 @@ impl Timeline {
     }
 
     /// A run of a schedule begins, of which `graph` tells what it is of.
-    pub(crate) fn open_run(&self, graph: impl FnOnce() -> Arc<Graph>) -> Option<OpenRun<'_>> {
+    pub(crate) fn open_run(&self, in_background: bool, graph: impl FnOnce() -> Arc<Graph>) -> Option<OpenRun<'_>> {
         self.is_on().then(|| {
             let graph = graph();
             let began = self.now();
-            let (number, frame) = self.book.lock().open_run(began);
+            let (number, frame) = self.book.lock().open_run(began, in_background);
             OpenRun {
                 timeline: self,
                 reader: self.clock.reader(),
@@ -245,6 +243,7 @@ impl Timeline {
                 frame,
                 graph,
                 began,
+                in_background,
                 shared_from: OnceLock::new(),
             }
         })
@@ -287,7 +286,7 @@ impl fmt::Debug for Timeline {
 /// ```
 pub struct OpenSpan<'timeline> {
     timeline: &'timeline Timeline,
-    open: Option<(Cow<'static, str>, u64, Duration)>,
+    open: Option<(Cow<'static, str>, Option<u64>, Duration)>,
     stays_on_its_thread: PhantomData<*const ()>,
 }
 
@@ -308,6 +307,7 @@ pub(crate) struct OpenRun<'timeline> {
     frame: u64,
     graph: Arc<Graph>,
     began: Duration,
+    in_background: bool,
     shared_from: OnceLock<Duration>,
 }
 
@@ -343,14 +343,26 @@ impl OpenRun<'_> {
 
     /// The run has ended.
     pub(crate) fn end(self, how: Ended) {
-        let Self { timeline, number, frame, graph, began, shared_from, .. } = self;
+        let Self { timeline, number, frame, graph, began, in_background, shared_from, .. } = self;
         let Ended { workers, always_shares, failed } = how;
         let ended = timeline.now();
         let shared_from = shared_from.into_inner();
         let (chunks, empty) = (Vec::new(), Vec::new());
         let complete = true;
-        let run =
-            Run { frame, graph, workers, began, ended, shared_from, always_shares, failed, complete, chunks, empty };
+        let run = Run {
+            frame,
+            graph,
+            workers,
+            began,
+            ended,
+            shared_from,
+            always_shares,
+            in_background,
+            failed,
+            complete,
+            chunks,
+            empty,
+        };
         timeline.book.lock().end_run(number, run);
     }
 }

@@ -3,13 +3,14 @@
 use std::{
     hint::black_box,
     ops::Range,
-    sync::{Barrier, LazyLock, Mutex, mpsc},
+    sync::{Arc, Barrier, LazyLock, Mutex, mpsc},
     thread,
     time::Duration,
 };
 
 use drawloom::{
     graph::{Closure, FrameGraph, Node, NodeError, Schedule},
+    report::{FrameReport, Prices},
     task::{Scheduler, Worker},
     timeline::{Chunk, IdleKind, Log},
 };
@@ -265,6 +266,64 @@ fn an_engine_that_marks_frames_has_its_own_whenever_it_is_started() {
     let log = timeline.take();
     assert_eq!(log.runs.iter().map(|run| run.frame).collect::<Vec<_>>(), [0, 0, 1]);
     assert_eq!(log.frames.len(), 2);
+}
+
+#[test]
+fn what_runs_in_the_background_is_of_no_frame_that_waits_for_it() {
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    scheduler.timeline().start();
+    let (begun, has_begun) = mpsc::channel();
+    let (ended, has_ended) = mpsc::channel::<()>();
+    let streaming = {
+        let scheduler = Arc::clone(&scheduler);
+        scheduler.clone().background(move || {
+            let has_ended = Mutex::new(has_ended);
+            let stream = Closure::new(move |_: &(), _range, _worker| {
+                begun.send(()).unwrap();
+                has_ended.lock().unwrap().recv().unwrap();
+                Ok(())
+            });
+            let mut graph = FrameGraph::new();
+            let stream = graph.add("stream", stream);
+            graph.keep(stream);
+            graph.compile().unwrap().run(&scheduler, &()).unwrap();
+        })
+    };
+    has_begun.recv().unwrap();
+    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    for _run in 0..2 {
+        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    }
+    ended.send(()).unwrap();
+    streaming.wait().unwrap();
+    let log = scheduler.timeline().take();
+    let told: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.processes[0].name.as_str())).collect();
+    assert_eq!(told, [(false, "busy"), (false, "busy"), (true, "stream")]);
+    assert_ne!(log.runs[0].frame, log.runs[1].frame, "each is a frame of its own");
+    for run in &log.runs[..2] {
+        let frame = log.frames.iter().find(|frame| frame.number == run.frame).unwrap();
+        assert_eq!((frame.began, frame.ended), (run.began, run.ended));
+        let report = FrameReport::new(&log, run.frame, &Prices::FREE).unwrap();
+        assert_eq!((report.took, report.critical_path[0].name.as_str()), (run.took(), "busy"));
+    }
+}
+
+#[test]
+fn a_span_around_a_run_is_of_the_frame_that_the_run_begins() {
+    let scheduler = Scheduler::new(1).unwrap();
+    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    scheduler.timeline().start();
+    for _frame in 0..3 {
+        let _span = scheduler.timeline().span("frame");
+        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    }
+    let log = scheduler.timeline().take();
+    let frames = log.frames.iter().zip(&log.spans).zip(&log.runs);
+    for ((frame, span), run) in frames {
+        assert_eq!((span.frame, run.frame), (frame.number, frame.number));
+        assert_eq!((frame.began, frame.ended), (span.began, span.ended));
+    }
+    assert_eq!(log.frames.len(), 3);
 }
 
 #[test]

@@ -254,12 +254,25 @@ fn what_is_not_whole_is_not_reported_on() {
 }
 
 #[test]
-fn a_log_that_makes_no_sense_is_reported_on_all_the_same() {
+fn a_log_that_names_what_is_not_there_is_an_error() {
+    let refused = |spoil: fn(&mut Run)| {
+        let mut log = log();
+        spoil(&mut log.runs[0]);
+        FrameReport::new(&log, 12, &Prices::FREE) == Err(ReportError::Contradictory { frame: 12 })
+    };
+    assert!(refused(|run| run.chunks[0].worker = 99));
+    assert!(refused(|run| run.chunks[0].process = 77));
+    assert!(refused(|run| run.empty[0].process = 77));
+    assert!(refused(|run| Arc::make_mut(&mut run.graph).processes[0].dependencies.push(3)));
+    assert!(refused(|run| Arc::make_mut(&mut run.graph).processes[0].dependencies.push(0)));
+}
+
+#[test]
+fn times_that_make_no_sense_are_reported_on_all_the_same() {
     let range = |start, end| Range { start, end };
     let mut log = log();
     let run = &mut log.runs[0];
-    run.chunks[5] = chunk(3, 0, 99, 1..2);
-    run.chunks.push(chunk(77, 0, 1, range(1_400, 1_300)));
+    run.chunks.push(chunk(3, 9, 1, range(1_400, 1_300)));
     run.ended = micros(1_500);
     log.spans.push(span("backwards", range(1_500, 1_400)));
     log.workers[1].idle.push(Idle { kind: IdleKind::Asleep, began: micros(1_500), ended: micros(1_200) });

@@ -23,7 +23,7 @@ const LONGEST_NAME: usize = 60;
 const LONGEST_OF_WORKER: usize = 40;
 const LONGEST_OF_SEVERAL: usize = 17;
 
-/// Which part of the frame is the least that is worth saving: one in so many.
+/// Which part of the frame is the least that is worth saving, and worth telling as slack: one in so many.
 const LEAST_SAVED: u32 = 200;
 
 /// The report in words: what is to blame first, then each list of it, no longer than somebody reads.
@@ -140,7 +140,8 @@ impl FrameReport {
     }
 
     fn write_slack(&self, to: &mut Formatter<'_>) -> fmt::Result {
-        let mut loose: Vec<&Slack> = self.slack.iter().filter(|slack| !slack.time.is_zero()).collect();
+        let is_loose = |slack: &&Slack| slack.time > self.took / LEAST_SAVED;
+        let mut loose: Vec<&Slack> = self.slack.iter().filter(is_loose).collect();
         if loose.is_empty() {
             return Ok(());
         }

@@ -23,7 +23,7 @@ const CONTROLS: &str = include_str!("controls.js");
 /// Writes a page that shows the log, to be opened in a browser: one HTML file, which loads nothing.
 ///
 /// Workers are lanes and phases colours. Beside them stands, for each frame, its [report](super::FrameReport), which every
-/// frame is replayed for: so a long log takes its time. A chunk takes some 40 bytes.
+/// frame is replayed for: so a long log takes its time. A chunk takes some 40 bytes, and the words of a frame's report some 4 KiB.
 ///
 /// # Errors
 ///

@@ -29,14 +29,16 @@ function drawGrid(context) {
     ticks().found.forEach((time) => context.fillRect(Math.round(xOf(time + origin())), 0, 1, size.height));
 }
 
-// Everything outside of the chosen frame steps back, and every frame's beginning is marked.
+// Everything outside of the chosen frame steps back, but for what the device does later, and every frame's beginning is marked.
 function drawVeil(context) {
     const frame = data.frames[state.frame];
+    const device = lanes.find(({ kind }) => kind === "device");
+    const height = device ? device.top - size.scrolled : size.height;
     context.fillStyle = theme.ground;
     context.globalAlpha = 0.55;
     if (frame) {
-        context.fillRect(0, 0, Math.max(xOf(frame.began), 0), size.height);
-        context.fillRect(xOf(frame.ended), 0, size.width, size.height);
+        context.fillRect(0, 0, Math.max(xOf(frame.began), 0), height);
+        context.fillRect(xOf(frame.ended), 0, size.width, height);
     }
     context.globalAlpha = 1;
     context.fillStyle = theme.soft;
