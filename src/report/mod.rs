@@ -4,7 +4,7 @@
 //! A frame is recorded by the [timeline](crate::timeline): what every chunk took. A [`FrameReport`] tells from that which
 //! processes are to blame for its time. A [`Replay`] runs those chunks again on a clock of its own, on as many workers as are
 //! asked for, by the rules of this crate's own scheduler: who takes what, who is woken when, and what each of that
-//! [costs](Prices).
+//! [costs](Prices). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
 //!
 //! ```
 //! use drawloom::{
