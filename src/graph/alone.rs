@@ -86,12 +86,16 @@ impl Patience {
     /// that many chunks.
     const MOST_CHUNKS: u32 = 16;
 
-    /// Another chunk is done. At the start of a run every look is twice as far from the one before.
+    /// Another chunk is done.
+    #[inline]
     fn is_over(&mut self) -> bool {
         self.chunks += 1;
-        if self.chunks < self.next_look {
-            return false;
-        }
+        self.chunks >= self.next_look && self.look()
+    }
+
+    /// Asks the time. At the start of a run every look is twice as far from the one before.
+    #[cold]
+    fn look(&mut self) -> bool {
         self.chunks = 0;
         self.next_look = (self.next_look * 2).min(Self::MOST_CHUNKS);
         self.start.elapsed() > self.at_most
