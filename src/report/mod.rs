@@ -41,6 +41,7 @@
 //! The more workers, the more a prediction is what could be at best.
 
 mod chrome_trace;
+mod consistency;
 mod error;
 mod frame_report;
 mod moments;

@@ -236,6 +236,10 @@ fn a_log_that_names_what_it_does_not_list_is_refused() {
         (Run { empty: vec![chunk(5, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of process 5 of 2"),
         (Run { chunks: vec![chunk(0, 2, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of worker 2 of 2"),
         (run(vec![process("a", &[]), process("b", &[2])], 9, vec![]), "process 1 of run 0 waits for process 2 of 2"),
+        (
+            run(vec![process("a", &[1]), process("b", &[])], 9, vec![]),
+            "process 0 of run 0 waits for process 1, which is not before it",
+        ),
     ];
     for (run, problem) in cases {
         let error = write_chrome_trace(&log(vec![run]), io::sink()).unwrap_err();

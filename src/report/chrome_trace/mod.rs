@@ -10,7 +10,10 @@ use std::{
     time::Duration,
 };
 
-use crate::timeline::{Chunk, DeviceLog, IdleKind, Log, Process, Run};
+use crate::{
+    report::consistency::check_log,
+    timeline::{Chunk, DeviceLog, IdleKind, Log, Process, Run},
+};
 
 use self::{
     events::{Events, Lane, microseconds},
@@ -70,9 +73,9 @@ const DEVICE: usize = 2;
 /// # Errors
 ///
 /// What `writer` returns; and [`InvalidInput`](io::ErrorKind::InvalidInput) if the log names a process, a worker or a thread
-/// that it does not list.
+/// that it does not list, or has a process wait for a later one.
 pub fn write_chrome_trace(log: &Log, writer: impl io::Write) -> io::Result<()> {
-    check(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidInput, problem))?;
+    check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidInput, problem))?;
     let events = Events::begin(BufWriter::new(writer))?;
     let mut trace = Trace { log, events, threads: log.workers.len(), arrows: 0, left_out: 0 };
     trace.name_process(CPU, "drawloom")?;
@@ -309,29 +312,5 @@ impl Waits {
         }
         self.changes.clear();
         Ok(())
-    }
-}
-
-/// What the log names and does not list.
-fn check(log: &Log) -> Result<(), String> {
-    for (index, run) in log.runs.iter().enumerate() {
-        let processes = run.graph.processes.len();
-        for chunk in run.chunks.iter().chain(&run.empty) {
-            if chunk.process >= processes {
-                return Err(format!("run {index} has a chunk of process {} of {processes}", chunk.process));
-            }
-            if chunk.worker >= log.workers.len() {
-                return Err(format!("run {index} has a chunk of worker {} of {}", chunk.worker, log.workers.len()));
-            }
-        }
-        for (process, dependency) in run.graph.processes.iter().enumerate() {
-            if let Some(dependency) = dependency.dependencies.iter().find(|&&dependency| dependency >= processes) {
-                return Err(format!("process {process} of run {index} waits for process {dependency} of {processes}"));
-            }
-        }
-    }
-    match log.spans.iter().find(|span| span.thread >= log.threads.len()) {
-        Some(span) => Err(format!("there is a span of thread {} of {}", span.thread, log.threads.len())),
-        None => Ok(()),
     }
 }

@@ -5,8 +5,8 @@ use std::{collections::HashMap, io, sync::Arc, time::Duration};
 use serde::Serialize;
 
 use crate::{
-    report::{FrameReport, Prices},
-    timeline::{Chunk, Graph, IdleKind, Log, Process, Run},
+    report::{FrameReport, Prices, consistency::check_log},
+    timeline::{Chunk, Graph, IdleKind, Log, Process},
 };
 
 /// A log and its reports, as `model.js` reads them. Texts are indices of `texts`. Times are in nanoseconds: moments since the
@@ -76,7 +76,7 @@ struct Device {
 
 impl Data {
     pub(super) fn new(log: &Log, prices: &Prices) -> io::Result<Self> {
-        check(log)?;
+        check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidData, problem))?;
         let start = first_moment(log);
         let mut texts = Texts::default();
         let threads = log.threads.iter().map(|name| texts.add(name)).collect();
@@ -204,22 +204,4 @@ fn first_moment(log: &Log) -> Duration {
     let idle = log.workers.iter().flat_map(|worker| &worker.idle).map(|idle| idle.began);
     let passes = log.device.iter().flat_map(|device| &device.passes).map(|pass| pass.began);
     frames.chain(runs).chain(spans).chain(idle).chain(passes).min().unwrap_or_default()
-}
-
-/// Whether everything is there that the log speaks of.
-fn check(log: &Log) -> io::Result<()> {
-    let is_whole = |run: &Run| {
-        let processes = &run.graph.processes;
-        let is_there = |chunk: &Chunk| chunk.process < processes.len() && chunk.worker < log.workers.len();
-        let is_ordered = |(index, process): (usize, &Process)| process.dependencies.iter().all(|&other| other < index);
-        run.chunks.iter().chain(&run.empty).all(is_there) && processes.iter().enumerate().all(is_ordered)
-    };
-    let problem = if !log.runs.iter().all(is_whole) {
-        "a run of the log speaks of a process or a worker that it does not have"
-    } else if !log.spans.iter().all(|span| span.thread < log.threads.len()) {
-        "a span of the log is of a thread that it does not have"
-    } else {
-        return Ok(());
-    };
-    Err(io::Error::new(io::ErrorKind::InvalidData, problem))
 }

@@ -13,7 +13,7 @@ use std::time::Duration;
 use crate::{
     graph::{Flow, Sharing, Way},
     task::Scheduler,
-    timeline::{Chunk, Log, Process, Run},
+    timeline::{Log, Run},
 };
 
 use self::{
@@ -21,6 +21,7 @@ use self::{
     run::{Outcome, Replays},
 };
 use super::{
+    consistency::check_run,
     error::ReportError,
     moments::{length, outermost, own_time, union},
 };
@@ -94,7 +95,9 @@ impl Replay {
         let costs = |run: &Run| match run {
             Run { failed: true, frame, .. } => Err(ReportError::Failed { frame: *frame }),
             Run { complete: false, frame, .. } => Err(ReportError::Incomplete { frame: *frame }),
-            Run { frame, .. } if !is_consistent(run) => Err(ReportError::Contradictory { frame: *frame }),
+            Run { frame, .. } if check_run(run, "it", run.workers).is_err() => {
+                Err(ReportError::Contradictory { frame: *frame })
+            }
             _ => Ok(Costs::new(run, &prices)),
         };
         Ok(Self { runs: runs.into_iter().map(costs).collect::<Result<_, _>>()?, serial, prices })
@@ -158,14 +161,6 @@ impl Replay {
 fn replayed(alone: bool, time: u64, busy: Vec<u64>) -> Replayed {
     let busy = busy.into_iter().map(Duration::from_nanos).collect();
     Replayed { time: Duration::from_nanos(time), alone, busy }
-}
-
-/// Whether each process waits for earlier ones alone, and each chunk is of a process and a worker that are there.
-fn is_consistent(run: &Run) -> bool {
-    let processes = &run.graph.processes;
-    let waits = |(index, process): (usize, &Process)| process.dependencies.iter().all(|&other| other < index);
-    let is_there = |chunk: &Chunk| chunk.process < processes.len() && chunk.worker < run.workers;
-    processes.iter().enumerate().all(waits) && run.chunks.iter().chain(&run.empty).all(is_there)
 }
 
 /// Whether a schedule that takes so many nanoseconds on one thread, or on all workers, comes to be run by one.
