@@ -19,6 +19,9 @@ mod results;
 mod shape;
 #[path = "timeline/spans.rs"]
 mod spans;
+#[path = "shared/stopwatch.rs"]
+#[expect(dead_code, reason = "the rest is for the benches that draw")]
+mod stopwatch;
 #[path = "shared/table.rs"]
 mod table;
 #[path = "timeline/turns.rs"]
@@ -70,8 +73,9 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let counted = if quick { Ok(Vec::new()) } else { count::count(&progress) };
     progress.finish_and_clear();
 
+    let ring_bytes = timed.iter().map(Timed::ring_bytes).max().unwrap_or_default();
     let timed = timed.iter().map(Timed::figures).collect();
-    let report = Report::new(Figures { rounds, timed, span, counted: counted?, ring_bytes: turns::RING_BYTES });
+    let report = Report::new(Figures { rounds, timed, span, counted: counted?, ring_bytes });
     report.print(quick);
     // A trial must not take the place of what was measured.
     if !quick {

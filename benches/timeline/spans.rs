@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use crate::turns::median;
+use crate::stopwatch::middle;
 
 const SPANS: u32 = 1_000_000;
 
@@ -16,7 +16,7 @@ pub fn measure(rounds: usize) -> f64 {
         drop(black_box(span.entered()));
     };
     let without = || _ = black_box((name, view));
-    median((0..rounds).map(|_| time(with) - time(without)))
+    middle((0..rounds).map(|_| time(with) - time(without)))
 }
 
 fn time(call: impl Fn()) -> f64 {

@@ -8,13 +8,10 @@ use drawloom::graph::{FrameGraph, Node, NodeError, Schedule};
 use drawloom::task::{Scheduler, Worker};
 
 use crate::report::TimedFigures;
+use crate::stopwatch::middle;
 use crate::work::Work;
 
 type Failure = Box<dyn Error + Send + Sync>;
-
-/// Bytes of an event, and of all that a worker has room for unless it is told otherwise.
-const EVENT_BYTES: usize = 48;
-pub const RING_BYTES: usize = EVENT_BYTES << 16;
 
 /// How long frames are run in a turn.
 const TURN: Duration = Duration::from_millis(15);
@@ -96,10 +93,15 @@ impl Timed {
         Ok(())
     }
 
+    /// What the recorder has asked for, a worker.
+    pub fn ring_bytes(&self) -> usize {
+        self.scheduler.timeline().bytes() / self.scheduler.workers()
+    }
+
     /// What was measured so far.
     pub fn figures(&self) -> TimedFigures {
         let differences = self.on.iter().zip(&self.off).map(|(on, off)| on - off);
-        let (frame, difference) = (median(self.off.iter().copied()), median(differences));
+        let (frame, difference) = (middle(self.off.iter().copied()), middle(differences));
         TimedFigures {
             row: self.name,
             chunks: self.chunks,
@@ -124,11 +126,4 @@ impl Node<Work> for Chunks {
         range.for_each(|job| work.job(job));
         Ok(())
     }
-}
-
-/// The one in the middle.
-pub fn median(figures: impl Iterator<Item = f64>) -> f64 {
-    let mut figures: Vec<_> = figures.collect();
-    figures.sort_by(f64::total_cmp);
-    figures.get(figures.len() / 2).copied().unwrap_or_default()
 }

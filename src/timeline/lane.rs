@@ -42,6 +42,11 @@ impl Lane {
         self.ring.make_room();
     }
 
+    /// How much memory it has.
+    pub(super) fn bytes(&self) -> usize {
+        self.ring.bytes()
+    }
+
     /// The worker has nothing to do from this mark on, or passes its time in another way. Without a mark nothing is recorded,
     /// but if it is asleep still when something is, it has been so for all of that time.
     pub(super) fn start_idle(&self, kind: IdleKind, now: Option<u64>) {

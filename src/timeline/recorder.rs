@@ -97,6 +97,11 @@ impl Timeline {
         RECORDS && self.is_on.load(Ordering::Relaxed)
     }
 
+    /// How many bytes of memory its rings take: none before it was started for the first time, and never more from then on.
+    pub fn bytes(&self) -> usize {
+        self.lanes.iter().map(|lane| lane.bytes()).sum()
+    }
+
     /// The time on its axis: since the scheduler was built, unless an engine's clock says it. The first time, it waits as
     /// [`start`](Self::start) does.
     pub fn now(&self) -> Duration {

@@ -49,6 +49,11 @@ impl Ring {
         self.words.get_or_init(|| (0..self.capacity * WORDS).map(|_| AtomicU64::new(0)).collect());
     }
 
+    /// How much memory it has.
+    pub(super) fn bytes(&self) -> usize {
+        self.words.get().map_or(0, |words| size_of_val(&**words))
+    }
+
     /// Writes an event, if there is room. One thread at a time may do so, each after the one before.
     #[inline]
     pub(super) fn push(&self, event: Event) {

@@ -184,7 +184,9 @@ fn a_run_that_failed_says_so_and_leaves_nothing_in_the_next() {
 fn what_there_is_no_room_for_is_counted_and_the_run_is_not_complete() {
     let scheduler = Scheduler::builder().workers(1).timeline_capacity(64).build().unwrap();
     let mut schedule = one_process(Busy { width: 100, pinned: false });
+    assert_eq!(scheduler.timeline().bytes(), 0);
     scheduler.timeline().start();
+    assert_eq!(scheduler.timeline().bytes(), 64 * 48);
     for chunk in [4, 1, 4] {
         schedule.run(&scheduler, &Call { chunk, fails: false }).unwrap();
     }
