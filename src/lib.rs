@@ -68,6 +68,7 @@ pub mod blocks;
 pub mod graph;
 pub mod handle;
 pub mod scene;
+pub mod raster;
 pub mod command;
 pub mod view;
 pub mod queue;

@@ -1,5 +1,7 @@
 //! Triangle meshes.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::{Asset, Assets, SceneError};
@@ -111,12 +113,21 @@ impl Mesh {
     }
 
     /// The indices of each triangle's corners, counter-clockwise seen from its visible side.
-    pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.triangles_in(0..self.triangle_count())
+    }
+
+    /// Those of some of the triangles, by their number.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    pub(crate) fn triangles_in(&self, numbers: Range<usize>) -> impl Iterator<Item = [u32; 3]> + '_ {
         let (step, turned) = match self.topology {
             Topology::TriangleList => (3, false),
             Topology::TriangleStrip => (1, true),
         };
-        let triangles = self.indices.array_windows().step_by(step).enumerate();
+        let indices = &self.indices[numbers.start * step..];
+        let triangles = numbers.zip(indices.array_windows().step_by(step));
         triangles.map(move |(number, &[a, b, c])| if turned && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
     }
 }

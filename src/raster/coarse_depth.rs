@@ -1,0 +1,417 @@
+//! A coarse depth buffer that never claims more than what is hidden for sure.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+use super::silhouettes::{Silhouette, Silhouettes};
+
+/// How near the nearest things are that cover each square of a picture as a whole, taken where they are farthest within the
+/// square (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where
+/// theirs is by samples).
+///
+/// A square is covered if each of its cells lies between all lines of some [silhouette](Silhouettes): of a line only the cell's
+/// worst corner counts, and of a plane over the silhouette again its worst corner, since both are linear. So what is farther than
+/// the square's number is hidden in all of the square. Silhouettes that each cover some cells are taken together until they have
+/// all, and then as near as the farthest of them: those that are drawn nearest first are so as near as they can be.
+///
+/// Strips may be drawn at the same time, and looked at when all are drawn.
+#[derive(Debug, Default)]
+pub struct CoarseDepth {
+    /// A square's width in pixels.
+    side: f64,
+    /// In cells.
+    cells: usize,
+    /// Squares to the right, and down.
+    size: [usize; 2],
+    /// The nearness of each square, as an f32's bits; 0 where nothing is.
+    squares: Vec<AtomicU32>,
+    /// The least nearness of each tile of [`CoarseDepth::TILE`] by as many squares.
+    tiles: Vec<AtomicU32>,
+    /// For each square, while it is drawn, a [`Layer`].
+    layers: Vec<AtomicU64>,
+}
+
+/// Some of a square's cells, a bit each, and how near what covers them is at least.
+#[derive(Clone, Copy, Debug)]
+struct Layer {
+    cells: u32,
+    nearness: f32,
+}
+
+impl Layer {
+    const EMPTY: u64 = 0;
+
+    fn from_bits(bits: u64) -> Self {
+        Self { cells: (bits >> 32) as u32, nearness: f32::from_bits(bits as u32) }
+    }
+
+    fn bits(self) -> u64 {
+        u64::from(self.cells) << 32 | u64::from(self.nearness.to_bits())
+    }
+
+    /// Both together, as near as the farther one.
+    fn and(self, other: Self) -> Self {
+        Self { cells: self.cells | other.cells, nearness: self.nearness.min(other.nearness) }
+    }
+}
+
+impl CoarseDepth {
+    /// How many squares a tile is wide: what is as large as several is asked for tiles first. A strip is a row of tiles.
+    pub const TILE: usize = 8;
+
+    /// Makes room for a picture in squares of so many pixels. What is in them counts only when it has been drawn.
+    pub fn reset(&mut self, picture: [u32; 2], side: u32) {
+        self.side = f64::from(side.max(1));
+        // A cell is a pixel wide at least.
+        self.cells = (side.max(1) as usize).min(MOST_CELLS);
+        self.size = picture.map(|pixels| pixels.div_ceil(side.max(1)) as usize);
+        let [columns, rows] = self.size;
+        self.squares.resize_with(columns * rows, AtomicU32::default);
+        self.layers.resize_with(columns * rows, AtomicU64::default);
+        self.tiles.resize_with(columns.div_ceil(Self::TILE) * self.strip_count(), AtomicU32::default);
+    }
+
+    /// The number of strips.
+    pub fn strip_count(&self) -> usize {
+        self.size[1].div_ceil(Self::TILE)
+    }
+
+    /// How many squares there are to the right, and down.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Draws a strip, whatever was there before. Strips that are drawn at the same time must not be the same.
+    pub fn draw(&self, strip: usize, silhouettes: &Silhouettes) {
+        let [columns, rows] = self.size;
+        let rows = strip * Self::TILE..rows.min((strip + 1) * Self::TILE);
+        // Whoever reads the squares does so in a job that depends on this one, which orders the two.
+        for square in rows.start * columns..rows.end * columns {
+            self.squares[square].store(0, Ordering::Relaxed);
+            self.layers[square].store(Layer::EMPTY, Ordering::Relaxed);
+        }
+        let [low, high] = [rows.start, rows.end].map(|row| row as f64 * self.side);
+        for silhouette in silhouettes.between(low, high) {
+            rows.clone().for_each(|row| self.draw_row(row, &silhouette));
+        }
+        for (column, tile) in (0..columns).step_by(Self::TILE).zip(self.tiles_of(strip)) {
+            let squares = rows.clone().flat_map(|row| self.row(row, column..columns.min(column + Self::TILE)));
+            let least = squares.map(|square| square.load(Ordering::Relaxed)).min();
+            tile.store(least.unwrap_or(0), Ordering::Relaxed);
+        }
+    }
+
+    fn draw_row(&self, row: usize, silhouette: &Silhouette<'_>) {
+        let [left, right] = silhouette.width.map(|x| (x / self.side).clamp(0.0, self.size[0] as f64));
+        let most = (silhouette.most as f32).max(0.0).next_up().to_bits();
+        let is_nearer = |square: &AtomicU32| square.load(Ordering::Relaxed) >= most;
+        if self.row(row, left as usize..right.ceil() as usize).iter().all(is_nearer) {
+            return;
+        }
+        let mut covered = [const { 0..0 }; MOST_CELLS];
+        let (mut first, mut end) = (usize::MAX, 0);
+        for (line, cells) in covered[..self.cells].iter_mut().enumerate() {
+            *cells = self.covered(row * self.cells + line, silhouette);
+            if cells.start < cells.end {
+                (first, end) = (first.min(cells.start), end.max(cells.end));
+            }
+        }
+        for column in first / self.cells..end.div_ceil(self.cells) {
+            self.draw_square(row, column, &covered[..self.cells], silhouette);
+        }
+    }
+
+    /// Which cells of a row of cells a silhouette covers.
+    fn covered(&self, row: usize, silhouette: &Silhouette<'_>) -> Range<usize> {
+        let width = self.side / self.cells as f64;
+        let half = width / 2.0;
+        let y = row as f64 * width + half;
+        let (mut first, mut last) = (0.0, self.size[0] as f64 * self.side);
+        for [right, down, offset, across] in silhouette.lines {
+            // At the cell's worst corner, by the place of its centre.
+            let rest = down * y + offset - (right.abs() + down.abs()) * half;
+            if *right > 0.0 {
+                first = f64::max(first, -rest * across);
+            } else if *right < 0.0 {
+                last = f64::min(last, -rest * across);
+            } else if rest < 0.0 {
+                return 0..0;
+            }
+        }
+        // Centres of cells lie half a cell past whole ones.
+        let first = ((first - half) / width).ceil().max(0.0);
+        let end = ((last - half) / width).floor() + 1.0;
+        if first < end { first as usize..(end as usize).min(self.size[0] * self.cells) } else { 0..0 }
+    }
+
+    fn draw_square(&self, row: usize, column: usize, covered: &[Range<usize>], silhouette: &Silhouette<'_>) {
+        // Only one job draws this strip.
+        let place = row * self.size[0] + column;
+        let (square, layer) = (&self.squares[place], &self.layers[place]);
+        let behind = f32::from_bits(square.load(Ordering::Relaxed));
+        if f64::from(behind) >= silhouette.most {
+            return;
+        }
+        let first = column * self.cells;
+        // The cells' own rectangle, so that a plane does not count where the silhouette has ended.
+        let (mut cells, mut low, mut high) = (0, [usize::MAX; 2], [0; 2]);
+        for (line, range) in covered.iter().enumerate() {
+            let [start, end] = [range.start, range.end].map(|cell| cell.saturating_sub(first).min(self.cells));
+            if start < end {
+                cells |= ((1_u32 << end) - (1 << start)) << (line * self.cells);
+                low = [low[0].min(start), low[1].min(line)];
+                high = [high[0].max(end), high[1].max(line + 1)];
+            }
+        }
+        if cells == 0 {
+            return;
+        }
+        let width = self.side / self.cells as f64;
+        let middle = |axis: usize, square: usize| {
+            (square * self.cells) as f64 * width + (low[axis] + high[axis]) as f64 * 0.5 * width
+        };
+        let half = |axis: usize| (high[axis] - low[axis]) as f64 * 0.5 * width;
+        let ([x, y], [half_x, half_y]) = ([middle(0, column), middle(1, row)], [half(0), half(1)]);
+        let (mut nearness, mut least_nearest) = (f64::INFINITY, f64::INFINITY);
+        for [right, down, offset] in silhouette.planes {
+            let centre = right * x + down * y + offset;
+            let within = right.abs() * half_x + down.abs() * half_y;
+            nearness = nearness.min(centre - within);
+            least_nearest = least_nearest.min(centre + within);
+        }
+        let nearness = nearness as f32;
+        if least_nearest >= silhouette.nearest || nearness <= behind {
+            return;
+        }
+        let all = u32::MAX >> (u32::BITS as usize - self.cells * self.cells);
+        if cells == all {
+            square.store(nearness.to_bits(), Ordering::Relaxed);
+            return;
+        }
+        let own = Layer { cells, nearness };
+        let known = Layer::from_bits(layer.load(Ordering::Relaxed));
+        // One that lies behind what covers all, or is empty, is of no use any more.
+        let both = if known.nearness > behind { known.and(own) } else { own };
+        if both.cells == all {
+            square.store(both.nearness.to_bits(), Ordering::Relaxed);
+            layer.store(Layer::EMPTY, Ordering::Relaxed);
+        } else {
+            layer.store(both.bits(), Ordering::Relaxed);
+        }
+    }
+
+    fn row(&self, row: usize, columns: Range<usize>) -> &[AtomicU32] {
+        let start = row * self.size[0];
+        &self.squares[start + columns.start..start + columns.end.max(columns.start)]
+    }
+
+    fn tiles_of(&self, strip: usize) -> &[AtomicU32] {
+        let count = self.size[0].div_ceil(Self::TILE);
+        &self.tiles[strip * count..][..count]
+    }
+
+    /// How near what covers the square at a place of the picture is; 0 where nothing does, and outside of the picture.
+    pub fn nearness_at(&self, x: f64, y: f64) -> f32 {
+        let [column, row] = [x, y].map(|pixel| (pixel / self.side).floor());
+        let [columns, rows] = self.size.map(|count| count as f64);
+        // No number is in any picture if it is none.
+        if !(column >= 0.0 && row >= 0.0 && column < columns && row < rows) {
+            return 0.0;
+        }
+        f32::from_bits(self.squares[row as usize * self.size[0] + column as usize].load(Ordering::Relaxed))
+    }
+
+    /// Whether all that lies in a rectangle of the picture and is nowhere nearer than `nearness` is hidden. `low` and `high` are
+    /// its corners in pixels; what of it is outside of the picture does not count, and if all of it is, the answer is `false`.
+    pub fn hides(&self, low: [f64; 2], high: [f64; 2], nearness: f32) -> bool {
+        let range = |axis: usize| {
+            let count = self.size[axis] as f64;
+            let [first, last] = [low[axis], high[axis]].map(|pixel| (pixel / self.side).floor());
+            // Not a range where a number is none.
+            let is_in = first < count && last >= 0.0 && count > 0.0;
+            is_in.then(|| first.max(0.0) as usize..last.min(count - 1.0) as usize + 1)
+        };
+        let (Some(columns), Some(rows)) = (range(0), range(1)) else { return false };
+        // Bits of numbers that are not negative are in the numbers' order.
+        let nearness = nearness.max(0.0).to_bits();
+        let covers = |square: &AtomicU32| square.load(Ordering::Relaxed) > nearness;
+        let strips = rows.start / Self::TILE..(rows.end - 1) / Self::TILE + 1;
+        for strip in strips {
+            let rows = rows.start.max(strip * Self::TILE)..rows.end.min((strip + 1) * Self::TILE);
+            let mut column = columns.start;
+            while column < columns.end {
+                let tile = column / Self::TILE;
+                let part = column..columns.end.min((tile + 1) * Self::TILE);
+                column = part.end;
+                if !covers(&self.tiles_of(strip)[tile])
+                    && !rows.clone().all(|row| self.row(row, part.clone()).iter().all(covers))
+                {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
+
+/// The most cells to a square's side. A layer has room for 5.
+const MOST_CELLS: usize = 4;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::DVec2;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn drawn(picture: [u32; 2], side: u32, silhouettes: &Silhouettes) -> CoarseDepth {
+        let mut depth = CoarseDepth::default();
+        depth.reset(picture, side);
+        (0..depth.strip_count()).for_each(|strip| depth.draw(strip, silhouettes));
+        depth
+    }
+
+    fn rectangle(low: [f64; 2], high: [f64; 2]) -> [DVec2; 4] {
+        [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(DVec2::from)
+    }
+
+    #[test]
+    fn only_squares_that_are_covered_as_a_whole_count() {
+        let mut silhouettes = Silhouettes::default();
+        silhouettes.add(rectangle([8.0, 7.9], [31.9, 40.0]), 0.0, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
+        let depth = drawn([64, 48], 8, &silhouettes);
+        for row in 0..6 {
+            for column in 0..8 {
+                let expected = if (1..3).contains(&column) && (1..5).contains(&row) { 0.5 } else { 0.0 };
+                let place = [column, row].map(|square| f64::from(square) * 8.0 + 4.0);
+                assert_eq!(depth.nearness_at(place[0], place[1]), expected, "{column} {row}");
+            }
+        }
+        assert!(depth.hides([8.0, 8.0], [23.9, 39.9], 0.4));
+        assert!(!depth.hides([8.0, 8.0], [23.9, 39.9], 0.5));
+        assert!(!depth.hides([7.9, 8.0], [23.9, 39.9], 0.4));
+        assert!(!depth.hides([8.0, 8.0], [24.0, 39.9], 0.4));
+        assert!(!depth.hides([8.0, f64::NAN], [20.0, 20.0], 0.4));
+        assert!(!depth.hides([-9.0, 9.0], [-2.0, 20.0], 0.4));
+        assert_eq!([depth.nearness_at(-1.0, 9.0), depth.nearness_at(f64::NAN, 9.0)], [0.0; 2]);
+    }
+
+    #[test]
+    fn a_margin_moves_a_silhouette_in() {
+        let count = |margin: f64| {
+            let mut silhouettes = Silhouettes::default();
+            silhouettes.add(rectangle([8.0, 8.0], [40.0, 40.0]), margin, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
+            let depth = drawn([64, 64], 8, &silhouettes);
+            depth.squares.iter().filter(|square| square.load(Ordering::Relaxed) > 0).count()
+        };
+        assert_eq!([0.0, 0.01, 8.0, 8.01].map(count), [16, 4, 4, 0]);
+    }
+
+    #[test]
+    fn silhouettes_cover_a_square_together() {
+        let nearness_of = |parts: &[([f64; 2], f64)]| {
+            let mut silhouettes = Silhouettes::default();
+            for &([left, right], nearness) in parts {
+                let corners = rectangle([left, -1.0], [right, 20.0]);
+                silhouettes.add(corners, 0.0, [[0.0, 0.0, nearness]], [f64::INFINITY; 2]);
+            }
+            drawn([16, 16], 16, &silhouettes).nearness_at(8.0, 8.0)
+        };
+        assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)]), 0.4);
+        assert_eq!(nearness_of(&[([-1.0, 8.0], 0.4), ([8.0, 17.0], 0.5)]), 0.4);
+        // A cell of four pixels that neither covers, and one that both do.
+        assert_eq!(nearness_of(&[([-1.0, 7.9], 0.5), ([7.9, 17.0], 0.4)]), 0.0);
+        assert_eq!(nearness_of(&[([-1.0, 9.0], 0.5), ([7.0, 17.0], 0.4)]), 0.4);
+        // Before what covers all, and behind it.
+        let whole = ([-1.0, 17.0], 0.45);
+        assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), whole, ([8.0, 17.0], 0.4)]), 0.45);
+        assert_eq!(nearness_of(&[whole, ([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.49)]), 0.49);
+        // What comes after all is covered may be nearer still.
+        let halves = [([-1.0, 8.0], 0.3), ([8.0, 17.0], 0.2), ([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)];
+        assert_eq!(nearness_of(&halves), 0.4);
+    }
+
+    #[test]
+    fn what_has_no_area_or_no_numbers_is_left_out() {
+        let mut silhouettes = Silhouettes::default();
+        let plane = [[0.0, 0.0, 0.5]];
+        let line = [DVec2::ZERO, DVec2::ONE, DVec2::splat(7.0), DVec2::splat(7.0)];
+        silhouettes.add(line, 0.0, plane, [1.0; 2]);
+        silhouettes.add([DVec2::ZERO, DVec2::X, DVec2::new(f64::NAN, 3.0)], 0.0, plane, [1.0; 2]);
+        silhouettes.add([DVec2::ZERO, DVec2::X, DVec2::new(f64::INFINITY, 3.0)], 0.0, plane, [1.0; 2]);
+        silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, [], [1.0; 2]);
+        silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, [[0.0, f64::NAN, 0.0]], [1.0; 2]);
+        silhouettes.add(rectangle([0.0; 2], [9.0; 2]), f64::NAN, plane, [1.0; 2]);
+        assert!(silhouettes.is_empty());
+        silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, plane, [1.0; 2]);
+        assert_eq!(silhouettes.len(), 1);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        /// Everything at once, against places of each square and each silhouette looked at one by one.
+        #[test]
+        fn no_place_is_farther_than_its_square_says(
+            shapes in prop::collection::vec(
+                (prop::collection::vec(prop::array::uniform2(-20.0..90.0_f64), 3..9), prop::array::uniform3(-0.01..0.01_f64)),
+                1..8,
+            ),
+            side in prop::sample::select(vec![1_u32, 2, 4, 8, 16]),
+            rectangle in prop::array::uniform4(-10.0..80.0_f64),
+            nearness in 0.2..0.8_f32,
+        ) {
+            let mut silhouettes = Silhouettes::default();
+            for (corners, [right, down, further]) in &shapes {
+                let planes = [[*right, *down, 0.5], [*further, -*right, 0.6]];
+                silhouettes.add(corners.iter().map(|&corner| DVec2::from(corner)), 0.0, planes, [f64::INFINITY; 2]);
+            }
+            let depth = drawn([70, 50], side, &silhouettes);
+            let nearest_at = |x: f64, y: f64| {
+                let mut nearest = 0.0;
+                for (corners, [right, down, further]) in &shapes {
+                    // Inside of a triangle of any three corners is inside of all of them.
+                    let place = DVec2::new(x, y);
+                    let corners: Vec<_> = corners.iter().map(|&corner| DVec2::from(corner)).collect();
+                    let mut triangles = corners.iter().enumerate().flat_map(|(index, &a)| {
+                        let corners = &corners;
+                        (0..index).flat_map(move |other| (0..other).map(move |third| [a, corners[other], corners[third]]))
+                    });
+                    let is_inside = triangles.any(|[a, b, c]| {
+                        let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
+                        sides.iter().all(|&side| side >= -1e-9) || sides.iter().all(|&side| side <= 1e-9)
+                    });
+                    if is_inside {
+                        nearest = f64::max(nearest, (right * x + down * y + 0.5).min(further * x - right * y + 0.6));
+                    }
+                }
+                nearest
+            };
+            let [columns, rows] = depth.size();
+            let width = f64::from(side);
+            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+                let [left, top] = [column, row].map(|square| square as f64 * width);
+                let found = f64::from(depth.nearness_at(left + width / 2.0, top + width / 2.0));
+                for share in [[0.01, 0.01], [0.99, 0.01], [0.01, 0.99], [0.99, 0.99], [0.5, 0.3]] {
+                    let nearest = nearest_at(left + share[0] * width, top + share[1] * width);
+                    prop_assert!(found <= nearest + 1e-6, "{found} at {left} {top}, and {nearest} in it");
+                }
+            }
+            let [a, b, c, d] = rectangle;
+            let (low, high) = ([a.min(b), c.min(d)], [a.max(b), c.max(d)]);
+            let touched = |row: usize, column: usize| {
+                let [left, top] = [column, row].map(|square| square as f64 * width);
+                left <= high[0] && left + width > low[0] && top <= high[1] && top + width > low[1]
+            };
+            let mut squares = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+            let mut any = false;
+            let all = squares.all(|(row, column)| {
+                let is_touched = touched(row, column);
+                any |= is_touched;
+                let found = depth.nearness_at((column as f64 + 0.5) * width, (row as f64 + 0.5) * width);
+                !is_touched || found > nearness
+            });
+            prop_assert_eq!(depth.hides(low, high, nearness), all && any);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+use glam::{DQuat, DVec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::raster::grid::{MIDDLE, STEPS};
+use crate::raster::{PixelBounds, Real, Triangle, Vector};
+
+const PICTURE: [usize; 2] = [1024, 512];
+const WINDINGS: [Option<Winding>; 3] = [None, Some(Winding::Clockwise), Some(Winding::CounterClockwise)];
+
+proptest! {
+    #[test]
+    fn what_is_left_out_covers_no_pixel(
+        corners in prop::collection::vec(any_corner(), 3..24),
+        indices in prop::collection::vec(prop::array::uniform3(0..24_u32), 1..40),
+        mirrored: bool,
+    ) {
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let clip: Vec<_> = corners.iter().map(|&Vector([x, y, z, w])| Vector([x * sign, y, z, w])).collect();
+        let triangles: Vec<_> = indices.iter().map(|corners| corners.map(|corner| corner % clip.len() as u32)).collect();
+        for culled in WINDINGS {
+            let (kept, counts) = cull(&clip, &triangles, culled);
+            let mut next = kept.as_chunks::<3>().0.iter().peekable();
+            let mut left_out = 0;
+            for triangle in &triangles {
+                if next.next_if_eq(&triangle).is_none() {
+                    left_out += 1;
+                    let corners = triangle.map(|index| clip[index as usize]);
+                    prop_assert!(!covers_any::<f64>(corners, culled), "{:?}", corners);
+                    prop_assert!(!covers_any::<f32>(corners, culled), "{:?}", corners);
+                }
+            }
+            prop_assert_eq!((left_out, triangles.len()), (counts.culled(), counts.triangles));
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_kept(
+        number in prop::sample::select(vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY]),
+        axis in 0..4_usize,
+    ) {
+        let mut corners = [Vector([-9.0, 0.0, 0.5, 1.0]); 3];
+        corners[1].0[axis] = number;
+        for culled in WINDINGS {
+            prop_assert_eq!(cull(&corners, &[[0, 1, 2], [1, 1, 1]], culled).1.culled(), 0);
+        }
+    }
+}
+
+/// Two million in release. Each is decided by every way to move its corners by a step along each axis, in i128.
+#[test]
+fn no_sliver_is_left_out_that_could_be_drawn() {
+    let slivers = if cfg!(debug_assertions) { 100_000 } else { 2_000_000 };
+    let mut random = Random(7);
+    let mut counts = CulledTriangles::default();
+    for _ in 0..slivers {
+        let places = random.sliver();
+        let clip = places.map(corner_at);
+        let (kept, count) = cull(&clip, &[[0, 1, 2]], Some(Winding::Clockwise));
+        counts += count;
+        if kept.is_empty() {
+            let moved = (0..64).map(|moves: i64| {
+                [0, 1, 2]
+                    .map(|corner| [0, 1].map(|axis| places[corner][axis] + (moves >> (2 * corner + axis) & 1) * 2 - 1))
+            });
+            let is_back = moved.clone().all(|places| exact_area(places) > 0);
+            let [a, b, c] = places;
+            assert!(is_back || has_no_middle(places) || a == b || b == c || c == a, "{places:?}");
+        }
+    }
+    // Neither test is one that nothing passes, and neither one that everything does.
+    let each = [counts.back_facing, counts.zero_size, slivers - counts.culled()];
+    assert!(each.iter().all(|&count| count > slivers / 100), "{counts:?}");
+}
+
+#[test]
+fn each_reason_is_counted() {
+    let places = [[40, 40], [40, 80], [80, 40], [42, 41], [42, 44], [44, 41]];
+    let mut clip: Vec<_> = places.map(|place| corner_at(place.map(|number| number * STEPS / 2))).into();
+    clip.extend([[3.0, 0.0, 0.5, 1.0], [9.0, 0.3, 0.5, 1.0], [2.0, -5.0, 0.5, 1.0]].map(Vector));
+    // Beside the camera plane, and behind it.
+    clip.extend([[0.0, 0.0, 0.5, 0.1], [1.0, 0.0, 0.5, -1.0], [0.0, 1.0, 0.5, -2.0]].map(Vector));
+    clip.extend([[600, 600], [610, 603], [605, 700]].map(corner_at));
+    let triangles = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [0, 0, 2],
+        [0, 2, 2],
+        [0, 2, 0],
+        [3, 4, 5],
+        [6, 7, 8],
+        [9, 10, 11],
+        [12, 14, 13],
+        [0, 1, 10],
+        [0, 1, 99],
+    ];
+    let (kept, counts) = cull(&clip, &triangles, Some(Winding::Clockwise));
+    let expected = CulledTriangles { triangles: 11, degenerate: 3, off_screen: 2, back_facing: 1, zero_size: 1 };
+    assert_eq!(counts, expected);
+    assert_eq!(kept, [[0, 1, 2], [3, 4, 5], [0, 1, 10], [0, 1, 99]].as_flattened());
+    assert_eq!((counts.culled(), counts.share()), (7, 7.0 / 11.0));
+    assert_eq!(cull(&clip, &triangles, None).1.back_facing, 0);
+    assert_eq!(CulledTriangles::default().share(), 0.0);
+}
+
+#[test]
+fn what_may_be_clipped_is_kept() {
+    let back_facing = [[0.0, 0.0, 0.5, 1.0], [0.0, 0.5, 0.4, 1.0], [0.5, 0.0, 0.3, 1.0]];
+    let count = |corner: [f64; 4]| {
+        let clip = [Vector(back_facing[0]), Vector(back_facing[1]), Vector(corner)];
+        cull(&clip, &[[0, 1, 2]], Some(Winding::Clockwise)).1.back_facing
+    };
+    assert_eq!(count(back_facing[2]), 1);
+    for [x, y, z, w] in [[0.5, 0.0, 1.0, 1.0], [0.5, 0.0, 0.0, 1.0], [2.0, 0.0, 0.3, 1.0], [0.5, -2.0, 0.3, 1.0]] {
+        assert_eq!(count([x, y, z, w]), 0, "{x} {y} {z} {w}");
+    }
+}
+
+#[test]
+fn most_of_what_cannot_be_seen_of_a_ball_is_left_out() {
+    // A ball half in the picture, 500 m away, with a far plane infinitely far away, and one within it.
+    let perspective = |[x, y, z]: [f64; 3]| [x * 2.0, y * 4.0, 0.05, -z];
+    let orthographic = |[x, y, z]: [f64; 3]| [x * 0.004, y * 0.008, 1.0 + z * 0.001, 1.0];
+    for projection in [perspective, orthographic] {
+        let ball = |ring: i32, segment: i32| {
+            let turn = DQuat::from_rotation_y(f64::from(segment) * 0.1) * DQuat::from_rotation_x(f64::from(ring) * 0.1);
+            turn * DVec3::NEG_Y * 100.0 + DVec3::new(250.0, 0.0, -500.0)
+        };
+        let places = (0..=31).flat_map(|ring| (0..=63).map(move |segment| ball(ring, segment)));
+        let clip: Vec<_> = places.map(|place| Vector(projection(place.to_array()))).collect();
+        let quads = (0..31).flat_map(|ring| (0..63).map(move |segment| ring * 64 + segment));
+        let triangles: Vec<_> =
+            quads.flat_map(|low| [[low, low + 1, low + 64], [low + 1, low + 65, low + 64]]).collect();
+        let (_, counts) = cull(&clip, &triangles, Some(Winding::Clockwise));
+        let (_, turned) = cull(&clip, &triangles, Some(Winding::CounterClockwise));
+        let visible = counts.triangles - counts.off_screen;
+        assert_eq!(counts.off_screen, turned.off_screen);
+        assert!(counts.off_screen > counts.triangles * 2 / 5, "{counts:?}");
+        assert!(counts.back_facing + turned.back_facing > visible * 9 / 10, "{counts:?} {turned:?}");
+    }
+}
+
+fn cull(clip: &[Vector4<f64>], triangles: &[[u32; 3]], culled: Option<Winding>) -> (Vec<u32>, CulledTriangles) {
+    let mut kept = Vec::new();
+    let counts = cull_triangles(clip, triangles.iter().copied(), PICTURE, culled, &mut kept);
+    (kept, counts)
+}
+
+fn covers_any<R: Real>(corners: [Vector4<f64>; 3], culled: Option<Winding>) -> bool {
+    let corners = corners.map(|corner| (Vector(corner.0.map(R::of)), []));
+    let (mut triangles, mut covers) = (Vec::new(), false);
+    Triangle::<R, 0>::set_up(&corners, PICTURE, culled, &mut triangles);
+    for triangle in triangles {
+        triangle.cover(PixelBounds::of_picture(PICTURE), |_, _| covers = true);
+    }
+    covers
+}
+
+fn exact_area(places: [Place; 3]) -> i128 {
+    let [a, b, c] = places.map(|place| place.map(i128::from));
+    a[0] * b[1] - b[0] * a[1] + b[0] * c[1] - c[0] * b[1] + c[0] * a[1] - a[0] * c[1]
+}
+
+fn has_no_middle(places: [Place; 3]) -> bool {
+    (0..2).any(|axis| {
+        let along = places.map(|place| place[axis]);
+        let (low, high) = (along.into_iter().min().unwrap() - 1, along.into_iter().max().unwrap() + 1);
+        (low..=high).all(|place| place.rem_euclid(STEPS) != MIDDLE)
+    })
+}
+
+/// A corner that is just at this place of the picture.
+fn corner_at(place: Place) -> Vector4<f64> {
+    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS as f64 / 2.0));
+    Vector([x - 1.0, 1.0 - y, 0.5, 1.0])
+}
+
+/// Corners in and around the picture, many of them in a heap of a few pixels, many on a line, and some behind the camera.
+fn any_corner() -> impl Strategy<Value = Vector4<f64>> {
+    let along = prop_oneof![
+        -1.5..1.5_f64,
+        -200.0..200.0_f64,
+        0.1..0.108_f64,
+        prop::sample::select(vec![0.0, 1.0, -1.0, 2.0, -2.0])
+    ];
+    let w = prop_oneof![Just(1.0), 0.01..100.0_f64, -2.0..2.0_f64];
+    let depth = prop_oneof![Just(0.01), Just(0.0), Just(1.0), -0.1..1.1_f64];
+    (along.clone(), along, depth, w, any::<bool>(), -3..=3_i32).prop_map(|(x, y, depth, w, on_line, off)| {
+        let y = if on_line { x * 0.7 + f64::from(off) * 1e-5 } else { y };
+        Vector([x * w, y * w, depth, w])
+    })
+}
+
+/// Numbers that look random (Vigna's SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: i64) -> i64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ mixed >> 31) % end as u64) as i64
+    }
+
+    /// Two corners up to 2000 steps apart, or 6, and one within a few steps of the line between them.
+    fn sliver(&mut self) -> [Place; 3] {
+        let reach = if self.below(2) == 0 { 2000 } else { 6 };
+        let from = [0, 1].map(|axis| self.below(PICTURE[axis] as i64 * STEPS));
+        let to = from.map(|along| along + self.below(2 * reach + 1) - reach);
+        let share = self.below(1001);
+        let off = 1 + self.below(8);
+        let third =
+            [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share / 1000 + self.below(2 * off + 1) - off);
+        [from, to, third]
+    }
+}
