@@ -33,6 +33,7 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
+use drawloom::quality::Quality;
 use drawloom::scene::{obj, sample};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -98,12 +99,13 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
 /// Objects of 64 meshes and 16 materials anywhere in a view, one in ten blended.
 fn scattered(objects: u32) -> Vec<RenderCommand> {
     let mut random = Random::new();
+    let Quality { opaque_order, blended_order, .. } = Quality::balanced();
     let command = |object: u32| {
         let (mesh, material) = (random.below(64) as u32, random.below(16) as u32);
         let (depth, state) = (random.between(100.0, 200.0) as f32, DrawState::PLAIN);
         let key = match object % 10 {
-            0 => SortKey::blended(depth),
-            _ => SortKey::opaque(state, mesh, depth),
+            0 => SortKey::blended(blended_order.code(depth, 0.05, f32::INFINITY)),
+            _ => SortKey::opaque(state, mesh, opaque_order.code(depth, 0.05, f32::INFINITY)),
         };
         RenderCommand { key, object, mesh, material, state }
     };

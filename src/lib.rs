@@ -66,6 +66,7 @@ pub mod timeline;
 pub mod task;
 pub mod blocks;
 pub mod graph;
+pub mod quality;
 pub mod handle;
 pub mod scene;
 pub mod raster;

@@ -1,11 +1,15 @@
 //! Backends: what turns batches into recorded chunks, and submits them (M 10.3, "Submitting a RenderCommand to the API").
 
 mod null;
+mod picture;
+mod subdivided;
+mod texels;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 use std::ops::Range;
 
 use crate::process::{Draws, FramePlan, Pass};
+use crate::quality::Quality;
 use crate::queue::DrawList;
 use crate::scene::SceneRef;
 use crate::task::Worker;
@@ -13,9 +17,10 @@ use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 #[cfg(feature = "wgpu")]
 pub use self::wgpu::{
-    DeviceClock, Encode, PassTime, PassTimes, Picture, Record, WgpuBackend, WgpuPass, WgpuResources, WgpuSubmission,
+    DeviceClock, Encode, PassTime, PassTimes, Record, WgpuBackend, WgpuPass, WgpuResources, WgpuSubmission,
 };
 pub use null::{NullBackend, NullPass, NullSubmission};
+pub use picture::Picture;
 
 /// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
 /// several workers at once; each of those takes the worker as proof that it runs in a job (M 10.3 asserts it).
@@ -109,7 +114,7 @@ pub struct FrameRequest<'a> {
     pub plan: &'a FramePlan,
     /// What each process draws, in the plan's order.
     pub draws: &'a [Draws<'a>],
-    /// The views.
+    /// The views. A kept one's targets still hold what an earlier frame drew: see [`RenderView::is_kept`].
     pub views: &'a [RenderView],
     /// The lights that reach each view.
     pub lights: &'a [LightTable],
@@ -117,6 +122,8 @@ pub struct FrameRequest<'a> {
     pub passes: &'a [Pass],
     /// The scene.
     pub scene: &'a SceneRef<'a>,
+    /// How accurate the frame is to be.
+    pub quality: &'a Quality,
     /// Where the backend counts what it leaves out.
     pub rejections: &'a Rejections,
 }
@@ -177,6 +184,20 @@ pub enum BackendError {
     ViewOutOfReach {
         /// The view.
         view: String,
+    },
+    /// The software backend has nothing to run in the place of a process's WGSL.
+    #[error("process {process:?} has no twin on the CPU, so the software backend cannot draw it")]
+    NoTwin {
+        /// The process.
+        process: String,
+    },
+    /// A process's twin panicked.
+    #[error("the twin of process {process:?} panicked: {message}")]
+    TwinPanicked {
+        /// The process.
+        process: String,
+        /// What the panic said.
+        message: String,
     },
     /// A raw pass reported an error.
     #[error("the raw pass failed: {0}")]

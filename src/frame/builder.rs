@@ -7,6 +7,7 @@ use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
 use crate::backend::Backend;
 use crate::process::{Deferred, RenderProcess};
+use crate::quality::Quality;
 use crate::task::Scheduler;
 use crate::view::ShadowMaps;
 
@@ -19,6 +20,7 @@ pub struct RendererBuilder<B> {
     shadow_maps: ShadowMaps,
     granularity: Granularity,
     instancing: bool,
+    quality: Option<Quality>,
 }
 
 impl<B: Backend> RendererBuilder<B> {
@@ -31,6 +33,7 @@ impl<B: Backend> RendererBuilder<B> {
             shadow_maps: ShadowMaps::default(),
             granularity: Granularity::default(),
             instancing: true,
+            quality: None,
         }
     }
 
@@ -72,18 +75,31 @@ impl<B: Backend> RendererBuilder<B> {
         self
     }
 
+    /// How accurate frames are, and so what they cost. It says so of the [`Deferred`] pipeline as well, whatever that was told:
+    /// see [`Deferred::quality`]. Without it the pipeline stays as it is, and all else is [`Quality::balanced`].
+    pub fn quality(mut self, quality: Quality) -> Self {
+        self.quality = Some(quality);
+        self
+    }
+
     /// The renderer, which records on the scheduler's workers, and the submitter. The thread that calls this is the device
     /// thread: the submitter cannot leave it.
     ///
     /// # Errors
-    /// If the processes do not make a frame, if shadow maps cannot be as they are set, or if the granularity is a chunk of 0.
+    /// If the processes do not make a frame, if shadow maps or the quality cannot be as they are set, or if the granularity is a
+    /// chunk of 0.
     pub fn build(self, scheduler: Arc<Scheduler>) -> Result<(Renderer<B>, Submitter<B>), BuildError> {
         if self.granularity == Granularity::Chunk(0) {
             return Err(BuildError::EmptyChunk);
         }
-        let plans = Plans::new(self.deferred, self.processes, self.outputs, self.shadow_maps)?;
+        self.quality.unwrap_or_default().check()?;
+        let deferred = match (self.deferred, &self.quality) {
+            (Some(deferred), Some(quality)) => Some(deferred.quality(quality)),
+            (deferred, _) => deferred,
+        };
+        let plans = Plans::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = Arc::new(self.backend);
         let submitter = Submitter::new(Arc::clone(&backend), Arc::clone(scheduler.timeline()));
-        Ok((Renderer::new(backend, plans, self.granularity, self.instancing, scheduler), submitter))
+        Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))
     }
 }

@@ -3,6 +3,7 @@
 use crate::backend::BackendError;
 use crate::graph::{GraphProblem, NodeError, RunError};
 use crate::process::{PlanError, ProcessError};
+use crate::quality::QualityError;
 use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
 
@@ -13,6 +14,9 @@ pub enum BuildError {
     /// The processes do not make a frame.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// The quality cannot be.
+    #[error(transparent)]
+    Quality(#[from] QualityError),
     /// [`Granularity::Chunk`](super::Granularity::Chunk) of 0.
     #[error("a chunk of 0 draws makes no jobs")]
     EmptyChunk,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::FrameError;
 use super::cost_model::CostModel;
+use super::occlusion::{Payoff, occluders};
 use super::phase::{FrameNode, PassTable, Phase};
 use crate::graph::{FrameGraph, ProcessId, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
@@ -22,24 +23,41 @@ pub(super) struct FrameJobs {
     pub(super) passes: Vec<Pass>,
     /// What the jobs were drawn up for.
     pub(super) plan: Arc<FramePlan>,
-    views: Vec<(String, ViewKind)>,
+    /// Name and kind of each, and whether it is kept.
+    views: Vec<(String, ViewKind, bool)>,
     selections: Vec<Option<Selection>>,
+    /// Whether what each process draws hides what is behind it.
+    hides: Vec<bool>,
+    /// In what squares what is hidden is looked for.
+    occlusion: Option<u32>,
+    /// For each view, which objects hide others; `None` where that is not looked for.
+    pub(super) occluders: Vec<Option<Vec<Selection>>>,
+    /// For each view, whether it pays.
+    pub(super) payoffs: Vec<Payoff>,
 }
 
 impl FrameJobs {
-    /// Draws up the jobs: each process in each view of its kind goes through its phases one after the other, and nothing
-    /// else waits for anything. The order of passes concerns the device alone, so it binds submission, not recording.
+    /// Draws up the jobs: each process in each view of its kind that is not kept goes through its phases one after the other,
+    /// and nothing else waits for anything. The order of passes concerns the device alone, so it binds submission, not
+    /// recording. If `occlusion`, what is hidden is looked for where it can be.
     ///
     /// # Errors
     /// If a view is drawn by no process.
-    pub(super) fn new(plan: &Arc<FramePlan>, draws: &[Draws<'_>], views: &[RenderView]) -> Result<Self, FrameError> {
+    pub(super) fn new(
+        plan: &Arc<FramePlan>,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        occlusion: Option<u32>,
+    ) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
-            if !passes.iter().any(|pass| pass.view == index) {
+            if !view.is_kept && !passes.iter().any(|pass| pass.view == index) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
 
+        let of_view = |view| occlusion.and_then(|_| occluders(plan, draws, &passes, view));
+        let occluders: Vec<_> = views.iter().enumerate().map(of_view).collect();
         let mut nodes = Nodes::default();
         let objects = nodes.add("objects".to_owned(), Phase::Objects, None, Labels::default(), None);
         nodes.add("upload objects".to_owned(), Phase::Upload, None, Labels::default(), Some(objects));
@@ -55,7 +73,12 @@ impl FrameJobs {
             if draws[pass.process].selection().is_some() {
                 let seen = *compacted[view].get_or_insert_with(|| {
                     let name = format!("visibility, {view_name}");
-                    let seen = nodes.add(name, Phase::Visibility { view }, None, of_view.clone(), Some(objects));
+                    let mut seen = nodes.add(name, Phase::Visibility { view }, None, of_view.clone(), Some(objects));
+                    let phases = [Phase::Occluders { view }, Phase::CoarseDepth { view }, Phase::Occlusion { view }];
+                    for phase in phases.into_iter().filter(|_| occluders[view].is_some()) {
+                        let name = format!("{}, {view_name}", phase.name());
+                        seen = nodes.add(name, phase, None, of_view.clone(), Some(seen));
+                    }
                     let name = format!("compact, {view_name}");
                     nodes.add(name, Phase::Compact { view }, None, of_view.clone(), Some(seen))
                 });
@@ -78,16 +101,27 @@ impl FrameJobs {
         let Nodes { graph, kinds, count } = nodes;
         let costs = CostModel::new(kinds.len(), count);
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
-        let views = views.iter().map(|view| (view.name().to_owned(), view.kind())).collect();
+        let views = views.iter().map(|view| (view.name().to_owned(), view.kind(), view.is_kept)).collect();
         let selections = draws.iter().map(Draws::selection).collect();
-        Ok(Self { schedule, costs, passes, plan: Arc::clone(plan), views, selections })
+        let hides = draws.iter().map(Draws::hides).collect();
+        let payoffs = vec![Payoff::default(); occluders.len()];
+        let plan = Arc::clone(plan);
+        Ok(Self { schedule, costs, passes, plan, views, selections, hides, occlusion, occluders, payoffs })
     }
 
     /// Whether they are what this plan, these draws and these views need.
-    pub(super) fn fit(&self, plan: &FramePlan, draws: &[Draws<'_>], views: &[RenderView]) -> bool {
-        let names = self.views.iter().map(|(name, kind)| (name.as_str(), *kind));
+    pub(super) fn fit(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        occlusion: Option<u32>,
+    ) -> bool {
+        let names = self.views.iter().map(|(name, kind, is_kept)| (name.as_str(), *kind, *is_kept));
         self.plan.identity() == plan.identity()
-            && names.eq(views.iter().map(|view| (view.name(), view.kind())))
+            && self.occlusion == occlusion
+            && self.hides.iter().copied().eq(draws.iter().map(Draws::hides))
+            && names.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_kept)))
             && self.selections.iter().copied().eq(draws.iter().map(Draws::selection))
     }
 
@@ -160,10 +194,11 @@ impl JobsCache {
         plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
         views: &[RenderView],
+        occlusion: Option<u32>,
     ) -> Result<&mut FrameJobs, FrameError> {
-        let found = match self.latest_first.iter().position(|jobs| jobs.fit(plan, draws, views)) {
+        let found = match self.latest_first.iter().position(|jobs| jobs.fit(plan, draws, views, occlusion)) {
             Some(index) => self.latest_first.remove(index),
-            None => FrameJobs::new(plan, draws, views)?,
+            None => FrameJobs::new(plan, draws, views, occlusion)?,
         };
         self.latest_first.truncate(Self::MOST - 1);
         self.latest_first.insert(0, found);
@@ -179,7 +214,8 @@ impl JobsCache {
 fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
     let mut passes = Vec::new();
     for (process, planned) in plan.processes().iter().enumerate() {
-        for (view, _) in views.iter().enumerate().filter(|(_, view)| view.kind() == planned.declaration.views) {
+        let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_kept;
+        for (view, _) in views.iter().enumerate().filter(|(_, view)| is_drawn(view)) {
             passes.push(Pass { process, view });
         }
     }

@@ -5,6 +5,8 @@ mod cost_model;
 mod error;
 mod granularity;
 mod jobs;
+mod kept_maps;
+mod occlusion;
 mod phase;
 mod plans;
 mod recorded;

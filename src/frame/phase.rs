@@ -6,6 +6,7 @@ use parking_lot::{Mutex, RwLock};
 
 use super::Granularity;
 use super::cost_model::CostModel;
+use super::occlusion::{ViewOcclusion, choose_occluders};
 use super::statistics::{Stage, StageClock};
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::blocks::Blocks;
@@ -13,7 +14,7 @@ use crate::command::RenderCommand;
 use crate::graph::{Node, NodeError};
 use crate::queue::{DrawList, DrawPart, Fill, Selection, SortMemory, Split, instance, sort};
 use crate::task::Worker;
-use crate::view::{Frustum, LightTable, ObjectTable, VisibleSet, WorldBounds};
+use crate::view::{LightTable, ObjectTable, OccluderMeshes, VisibleSet};
 
 /// What a node of the frame's job graph does: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +25,13 @@ pub(super) enum Phase {
     Upload,
     /// Finds what a view sees.
     Visibility { view: usize },
-    /// Counts it.
+    /// Chooses what of it may hide the rest.
+    Occluders { view: usize },
+    /// Draws that.
+    CoarseDepth { view: usize },
+    /// Leaves out what is hidden.
+    Occlusion { view: usize },
+    /// Counts what is left.
     Compact { view: usize },
     /// Makes commands of it.
     Fill { pass: usize },
@@ -54,6 +61,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) recordings: &'a [Recording<B>],
     pub(super) clock: &'a StageClock,
     pub(super) costs: &'a CostModel,
+    /// For each view, which objects hide others, if that is looked for.
+    pub(super) occluders: &'a [Option<Vec<Selection>>],
     pub(super) workers: usize,
 }
 
@@ -63,6 +72,10 @@ pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
     /// One for each view.
     pub(super) visible: Vec<VisibleSet>,
+    /// One for each view.
+    pub(super) occlusion: Vec<ViewOcclusion>,
+    /// What of meshes hides; of no use to frames without occlusion.
+    pub(super) occluder_meshes: OccluderMeshes,
     /// One for each view.
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
@@ -101,6 +114,7 @@ impl FrameTables {
     pub(super) fn reset(&mut self, views: usize, workers: usize) {
         let objects = self.objects.len();
         self.visible.resize_with(views, VisibleSet::default);
+        self.occlusion.resize_with(views, ViewOcclusion::default);
         self.lights.resize_with(views, LightTable::default);
         self.sort_memory.resize_with(workers, Mutex::default);
         for visible in &mut self.visible {
@@ -154,6 +168,9 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode {
     fn run(&self, frame: &FrameContext<'_, B>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
         let chunk = range.clone();
         let (result, took) = frame.clock.measure(self.phase.stage(), || self.work(frame, chunk, worker));
+        if let Some(view) = self.phase.paid_by(frame) {
+            frame.tables.occlusion[view].note(took);
+        }
         if frame.granularity == Granularity::Adaptive
             && let Some(items) = self.phase.known_items(frame, range)
         {
@@ -178,6 +195,9 @@ impl Phase {
             Self::Objects => "objects",
             Self::Upload => "upload",
             Self::Visibility { .. } => "visibility",
+            Self::Occluders { .. } => "occluders",
+            Self::CoarseDepth { .. } => "coarse depth",
+            Self::Occlusion { .. } => "occlusion",
             Self::Compact { .. } => "compact",
             Self::Fill { .. } => "fill",
             Self::Split { .. } => "split",
@@ -194,6 +214,12 @@ impl Phase {
         match self {
             Self::Objects | Self::Visibility { .. } => tables.objects.len(),
             Self::Upload => tables.objects.block_count(),
+            Self::Occluders { view } => usize::from(tables.occlusion[view].is_on()),
+            Self::CoarseDepth { view } if tables.occlusion[view].is_on() => {
+                tables.occlusion[view].occlusion.strip_count()
+            }
+            Self::Occlusion { view } if tables.occlusion[view].is_on() => tables.objects.len(),
+            Self::CoarseDepth { .. } | Self::Occlusion { .. } => 0,
             Self::Fill { pass } => visible_count(frame, pass),
             Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().part_count(),
             Self::Record { pass } => part_count(frame, pass),
@@ -212,7 +238,32 @@ impl Phase {
 
     /// Whether it is cut into jobs. What is sorted and merged was cut before, when it was split.
     fn can_be_cut(self) -> bool {
-        matches!(self, Self::Objects | Self::Upload | Self::Visibility { .. } | Self::Fill { .. } | Self::Record { .. })
+        matches!(
+            self,
+            Self::Objects
+                | Self::Upload
+                | Self::Visibility { .. }
+                | Self::CoarseDepth { .. }
+                | Self::Occlusion { .. }
+                | Self::Fill { .. }
+                | Self::Record { .. }
+        )
+    }
+
+    /// The view that looks for what is hidden to save this, or to do it.
+    fn paid_by<B: Backend>(self, frame: &FrameContext<'_, B>) -> Option<usize> {
+        let view = match self {
+            Self::Objects | Self::Upload | Self::Visibility { .. } | Self::Compact { .. } => return None,
+            Self::Occluders { view } | Self::CoarseDepth { view } | Self::Occlusion { view } => view,
+            Self::Fill { pass }
+            | Self::Split { pass }
+            | Self::Sort { pass }
+            | Self::Instance { pass }
+            | Self::Prepare { pass }
+            | Self::Record { pass }
+            | Self::Finish { pass } => frame.request.passes[pass].view,
+        };
+        frame.occluders[view].as_ref().map(|_| view)
     }
 
     /// How many items lie in a range, where jobs are made as large as what their items are known to cost. To sort, a part's
@@ -227,7 +278,12 @@ impl Phase {
 
     fn stage(self) -> Stage {
         match self {
-            Self::Objects | Self::Visibility { .. } | Self::Compact { .. } => Stage::Visibility,
+            Self::Objects
+            | Self::Visibility { .. }
+            | Self::Occluders { .. }
+            | Self::CoarseDepth { .. }
+            | Self::Occlusion { .. }
+            | Self::Compact { .. } => Stage::Visibility,
             Self::Fill { .. } => Stage::Fill,
             Self::Split { .. } | Self::Sort { .. } => Stage::Sort,
             Self::Instance { .. } => Stage::Instance,
@@ -250,6 +306,13 @@ impl FrameNode {
                 return frame.backend.upload_objects(worker, frame.frame, &tables.objects, range);
             }
             Phase::Visibility { view } => see(frame, view, range),
+            Phase::Occluders { view } => choose_occluders(frame, view),
+            Phase::CoarseDepth { view } => range.for_each(|strip| tables.occlusion[view].occlusion.draw(strip)),
+            Phase::Occlusion { view } => {
+                let occlusion = &tables.occlusion[view].occlusion;
+                let hides = |first, seen| occlusion.hidden(frame.request.scene, &tables.objects, first, seen);
+                tables.occlusion[view].hide(tables.visible[view].hide(range, hides));
+            }
             Phase::Compact { view } => tables.visible[view].compact(),
             Phase::Fill { pass } => fill(frame, pass, range),
             Phase::Split { pass } => {
@@ -307,21 +370,11 @@ fn join(table: &PassTable, merges: bool) {
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
     let frustum = &frame.request.views[view].frustum;
     frame.tables.visible[view].test(range, |objects| {
-        let spheres = &frame.tables.objects.block(objects.start / ObjectTable::BLOCK).spheres;
+        let block = frame.tables.objects.block(objects.start / ObjectTable::BLOCK);
         let first = objects.start % ObjectTable::BLOCK;
-        let place = first % Frustum::AT_ONCE;
-        if objects.len() >= FEW {
-            return frustum.may_see_each(spheres, first - place) >> place;
-        }
-        (0..objects.len()).fold(0, |bits, offset| {
-            let WorldBounds { center, radius } = spheres.get(first + offset);
-            bits | u64::from(frustum.may_see(center, radius)) << offset
-        })
+        block.seen(frustum, frame.request.quality.culling, first..first + objects.len())
     });
 }
-
-/// Fewer objects than these are tested one by one: it takes less time than to test a whole word of them.
-const FEW: usize = 12;
 
 fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize>) {
     let table = &frame.tables.passes[pass];
@@ -332,6 +385,7 @@ fn fill<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, ranks: Range<usize
         visible: &frame.tables.visible[view],
         selection: table.selection.unwrap_or_default(),
         scene: frame.request.scene,
+        quality: frame.request.quality,
     };
     fill.run(ranks, &table.commands);
 }

@@ -48,6 +48,11 @@ impl Plans {
         Self::new(Some(deferred), self.processes.clone(), self.outputs.clone(), self.shadow_maps)
     }
 
+    /// The deferred pipeline, if there is one.
+    pub(super) fn deferred(&self) -> Option<&Deferred> {
+        self.deferred.as_ref()
+    }
+
     /// The plan of the last frame; before the first one, of an empty scene.
     pub(super) fn current(&self) -> &Arc<FramePlan> {
         &self.current

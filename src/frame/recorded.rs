@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::kept_maps::OnItsWay;
 use super::{FrameStatistics, SubmitError};
 use crate::backend::Backend;
 use crate::process::Pass;
@@ -19,6 +20,7 @@ pub struct Recorded<B: Backend> {
     pub(super) backend: Arc<B>,
     /// Which frame of the timeline it is, if that was on.
     pub(super) frame_number: Option<u64>,
+    pub(super) on_its_way: OnItsWay,
 }
 
 impl<B: Backend> Recorded<B> {
@@ -79,12 +81,13 @@ impl<B: Backend> Submitter<B> {
         }
         let _span_of_timeline = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
-        let Recorded { queues, frame, mut statistics, .. } = recorded;
+        let Recorded { queues, frame, mut statistics, on_its_way, .. } = recorded;
         let mut passes = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
         passes.extend(queues.into_iter().flat_map(|queue| queue.passes));
         // Passes are ordered by process first, and processes are in an order that keeps every dependency.
         passes.sort_unstable_by_key(|(pass, _)| *pass);
         let submission = self.backend.submit(frame, passes)?;
+        on_its_way.arrive();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use parking_lot::RwLockReadGuard;
 
 use super::jobs::JobsCache;
+use super::kept_maps::KeptMaps;
 use super::phase::{FrameContext, FrameTables, Recording};
 use super::plans::Plans;
 use super::recorded::{Recorded, ViewQueue};
@@ -13,6 +14,7 @@ use super::views::{ValidLights, views_of};
 use super::{BuildError, FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::process::{Deferred, FramePlan, Pass};
+use crate::quality::Quality;
 use crate::queue::DrawList;
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
@@ -44,9 +46,13 @@ pub struct Renderer<B: Backend> {
     plans: Plans,
     granularity: Granularity,
     merges: bool,
+    quality: Quality,
+    /// Whether the pipeline was told that quality.
+    pipeline_knows_quality: bool,
     scheduler: Arc<Scheduler>,
     jobs: JobsCache,
     tables: FrameTables,
+    kept_maps: KeptMaps,
     /// One for each pass of the latest frame.
     recordings: Vec<Recording<B>>,
     /// What the last warnings were about.
@@ -64,11 +70,26 @@ impl<B: Backend> Renderer<B> {
         plans: Plans,
         granularity: Granularity,
         merges: bool,
+        quality: Option<Quality>,
         scheduler: Arc<Scheduler>,
     ) -> Self {
         let (jobs, tables) = (JobsCache::default(), FrameTables::default());
-        let (recordings, told) = (Vec::new(), Vec::new());
-        Self { backend, plans, granularity, merges, scheduler, jobs, tables, recordings, told }
+        let (quality, pipeline_knows_quality) = (quality.unwrap_or_default(), quality.is_some());
+        let (kept_maps, recordings, told) = (KeptMaps::default(), Vec::new(), Vec::new());
+        Self {
+            backend,
+            plans,
+            granularity,
+            merges,
+            quality,
+            pipeline_knows_quality,
+            scheduler,
+            jobs,
+            tables,
+            kept_maps,
+            recordings,
+            told,
+        }
     }
 
     /// Records a frame: everything up to submission. The calling thread works too.
@@ -85,15 +106,19 @@ impl<B: Backend> Renderer<B> {
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
         check(&scene)?;
+        self.tables.objects.hold(self.quality.culling);
         self.tables.objects.reset(scene.object_count());
-        let lights = ValidLights::new(&scene, self.tables.objects.rejections());
+        let mut lights = ValidLights::new(&scene, self.tables.objects.rejections(), self.quality.light_cut_off);
+        let plan = self.plans.follow(&SceneRef { lights: &lights.lights, ..scene })?;
+        let mut views = views_of(&scene, &lights, self.plans.shadow_maps(), &plan)?;
+        let interval = self.quality.shadows.interval;
+        let maps = self.kept_maps.follow(interval, &plan, &mut views, &mut lights.lights);
         let scene = SceneRef { lights: &lights.lights, ..scene };
-        let plan = self.plans.follow(&scene)?;
-        let views = views_of(&scene, &lights, self.plans.shadow_maps(), &plan)?;
         let draws = plan.draws()?;
-        let jobs = self.jobs.find(&plan, &draws, &views)?;
+        let jobs = self.jobs.find(&plan, &draws, &views, self.quality.occlusion)?;
         jobs.reset(&mut self.tables.passes, scene.object_count());
         self.tables.reset(views.len(), self.scheduler.workers());
+        self.tables.reset_occlusion(&scene, &views, jobs, self.quality.occlusion);
         let clock = StageClock::default();
         clock.measure(Stage::Visibility, || {
             let shadows = self.plans.tells_shadowed_apart();
@@ -108,6 +133,7 @@ impl<B: Backend> Renderer<B> {
             lights: &self.tables.lights,
             passes: &jobs.passes,
             scene: &scene,
+            quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
 
@@ -125,11 +151,15 @@ impl<B: Backend> Renderer<B> {
             recordings: &self.recordings,
             clock: &clock,
             costs: &jobs.costs,
+            occluders: &jobs.occluders,
             workers: self.scheduler.workers(),
         };
         let outcome = jobs.schedule.run(&self.scheduler, &context);
         match outcome {
-            Ok(()) => jobs.costs.learn(),
+            Ok(()) => {
+                jobs.costs.learn();
+                self.tables.learn_payoffs(&jobs.occluders, &mut jobs.payoffs);
+            }
             Err(_) => jobs.costs.forget_frame(),
         }
         outcome?;
@@ -138,8 +168,10 @@ impl<B: Backend> Renderer<B> {
         let uploaded = self.backend.uploaded().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
-        warn_of_changes(&statistics.rejections, &mut self.told);
-        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number })
+        let keeps_maps = views.iter().any(|view| view.is_kept);
+        warn_of_changes(&statistics.rejections, keeps_maps, &mut self.told);
+        let on_its_way = self.kept_maps.keep(maps);
+        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number, on_its_way })
     }
 
     /// Draws with another deferred pipeline from the next frame on: with other settings, or other steps. Pipelines that both
@@ -149,11 +181,35 @@ impl<B: Backend> Renderer<B> {
     /// If the processes do not make a frame; then nothing changes.
     pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
         self.plans = self.plans.with_deferred(deferred)?;
+        self.pipeline_knows_quality = false;
+        self.kept_maps.forget();
         Ok(())
     }
 
+    /// Draws with another quality from the next frame on; that of the deferred pipeline is another as well.
+    ///
+    /// # Errors
+    /// If there can be no frames of that quality; then nothing changes.
+    pub fn set_quality(&mut self, quality: Quality) -> Result<(), BuildError> {
+        quality.check()?;
+        if quality == self.quality && self.pipeline_knows_quality {
+            return Ok(());
+        }
+        if let Some(deferred) = self.plans.deferred() {
+            self.plans = self.plans.with_deferred(deferred.clone().quality(&quality))?;
+        }
+        (self.quality, self.pipeline_knows_quality) = (quality, true);
+        self.kept_maps.forget();
+        Ok(())
+    }
+
+    /// How accurate frames are. Where nobody has said, a deferred pipeline may differ from it in what it was told itself.
+    pub fn quality(&self) -> &Quality {
+        &self.quality
+    }
+
     /// What the last frame drew in one view by one process, which may be nothing if it failed; `None` where that process draws
-    /// no commands there.
+    /// no commands there, or did not because the view was kept.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let jobs = self.jobs.latest()?;
         let name = |pass: &Pass| jobs.plan.processes()[pass.process].process.name();
@@ -214,6 +270,7 @@ fn statistics_of(
             name: view.name().to_owned(),
             kind: view.kind(),
             visible: tables.visible[index].count(),
+            occluded: tables.occlusion[index].hidden(),
             lights: request.lights[index].records().len(),
             commands: 0,
             batches: 0,
@@ -237,16 +294,19 @@ fn statistics_of(
     }
 }
 
-/// Warns of what is left out or cannot be drawn as asked, once and not in every frame.
-fn warn_of_changes(rejections: &[Rejection], told: &mut Vec<Rejection>) {
+/// Warns of what is left out or cannot be drawn as asked, once and not in every frame. What only shadow maps find out is not
+/// forgotten by a frame that keeps those there are.
+fn warn_of_changes(rejections: &[Rejection], keeps_maps: bool, told: &mut Vec<Rejection>) {
     // A light that is switched off is nothing to warn of.
     let is_news = |rejection: &&Rejection| rejection.reason != RejectionReason::DarkLight && !told.contains(rejection);
     for rejection in rejections.iter().filter(is_news) {
         let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
         tracing::warn!(target: "drawloom", count, first, "not drawn as asked: {reason}");
     }
-    told.clear();
-    told.extend_from_slice(rejections);
+    told.retain(|old| keeps_maps && old.reason == RejectionReason::CoarseEdges);
+    told.extend(
+        rejections.iter().filter(|rejection| !(keeps_maps && rejection.reason == RejectionReason::CoarseEdges)),
+    );
 }
 
 /// What must hold of a scene as a whole. Single objects and lights are left out instead.

@@ -32,6 +32,8 @@ pub struct ViewStatistics {
     pub kind: ViewKind,
     /// Objects it sees.
     pub visible: usize,
+    /// Objects it would see, did others not hide them: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
+    pub occluded: usize,
     /// Lights that reach it.
     pub lights: usize,
     /// Commands, over all its processes.

@@ -12,8 +12,8 @@ pub(super) struct ValidLights {
 }
 
 impl ValidLights {
-    /// Counts those that are left out.
-    pub(super) fn new(scene: &SceneRef<'_>, rejections: &Rejections) -> Self {
+    /// Counts those that are left out; see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off) for the others.
+    pub(super) fn new(scene: &SceneRef<'_>, rejections: &Rejections, cut_off: f32) -> Self {
         let mut valid =
             Self { lights: Vec::with_capacity(scene.lights.len()), indices: Vec::with_capacity(scene.lights.len()) };
         for (index, light) in scene.lights.iter().enumerate() {
@@ -25,7 +25,7 @@ impl ValidLights {
             } else if light.is_dark() {
                 rejections.count(RejectionReason::DarkLight, index);
             } else {
-                valid.lights.push(*light);
+                valid.lights.push(light.cut_off_at(cut_off));
                 valid.indices.push(index);
             }
         }

@@ -6,6 +6,7 @@ use super::{
     DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, PlanError, PostStep, RenderProcess,
     Requirements, ShadowCasters, ToneMapping, Transparency,
 };
+use crate::quality::Quality;
 use crate::queue::MaterialShare;
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
@@ -80,6 +81,25 @@ impl Deferred {
     /// How shadow maps are drawn and read; with `None`, no light casts shadows.
     pub fn shadow_maps(self, shadow_maps: Option<ShadowMaps>) -> Self {
         Self { shadow_maps, ..self }
+    }
+
+    /// What a [`Quality`] says of the pipeline: the depth pre-pass, normals and diffuse colours in the geometry buffer, the steps of
+    /// post-processing that are there and, if it has any, its shadow maps. The format of `radiance` stays as it is, and so does how
+    /// far the shadow maps of directional lights reach.
+    pub fn quality(mut self, quality: &Quality) -> Self {
+        self.depth_pre_pass = quality.depth_pre_pass;
+        let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
+        self.formats = GeometryFormats { normal, diffuse, ..self.formats };
+        for step in &mut self.post {
+            if let Some(other) = step.with_quality(quality) {
+                *step = other;
+            }
+        }
+        if let Some(maps) = &mut self.shadow_maps {
+            let shadows = quality.shadows;
+            *maps = ShadowMaps { side: shadows.side, bias: shadows.bias, filter: shadows.filter, ..*maps };
+        }
+        self
     }
 
     /// Adds a step of post-processing behind those that are there. The first reads `radiance`, the last draws `picture`.

@@ -3,6 +3,8 @@
 //   @group(0)  what the frame and the view are: below
 //   @group(1)  materials and their textures: below
 //   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets it samples, in that order
+//
+// Before it stands `const ABSOLUTE_TRANSFORMS: bool`, as the frame's quality has it.
 
 struct View {
     // From world axes relative to the camera to clip space; depth is reversed.
@@ -135,8 +137,13 @@ fn rotate(orientation: vec4<f32>, direction: vec3<f32>) -> vec3<f32> {
 
 // From object space to world axes relative to the camera.
 fn relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
-    let origin = fixed_difference(object.position_low, object.position_high, view.position_low, view.position_high);
-    return origin + rotate(object.orientation, object.scale * position);
+    let turned = rotate(object.orientation, object.scale * position);
+    if ABSOLUTE_TRANSFORMS {
+        // Far from the world's origin both lose what they have in common too late.
+        let in_world = metres_from_origin(object.position_low, object.position_high) + turned;
+        return in_world - metres_from_origin(view.position_low, view.position_high);
+    }
+    return fixed_difference(object.position_low, object.position_high, view.position_low, view.position_high) + turned;
 }
 
 // A shader that is to draw at just the depth of another calls this, and marks its position `@invariant`.
@@ -209,6 +216,11 @@ fn fixed_difference(low: vec3<u32>, high: vec3<i32>, from_low: vec3<u32>, from_h
     let magnitude_high = select(bitcast<vec3<u32>>(difference_high), ~bitcast<vec3<u32>>(difference_high) + carry, negative);
     let magnitude = vec3<f32>(magnitude_high) * 4.0 + vec3<f32>(magnitude_low) * 0x1p-30;
     return select(magnitude, -magnitude, negative);
+}
+
+// A fixed-point position in the world, rounded to f32: in steps of 6 cm at 1,000 km.
+fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
+    return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
 }
 
 // A material's diffuse colour and opacity at a place of its texture. The two gradients are how `uv` changes from pixel to

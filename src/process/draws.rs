@@ -86,6 +86,11 @@ impl Draws<'_> {
         }
     }
 
+    /// Whether what is drawn hides what comes behind it, where it writes depth.
+    pub fn hides(&self) -> bool {
+        matches!(self, Self::Commands(commands) if commands.writes_depth)
+    }
+
     /// The bytes of the uniform at `@group(2) @binding(0)`; empty where there is none.
     pub fn parameters(&self) -> &[u8] {
         match self {

@@ -1,13 +1,19 @@
 //! What a target's pixels are.
 
+use crate::quality::{DiffuseFormat, NormalFormat};
+
 /// The format of a target. All of them can be drawn to and read on every adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
+    /// Two bytes, linear, 0 to 1.
+    Rg8Unorm,
     /// Four bytes, linear, 0 to 1.
     Rgba8Unorm,
     /// Four bytes, the colours sRGB encoded.
     Rgba8Srgb,
+    /// Three numbers of 10 bits and one of 2, linear, 0 to 1.
+    Rgb10a2Unorm,
     /// Four half floats.
     Rgba16Float,
     /// Two half floats.
@@ -31,14 +37,14 @@ impl Format {
 
     /// Whether it holds numbers below 0.
     pub fn is_signed(self) -> bool {
-        !matches!(self, Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Depth32Float)
+        matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R32Float)
     }
 
     /// Numbers a pixel.
     pub fn channels(self) -> usize {
         match self {
-            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgba16Float => 4,
-            Self::Rg16Float => 2,
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
+            Self::Rg8Unorm | Self::Rg16Float => 2,
             Self::R32Float | Self::Depth32Float => 1,
         }
     }
@@ -46,8 +52,32 @@ impl Format {
     /// Bytes a pixel.
     pub fn bytes(self) -> usize {
         match self {
-            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rg16Float | Self::R32Float | Self::Depth32Float => 4,
+            Self::Rg8Unorm => 2,
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm => 4,
+            Self::Rg16Float | Self::R32Float | Self::Depth32Float => 4,
             Self::Rgba16Float => 8,
+        }
+    }
+}
+
+/// What the target `normal` is to be: see [`GeometryFormats`](super::GeometryFormats).
+impl From<NormalFormat> for Format {
+    fn from(normals: NormalFormat) -> Self {
+        match normals {
+            NormalFormat::Octahedral8 => Self::Rg8Unorm,
+            NormalFormat::Octahedral10 => Self::Rgb10a2Unorm,
+            NormalFormat::Octahedral16 => Self::Rgba8Unorm,
+            NormalFormat::HalfFloat => Self::Rg16Float,
+        }
+    }
+}
+
+/// What the target `diffuse` is to be: see [`GeometryFormats`](super::GeometryFormats).
+impl From<DiffuseFormat> for Format {
+    fn from(diffuse: DiffuseFormat) -> Self {
+        match diffuse {
+            DiffuseFormat::Srgb8 => Self::Rgba8Srgb,
+            DiffuseFormat::HalfFloat => Self::Rgba16Float,
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use super::geometry_buffer_twin::GeometryBufferTwin;
+use super::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess, Twin};
 use crate::queue::{Blending, MaterialShare, Selection};
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for radiance:
@@ -10,7 +11,7 @@ use crate::queue::{Blending, MaterialShare, Selection};
 /// | target | what | format, unless set otherwise |
 /// | --- | --- | --- |
 /// | `depth` | reversed depth, 0 where nothing is | [`Format::Depth32Float`] |
-/// | `normal` | in the world, octahedral (Cigolle et al. 2014), at most 0.06° off if the device rounds | [`Format::Rg16Float`] |
+/// | `normal` | in the world, octahedral (Cigolle et al. 2014): see [`GeometryFormats::normals_wgsl`] | [`Format::Rg16Float`] |
 /// | `diffuse` | the share of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
 /// | `radiance` | what the surface gives off by itself and reflects of the ambient light, and the scene's background | [`Format::Rgba16Float`] |
 ///
@@ -28,7 +29,8 @@ pub struct GeometryBuffer {
 /// What the geometry buffer's targets are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GeometryFormats {
-    /// Of `normal`: two channels or more. With [`Format::Rgba8Unorm`] normals are up to 0.95° off.
+    /// Of `normal`: two channels or more. `NormalFormat::Octahedral16.into()` is one; [`GeometryFormats::normals_wgsl`] says how far
+    /// off normals are in each.
     pub normal: Format,
     /// Of `diffuse`: three channels or more.
     pub diffuse: Format,
@@ -49,11 +51,6 @@ impl GeometryFormats {
         let misfit = targets.into_iter().find(|(_, format, channels)| format.channels() < *channels);
         misfit.map(|(target, format, _)| (target, format))
     }
-
-    /// WGSL that shaders of the targets need: whether normals are stored from 0 to 1 rather than from −1.
-    pub(super) fn constants(&self) -> String {
-        format!("const NORMALS_FROM_ZERO_TO_ONE: bool = {};\n", !self.normal.is_signed())
-    }
 }
 
 impl GeometryBuffer {
@@ -71,7 +68,7 @@ impl GeometryBuffer {
             format!("geometry buffer {} of {}", share.index + 1, share.of)
         };
         let shader =
-            [include_str!("surface.wgsl"), &formats.constants(), include_str!("geometry_buffer.wgsl")].concat();
+            [include_str!("surface.wgsl"), &formats.normals_wgsl(), include_str!("geometry_buffer.wgsl")].concat();
         Self { name, shader, formats, share, has_depth: false }
     }
 
@@ -119,5 +116,9 @@ impl RenderProcess for GeometryBuffer {
             writes_depth: !self.has_depth,
             parameters: Cow::Borrowed(&[]),
         })
+    }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(Twin::objects(GeometryBufferTwin { formats: self.formats }))
     }
 }

@@ -7,13 +7,13 @@ struct Targets {
 @fragment
 fn fragment(in: Surface) -> Targets {
     let material = materials[in.material];
-    let normal = octahedral_from_direction(seen_normal(in, material));
+    let normal = seen_normal(in, material);
     let diffuse = seen_diffuse(in, material).rgb;
     let radiance = material.emission + diffuse * view.ambient;
     return Targets(
-        vec4<f32>(select(normal, normal * 0.5 + 0.5, NORMALS_FROM_ZERO_TO_ONE), 0.0, 1.0),
-        vec4<f32>(diffuse, 1.0),
-        // Past this a half float would be infinite.
+        stored_normal(normal),
+        // Past this a half float would be infinite, and not a number where no light falls.
+        vec4<f32>(min(diffuse, vec3<f32>(60000.0)), 1.0),
         vec4<f32>(min(radiance, vec3<f32>(60000.0)), 1.0),
     );
 }

@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 
+use super::light_volumes_twin::LightVolumesTwin;
 use super::shadow::shadow_shader;
-use super::{Declare, Draws, GeometryFormats, LightDraws, RenderProcess, ShadowCasters};
+use super::shadow_twin::ShadowReader;
+use super::{Declare, Draws, GeometryFormats, LightDraws, RenderProcess, ShadowCasters, Twin};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
@@ -23,6 +25,7 @@ pub struct LightVolumes {
     name: String,
     shader: String,
     class: LightClass,
+    twin: LightVolumesTwin,
 }
 
 impl LightVolumes {
@@ -39,12 +42,14 @@ impl LightVolumes {
     fn of_class(kind: LightKind, formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
         let class = LightClass { kind, shadowed: maps.is_some() };
         let shader = [
-            &formats.constants(),
+            &formats.normals_wgsl(),
             include_str!("illumination.wgsl"),
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
             include_str!("light_volumes.wgsl"),
         ];
-        Self { name: Self::name_of(class), shader: shader.concat(), class }
+        let shadows = maps.map(ShadowReader::new);
+        let twin = LightVolumesTwin { formats, shadows };
+        Self { name: Self::name_of(class), shader: shader.concat(), class, twin }
     }
 
     /// What the process of a class is called, such as "point lights" or "shadowed spot lights".
@@ -74,5 +79,9 @@ impl RenderProcess for LightVolumes {
 
     fn draws(&self) -> Draws<'_> {
         Draws::Lights(LightDraws { shader: &self.shader, class: self.class, parameters: Cow::Borrowed(&[]) })
+    }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(Twin::lights(self.twin))
     }
 }

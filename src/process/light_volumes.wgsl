@@ -6,8 +6,7 @@
 fn fragment(in: LightPixel) -> @location(0) vec4<f32> {
     let pixel = vec2<i32>(in.position.xy);
     let place = relative_of_pixel(clip_of_pixel(in.position), textureLoad(depth_target, pixel, 0));
-    let point = textureLoad(normal_target, pixel, 0).xy;
-    let normal = direction_from_octahedral(select(point, point * 2.0 - 1.0, NORMALS_FROM_ZERO_TO_ONE));
+    let normal = normal_of_stored(textureLoad(normal_target, pixel, 0));
     let light = lights[in.light];
 
     var illuminance = illuminance_from(light, place, normal);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Declare, Draws};
+use super::{Declare, Draws, Twin};
 
 /// A step of the frame: it owns its trip from the objects a view sees to a recorded pass.
 ///
@@ -50,6 +50,12 @@ pub trait RenderProcess: Send + Sync {
     /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending
     /// makes new pipelines.
     fn draws(&self) -> Draws<'_>;
+
+    /// What the software backend runs in the place of the process's WGSL; without one, frames with this process fail there, and
+    /// say so. Asked once a frame, by that backend alone.
+    fn twin(&self) -> Option<Twin> {
+        None
+    }
 }
 
 /// A process that an engine keeps a hold of, to change what it draws from frame to frame.
@@ -65,9 +71,17 @@ impl<P: RenderProcess + ?Sized> RenderProcess for Arc<P> {
     fn draws(&self) -> Draws<'_> {
         (**self).draws()
     }
+
+    fn twin(&self) -> Option<Twin> {
+        (**self).twin()
+    }
 }
 
 /// What every shader begins with: the bindings, the structures and the functions that Drawloom provides.
 ///
 /// A process's own WGSL is appended to it. See the file `drawloom.wgsl` for what it may use.
+///
+/// It is not whole by itself: before it belongs `const ABSOLUTE_TRANSFORMS: bool = false;`, or `true` for
+/// [`TransformPrecision::Absolute`](crate::quality::TransformPrecision::Absolute). Of a frame's processes the backend sees to
+/// that; whoever compiles it alone does so on their own.
 pub const SHADER_PRELUDE: &str = concat!(include_str!("drawloom.wgsl"), "\n", include_str!("light_volume.wgsl"));

@@ -75,6 +75,7 @@ fn filtered(layer: u32, place: MapPlace) -> f32 {
     let inside = fract(center);
     let last = 2 * SHADOW_FILTER + 1;
     var lit = 0.0;
+    var is_shadowed = false;
     for (var row = 0; row <= last; row++) {
         var weight_of_row = 1.0;
         if row == 0 { weight_of_row = 1.0 - inside.y; } else if row == last { weight_of_row = inside.y; }
@@ -85,8 +86,11 @@ fn filtered(layer: u32, place: MapPlace) -> f32 {
             // Reversed: what is nearer to the light has the greater depth.
             if textureLoad(shadow_maps, pixel, layer, 0) <= place.depth {
                 lit += weight;
+            } else {
+                is_shadowed = true;
             }
         }
     }
-    return lit / f32(last * last);
+    // The weights' sum may be off by a rounding, and what nothing stands before is to be just as bright as without a map.
+    return select(1.0, lit / f32(last * last), is_shadowed);
 }

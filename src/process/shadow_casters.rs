@@ -1,6 +1,7 @@
 //! Shadow maps (L 4.2.2, steps 1 to 6).
 
-use super::{CommandDraws, Declare, Draws, Format, RenderProcess};
+use super::shadow_map_twin::ShadowMapTwin;
+use super::{CommandDraws, Declare, Draws, Format, RenderProcess, Twin};
 use crate::scene::ViewKind;
 
 /// Draws, for every light that casts shadows, the depth of all opaque objects as the light sees them: the target `shadow map`
@@ -45,5 +46,9 @@ impl RenderProcess for ShadowCasters {
             fragment: self.hemispheres.then_some("fragment"),
             ..CommandDraws::default()
         })
+    }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(Twin::objects(ShadowMapTwin { hemispheres: self.hemispheres }))
     }
 }

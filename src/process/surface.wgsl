@@ -11,8 +11,13 @@ struct Surface {
 fn vertex(in: VertexInput) -> Surface {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, in.position);
-    return Surface(clip_position(relative), relative, world_normal(object, in.normal), in.uv, object.material);
+    let uv = clamp(in.uv, vec2<f32>(-FARTHEST_UV), vec2<f32>(FARTHEST_UV));
+    return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material);
 }
+
+// From here on all f32 are whole numbers, and the texture is at its beginning. At the end of f32, interpolated and filtered, they
+// would be no numbers any more.
+const FARTHEST_UV: f32 = 0x1p23;
 
 // The normal of the side that is seen. To be called before the flow parts.
 fn seen_normal(in: Surface, material: Material) -> vec3<f32> {

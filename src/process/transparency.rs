@@ -1,7 +1,9 @@
 //! Transparency: what the geometry buffer cannot hold.
 
 use super::shadow::shadow_shader;
-use super::{CommandDraws, Declare, Draws, RenderProcess, ShadowCasters};
+use super::shadow_twin::ShadowReader;
+use super::transparency_twin::TransparencyTwin;
+use super::{CommandDraws, Declare, Draws, RenderProcess, ShadowCasters, Twin};
 use crate::queue::Selection;
 use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
@@ -12,10 +14,13 @@ use crate::view::ShadowMaps;
 /// They are lit where they are drawn, by all lights that reach the view and with the same shadows, on the side that is seen;
 /// their emission is added. A subtractive object takes what it would otherwise reflect and give off, and may leave less than
 /// nothing for what is drawn over it; tone mapping shows that as black. They cast no shadows themselves.
+///
+/// Where lights add up to more than a half float can say, some devices store an infinity, and an infinity times 0 is no number:
+/// there, even what is opaque does not hide it.
 #[derive(Clone, Debug)]
 pub struct Transparency {
     shader: String,
-    shadowed: bool,
+    twin: TransparencyTwin,
 }
 
 impl Transparency {
@@ -27,7 +32,7 @@ impl Transparency {
             &shadow_shader(maps.map(|maps| (1, maps))),
             include_str!("transparency.wgsl"),
         ];
-        Self { shader: shader.concat(), shadowed: maps.is_some() }
+        Self { shader: shader.concat(), twin: TransparencyTwin { shadows: maps.map(ShadowReader::new) } }
     }
 }
 
@@ -37,7 +42,7 @@ impl RenderProcess for Transparency {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        if self.shadowed {
+        if self.twin.shadows.is_some() {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
         declare.tests_depth("depth");
@@ -51,5 +56,9 @@ impl RenderProcess for Transparency {
             writes_depth: false,
             ..CommandDraws::default()
         })
+    }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(Twin::objects(self.twin))
     }
 }

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::DVec3;
 
 use super::halvings::halvings;
 use crate::blocks::Blocks;
 use crate::command::{DrawState, RenderCommand, SortKey};
+use crate::quality::{DepthCodes, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
 use crate::view::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, places};
 
@@ -27,7 +28,8 @@ impl Selection {
     /// Every object: first the opaque ones, then the others.
     pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL };
 
-    fn takes(self, blend: Blend, material: u32) -> bool {
+    /// Whether it takes what mixes like that and is of the material in this slot.
+    pub fn takes(self, blend: Blend, material: u32) -> bool {
         let blends = match self.blending {
             Blending::Opaque => blend == Blend::None,
             Blending::Blended => blend != Blend::None,
@@ -85,13 +87,27 @@ pub struct Fill<'a> {
     pub selection: Selection,
     /// The scene, for what only few views need to know of an object.
     pub scene: &'a SceneRef<'a>,
+    /// How precisely commands are ordered, and how finely meshes are subdivided for paraboloids.
+    pub quality: &'a Quality,
+}
+
+/// What orders a view's commands by depth.
+struct DepthOrder {
+    forward: DVec3,
+    opaque: DepthCodes,
+    blended: DepthCodes,
 }
 
 impl Fill<'_> {
     /// Writes one slot of `commands` for each visible object whose rank is in `ranks`; what the process does not draw
     /// becomes [`RenderCommand::NOTHING`].
     pub fn run(&self, ranks: Range<usize>, commands: &Blocks<RenderCommand>) {
-        let forward = self.view.camera.orientation.normalize() * Vec3::NEG_Z;
+        let camera = &self.view.camera;
+        let order = DepthOrder {
+            forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
+            opaque: self.quality.opaque_order.codes(camera.near, camera.far),
+            blended: self.quality.blended_order.codes(camera.near, camera.far),
+        };
         for (block, part) in Blocks::<RenderCommand>::parts(ranks) {
             let mut slots = commands.write(block);
             // Visible objects come in order, so the table's blocks are changed seldom.
@@ -105,14 +121,14 @@ impl Fill<'_> {
                 };
                 let start = rank % Blocks::<RenderCommand>::SIZE;
                 for (slot, place) in slots[start..].iter_mut().zip(places(bits)) {
-                    *slot = self.command(first + place, objects, forward);
+                    *slot = self.command(first + place, objects, &order);
                 }
             });
         }
     }
 
     #[inline]
-    fn command(&self, object: usize, objects: &ObjectBlock, forward: Vec3) -> RenderCommand {
+    fn command(&self, object: usize, objects: &ObjectBlock, order: &DepthOrder) -> RenderCommand {
         let entry = object % ObjectTable::BLOCK;
         let draw = objects.draws[entry];
         let blend = draw.state.blend();
@@ -121,17 +137,21 @@ impl Fill<'_> {
         }
         let mut state = draw.state;
         if self.view.camera.projection == Projection::Paraboloid {
-            let Some(halvings) = halvings(self.view, self.scene, object) else { return RenderCommand::NOTHING };
+            let widest_angle = f64::from(self.quality.shadows.widest_edge).to_radians();
+            let Some(halvings) = halvings(self.view, self.scene, object, widest_angle) else {
+                return RenderCommand::NOTHING;
+            };
             state = state.subdivided(halvings);
             if halvings > DrawState::FINEST {
                 self.table.rejections().count_once(RejectionReason::CoarseEdges, object);
             }
         }
         let center = objects.spheres.get(entry).center;
-        let depth = forward.dot((center - self.view.camera.position).as_vec3());
+        // In f64, and rounded once: then no two are in the wrong order that f32 can tell apart, however far aside they are.
+        let depth = order.forward.dot(center - self.view.camera.position) as f32;
         let key = match blend {
-            Blend::None => SortKey::opaque(state, draw.mesh, depth),
-            _ => SortKey::blended(depth),
+            Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.of(depth)),
+            _ => SortKey::blended(order.blended.of(depth)),
         };
         RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
     }

@@ -5,14 +5,14 @@ use glam::{DVec3, Vec3};
 use crate::scene::SceneRef;
 use crate::view::RenderView;
 
-/// How often the edges of an object are to be halved in the view of a paraboloid: until they are seen under 5° at most, where
-/// being drawn straight puts them off by half a pixel of a map of 1024 (Brabec et al. 2002). `None` for an object that lies
+/// How often the edges of an object are to be halved in the view of a paraboloid: until they are seen under `widest_angle`
+/// radians at most; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that lies
 /// behind the camera as a whole, and keeps no light from anything.
 ///
 /// The distance is that of the nearest place of the mesh's box, so the result is the same for every instance at one distance.
 /// A box that is very near, or around the camera, says little; then every triangle is looked at. The result may be more than
 /// [`DrawState::FINEST`](crate::command::DrawState::FINEST).
-pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize) -> Option<u32> {
+pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize, widest_angle: f64) -> Option<u32> {
     let mesh = scene.assets.get(scene.meshes[object]).ok()?;
     let scale = scene.scales[object];
     let to_object = scene.orientations[object].normalize().as_dquat().inverse();
@@ -28,21 +28,18 @@ pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize) -
     }
     let edge = f64::from(mesh.longest_edge()) * f64::from(scale.abs().max_element());
     let until = |shortest: f64| (edge / shortest).log2().ceil().clamp(0.0, 64.0) as u32;
-    let by_box = until(WIDEST_ANGLE * eye.distance(eye.clamp(low, high)).max(nearest));
+    let by_box = until(widest_angle * eye.distance(eye.clamp(low, high)).max(nearest));
     if by_box < WORTH_A_LOOK {
         return Some(by_box);
     }
     let places = |corner: u32| (Vec3::from(mesh.vertices()[corner as usize].position) * scale).as_dvec3() - eye;
     let shortest = mesh.triangles().map(|corners| corners.map(places)).filter_map(|[a, b, c]| {
-        let widest = WIDEST_ANGLE * distance_to_triangle(a, b, c).max(nearest);
+        let widest = widest_angle * distance_to_triangle(a, b, c).max(nearest);
         let is_before = [a, b, c].iter().any(|corner| forward.dot(*corner) > 0.0);
         (is_before && a.distance(b).max(b.distance(c)).max(c.distance(a)) > widest).then_some(widest)
     });
     Some(shortest.reduce(f64::min).map_or(0, until))
 }
-
-/// In radians.
-const WIDEST_ANGLE: f64 = 0.0873;
 
 /// What is nearer to a light than this share of its range counts as if it were there.
 const NEAREST: f64 = 1e-3;
@@ -74,8 +71,15 @@ mod tests {
     use super::*;
     use crate::scene::{Camera, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex, ViewKind};
 
+    /// That of [`Quality::balanced`](crate::quality::Quality::balanced): 5°.
+    const WIDEST_ANGLE: f64 = 0.087_266_462_599_716_48;
+
     /// A floor of 8 m, seen from a lamp above it.
     fn floor_from(height: f64, scale: Vec3) -> Option<u32> {
+        floor_under(WIDEST_ANGLE, height, scale)
+    }
+
+    fn floor_under(widest_angle: f64, height: f64, scale: Vec3) -> Option<u32> {
         let corner = |x, z| Vertex { position: [x, 0.0, z], ..Vertex::default() };
         let corners = vec![corner(-4.0, -4.0), corner(-4.0, 4.0), corner(4.0, -4.0), corner(4.0, 4.0)];
         let mut scene = Scene::new();
@@ -88,7 +92,7 @@ mod tests {
             kind: ViewKind::Shadow,
             ..Camera::looking_at("lamp", DVec3::Y * height, DVec3::Y * (height - 1.0))
         };
-        halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0)
+        halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, widest_angle)
     }
 
     #[test]
@@ -102,6 +106,15 @@ mod tests {
         assert_eq!(floor_from(2.0, Vec3::new(-2.0, 1.0, 0.1)), floor_from(1.0, Vec3::ONE));
         assert_eq!(floor_from(1e-3, Vec3::splat(1e-30)), Some(0));
         assert_eq!(floor_from(1e-3, Vec3::splat(1e30)), Some(64));
+    }
+
+    #[test]
+    fn twice_the_angle_is_a_halving_less() {
+        for height in [0.5, 2.0, 10.0, 30.0] {
+            let halvings = |times: f64| floor_under(WIDEST_ANGLE * times, height, Vec3::ONE).unwrap();
+            assert_eq!([halvings(0.5), halvings(2.0)], [halvings(1.0) + 1, halvings(1.0) - 1], "{height}");
+        }
+        assert_eq!(floor_under(1e-300, 2.0, Vec3::ONE), Some(64));
     }
 
     #[test]
@@ -136,7 +149,7 @@ mod tests {
                 kind: ViewKind::Shadow,
                 ..Camera::looking_at("lamp", DVec3::Y * height, DVec3::Y * (height - 1.0))
             };
-            halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0)
+            halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, WIDEST_ANGLE)
         };
         // 14 cm at 2 m are 4°, and at 10 cm 81°.
         assert_eq!(from(0.0), Some(0));

@@ -39,8 +39,8 @@ mod tests {
             let cull = [Cull::Back, Cull::Back, Cull::Nothing][kind as usize];
             let state = DrawState::new(Topology::TriangleList, cull, blend);
             let key = match blend {
-                Blend::None => SortKey::opaque(state, mesh, depth),
-                _ => SortKey::blended(depth),
+                Blend::None => SortKey::opaque(state, mesh, depth.to_bits() << 1),
+                _ => SortKey::blended(depth.to_bits() << 1),
             };
             (drawn > 0).then_some(RenderCommand { key, object: 0, mesh, material, state })
         })

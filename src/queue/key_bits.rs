@@ -90,6 +90,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::command::DrawState;
+    use crate::quality::{DepthCurve, DepthKey};
 
     proptest! {
         #[test]
@@ -119,5 +121,21 @@ mod tests {
         assert_eq!(KeyBits::new(u64::MAX).width(), 64);
         // Six runs, of which the three nearest become one.
         assert_eq!(KeyBits::new(0x8000_8000_8000_0421).width(), 3 + 11);
+    }
+
+    #[test]
+    fn fewer_bits_of_depth_are_fewer_to_sort_by() {
+        let width = |bits: u32, blends: bool| {
+            let key = |depth: u16| {
+                let order = DepthKey { bits, curve: DepthCurve::Logarithmic };
+                let depth = order.code(f32::from(depth) * 0.37, 0.1, 1e4);
+                if blends { SortKey::blended(depth) } else { SortKey::opaque(DrawState::PLAIN, 5, depth) }
+            };
+            let differing = (0..5_000).fold(0, |bits, depth| bits | (key(depth).bits() ^ key(0).bits()));
+            KeyBits::new(differing).width()
+        };
+        for bits in [1, 4, 8, 16, 20] {
+            assert_eq!([width(bits, false), width(bits, true)], [bits; 2]);
+        }
     }
 }

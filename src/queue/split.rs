@@ -102,7 +102,7 @@ mod tests {
         let mut commands = Blocks::new();
         commands.reserve(depths.len(), RenderCommand::NOTHING);
         for (place, &depth) in depths.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-            let key = SortKey::opaque(DrawState::PLAIN, place as u32 % 3, depth);
+            let key = SortKey::opaque(DrawState::PLAIN, place as u32 % 3, depth.to_bits() << 1);
             commands.write(place / Blocks::<RenderCommand>::SIZE)[place % Blocks::<RenderCommand>::SIZE] =
                 RenderCommand {
                     key,

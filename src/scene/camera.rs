@@ -16,7 +16,7 @@ pub struct Camera {
     pub orientation: Quat,
     /// How places become places of the picture.
     pub projection: Projection,
-    /// The distance from which on it sees, in metres, above 0.
+    /// The distance from which on it sees, in metres, 1e-27 or more.
     pub near: f32,
     /// The distance up to which it sees, in metres. In perspective it may be infinite; there it leaves out objects that are
     /// farther away as a whole, and depth does not depend on it.
@@ -42,7 +42,7 @@ pub enum Projection {
     /// In a [`ViewKind::Shadow`] picture, what is nearer than `near` is drawn as if it were just there: it casts its shadow
     /// from however far in front of the picture it is.
     Orthographic {
-        /// The distance between the picture's lower and upper edge, in metres.
+        /// The distance between the picture's lower and upper edge, in metres, 1e-6 or more.
         height: f32,
     },
     /// Everything that lies before the camera, as a mirror shaped like a paraboloid shows it: the half space becomes a disc
@@ -116,6 +116,8 @@ impl Camera {
             "its orientation is not of unit length"
         } else if !(self.near > 0.0 && self.near.is_finite()) {
             "its near plane is not a positive distance"
+        } else if self.near < NEAREST {
+            "its near plane is nearer than 1e-27 m"
         } else if self.far.is_nan() || self.far <= self.near {
             "its far plane is not beyond its near plane"
         } else if let Some(reason) = self.projection_problem() {
@@ -134,7 +136,7 @@ impl Camera {
                 .then_some("its field of view is not between 0.0001 and 180 degrees"),
             _ if self.far.is_infinite() => Some("without perspective its far plane must be finite"),
             Projection::Orthographic { height } => {
-                (!in_range(height, f32::MIN_POSITIVE)).then_some("its height is not a positive distance")
+                (!in_range(height, LOWEST)).then_some("its height is not a distance of 1e-6 m or more")
             }
             Projection::Paraboloid => {
                 (self.kind != ViewKind::Shadow).then_some("only what a light sees can be drawn as a paraboloid")
@@ -142,6 +144,14 @@ impl Camera {
         }
     }
 }
+
+/// The nearest near plane in metres. Depth is its distance over that of what is seen, and what is seen may be 1.5e10 m away, from
+/// one end of the world's reach to the other: nearer than 2e-28 m, that leaves the range of f32, and nothing would be seen.
+const NEAREST: f32 = 1e-27;
+
+/// The lowest picture without perspective in metres: below, the steps of the places of objects, 2⁻³⁰ m, would be seen as steps of
+/// whole pixels.
+const LOWEST: f32 = 1e-6;
 
 /// The narrowest field of view in radians: some 2 m at a million metres. Far below it the projection leaves the range of f32.
 const NARROWEST: f32 = 1.7e-6;

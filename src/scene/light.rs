@@ -103,6 +103,22 @@ impl Light {
         }
     }
 
+    /// The same, but ending where the brightest channel of its intensity has fallen to `cut_off`, if that is nearer than its
+    /// range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0 leaves it as it is, and so
+    /// does any a directional light, which does not fall off.
+    pub(crate) fn cut_off_at(mut self, cut_off: f32) -> Self {
+        if let Self::Point { intensity, range, .. }
+        | Self::Spot { intensity, range, .. }
+        | Self::Hemispherical { intensity, range, .. } = &mut self
+            && cut_off > 0.0
+        {
+            // In f64 no quotient of two floats leaves the range; and a light's range is never 0.
+            let end = (f64::from(intensity.max_element()) / f64::from(cut_off)).sqrt() as f32;
+            *range = range.min(end.max(f32::MIN_POSITIVE));
+        }
+        self
+    }
+
     /// Whether it gives no light at all.
     pub(crate) fn is_dark(&self) -> bool {
         let (Self::Directional { illuminance: color, .. }
@@ -188,4 +204,84 @@ fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
     let distinct = inner.cos() > outer.cos();
     (!ordered || !distinct)
         .then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees, or too close to fade")
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// What a light brings to a surface that faces it on its axis: `illuminance_from` in `illumination.wgsl`, in f64.
+    fn illuminance(intensity: f64, range: f64, distance: f64) -> f64 {
+        if distance >= range {
+            return 0.0;
+        }
+        let share = distance * distance / (range * range);
+        intensity * (1.0 - share * share).powi(2) / (distance * distance)
+    }
+
+    fn lights(intensity: Vec3, range: f32) -> [Light; 3] {
+        let (position, direction, casts_shadow) = (DVec3::ZERO, Vec3::X, false);
+        let (inner_angle, outer_angle) = (0.2, 0.4);
+        [
+            Light::Point { position, intensity, range },
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
+            Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(5_000))]
+
+        /// The bound that `Quality::light_cut_off` states, against the light as it is and against one that never ends.
+        #[test]
+        fn what_is_cut_off_is_less_than_stated(
+            exponents in prop::array::uniform3(-6.0..6.0_f32),
+            range in -3.0..6.0_f32,
+            cut_off in -8.0..3.0_f32,
+            share in prop_oneof![1e-3..2.0_f64, Just((2.0 / 3.0_f64).powf(0.25)), 0.99..1.01_f64],
+        ) {
+            let intensity = Vec3::from_array(exponents.map(|exponent| 10_f32.powf(exponent)));
+            let (range, cut_off) = (10_f32.powf(range), 10_f32.powf(cut_off));
+            let bound = 1.089 * f64::from(cut_off);
+            for light in lights(intensity, range) {
+                let (_, end) = light.cut_off_at(cut_off).reach().unwrap();
+                prop_assert!(end <= range);
+                let distance = share * f64::from(end);
+                for channel in intensity.to_array().map(f64::from) {
+                    let drawn = illuminance(channel, f64::from(end), distance);
+                    let own = illuminance(channel, f64::from(range), distance);
+                    prop_assert!(drawn <= own * (1.0 + 1e-12) && own - drawn <= bound, "{own} {drawn}");
+                    if end < range {
+                        let untruncated = channel / (distance * distance);
+                        prop_assert!(untruncated - drawn <= bound, "{untruncated} {drawn}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lights_end_where_they_have_fallen_to_the_cut_off() {
+        for light in lights(Vec3::new(1.0, 9.0, 4.0), 100.0) {
+            let reach = |cut_off| light.cut_off_at(cut_off).reach().map(|(_, range)| range);
+            assert_eq!(light.cut_off_at(0.0), light);
+            assert_eq!([reach(1.0), reach(0.01), reach(1e-9)], [Some(3.0), Some(30.0), Some(100.0)]);
+        }
+        let sun = Light::Directional { direction: Vec3::X, illuminance: Vec3::ONE, casts_shadow: true };
+        assert_eq!(sun.cut_off_at(0.5), sun);
+    }
+
+    #[test]
+    fn no_cut_off_leaves_a_light_that_cannot_be() {
+        let least = f32::from_bits(1);
+        for intensity in [0.0, least, f32::MIN_POSITIVE, 1.0, f32::MAX] {
+            for cut_off in [least, 1.0, f32::MAX] {
+                for light in lights(Vec3::splat(intensity), 5.0) {
+                    assert_eq!(light.cut_off_at(cut_off).check(0), Ok(()), "{intensity} {cut_off}");
+                }
+            }
+        }
+    }
 }

@@ -12,6 +12,7 @@ mod material;
 mod mesh;
 #[cfg(feature = "obj")]
 pub mod obj;
+mod packed_vertex;
 pub mod sample;
 mod scene_ref;
 mod subdivision;
@@ -23,5 +24,6 @@ pub use error::SceneError;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
+pub use packed_vertex::PackedVertex;
 pub use scene_ref::SceneRef;
 pub(crate) use scene_ref::is_unit;

@@ -17,7 +17,8 @@ pub struct SceneRef<'a> {
     pub positions: &'a [DVec3],
     /// From object space to the world's axes; of unit length.
     pub orientations: &'a [Quat],
-    /// Along the object's own axes, applied first; negative mirrors.
+    /// Along the object's own axes, applied first; negative mirrors. A vertex is drawn within some millionth of its distance of
+    /// where it belongs, so what is as many times as large as it is far does not lie where it should.
     pub scales: &'a [Vec3],
     /// In object space, before scaling. A sphere that holds all that is drawn of the object.
     pub bounds: &'a [Bounds],

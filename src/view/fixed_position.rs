@@ -15,6 +15,9 @@ impl FixedPosition {
     /// into 64 bits too.
     pub const REACH: f64 = 4_294_967_296.0;
 
+    /// The world's origin.
+    pub const ORIGIN: Self = Self([0; 3]);
+
     const STEPS_PER_METRE: f64 = 1_073_741_824.0;
 
     /// The nearest fixed-point position; `None` where a coordinate is not finite or beyond [`FixedPosition::REACH`].
@@ -23,6 +26,21 @@ impl FixedPosition {
         let within = position.abs().cmplt(DVec3::splat(Self::REACH)).all();
         within.then(|| {
             Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| (steps + 0.5_f64.copysign(steps)) as i64))
+        })
+    }
+
+    /// The position of these halves: see [`FixedPosition::halves`].
+    pub fn from_halves(low: [u32; 3], high: [i32; 3]) -> Self {
+        Self(std::array::from_fn(|axis| i64::from(high[axis]) << 32 | i64::from(low[axis])))
+    }
+
+    /// The difference from another position in metres, rounded just as the shader rounds it.
+    pub fn relative_to(self, other: Self) -> [f32; 3] {
+        std::array::from_fn(|axis| {
+            let steps = self.0[axis].wrapping_sub(other.0[axis]);
+            let (high, low) = ((steps.unsigned_abs() >> 32) as u32, steps.unsigned_abs() as u32);
+            let magnitude = high as f32 * 4.0 + low as f32 * 2_f32.powi(-30);
+            if steps < 0 { -magnitude } else { magnitude }
         })
     }
 
@@ -63,7 +81,10 @@ mod tests {
             let offset = if sign { 10_f64.powf(exponent) } else { -10_f64.powf(exponent) };
             let other = (place + offset).clamp(-4.29e9, 4.29e9);
             let (camera, object) = (DVec3::splat(place), DVec3::splat(other));
-            let found = difference(FixedPosition::new(object).unwrap(), FixedPosition::new(camera).unwrap());
+            let (camera, object) = (FixedPosition::new(camera).unwrap(), FixedPosition::new(object).unwrap());
+            let found = difference(object, camera);
+            let (low, high) = object.halves();
+            prop_assert_eq!(FixedPosition::from_halves(low, high).relative_to(camera), found);
             let exact = other - place;
             let bound = 2_f64.powi(-30) + exact.abs() * 2_f64.powi(-22);
             prop_assert!((f64::from(found[0]) - exact).abs() <= bound, "{} for {exact}", found[0]);

@@ -54,6 +54,7 @@ impl LightTable {
     /// by nothing.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
         self.records.clear();
+        self.reaching.clear();
         self.ranges = Default::default();
         if view.kind() == ViewKind::Shadow {
             return;
@@ -66,7 +67,6 @@ impl LightTable {
             }
         }
         let mut counts = [0; LightClass::COUNT];
-        self.reaching.clear();
         for (index, light) in lights.iter().enumerate() {
             if light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius)) {
                 let class = LightClass::of(light, shadows).index();
@@ -91,6 +91,13 @@ impl LightTable {
     /// All of them.
     pub fn records(&self) -> &[LightRecord] {
         &self.records
+    }
+
+    /// Of each record in order: the light's index in the scene, and that of the view that draws its shadow map, if one does.
+    pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
+        let of_class = |class: usize| self.reaching.iter().filter(move |(other, _)| *other == class);
+        let lights = (0..LightClass::COUNT).flat_map(of_class);
+        lights.map(|&(_, light)| (light, self.maps.get(light).copied().flatten()))
     }
 
     /// Where those of a class are among them.

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
-use glam::Quat;
+use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::{FixedPosition, RejectionReason, Rejections, Spheres, WorldBounds};
+use super::frustum::Judged;
+use super::{Boxes, FixedPosition, Frustum, ObjectBox, RejectionReason, Rejections, Spheres, WorldBounds};
 use crate::blocks::parts;
 use crate::command::{Cull, DrawState};
+use crate::quality::CullingVolume;
 use crate::scene::{Material, Mesh, SceneRef, is_unit};
 
 /// The frame's objects: what is uploaded, where each is, and how each is drawn. Objects that cannot be drawn are counted
@@ -20,6 +22,9 @@ pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
     rejections: Rejections,
     length: usize,
+    culling: CullingVolume,
+    /// The volume that blocks have boxes for.
+    held: CullingVolume,
 }
 
 /// What the table holds of [`ObjectTable::BLOCK`] objects; object `index` is at `index % BLOCK`.
@@ -29,15 +34,62 @@ pub struct ObjectBlock {
     pub records: [ObjectRecord; ObjectTable::BLOCK],
     /// Where they are.
     pub spheres: Spheres,
+    /// The boxes around them, where the table is told to hold some.
+    pub boxes: Option<Boxes>,
     /// How they are drawn.
     pub draws: [ObjectDraw; ObjectTable::BLOCK],
 }
+
+impl ObjectBlock {
+    /// Which of the objects `entries`, of one word of [`Frustum::AT_ONCE`], a view may see: a bit each, from the lowest. Never
+    /// left out is one that it does see; those that cannot be drawn are.
+    ///
+    /// The sphere is asked for first, whatever volume it is: it tells of most objects whether they are outside or inside as a
+    /// whole, and only of the others the box is asked for.
+    ///
+    /// # Panics
+    /// If there are no such objects, or none.
+    pub fn seen(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
+        let place = entries.start % Frustum::AT_ONCE;
+        let first = entries.start - place;
+        if volume == CullingVolume::None {
+            let drawn = |bits, (offset, &radius): (usize, &f32)| bits | u64::from(radius >= 0.0) << offset;
+            return self.spheres.radii()[entries].iter().enumerate().fold(0, drawn);
+        }
+        if entries.len() < FEW {
+            let may_see = |entry: usize| {
+                let WorldBounds { center, radius } = self.spheres.get(entry);
+                frustum.may_see(center, radius)
+            };
+            let one = |bits, entry: usize| bits | u64::from(may_see(entry)) << (entry - entries.start);
+            return self.kept(frustum, first, entries.clone().fold(0, one) << place) >> place;
+        }
+        match &self.boxes {
+            None => frustum.may_see_each(&self.spheres, first) >> place,
+            Some(_) => {
+                let Judged { seen, whole } = frustum.judge_each(&self.spheres, first);
+                let asked = (u64::MAX >> (Frustum::AT_ONCE - entries.len())) << place;
+                (seen & whole | self.kept(frustum, first, seen & !whole & asked)) >> place
+            }
+        }
+    }
+
+    /// Those of the objects `asked` for, of the word from `first` on, of whose boxes any may be seen; all of them where there are
+    /// no boxes.
+    fn kept(&self, frustum: &Frustum, first: usize, asked: u64) -> u64 {
+        self.boxes.as_ref().map_or(asked, |boxes| frustum.may_see_boxes(&self.spheres, boxes, first, asked))
+    }
+}
+
+/// Fewer objects than these are tested one by one: it takes less time than to test a whole word of them.
+const FEW: usize = 12;
 
 impl Default for ObjectBlock {
     fn default() -> Self {
         Self {
             records: [bytemuck::Zeroable::zeroed(); ObjectTable::BLOCK],
             spheres: Spheres::default(),
+            boxes: None,
             draws: [ObjectDraw::default(); ObjectTable::BLOCK],
         }
     }
@@ -47,11 +99,24 @@ impl ObjectTable {
     /// Objects in a block.
     pub const BLOCK: usize = Spheres::COUNT;
 
+    /// Says what stands for objects when views are asked for them, from the next [`ObjectTable::reset`] on; spheres unless it is
+    /// said otherwise.
+    pub fn hold(&mut self, volume: CullingVolume) {
+        self.culling = volume;
+    }
+
     /// Makes room for `objects` objects.
     pub fn reset(&mut self, objects: usize) {
         self.length = objects;
-        let blocks = self.block_count().max(self.blocks.len());
+        let before = self.blocks.len();
+        let blocks = self.block_count().max(before);
         self.blocks.resize_with(blocks, RwLock::default);
+        // Blocks are only touched where something is to change.
+        let right = if self.held == self.culling { before } else { 0 };
+        for block in &mut self.blocks[right..] {
+            block.get_mut().boxes = Boxes::new(self.culling);
+        }
+        self.held = self.culling;
         // What lies behind the last object is tested with it, and is not to be seen.
         if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK) {
             let spheres = &mut last.get_mut().spheres;
@@ -64,13 +129,16 @@ impl ObjectTable {
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
         for (index, part) in parts(range, Self::BLOCK) {
             let mut block = self.blocks[index].write();
-            let ObjectBlock { records, spheres, draws } = &mut **block;
+            let ObjectBlock { records, spheres, boxes, draws } = &mut **block;
             for object in part {
                 let entry = object % Self::BLOCK;
                 match describe(scene, object) {
                     Ok((record, bounds, draw)) => {
                         records[entry] = record;
                         spheres.set(entry, bounds);
+                        if let Some(boxes) = boxes {
+                            boxes.set(entry, &box_of(scene, object, bounds));
+                        }
                         draws[entry] = draw;
                     }
                     Err(reason) => {
@@ -174,15 +242,12 @@ fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldB
 
     let bounds = scene.bounds[object];
     let offset = orientation * (scale * bounds.center);
-    // Grown by what rounding can have turned and moved the centre, and shortened the radius: some ten roundings of 2⁻²⁴,
-    // which is less than 1e-6, in the terms of the rotation; and one each in the product and in the sum. The sum of the
-    // offset's coordinates is no less than its length.
-    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + offset.abs().element_sum() * 1e-6;
+    let center = position + offset.as_dvec3();
+    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + misplaced(center, offset) as f32;
     // An offset that is not finite makes a radius that is none either.
-    if !(bounds.radius >= 0.0 && radius < f32::INFINITY) {
+    if !(bounds.radius >= 0.0 && radius <= LARGEST) {
         return Err(RejectionReason::InvalidBounds);
     }
-    let center = position + offset.as_dvec3();
 
     let slots = (scene.meshes[object].index(), scene.materials[object].index());
     let (position_low, position_high) = fixed.halves();
@@ -199,14 +264,55 @@ fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldB
     Ok((record, WorldBounds { center, radius }, draw))
 }
 
+/// How far an object's centre may be from where it is drawn, in metres.
+///
+/// The offset is turned in f32: some 40 roundings of 2⁻²⁴ at most (thirteen of the orientation's length and direction and of the
+/// scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length; 2⁻¹⁸ is 64 of them.
+/// Each coordinate of the centre, in f64, is off by half a step, 2⁻⁵³ of it. And where the object is drawn relative to a camera is
+/// off by half a step of fixed point for each of the two, 2⁻³⁰ m a coordinate. √3 times as much in space is less than twice.
+#[inline]
+fn misplaced(center: DVec3, offset: Vec3) -> f64 {
+    let turned = f64::from(offset.abs().element_sum()) * 2_f64.powi(-18);
+    turned + center.abs().max_element() * 2_f64.powi(-52) + 2_f64.powi(-29)
+}
+
+/// The box around an object's mesh, or around its sphere where the engine gave it other bounds than its mesh has.
+///
+/// What is rounded in f64 is far below what [`misplaced`] and [`Frustum::may_see_boxes`] allow.
+fn box_of(scene: &SceneRef<'_>, object: usize, sphere: WorldBounds) -> ObjectBox {
+    let bounds = scene.bounds[object];
+    let mesh = scene.assets.get(scene.meshes[object]).ok().filter(|mesh| mesh.bounds() == bounds);
+    let Some(mesh) = mesh else {
+        let radius = f64::from(sphere.radius);
+        return ObjectBox { half_axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius), margin: 0.0 };
+    };
+    let [low, high] = mesh.corners().map(Vec3::as_dvec3);
+    let center = bounds.center.as_dvec3();
+    let scale = scene.scales[object];
+    let half = (high - center).max(center - low) * scale.abs().as_dvec3();
+    let turn = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
+    let offset = scale * bounds.center;
+    ObjectBox {
+        half_axes: [turn.x_axis * half.x, turn.y_axis * half.y, turn.z_axis * half.z],
+        // Turning it changes no coordinate by more than its length.
+        margin: misplaced(sphere.center, offset),
+    }
+}
+
+/// The largest radius in metres of an object in the world. What is larger leaves the range of f32 on its way to clip space: where
+/// the field of view is the narrowest there is, a place is multiplied by some 1e6, and by a hundred more where a picture is that
+/// much higher than wide.
+const LARGEST: f32 = 1e30;
+
 /// The same rotation at unit length, of one that has drifted from it as little as [`is_unit`] allows.
 ///
 /// Two steps of Newton's method for 1/√x from 1: of an error e in the square of the length they leave less than e⁴, which is
-/// below what an f32 can say, and they take a fraction of the time of a root and a division.
+/// below what an f32 can say, and they take a fraction of the time of a root and a division. In f64, since a length that is off by
+/// one rounding moves what is turned by four.
 #[inline]
 fn normalized(turn: Quat) -> Quat {
-    let closer = |turn: Quat| turn * (1.5 - 0.5 * turn.length_squared());
-    closer(closer(turn))
+    let closer = |turn: DQuat| turn * (1.5 - 0.5 * turn.length_squared());
+    closer(closer(turn.as_dquat())).as_quat()
 }
 
 fn state_of(mesh: &Mesh, material: &Material, scale: glam::Vec3) -> DrawState {

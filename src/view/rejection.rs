@@ -62,8 +62,9 @@ pub enum RejectionReason {
     StaleMesh,
     /// An object's material was removed.
     StaleMaterial,
-    /// An object's edges are too long for the paraboloid shadow map that sees it: drawn straight there, they are off by more
-    /// than half a pixel in 1024. It is drawn all the same.
+    /// An object's edges are too long for the paraboloid shadow map that sees it: longer than
+    /// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge) allows, as often as they are halved. It is drawn all
+    /// the same.
     CoarseEdges,
     /// A light gives no light: its intensity is 0.
     DarkLight,

@@ -1,6 +1,6 @@
 //! One camera's trip through the frame.
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{DMat4, DVec4, Mat4, Vec3};
 
 use super::Frustum;
 use crate::scene::{Camera, Projection, ViewKind};
@@ -17,12 +17,15 @@ pub struct RenderView {
     pub light: Option<usize>,
     /// Which layer it draws of the targets that all views of its kind share.
     pub layer: u32,
+    /// Whether its targets keep what the frame before had in them. Then no process draws in it, and it is here for those that
+    /// read them: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
+    pub is_kept: bool,
 }
 
 impl RenderView {
     /// The view of `camera`.
     pub fn new(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), frustum: Frustum::new(camera), light: None, layer: 0 }
+        Self { camera: camera.clone(), frustum: Frustum::new(camera), light: None, layer: 0, is_kept: false }
     }
 
     /// What it is called in reports: the camera's name.
@@ -37,23 +40,32 @@ impl RenderView {
 
     /// From world axes relative to the camera to clip space: reversed depth, 1 at the near plane, and 0 at the far plane or, in
     /// perspective, infinitely far away. For a paraboloid, which no matrix makes, to the camera's own axes.
+    ///
+    /// It is worked out in f64 and rounded once: each of its numbers is off by half a unit in its last place.
     pub fn clip_from_relative(&self) -> Mat4 {
+        self.precise_clip_from_relative().as_mat4()
+    }
+
+    /// The same before it is rounded.
+    pub(crate) fn precise_clip_from_relative(&self) -> DMat4 {
         let camera = &self.camera;
-        let aspect = camera.aspect();
+        let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
         let projection = match camera.projection {
             Projection::Perspective { field_of_view } => {
-                let scale = 1.0 / (field_of_view * 0.5).tan();
-                Mat4::from_cols(Vec4::X * (scale / aspect), Vec4::Y * scale, Vec4::NEG_W, Vec4::Z * camera.near)
+                let scale = 1.0 / (f64::from(field_of_view) * 0.5).tan();
+                let end = DVec4::Z * f64::from(camera.near);
+                DMat4::from_cols(DVec4::X * (scale / aspect), DVec4::Y * scale, DVec4::NEG_W, end)
             }
             Projection::Orthographic { height } => {
-                let scale = 2.0 / height;
-                let depth = 1.0 / (camera.far - camera.near);
-                let end = Vec4::new(0.0, 0.0, camera.far * depth, 1.0);
-                Mat4::from_cols(Vec4::X * (scale / aspect), Vec4::Y * scale, Vec4::Z * depth, end)
+                let scale = 2.0 / f64::from(height);
+                let far = f64::from(camera.far);
+                let depth = 1.0 / (far - f64::from(camera.near));
+                let end = DVec4::new(0.0, 0.0, far * depth, 1.0);
+                DMat4::from_cols(DVec4::X * (scale / aspect), DVec4::Y * scale, DVec4::Z * depth, end)
             }
-            Projection::Paraboloid => Mat4::IDENTITY,
+            Projection::Paraboloid => DMat4::IDENTITY,
         };
-        projection * Mat4::from_quat(camera.orientation.normalize().inverse())
+        projection * DMat4::from_quat(camera.orientation.as_dquat().normalize().inverse())
     }
 
     /// The axes of the picture in the world: right and up, each as long as half the picture (in perspective, at a distance of
@@ -72,7 +84,7 @@ impl RenderView {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use glam::{DVec3, Vec4Swizzles};
+    use glam::{DVec3, Vec4, Vec4Swizzles};
 
     use super::*;
 

@@ -38,6 +38,29 @@ impl VisibleSet {
         }
     }
 
+    /// Takes away what is hidden of a range of objects, and says how many that were: `hides` is asked for the objects of a word
+    /// of which any is seen, from `first`, a multiple of [`VisibleSet::WORD`], on, with a bit for each that is. Bits it answers
+    /// with beyond those do not count. Ranges looked at at the same time must not share objects, but may share words.
+    pub fn hide(&self, objects: Range<usize>, hides: impl Fn(usize, u64) -> u64) -> usize {
+        let mut count = 0;
+        for (word, asked) in parts(objects, Self::WORD) {
+            let known = (u64::MAX >> (Self::WORD - asked.len())) << (asked.start % Self::WORD);
+            let seen = self.words[word].load(Ordering::Relaxed) & known;
+            if seen != 0 {
+                let hidden = hides(word * Self::WORD, seen) & seen;
+                self.words[word].fetch_and(!hidden, Ordering::Relaxed);
+                count += hidden.count_ones() as usize;
+            }
+        }
+        count
+    }
+
+    /// A bit for each object from `word` × [`VisibleSet::WORD`] on, from the lowest: whether it is seen. None are past the last
+    /// word.
+    pub fn word(&self, word: usize) -> u64 {
+        self.words.get(word).map_or(0, |bits| bits.load(Ordering::Relaxed))
+    }
+
     /// Objects in a word.
     pub const WORD: usize = u64::BITS as usize;
 

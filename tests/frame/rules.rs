@@ -6,6 +6,7 @@ use std::sync::Arc;
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest};
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
+use drawloom::quality::Quality;
 use drawloom::queue::{DrawList, DrawPart};
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
@@ -36,6 +37,7 @@ fn broken_rule(
         lights: &[LightTable::default()],
         passes: &[PASS],
         scene: &scene.as_scene_ref(),
+        quality: &Quality::balanced(),
         rejections: &Rejections::default(),
     };
     let frame = NullBackend.begin(&request).unwrap();

@@ -80,7 +80,7 @@ pub fn radiance(submission: &WgpuSubmission, view: usize) -> Result<Vec<[f64; 3]
 }
 
 /// The number that a half float stands for.
-fn from_half(bits: u16) -> f64 {
+pub fn from_half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff) / 1024.0);
     let magnitude = match exponent {
         0 => fraction * 2_f64.powi(-14),

@@ -7,8 +7,10 @@ use super::growing_buffer::check_storage;
 use super::layouts::Layouts;
 use super::textures::{TextureArrays, TexturePlace};
 use super::uploads::Uploads;
+use super::vertices::{stride, with_bytes};
 use crate::backend::BackendError;
-use crate::scene::{Assets, Material, Mesh, Vertex};
+use crate::quality::VertexFormat;
+use crate::scene::{Assets, Material, Mesh};
 use crate::view::{RejectionReason, Rejections};
 
 /// What a frame draws from. It stays valid while assets change for later frames.
@@ -33,6 +35,8 @@ pub(super) struct MeshRange {
 /// Keeps meshes, materials and textures on the device, and uploads what changed since the last frame.
 pub(super) struct AssetCache {
     vertices: Arena,
+    /// How they lie there.
+    format: VertexFormat,
     indices: Arena,
     meshes: Vec<Option<MeshRange>>,
     textures: TextureArrays,
@@ -46,7 +50,8 @@ pub(super) struct AssetCache {
 impl Default for AssetCache {
     fn default() -> Self {
         Self {
-            vertices: Arena::new("vertices", wgpu::BufferUsages::VERTEX),
+            vertices: new_vertex_arena(),
+            format: VertexFormat::default(),
             indices: Arena::new("indices", wgpu::BufferUsages::INDEX),
             meshes: Vec::new(),
             textures: TextureArrays::default(),
@@ -58,7 +63,7 @@ impl Default for AssetCache {
 }
 
 impl AssetCache {
-    /// What a frame of these assets draws from.
+    /// What a frame of these assets, with vertices of this format, draws from.
     ///
     /// # Errors
     /// If the device has no room for them.
@@ -68,6 +73,7 @@ impl AssetCache {
         uploads: &Uploads,
         layouts: &Layouts,
         assets: &Assets,
+        vertices: VertexFormat,
         rejections: &Rejections,
     ) -> Result<Arc<AssetSnapshot>, BackendError> {
         let wanted = [
@@ -76,8 +82,13 @@ impl AssetCache {
             (assets.textures.identity(), assets.textures.revision()),
         ];
         let snapshot = match &self.snapshot {
-            Some(snapshot) if self.current == Some(wanted) => Arc::clone(snapshot),
+            Some(snapshot) if self.current == Some(wanted) && self.format == vertices => Arc::clone(snapshot),
             _ => {
+                if self.format != vertices {
+                    // A mesh begins a whole number of vertices into the arena, so one holds those of one size.
+                    (self.vertices, self.format) = (new_vertex_arena(), vertices);
+                    self.meshes.clear();
+                }
                 if self.current.is_none_or(|current| current[0].0 != wanted[0].0) {
                     self.meshes.clear();
                 }
@@ -114,11 +125,12 @@ impl AssetCache {
                 *range = None;
             }
         }
-        let bytes = changed.iter().map(|(_, _, mesh)| bytes_of(mesh));
+        let format = self.format;
+        let bytes = changed.iter().map(|(_, _, mesh)| bytes_of(mesh, format));
         let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
         if !self.vertices.fits(vertex_bytes) || !self.indices.fits(index_bytes) {
             // Everything moves to new buffers, and what was garbage stays behind.
-            let bytes = assets.iter::<Mesh>().map(|(_, mesh)| bytes_of(mesh));
+            let bytes = assets.iter::<Mesh>().map(|(_, mesh)| bytes_of(mesh, format));
             let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
             self.vertices.renew(device, vertex_bytes)?;
             self.indices.renew(device, index_bytes)?;
@@ -129,10 +141,10 @@ impl AssetCache {
                 .collect();
         }
         for (slot, revision, mesh) in changed {
-            let vertices = self.vertices.append(uploads, bytemuck::cast_slice(mesh.vertices()));
+            let vertices = with_bytes(mesh, format, |bytes| self.vertices.append(uploads, bytes));
             let indices = self.indices.append(uploads, bytemuck::cast_slice(mesh.indices()));
             self.meshes[slot] = Some(MeshRange {
-                base_vertex: (vertices / size_of::<Vertex>() as u64) as i32,
+                base_vertex: (vertices / stride(format)) as i32,
                 first_index: (indices / 4) as u32,
                 index_count: mesh.indices().len() as u32,
                 revision,
@@ -230,6 +242,10 @@ impl MaterialRecord {
     }
 }
 
-fn bytes_of(mesh: &Mesh) -> (u64, u64) {
-    (size_of_val(mesh.vertices()) as u64, size_of_val(mesh.indices()) as u64)
+fn new_vertex_arena() -> Arena {
+    Arena::new("vertices", wgpu::BufferUsages::VERTEX)
+}
+
+fn bytes_of(mesh: &Mesh, format: VertexFormat) -> (u64, u64) {
+    (mesh.vertices().len() as u64 * stride(format), size_of_val(mesh.indices()) as u64)
 }

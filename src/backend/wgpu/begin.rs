@@ -18,12 +18,13 @@ impl WgpuBackend {
     /// If the device cannot hold or make it.
     pub(super) fn start(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
+        let vertices = request.quality.vertices;
         self.check_device()?;
-        let pipelines = self.pipelines(plan, draws)?;
+        let pipelines = self.pipelines(request)?;
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin(scene.assets);
         let assets = checked(&self.device, "meshes, materials and textures", || {
-            self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, rejections)
+            self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, vertices, rejections)
         })??;
         let targets = checked(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
         checked(&self.device, "the frame's buffers", || {
@@ -104,8 +105,8 @@ impl WgpuBackend {
     ) -> Result<(), BackendError> {
         for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
             let halvings = batch.state.halvings();
-            let assets = request.scene.assets;
-            let mesh = self.subdivisions.find(&self.device, &self.uploads, assets, batch.mesh, halvings)?;
+            let (assets, vertices) = (request.scene.assets, request.quality.vertices);
+            let mesh = self.subdivisions.find(&self.device, &self.uploads, assets, vertices, batch.mesh, halvings)?;
             if mesh.is_coarse {
                 for rank in batch.first..batch.first + batch.count {
                     request.rejections.count_once(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);

@@ -79,8 +79,10 @@ pub(super) fn process_layout(
 /// A target's format in wgpu's words.
 pub(super) fn texture_format(format: Format) -> wgpu::TextureFormat {
     match format {
+        Format::Rg8Unorm => wgpu::TextureFormat::Rg8Unorm,
         Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
         Format::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Format::Rgb10a2Unorm => wgpu::TextureFormat::Rgb10a2Unorm,
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
         Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
         Format::R32Float => wgpu::TextureFormat::R32Float,

@@ -34,10 +34,10 @@ mod pipelines;
 mod record;
 mod subdivisions;
 mod targets;
-mod texels;
 mod textures;
 mod timestamps;
 mod uploads;
+mod vertices;
 mod ways;
 
 use std::collections::HashMap;
@@ -61,14 +61,14 @@ use self::timestamps::Timing;
 use self::uploads::Uploads;
 use self::ways::Ways;
 use super::{Backend, BackendError, FrameRequest, PassRequest};
-use crate::process::{Draws, FramePlan, Pass};
+use crate::process::{Draws, Pass};
 use crate::task::Worker;
 use crate::view::ObjectTable;
 
 pub use device_clock::DeviceClock;
 pub use frame::{WgpuCommands, WgpuFrame, WgpuPart};
 pub use pass_times::{PassTime, PassTimes};
-pub use picture::{Picture, WgpuSubmission};
+pub use picture::WgpuSubmission;
 pub use ways::{Encode, Record, WgpuPass};
 
 /// Draws with wgpu, on a device that the engine made.
@@ -213,27 +213,30 @@ impl WgpuBackend {
     }
 
     /// The pipelines of every process of a plan: those there are, also from other plans, or new ones where a process draws in
-    /// another way than it did.
-    fn pipelines(&self, plan: &FramePlan, draws: &[Draws<'_>]) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
+    /// another way than it did, or the quality is another.
+    fn pipelines(
+        &self,
+        &FrameRequest { plan, draws, quality, .. }: &FrameRequest<'_>,
+    ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let mut kept = self.pipelines.lock();
         let there = kept.get(&plan.identity()).map(|kept| &kept.of_processes);
         if let Some(of_plan) =
-            there.filter(|of_plan| of_plan.iter().zip(draws).all(|(one, draws)| one.still_fit(draws)))
+            there.filter(|of_plan| of_plan.iter().zip(draws).all(|(one, draws)| one.still_fit(draws, quality)))
         {
             return Ok(Arc::clone(of_plan));
         }
         let mut of_plan = there.map_or_else(Vec::new, |of_plan| of_plan.to_vec());
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
-            if of_plan.get(index).is_some_and(|pipelines| pipelines.still_fit(draws)) {
+            if of_plan.get(index).is_some_and(|pipelines| pipelines.still_fit(draws, quality)) {
                 continue;
             }
             let mut all = kept.values().flat_map(|kept| kept.of_processes.iter());
-            let fitting = all.find(|pipelines| pipelines.fit(plan, planned, draws)).cloned();
+            let fitting = all.find(|pipelines| pipelines.fit(plan, planned, draws, quality)).cloned();
             let made = match fitting {
                 Some(fitting) => fitting,
                 None => {
                     let label = format!("the shader of {:?}", planned.process.name());
-                    let make = || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws);
+                    let make = || ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws, quality);
                     Arc::new(checked(&self.device, &label, make)?)
                 }
             };

@@ -6,8 +6,7 @@ use super::error_scope::checked;
 use super::pass_times::PassTimes;
 use super::targets::{FrameTargets, Target};
 use super::timestamps::Readback;
-use crate::backend::BackendError;
-use crate::process::Format;
+use crate::backend::{BackendError, Picture};
 
 /// A frame that was submitted to wgpu.
 pub struct WgpuSubmission {
@@ -16,19 +15,6 @@ pub struct WgpuSubmission {
     index: wgpu::SubmissionIndex,
     targets: Arc<FrameTargets>,
     times: Option<Readback>,
-}
-
-/// A target's pixels.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    /// In pixels.
-    pub width: u32,
-    /// In pixels.
-    pub height: u32,
-    /// What a pixel is.
-    pub format: Format,
-    /// Rows from top to bottom, without padding.
-    pub bytes: Vec<u8>,
 }
 
 impl WgpuSubmission {

@@ -7,11 +7,13 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
 use super::chooser::Chooser;
 use super::layouts::{Layouts, Sampled, process_layout, texture_format};
+use super::vertices::{attributes, stride};
 use super::ways::Ways;
 use crate::command::{Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
+use crate::quality::{Quality, TransformPrecision, VertexFormat};
 use crate::queue::Batch;
-use crate::scene::{Blend, LightKind, Topology, Vertex, ViewKind};
+use crate::scene::{Blend, LightKind, Topology, ViewKind};
 
 /// The pipelines of one process: one for each state that a scene has needed so far.
 pub(super) struct ProcessPipelines {
@@ -27,7 +29,7 @@ pub(super) struct ProcessPipelines {
     choosers: Mutex<Vec<Option<Chooser>>>,
 }
 
-/// All that pipelines are made from and that a process may change from frame to frame.
+/// All that pipelines are made from and that a process, or the quality, may change from frame to frame.
 #[derive(Clone, Debug, PartialEq)]
 struct Recipe<'a> {
     shader: Cow<'a, str>,
@@ -37,12 +39,13 @@ struct Recipe<'a> {
     writes_depth: bool,
     /// The one state of what is not drawn by commands.
     state: Option<DrawState>,
+    transforms: TransformPrecision,
 }
 
 /// What a process draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vertices {
-    Meshes,
+    Meshes(VertexFormat),
     /// One triangle, infinitely far away.
     FullScreen,
     LightVolumes,
@@ -52,15 +55,16 @@ enum Vertices {
 
 impl<'a> Recipe<'a> {
     /// Borrowed, because every frame compares it with what the pipelines were made from.
-    fn new(draws: &Draws<'a>) -> Self {
+    fn new(draws: &Draws<'a>, quality: &Quality) -> Self {
+        let (transforms, format) = (quality.transforms, quality.vertices);
         let parameter_bytes = draws.parameters().len();
         let state = fixed_state(draws);
         let of = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
-            Self { shader, vertices, fragment, parameter_bytes, writes_depth, state }
+            Self { shader, vertices, fragment, parameter_bytes, writes_depth, state, transforms }
         };
         match draws {
-            Draws::Commands(draws) => of(draws.shader, Vertices::Meshes, draws.fragment, draws.writes_depth),
+            Draws::Commands(draws) => of(draws.shader, Vertices::Meshes(format), draws.fragment, draws.writes_depth),
             Draws::FullScreen(draws) => of(draws.shader, Vertices::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => of(draws.shader, Vertices::LightVolumes, Some("fragment"), false),
             Draws::Raw(_) => of("", Vertices::None, None, false),
@@ -70,6 +74,12 @@ impl<'a> Recipe<'a> {
     fn into_owned(self) -> Recipe<'static> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
         Recipe { shader: owned(self.shader), fragment: self.fragment.map(owned), ..self }
+    }
+
+    /// The whole of the WGSL.
+    fn source(&self) -> String {
+        let is_absolute = self.transforms == TransformPrecision::Absolute;
+        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{SHADER_PRELUDE}\n{}", self.shader)
     }
 }
 
@@ -124,16 +134,16 @@ impl ProcessPipelines {
         plan: &FramePlan,
         planned: &PlannedProcess,
         draws: &Draws<'_>,
+        quality: &Quality,
     ) -> Self {
         let name = planned.process.name();
-        let recipe = Recipe::new(draws).into_owned();
+        let recipe = Recipe::new(draws, quality).into_owned();
         let attachments = Attachments::new(plan, &planned.declaration);
         let process_layout = process_layout(device, recipe.parameter_bytes, &attachments.sampled);
         let shader = (recipe.vertices != Vertices::None).then(|| {
-            let source = format!("{SHADER_PRELUDE}\n{}", recipe.shader);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
+                source: wgpu::ShaderSource::Wgsl(recipe.source().into()),
             });
             let groups = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
             let used = if process_layout.is_some() { 3 } else { 2 };
@@ -152,16 +162,16 @@ impl ProcessPipelines {
         pipelines
     }
 
-    /// Whether they are what a process of this plan that draws this needs.
-    pub(super) fn fit(&self, plan: &FramePlan, planned: &PlannedProcess, draws: &Draws<'_>) -> bool {
+    /// Whether they are what a process of this plan that draws this needs, in frames of this quality.
+    pub(super) fn fit(&self, plan: &FramePlan, planned: &PlannedProcess, draws: &Draws<'_>, quality: &Quality) -> bool {
         self.name == planned.process.name()
-            && self.recipe == Recipe::new(draws)
+            && self.still_fit(draws, quality)
             && self.attachments == Attachments::new(plan, &planned.declaration)
     }
 
     /// Whether they still are what a process draws, which they were made for.
-    pub(super) fn still_fit(&self, draws: &Draws<'_>) -> bool {
-        self.recipe == Recipe::new(draws)
+    pub(super) fn still_fit(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
+        self.recipe == Recipe::new(draws, quality)
     }
 
     /// Makes the pipelines that these batches need and that are not there yet. They are to be kept only if the device found
@@ -254,15 +264,14 @@ impl ProcessPipelines {
             format.map(|format| wgpu::ColorTargetState { format, blend, write_mask })
         };
         let targets: Vec<_> = self.attachments.colors.iter().map(target).collect();
-        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
-        let layout = |bytes: usize, attributes| wgpu::VertexBufferLayout {
-            array_stride: bytes as u64,
+        let layout = |array_stride, attributes| wgpu::VertexBufferLayout {
+            array_stride,
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes,
         };
         let (entry_point, vertices) = match self.recipe.vertices {
-            Vertices::Meshes => ("vertex", Some(Some(layout(size_of::<Vertex>(), &attributes[..])))),
-            Vertices::LightVolumes => ("light_volume", Some(Some(layout(size_of::<[f32; 3]>(), &attributes[..1])))),
+            Vertices::Meshes(format) => ("vertex", Some(Some(layout(stride(format), attributes(format))))),
+            Vertices::LightVolumes => ("light_volume", Some(Some(layout(size_of::<[f32; 3]>() as u64, &PLACE_ALONE)))),
             Vertices::FullScreen | Vertices::None => ("full_screen", None),
         };
         let (topology, strip_index_format) = match state.topology() {
@@ -318,10 +327,13 @@ impl ProcessPipelines {
             Vertices::FullScreen => wgpu::CompareFunction::GreaterEqual,
             // The far side of what a light reaches, where it is behind a surface; and never where there is none.
             Vertices::LightVolumes => wgpu::CompareFunction::Less,
-            Vertices::Meshes | Vertices::None => wgpu::CompareFunction::Greater,
+            Vertices::Meshes(_) | Vertices::None => wgpu::CompareFunction::Greater,
         }
     }
 }
+
+/// Of a light's geometry.
+const PLACE_ALONE: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
 
 /// The one state that is drawn with what is not drawn by commands; `None` for commands, of which each has its own.
 pub(super) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
@@ -369,8 +381,9 @@ mod tests {
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
         let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();
+        let quality = Quality::balanced();
         let layouts = Layouts::new(&device);
-        let pipelines = ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0]);
+        let pipelines = ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality);
 
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {

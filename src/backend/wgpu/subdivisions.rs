@@ -8,7 +8,10 @@ use parking_lot::Mutex;
 
 use super::arena::filled_buffer;
 use super::uploads::Uploads;
+use super::vertices::with_bytes;
 use crate::backend::BackendError;
+use crate::backend::subdivided::subdivided;
+use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 
 /// A subdivided mesh on the device.
@@ -21,8 +24,9 @@ pub(super) struct SubdividedMesh {
     used_in: AtomicU64,
 }
 
-/// Which mesh, and how often its edges are halved. What the mesh was before it changed has another revision.
-type Key = (u32, u64, u32);
+/// Which mesh, how often its edges are halved, and how its vertices lie in memory. What the mesh was before it changed has another
+/// revision.
+type Key = (u32, u64, u32, VertexFormat);
 
 /// Keeps subdivided meshes for as long as frames draw them, and a while longer.
 #[derive(Default)]
@@ -34,8 +38,6 @@ pub(super) struct Subdivisions {
 }
 
 impl Subdivisions {
-    /// No mesh becomes more triangles than this.
-    const MOST_TRIANGLES: usize = 1 << 18;
     /// In frames.
     const KEPT_UNUSED: u64 = 120;
 
@@ -63,19 +65,20 @@ impl Subdivisions {
         device: &wgpu::Device,
         uploads: &Uploads,
         assets: &Assets,
+        vertices: VertexFormat,
         slot: u32,
         halvings: u32,
     ) -> Result<Arc<SubdividedMesh>, BackendError> {
         let lost = || BackendError::BrokenRule { rule: "a batch draws a mesh that is there".to_owned() };
         let (revision, mesh) = assets.meshes.revised_at(slot).ok_or_else(lost)?;
         let frame = self.frame.load(Ordering::Relaxed);
-        let key = (slot, revision, halvings);
+        let key = (slot, revision, halvings, vertices);
         let kept = self.kept.lock().get(&key).cloned();
         let subdivided = match kept {
             Some(kept) => kept,
             None => {
                 // Two passes may do this at once, and then one of them was in vain: better than waiting for each other.
-                let made = Arc::new(SubdividedMesh::new(device, uploads, mesh, halvings)?);
+                let made = Arc::new(SubdividedMesh::new(device, uploads, mesh, vertices, halvings)?);
                 Arc::clone(self.kept.lock().entry(key).or_insert(made))
             }
         };
@@ -85,18 +88,23 @@ impl Subdivisions {
 }
 
 impl SubdividedMesh {
-    fn new(device: &wgpu::Device, uploads: &Uploads, mesh: &Mesh, halvings: u32) -> Result<Self, BackendError> {
-        // A little more, lest halves that were rounded up are halved again.
-        let longest = mesh.longest_edge() / (1_u64 << halvings) as f32 * 1.001;
-        let subdivided = mesh.subdivided(longest, Subdivisions::MOST_TRIANGLES);
-        let upload = |label, bytes, usage| filled_buffer(device, uploads, label, bytes, usage);
-        let vertices = bytemuck::cast_slice(subdivided.vertices());
+    fn new(
+        device: &wgpu::Device,
+        uploads: &Uploads,
+        mesh: &Mesh,
+        format: VertexFormat,
+        halvings: u32,
+    ) -> Result<Self, BackendError> {
+        let (subdivided, is_coarse) = subdivided(mesh, halvings);
+        let upload = |label, bytes: &[u8], usage| filled_buffer(device, uploads, label, bytes, usage);
         let indices = bytemuck::cast_slice(subdivided.indices());
         Ok(Self {
-            vertices: upload("subdivided vertices", vertices, wgpu::BufferUsages::VERTEX)?,
+            vertices: with_bytes(&subdivided, format, |vertices| {
+                upload("subdivided vertices", vertices, wgpu::BufferUsages::VERTEX)
+            })?,
             indices: upload("subdivided indices", indices, wgpu::BufferUsages::INDEX)?,
             index_count: subdivided.indices().len() as u32,
-            is_coarse: subdivided.longest_edge() > longest,
+            is_coarse,
             used_in: AtomicU64::new(0),
         })
     }

@@ -1,13 +1,9 @@
 //! Textures on the device, in arrays by size, so that no texture is ever bound for a single batch.
 
-use super::texels::mip_chain;
 use super::uploads::Uploads;
+use crate::backend::texels::{SIDES, array_for, mip_chain};
 use crate::scene::{Assets, Texture};
 use crate::view::RejectionReason;
-
-/// Sides of the arrays' square layers, in pixels. A texture goes into the first that holds it, scaled to its size; what is
-/// larger than the last is scaled down.
-const SIDES: [u32; 4] = [256, 512, 1024, 2048];
 
 /// Where a texture is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,11 +113,6 @@ impl Array {
             }
         }
     }
-}
-
-fn array_for(texture: &Texture) -> usize {
-    let longest = texture.width().max(texture.height());
-    SIDES.iter().position(|&side| longest <= side).unwrap_or(SIDES.len() - 1)
 }
 
 fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::Texture {

@@ -12,7 +12,7 @@ fn any_command() -> impl Strategy<Value = RenderCommand> {
         Just(u64::MAX),
         (0..64_u32).prop_map(|bit| 1 << bit),
         (0..64_u32).prop_map(|bit| (1 << bit) - 1),
-        any::<f32>().prop_map(|depth| SortKey::blended(depth).bits()),
+        any::<u32>().prop_map(|depth| SortKey::blended(depth).bits()),
     ];
     let slot = || prop_oneof![any::<u32>(), 0..300_u32, Just(u32::MAX), 0xffff_0000..=u32::MAX];
     (key, slot(), slot(), slot(), any::<u8>()).prop_map(|(bits, object, mesh, material, byte)| RenderCommand {
@@ -29,8 +29,8 @@ fn usual_commands(most: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
     let command = (0..200_u32, 0..30_u32, 0.1..100.0_f32, 0..10_u8).prop_map(|(mesh, material, depth, kind)| {
         let state = DrawState::from_byte(kind % 3);
         let key = match kind {
-            0 => SortKey::blended(depth),
-            _ => SortKey::opaque(state, mesh, depth),
+            0 => SortKey::blended(depth.to_bits() << 1),
+            _ => SortKey::opaque(state, mesh, depth.to_bits() << 1),
         };
         RenderCommand { key, object: 0, mesh, material, state }
     });
@@ -145,7 +145,7 @@ proptest! {
     #[test]
     fn usual_commands_are_short(commands in usual_commands(200)) {
         let coded = DeltaCommands::encode(&commands);
-        let opaque = commands.iter().filter(|command| command.key < SortKey::blended(f32::INFINITY)).count();
+        let opaque = commands.iter().filter(|command| command.key < SortKey::blended(u32::MAX)).count();
         // A byte says how long the others are. Of an opaque command the key changes in up to 7 bytes, the object in 2, the
         // material in 1 behind another that says so. Of a blended one mesh and state are there as well.
         prop_assert!(coded.bytes().len() <= HEADER + opaque * 12 + (commands.len() - opaque) * 14);
@@ -174,7 +174,7 @@ fn ways_to_code_that_there_are_not_are_found() {
 
 #[test]
 fn copies_of_an_object_are_a_byte_each() {
-    let key = SortKey::opaque(DrawState::PLAIN, 300_000, 4.0);
+    let key = SortKey::opaque(DrawState::PLAIN, 300_000, 4 << 20);
     let copy = |index: u32| RenderCommand {
         key,
         object: 5 + index * 126,

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::fxaa_twin::FxaaTwin;
 use super::{Placed, PlacedStep, PostStep};
-use crate::process::{FullScreen, RenderProcess};
+use crate::process::{FullScreen, RenderProcess, Twin};
 
 /// Smooths the steps that edges have where a pixel shows one surface or the other, from the picture alone (Lottes, "FXAA",
 /// NVIDIA 2009, in the form of its last version, 3.11).
@@ -35,6 +36,14 @@ impl Default for Fxaa {
     }
 }
 
+impl Fxaa {
+    /// The settings, each brought to between 0 and 1.
+    fn usable_settings(&self) -> [f32; 3] {
+        let settings = [self.contrast_threshold, self.dark_threshold, self.sub_pixel];
+        settings.map(|setting| if setting > 0.0 { setting.min(1.0) } else { 0.0 })
+    }
+}
+
 impl PostStep for Fxaa {
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
         Placed::between(source, target, *self)
@@ -45,12 +54,17 @@ impl PlacedStep for Fxaa {
     const NAME: &str = "fxaa";
 
     fn full_screen(&self) -> FullScreen<'static> {
-        let settings = [self.contrast_threshold, self.dark_threshold, self.sub_pixel, 0.0];
-        let parameters = settings.map(|setting| if setting > 0.0 { setting.min(1.0) } else { 0.0 });
+        let [contrast_threshold, dark_threshold, sub_pixel] = self.usable_settings();
+        let parameters = [contrast_threshold, dark_threshold, sub_pixel, 0.0];
         FullScreen {
             shader: include_str!("fxaa.wgsl"),
             parameters: bytemuck::cast_slice(&parameters).to_vec().into(),
             ..FullScreen::default()
         }
+    }
+
+    fn twin(&self) -> Twin {
+        let [contrast_threshold, dark_threshold, sub_pixel] = self.usable_settings();
+        Twin::full_screen(FxaaTwin { contrast_threshold, dark_threshold, sub_pixel })
     }
 }

@@ -1,11 +1,14 @@
 //! Post-processing: what is done to a picture after it was lit, step by step.
 
 mod fxaa;
+mod fxaa_twin;
 mod tone_mapping;
+mod tone_mapping_twin;
 
 use std::sync::Arc;
 
-use super::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
+use super::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, Twin};
+use crate::quality::Quality;
 
 pub use fxaa::Fxaa;
 pub use tone_mapping::{Exposure, ToneMapping};
@@ -59,6 +62,11 @@ pub use tone_mapping::{Exposure, ToneMapping};
 pub trait PostStep: Send + Sync {
     /// The process that does this step from the target `source` to the target `target`.
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess>;
+
+    /// The step to take instead in frames of a quality; `None`, unless said otherwise, for this one.
+    fn with_quality(&self, _quality: &Quality) -> Option<Arc<dyn PostStep>> {
+        None
+    }
 }
 
 impl<F, P> PostStep for F
@@ -76,6 +84,8 @@ trait PlacedStep: Send + Sync + 'static {
     const NAME: &str;
 
     fn full_screen(&self) -> FullScreen<'static>;
+
+    fn twin(&self) -> Twin;
 }
 
 /// A shipped step that knows where it stands.
@@ -102,6 +112,10 @@ impl<S: PlacedStep> RenderProcess for Placed<S> {
 
     fn draws(&self) -> Draws<'_> {
         Draws::FullScreen(self.step.full_screen())
+    }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(self.step.twin())
     }
 }
 

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::tone_mapping_twin::ToneMappingTwin;
 use super::{Placed, PlacedStep, PostStep, declare_step};
-use crate::process::{Declare, Draws, FullScreen, RenderProcess};
+use crate::process::{Declare, Draws, FullScreen, RenderProcess, Twin};
+use crate::quality::{Quality, ToneCurve};
 
-/// Maps radiance, which has no upper end, to a picture, which has: exposure, then the filmic curve that Narkowicz (2015)
-/// fitted to ACES, then sRGB. What is below zero, because something was taken away from it, is black.
+/// Maps radiance, which has no upper end, to a picture, which has: exposure, then a curve, then sRGB. What is below zero, because
+/// something was taken away from it, is black.
 ///
 /// As a process of its own it leads from the target `radiance` to the target `picture`; as a [`PostStep`], from and to
 /// whatever it is told.
@@ -15,6 +17,8 @@ use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 pub struct ToneMapping {
     /// Multiplies radiance.
     pub exposure: Exposure,
+    /// What ends at 1. In a [`Deferred`](crate::process::Deferred) pipeline that is told a quality, it is that of the quality.
+    pub curve: ToneCurve,
 }
 
 /// What radiance is multiplied by before it is mapped; 1 leaves it. What is not above 0, and what is not a number, makes a
@@ -26,7 +30,7 @@ pub struct ToneMapping {
 /// use drawloom::process::{Deferred, Exposure, ToneMapping};
 ///
 /// let exposure = Exposure::new(1.0);
-/// let deferred = Deferred::new().post(ToneMapping { exposure: exposure.clone() });
+/// let deferred = Deferred::new().post(ToneMapping::new(exposure.clone()));
 /// // Out of the cave.
 /// exposure.set(0.25);
 /// # let _ = deferred;
@@ -65,9 +69,15 @@ impl From<f32> for Exposure {
 }
 
 impl ToneMapping {
-    /// With an exposure: a number that stays, or an [`Exposure`] that changes.
+    /// Filmic, with an exposure: a number that stays, or an [`Exposure`] that changes.
     pub fn new(exposure: impl Into<Exposure>) -> Self {
-        Self { exposure: exposure.into() }
+        Self { exposure: exposure.into(), curve: ToneCurve::default() }
+    }
+
+    /// The exposure of the moment, finite and 0 or more: infinite, it would make what is black not a number.
+    fn usable_exposure(&self) -> f32 {
+        let exposure = self.exposure.get();
+        if exposure > 0.0 { exposure.min(f32::MAX) } else { 0.0 }
     }
 }
 
@@ -83,11 +93,19 @@ impl RenderProcess for ToneMapping {
     fn draws(&self) -> Draws<'_> {
         Draws::FullScreen(self.full_screen())
     }
+
+    fn twin(&self) -> Option<Twin> {
+        Some(PlacedStep::twin(self))
+    }
 }
 
 impl PostStep for ToneMapping {
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
         Placed::between(source, target, self.clone())
+    }
+
+    fn with_quality(&self, quality: &Quality) -> Option<Arc<dyn PostStep>> {
+        Some(Arc::new(Self { curve: quality.tone_curve, ..self.clone() }))
     }
 }
 
@@ -95,13 +113,15 @@ impl PlacedStep for ToneMapping {
     const NAME: &str = "tone mapping";
 
     fn full_screen(&self) -> FullScreen<'static> {
-        let exposure = self.exposure.get();
-        // Infinite, it would make what is black not a number.
-        let exposure = if exposure > 0.0 { exposure.min(f32::MAX) } else { 0.0 };
+        let clips = if self.curve == ToneCurve::Clipped { 1.0 } else { 0.0 };
         FullScreen {
             shader: include_str!("tone_mapping.wgsl"),
-            parameters: bytemuck::cast_slice(&[exposure, 0.0, 0.0, 0.0]).to_vec().into(),
+            parameters: bytemuck::cast_slice(&[self.usable_exposure(), clips, 0.0, 0.0]).to_vec().into(),
             ..FullScreen::default()
         }
+    }
+
+    fn twin(&self) -> Twin {
+        Twin::full_screen(ToneMappingTwin { exposure: self.usable_exposure(), curve: self.curve })
     }
 }

@@ -1,5 +1,7 @@
 struct Parameters {
     exposure: f32,
+    // 1 where what is brighter than 1 is cut off, and 0 where it is bent towards 1.
+    clips: f32,
 }
 
 @group(2) @binding(0) var<uniform> parameters: Parameters;
@@ -12,6 +14,9 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let sum = textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb;
     let finite = clamp(sum, vec3<f32>(0.0), vec3<f32>(65504.0));
     let radiance = min(finite * parameters.exposure, vec3<f32>(65504.0));
+    if parameters.clips == 1.0 {
+        return vec4<f32>(min(radiance, vec3<f32>(1.0)), 1.0);
+    }
     return vec4<f32>(filmic(radiance), 1.0);
 }
 

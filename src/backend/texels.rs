@@ -2,7 +2,17 @@
 
 use std::sync::LazyLock;
 
+use crate::raster::Real;
 use crate::scene::Texture;
+
+/// Sides of the squares that textures are scaled to, in pixels: of wgpu's arrays, and alike wherever else they are drawn.
+pub(super) const SIDES: [u32; 4] = [256, 512, 1024, 2048];
+
+/// Which of [`SIDES`] a texture is scaled to: the first that holds it, and the last where none does.
+pub(super) fn array_for(texture: &Texture) -> usize {
+    let longest = texture.width().max(texture.height());
+    SIDES.iter().position(|&side| longest <= side).unwrap_or(SIDES.len() - 1)
+}
 
 /// All mip levels of a texture scaled to a square, from `side` pixels down to one; RGBA bytes, sRGB encoded.
 pub(super) fn mip_chain(texture: &Texture, side: u32) -> Vec<Vec<u8>> {
@@ -15,6 +25,15 @@ pub(super) fn mip_chain(texture: &Texture, side: u32) -> Vec<Vec<u8>> {
         chain.push(encoded(&level));
     }
     chain
+}
+
+/// From sRGB encoded to linear, both from 0 to 1.
+pub(super) fn linear<R: Real>(value: R) -> R {
+    if value <= R::of(0.04045) {
+        value / R::of(12.92)
+    } else {
+        ((value + R::of(0.055)) / R::of(1.055)).powf(R::of(2.4))
+    }
 }
 
 type Texel = [f32; 4];
@@ -84,10 +103,6 @@ fn encoded(level: &[Texel]) -> Vec<u8> {
     let encode =
         |&[red, green, blue, alpha]: &Texel| [byte(srgb(red)), byte(srgb(green)), byte(srgb(blue)), byte(alpha)];
     level.iter().flat_map(encode).collect()
-}
-
-fn linear(value: f32) -> f32 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 fn srgb(value: f32) -> f32 {
