@@ -1,4 +1,4 @@
-//! Renders a scene through the whole frame, and says what that took.
+//! Renders a scene through the whole frame, and says what that took. Without a graphics adapter the processor draws it.
 //!
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
@@ -20,7 +20,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Backend, NullBackend, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Backend, NullBackend, Picture, SoftwareBackend, WgpuBackend};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::{Scene, obj, sample};
 use drawloom::task::Scheduler;
@@ -46,24 +46,25 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let scene = load_scene(arguments)?;
     let (report, log) = match arguments.backend {
-        BackendName::Null => {
-            let drawn = draw(arguments, &scene, NullBackend, NoDevice)?;
+        Some(BackendName::Null) => {
+            let drawn = draw(arguments, BackendName::Null, &scene, |_| NullBackend, NoDevice)?;
             (drawn.report, drawn.log)
         }
-        BackendName::Noop => {
+        Some(BackendName::Noop) => {
             let backend = wgpu_backend(arguments, adapter::noop_device()?)?;
-            let drawn = draw(arguments, &scene, backend, WgpuDevice::timed(false))?;
+            let drawn = draw(arguments, BackendName::Noop, &scene, |_| backend, WgpuDevice::timed(false))?;
             (drawn.report, drawn.log)
         }
-        BackendName::Wgpu => {
-            let backend = wgpu_backend(arguments, adapter::device()?)?;
-            let is_timed = arguments.html.is_some() || arguments.timeline.is_some();
-            let can_be_timed = backend.device().features().contains(wgpu::Features::TIMESTAMP_QUERY);
-            let backend = if is_timed && can_be_timed { backend.time_passes()? } else { backend };
-            let drawn = draw(arguments, &scene, backend, WgpuDevice::timed(is_timed && can_be_timed))?;
-            save(arguments, &drawn.last.submission)?;
-            (drawn.report, drawn.log)
+        Some(BackendName::Wgpu) => draw_on_adapter(arguments, &scene, adapter_backend(arguments)?)?,
+        Some(software @ (BackendName::Software | BackendName::Reference)) => {
+            draw_in_software(arguments, software, &scene, None)?
         }
+        None => match adapter_backend(arguments) {
+            Ok(backend) => draw_on_adapter(arguments, &scene, backend)?,
+            // Whoever says how wgpu is to record wants wgpu.
+            Err(error) if arguments.record.is_some() => return Err(error),
+            Err(error) => draw_in_software(arguments, BackendName::Software, &scene, Some(&*error))?,
+        },
     };
     report.print();
     timeline::tell(arguments, &log)?;
@@ -71,6 +72,39 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         Some(path) => report.write(path),
         None => Ok(()),
     }
+}
+
+fn adapter_backend(arguments: &Arguments) -> Result<WgpuBackend, Box<dyn Error>> {
+    wgpu_backend(arguments, adapter::device()?)
+}
+
+fn draw_on_adapter(
+    arguments: &Arguments,
+    scene: &Scene,
+    backend: WgpuBackend,
+) -> Result<(Report, Log), Box<dyn Error>> {
+    let is_timed = arguments.html.is_some() || arguments.timeline.is_some();
+    let is_timed = is_timed && backend.device().features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    let backend = if is_timed { backend.time_passes()? } else { backend };
+    let drawn = draw(arguments, BackendName::Wgpu, scene, |_| backend, WgpuDevice::timed(is_timed))?;
+    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    Ok((drawn.report, drawn.log))
+}
+
+/// Draws without an adapter: for that reason, if it is not what was asked for.
+fn draw_in_software(
+    arguments: &Arguments,
+    name: BackendName,
+    scene: &Scene,
+    reason: Option<&dyn Error>,
+) -> Result<(Report, Log), Box<dyn Error>> {
+    let make = |scheduler: &Arc<Scheduler>| match name {
+        BackendName::Reference => SoftwareBackend::reference(),
+        _ => SoftwareBackend::new(Arc::clone(scheduler)),
+    };
+    let drawn = draw(arguments, name, scene, make, NoDevice)?;
+    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    Ok((drawn.report.because(reason.map(with_causes)), drawn.log))
 }
 
 fn wgpu_backend(
@@ -122,8 +156,9 @@ struct Drawn<B: Backend> {
 /// Draws all frames.
 fn draw<B: Backend>(
     arguments: &Arguments,
+    name: BackendName,
     scene: &Scene,
-    backend: B,
+    make: impl FnOnce(&Arc<Scheduler>) -> B,
     mut device: impl Device<B>,
 ) -> Result<Drawn<B>, Box<dyn Error>> {
     let builder = Scheduler::builder().timeline_capacity(timeline::CAPACITY);
@@ -134,6 +169,7 @@ fn draw<B: Backend>(
     let workers = scheduler.workers();
     let deferred =
         Deferred::new().depth_pre_pass(arguments.depth_pre_pass).post(ToneMapping::default()).post(Fxaa::default());
+    let backend = make(&scheduler);
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?;
 
@@ -172,13 +208,12 @@ fn draw<B: Backend>(
 
     timeline.stop();
     let log = Log { device: device.end(renderer.backend(), &timeline)?, ..timeline.take() };
-    let report = Report::new(renderer.backend().adapter(), arguments, workers, &measured);
+    let report = Report::new(renderer.backend().adapter(), name, arguments, workers, &measured);
     Ok(Drawn { last: last.ok_or("no frame was drawn")?, report, log })
 }
 
-fn save(arguments: &Arguments, submission: &WgpuSubmission) -> Result<(), Box<dyn Error>> {
+fn save(arguments: &Arguments, picture: &Picture) -> Result<(), Box<dyn Error>> {
     let path = arguments.out.clone().unwrap_or_else(|| "frame.png".into());
-    let picture = submission.read(0, "picture")?;
     image::save_buffer(&path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
         .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
     println!("{} written", path.display());

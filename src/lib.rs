@@ -36,7 +36,7 @@
 //! # Features
 //!
 //! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the queue is there, with a
-//!   backend that counts and checks.
+//!   backend that counts and checks, and one that draws on the processor.
 //! - `obj` (default): OBJ files and their textures.
 //!
 //! # Spans

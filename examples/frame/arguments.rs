@@ -22,9 +22,10 @@ pub struct Arguments {
     #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
     pub camera: Option<PlacedCamera>,
 
-    /// What draws: `wgpu` an adapter, `noop` wgpu without one, `null` nothing, with every rule checked.
-    #[arg(long, value_enum, default_value = "wgpu")]
-    pub backend: BackendName,
+    /// What draws: `wgpu` an adapter, `software` the processor, `reference` the same in f64 on one thread, `noop` wgpu without an
+    /// adapter, `null` nothing, with every rule checked. If not given, an adapter, and the processor where there is none.
+    #[arg(long, value_enum)]
+    pub backend: Option<BackendName>,
 
     /// Threads that run jobs, this one included; as many as the machine has cores if not given.
     #[arg(long, value_name = "N")]
@@ -83,10 +84,10 @@ impl Arguments {
     /// The command line's arguments, or clap's error.
     pub fn checked() -> Self {
         let arguments = Self::parse();
-        if arguments.out.is_some() && arguments.backend != BackendName::Wgpu {
+        if arguments.out.is_some() && matches!(arguments.backend, Some(BackendName::Noop | BackendName::Null)) {
             conflict("--out needs a picture, and this backend draws none");
         }
-        if arguments.record.is_some() && arguments.backend == BackendName::Null {
+        if arguments.record.is_some() && !arguments.backend.is_none_or(BackendName::is_wgpu) {
             conflict("--record is for wgpu, and this backend records nothing");
         }
         arguments
@@ -137,6 +138,10 @@ impl RecordName {
 pub enum BackendName {
     /// wgpu on the machine's adapter.
     Wgpu,
+    /// The processor, in f32 on all workers.
+    Software,
+    /// The processor, in f64 on one thread: what the others should draw.
+    Reference,
     /// wgpu's own backend that does nothing: the price of recording alone.
     Noop,
     /// Drawloom's backend that counts and checks.
@@ -148,9 +153,15 @@ impl BackendName {
     pub fn name(self) -> &'static str {
         match self {
             Self::Wgpu => "wgpu",
+            Self::Software => "software",
+            Self::Reference => "reference",
             Self::Noop => "noop",
             Self::Null => "null",
         }
+    }
+
+    fn is_wgpu(self) -> bool {
+        matches!(self, Self::Wgpu | Self::Noop)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use drawloom::backend::{Backend, DeviceClock, NullBackend, PassTimes, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Backend, DeviceClock, PassTimes, WgpuBackend, WgpuSubmission};
 use drawloom::timeline::{DeviceLog, Timeline};
 
 /// A backend's device, as frames are drawn.
@@ -26,23 +26,19 @@ pub trait Device<B: Backend> {
     fn end(self, backend: &B, timeline: &Timeline) -> Result<Option<DeviceLog>, Box<dyn Error>>;
 }
 
-/// There is none.
+/// There is none, or none that works on by itself.
 pub struct NoDevice;
 
-impl Device<NullBackend> for NoDevice {
-    fn start(&mut self, _backend: &NullBackend, _timeline: &Timeline) -> Result<(), Box<dyn Error>> {
+impl<B: Backend> Device<B> for NoDevice {
+    fn start(&mut self, _backend: &B, _timeline: &Timeline) -> Result<(), Box<dyn Error>> {
         Ok(())
     }
 
-    fn wait(
-        &mut self,
-        _submission: &<NullBackend as Backend>::Submission,
-        _number: Option<u64>,
-    ) -> Result<(), Box<dyn Error>> {
+    fn wait(&mut self, _submission: &B::Submission, _number: Option<u64>) -> Result<(), Box<dyn Error>> {
         Ok(())
     }
 
-    fn end(self, _backend: &NullBackend, _timeline: &Timeline) -> Result<Option<DeviceLog>, Box<dyn Error>> {
+    fn end(self, _backend: &B, _timeline: &Timeline) -> Result<Option<DeviceLog>, Box<dyn Error>> {
         Ok(None)
     }
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use drawloom::FrameStatistics;
 use serde::Serialize;
 
-use crate::arguments::{Arguments, RecordName};
+use crate::arguments::{Arguments, BackendName, RecordName};
 
 /// What is told of the frames.
 #[derive(Serialize)]
@@ -26,6 +26,9 @@ pub struct Report {
     /// What was left out or not drawn as asked; only printed.
     #[serde(skip)]
     rejections: Vec<String>,
+    /// Why it was not drawn by what was to draw it; only printed.
+    #[serde(skip)]
+    reason: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -61,6 +64,7 @@ impl Report {
     /// From what each frame measured; there is at least one.
     pub fn new(
         adapter: String,
+        backend: BackendName,
         arguments: &Arguments,
         workers: usize,
         measured: &[(Duration, FrameStatistics)],
@@ -81,7 +85,7 @@ impl Report {
         let rejections = frame.rejections.iter();
         Self {
             adapter,
-            backend: arguments.backend.name(),
+            backend: backend.name(),
             workers,
             granularity: arguments.granularity.name(),
             record: arguments.record.map(RecordName::name),
@@ -107,13 +111,20 @@ impl Report {
                     )
                 })
                 .collect(),
+            reason: None,
         }
+    }
+
+    /// The same of frames that another backend was to draw, which could not for this reason.
+    pub fn because(self, reason: Option<String>) -> Self {
+        Self { reason, ..self }
     }
 
     /// As a table.
     pub fn print(&self) {
         let Self { adapter, backend, workers, granularity, objects, frames, .. } = self;
-        println!("adapter  {adapter}");
+        let reason = self.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
+        println!("drawn by {adapter}{reason}");
         let record = self.record.map_or(String::new(), |record| format!(", {record}"));
         println!("frames   {frames} on {backend}, {workers} workers, {granularity}{record}");
         println!("objects  {objects}");

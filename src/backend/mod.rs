@@ -2,6 +2,7 @@
 
 mod null;
 mod picture;
+mod software;
 mod subdivided;
 mod texels;
 #[cfg(feature = "wgpu")]
@@ -21,6 +22,7 @@ pub use self::wgpu::{
 };
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
+pub use software::{SoftwareBackend, SoftwareSubmission};
 
 /// What a frame needs of a device. Everything but [`Backend::submit`] is called while a frame is recorded, most of it from
 /// several workers at once; each of those takes the worker as proof that it runs in a job (M 10.3 asserts it).

@@ -1,0 +1,154 @@
+//! A frame on its way through the software backend.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+
+use super::assets::Meshes;
+use super::engine::Engine;
+use super::materials::MaterialTable;
+use super::number::{CameraPlace, Number};
+use super::object_pass::ObjectPass;
+use super::pass::{Attachments, DrawingPass};
+use super::picture_pass::{draw_full_screen, draw_lights};
+use super::pieces::pieces;
+use super::submission::SoftwareSubmission;
+use super::targets::FrameTargets;
+use crate::backend::{BackendError, PassRequest};
+use crate::process::{FullScreenTwin, LightTwin, LightValues, ObjectTwin, Pass, ViewValues};
+use crate::queue::{Batch, DrawList};
+use crate::scene::{Blend, Mesh};
+use crate::view::{ObjectTable, RejectionReason};
+
+/// A frame on its way, in either kind of number.
+pub(super) trait Recording: Send + Sync {
+    /// Takes in blocks of objects.
+    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>);
+
+    /// Subdivides the meshes that a pass draws so.
+    ///
+    /// # Errors
+    /// If it draws what is no mesh: an error of Drawloom's own.
+    fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
+
+    /// Draws everything.
+    ///
+    /// # Errors
+    /// If a twin panics.
+    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError>;
+}
+
+/// A recorded pass: what it draws.
+#[derive(Debug)]
+pub struct SoftwareCommands {
+    batches: Vec<Batch>,
+    objects: Vec<u32>,
+}
+
+impl SoftwareCommands {
+    pub(super) fn new(list: &DrawList) -> Self {
+        Self { batches: list.batches.clone(), objects: list.objects.clone() }
+    }
+}
+
+/// A frame on its way.
+pub(super) struct Frame<R: Number> {
+    pub(super) engine: Arc<Engine<R>>,
+    pub(super) views: Vec<ViewState<R>>,
+    /// In the order they are submitted.
+    pub(super) passes: Vec<FramePass<R>>,
+    pub(super) objects: R::Objects,
+    pub(super) meshes: Meshes,
+    /// By the mesh's slot, and how often its edges are halved.
+    pub(super) subdivided: Mutex<HashMap<(u32, u32), Arc<Mesh>>>,
+    pub(super) materials: Arc<MaterialTable>,
+    pub(super) targets: Arc<FrameTargets<R>>,
+}
+
+/// A view, as twins read it.
+pub(super) struct ViewState<R> {
+    pub(super) values: ViewValues<R>,
+    /// Those that reach it.
+    pub(super) lights: Vec<LightValues<R>>,
+    pub(super) camera: CameraPlace,
+}
+
+/// One process in one view.
+pub(super) struct FramePass<R: Number> {
+    pub(super) pass: Pass,
+    /// The process's name.
+    pub(super) process: String,
+    pub(super) draws: PassDraws<R>,
+    pub(super) attachments: Attachments<R>,
+}
+
+/// What a pass draws.
+pub(super) enum PassDraws<R: Number> {
+    Objects { twin: Arc<dyn ObjectTwin<R>>, writes_depth: bool },
+    FullScreen { twin: Arc<dyn FullScreenTwin<R>>, blend: Blend },
+    Lights { twin: Arc<dyn LightTwin<R>>, lights: Range<usize> },
+}
+
+impl<R: Number> Recording for Frame<R> {
+    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>) {
+        R::upload(&self.objects, objects, blocks);
+    }
+
+    fn prepare(&self, &PassRequest { frame: request, list, .. }: &PassRequest<'_>) -> Result<(), BackendError> {
+        for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
+            let halvings = batch.state.halvings();
+            let found = self.engine.subdivisions.find(request.scene.assets, batch.mesh, halvings);
+            let found = found.ok_or_else(no_such_mesh)?;
+            if found.is_coarse {
+                for &object in &list.objects[batch.first as usize..][..batch.count as usize] {
+                    request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
+                }
+            }
+            self.subdivided.lock().insert((batch.mesh, halvings), Arc::clone(&found.mesh));
+        }
+        Ok(())
+    }
+
+    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError> {
+        let _one_at_a_time = self.engine.drawing.lock();
+        for (pass, commands) in &passes {
+            let known = self.passes.iter().find(|known| known.pass == *pass);
+            let unknown = || BackendError::BrokenRule { rule: format!("{pass:?} is of this frame") };
+            self.draw(known.ok_or_else(unknown)?, commands)?;
+        }
+        Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
+    }
+}
+
+impl<R: Number> Frame<R> {
+    fn draw(&self, pass: &FramePass<R>, commands: &SoftwareCommands) -> Result<(), BackendError> {
+        let view = &self.views[pass.pass.view];
+        let drawing =
+            DrawingPass { crew: &self.engine.crew, view, materials: &*self.materials, attachments: &pass.attachments };
+        let outcome = match &pass.draws {
+            PassDraws::Objects { twin, writes_depth } => {
+                let subdivided = self.subdivided.lock();
+                let mesh_of = |batch: &Batch| {
+                    let mesh = match batch.state.halvings() {
+                        0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
+                        halvings => subdivided.get(&(batch.mesh, halvings)),
+                    };
+                    mesh.cloned().ok_or_else(no_such_mesh)
+                };
+                let pieces = pieces(&commands.batches, &commands.objects, mesh_of)?;
+                let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
+                let (twin, writes_depth) = (&**twin, *writes_depth);
+                ObjectPass { drawing, twin, writes_depth, pieces: &pieces, object_of: &object_of }.run()
+            }
+            PassDraws::FullScreen { twin, blend } => draw_full_screen(&drawing, &**twin, *blend),
+            PassDraws::Lights { twin, lights } => draw_lights(&drawing, &**twin, lights.clone()),
+        };
+        outcome.map_err(|panic| BackendError::TwinPanicked { process: pass.process.clone(), message: panic.message })
+    }
+}
+
+fn no_such_mesh() -> BackendError {
+    BackendError::BrokenRule { rule: "a batch draws a mesh that is there".to_owned() }
+}

@@ -1,0 +1,222 @@
+//! The views' targets.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use parking_lot::RwLock;
+
+use super::SoftwareBackend;
+use super::formats::append_bytes;
+use super::number::Number;
+use super::tiles::{Tile, Tiling};
+use crate::backend::{BackendError, Picture};
+use crate::process::{FramePlan, PlannedTarget, Sampled};
+use crate::raster::{Real, Vector, Vector4};
+use crate::scene::ViewKind;
+use crate::view::RenderView;
+
+/// A target's pixels: of one view, or, in layers, of all views of a kind.
+pub(super) struct Texture<R> {
+    pub(super) planned: PlannedTarget,
+    pub(super) tiling: Tiling,
+    layers: usize,
+    /// Layer after layer.
+    pub(super) tiles: RwLock<Vec<Tile<R>>>,
+}
+
+/// A target as one view has it.
+pub(super) struct Target<R> {
+    pub(super) texture: Arc<Texture<R>>,
+    pub(super) layer: usize,
+}
+
+impl<R> Clone for Target<R> {
+    fn clone(&self) -> Self {
+        Self { texture: Arc::clone(&self.texture), layer: self.layer }
+    }
+}
+
+/// The targets of one frame.
+pub(super) struct FrameTargets<R> {
+    /// One for each view: those it has for itself, and its layers of those it shares.
+    views: Vec<Vec<Target<R>>>,
+    /// Those that all views of a kind share.
+    layered: Vec<Arc<Texture<R>>>,
+}
+
+impl<R> Default for FrameTargets<R> {
+    fn default() -> Self {
+        Self { views: Vec::new(), layered: Vec::new() }
+    }
+}
+
+impl<R> FrameTargets<R> {
+    /// The target of one view by its name.
+    pub(super) fn find(&self, view: usize, name: &str) -> Option<&Target<R>> {
+        self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
+    }
+
+    /// All layers of what the views of a kind share.
+    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<Target<R>> {
+        let is_wanted = |texture: &&Arc<Texture<R>>| texture.planned.views == kind && texture.planned.name == name;
+        self.layered.iter().find(is_wanted).map(|texture| Target { texture: Arc::clone(texture), layer: 0 })
+    }
+}
+
+/// Keeps targets from frame to frame, and makes new ones where a picture's size or the plan changes. What no frame needs any
+/// more is dropped.
+pub(super) struct TargetCache<R> {
+    current: Arc<FrameTargets<R>>,
+}
+
+impl<R> Default for TargetCache<R> {
+    fn default() -> Self {
+        Self { current: Arc::default() }
+    }
+}
+
+impl<R: Number> TargetCache<R> {
+    /// The targets of a frame of these views.
+    ///
+    /// # Errors
+    /// If a picture is too large, or there is no memory for it.
+    pub(super) fn update(
+        &mut self,
+        plan: &FramePlan,
+        views: &[RenderView],
+    ) -> Result<Arc<FrameTargets<R>>, BackendError> {
+        let mut next = FrameTargets::default();
+        for planned in plan.targets().iter().filter(|planned| planned.layered) {
+            let mut sharing = views.iter().filter(|view| view.kind() == planned.views);
+            // Without a view there still is something to read: a pixel where nothing is.
+            let size = sharing.clone().next().map_or([1, 1], |view| view.camera.size);
+            let layers = sharing.by_ref().count().max(1);
+            let fits = |kept: &&Arc<Texture<R>>| (layers..=2 * layers).contains(&kept.layers);
+            let mut kept = self.current.layered.iter().filter(|kept| kept.is_for(planned, size));
+            let texture = match kept.find(fits) {
+                Some(kept) => Arc::clone(kept),
+                None => Arc::new(Texture::new(planned, size, layers)?),
+            };
+            next.layered.push(texture);
+        }
+        for (index, view) in views.iter().enumerate() {
+            let mut targets = Vec::new();
+            for planned in plan.targets().iter().filter(|planned| planned.views == view.kind()) {
+                if planned.layered {
+                    let shared = next.layered.iter().find(|texture| texture.planned == *planned);
+                    targets.extend(
+                        shared.map(|texture| Target { texture: Arc::clone(texture), layer: view.layer as usize }),
+                    );
+                    continue;
+                }
+                let kept = self.current.find(index, &planned.name);
+                let texture = match kept.filter(|kept| kept.texture.is_for(planned, view.camera.size)) {
+                    Some(kept) => Arc::clone(&kept.texture),
+                    None => Arc::new(Texture::new(planned, view.camera.size, 1)?),
+                };
+                targets.push(Target { texture, layer: 0 });
+            }
+            next.views.push(targets);
+        }
+        self.current = Arc::new(next);
+        Ok(Arc::clone(&self.current))
+    }
+}
+
+impl<R: Number> Texture<R> {
+    fn new(planned: &PlannedTarget, size: [u32; 2], layers: usize) -> Result<Self, BackendError> {
+        let (allowed, needed) = (SoftwareBackend::LARGEST_PICTURE, size[0].max(size[1]));
+        if needed > allowed {
+            let (allowed, needed) = (u64::from(allowed), u64::from(needed));
+            return Err(BackendError::Limit { limit: "largest width and height of a picture", allowed, needed });
+        }
+        let tiling = Tiling::new(size.map(|pixels| pixels as usize));
+        let out_of_memory = || BackendError::OutOfMemory { label: format!("the target {:?}", planned.name) };
+        let count = tiling.count().checked_mul(layers).ok_or_else(out_of_memory)?;
+        let mut tiles = Vec::new();
+        tiles.try_reserve_exact(count).map_err(|_| out_of_memory())?;
+        for _ in 0..count {
+            tiles.push(Tile::new(planned.format.channels()).ok_or_else(out_of_memory)?);
+        }
+        Ok(Self { planned: planned.clone(), tiling, layers, tiles: RwLock::new(tiles) })
+    }
+
+    fn is_for(&self, planned: &PlannedTarget, size: [u32; 2]) -> bool {
+        self.planned == *planned && self.tiling.size() == size.map(|pixels| pixels as usize)
+    }
+}
+
+impl<R: Number> Target<R> {
+    /// Where its tiles are among those of the texture.
+    pub(super) fn tiles(&self) -> Range<usize> {
+        let count = self.texture.tiling.count();
+        self.layer * count..(self.layer + 1) * count
+    }
+
+    /// Its pixels, as a device has them in memory.
+    pub(super) fn picture(&self) -> Picture {
+        let (format, size) = (self.texture.planned.format, self.texture.tiling.size());
+        let mut bytes = Vec::with_capacity(size[0] * size[1] * format.bytes());
+        self.visit(|pixel| append_bytes(format, pixel.0, &mut bytes));
+        Picture { width: size[0] as u32, height: size[1] as u32, format, bytes }
+    }
+
+    /// Its pixels as they are kept, rows from top to bottom.
+    pub(super) fn numbers(&self) -> Vec<[f64; 4]> {
+        let mut numbers = Vec::new();
+        self.visit(|pixel| numbers.push(pixel.0.map(Real::as_f64)));
+        numbers
+    }
+
+    fn visit(&self, mut visit: impl FnMut(Vector4<R>)) {
+        // No writer waits for this one while it waits for another.
+        let tiles = self.texture.tiles.read();
+        let sampled = self.sampled(&tiles);
+        let [width, height] = self.texture.tiling.size();
+        for y in 0..height {
+            (0..width).for_each(|x| visit(sampled.load([x, y], 0)));
+        }
+    }
+
+    /// What twins read of it.
+    pub(super) fn sampled<'a>(&self, tiles: &'a [Tile<R>]) -> SampledTarget<'a, R> {
+        let Texture { planned, tiling, layers, .. } = &*self.texture;
+        SampledTarget {
+            tiles,
+            tiling: *tiling,
+            channels: planned.format.channels(),
+            first: self.layer,
+            layers: *layers,
+        }
+    }
+}
+
+/// A target that a twin reads.
+pub(super) struct SampledTarget<'a, R> {
+    tiles: &'a [Tile<R>],
+    tiling: Tiling,
+    channels: usize,
+    /// The layer that is the twin's first.
+    first: usize,
+    layers: usize,
+}
+
+impl<R: Number> Sampled<R> for SampledTarget<'_, R> {
+    fn size(&self) -> [usize; 2] {
+        self.tiling.size()
+    }
+
+    fn load(&self, place: [usize; 2], layer: usize) -> Vector4<R> {
+        let layer = (self.first + layer).min(self.layers - 1);
+        let (tile, pixel) = self.tiling.find(place);
+        // Channels that a format lacks are those of opaque black.
+        let (zero, one) = (R::zero(), R::one());
+        Vector(match *self.tiles[layer * self.tiling.count() + tile].pixel(pixel, self.channels) {
+            [red] => [red, zero, zero, one],
+            [red, green] => [red, green, zero, one],
+            [red, green, blue] => [red, green, blue, one],
+            [red, green, blue, alpha, ..] => [red, green, blue, alpha],
+            [] => [zero, zero, zero, one],
+        })
+    }
+}
