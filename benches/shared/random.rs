@@ -9,7 +9,12 @@ pub struct Random(u64);
 
 impl Random {
     pub fn new() -> Self {
-        Self(0x5eed_d1a3_0000_0001)
+        Self::stream(0)
+    }
+
+    /// One of many sequences, for work that is shared out: which worker draws from it changes nothing.
+    pub fn stream(number: u64) -> Self {
+        Self(0x5eed_d1a3_0000_0001_u64.wrapping_add(number.wrapping_mul(0xd134_2543_de82_ef95)))
     }
 
     /// From `low` to `high`.

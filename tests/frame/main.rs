@@ -4,8 +4,11 @@ mod bad_input;
 mod changes;
 mod deferred;
 mod failing_process;
+mod occlusion;
+mod quality;
 mod rules;
 mod same_result;
+mod shadow_interval;
 mod timeline;
 #[cfg(feature = "wgpu")]
 mod uploads;

@@ -10,8 +10,10 @@ mod changes;
 mod device_times;
 mod devices;
 mod extremes;
+mod formats;
 mod geometry;
 mod judge;
+mod light_cut_off;
 mod light_volumes;
 mod lighting;
 mod painted;
@@ -24,11 +26,14 @@ mod requirements;
 mod same_bytes;
 mod shadow_bias;
 mod shadow_casters;
+mod shadow_interval;
 mod shadows;
+mod software;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 mod studio;
 mod techniques;
+mod transforms;
 mod transparency;
 
 use std::path::PathBuf;
@@ -45,7 +50,9 @@ fn main() {
     let cases = [
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
+        (formats::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
+        (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (painted::CASES, Needs::Adapter),
@@ -61,7 +68,11 @@ fn main() {
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),
+        (shadow_interval::CASES, Needs::Adapter),
         (shadows::CASES, Needs::Adapter),
+        (software::CASES, Needs::Adapter),
+        (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (transforms::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];

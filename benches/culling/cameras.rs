@@ -1,0 +1,57 @@
+//! Cameras as they are, and as they can be at the worst.
+
+use drawloom::glam::{DVec3, Quat};
+use drawloom::scene::{Camera, Projection, ViewKind};
+
+use crate::random::Random;
+
+/// One whose numbers are anywhere within what a camera can be, and often at an end of it: fields of view from 0.1° to 179°,
+/// pictures a hundred times as wide as high and the other way round, near planes from 1e-5 m, far planes up to 1e9 m and
+/// infinitely far, places up to 4e9 m from the world's origin, with and without perspective, and what lights see.
+pub fn any_camera(random: &mut Random) -> Camera {
+    let place = match random.below(4) {
+        0 => DVec3::ZERO,
+        _ => random.direction() * magnitude(random, 0.0, 9.6),
+    };
+    let mut camera = Camera::looking_at("any", place, DVec3::ZERO);
+    camera.orientation = match random.below(8) {
+        0 => Quat::IDENTITY,
+        _ => Quat::from_axis_angle(random.direction().as_vec3().normalize(), random.between(-3.2, 3.2) as f32),
+    };
+    let wide = magnitude(random, 0.0, 2.0) as u32;
+    camera.size = match random.below(3) {
+        0 => [40 * wide, 40],
+        1 => [40, 40 * wide],
+        _ => [1_920, 1_080],
+    };
+    camera.near = magnitude(random, -5.0, 2.0) as f32;
+    let far = match random.below(3) {
+        0 => 1e9,
+        _ => camera.near * magnitude(random, 0.001, 7.0) as f32,
+    };
+    let kind = random.below(10);
+    // Of those with perspective, one in two sees for ever.
+    camera.far = if kind < 4 { f32::INFINITY } else { far };
+    (camera.projection, camera.kind) = match kind {
+        ..8 => {
+            let degrees = match random.below(4) {
+                0 => 0.1,
+                1 => 179.0,
+                2 => magnitude(random, -1.0, 2.25),
+                _ => random.between(0.1, 179.0),
+            };
+            (Projection::Perspective { field_of_view: (degrees as f32).to_radians() }, ViewKind::Main)
+        }
+        8 => {
+            let kind = if random.below(2) == 0 { ViewKind::Shadow } else { ViewKind::Main };
+            (Projection::Orthographic { height: magnitude(random, -5.0, 7.0) as f32 }, kind)
+        }
+        _ => (Projection::Paraboloid, ViewKind::Shadow),
+    };
+    camera
+}
+
+/// Between two powers of ten, and any power of ten between them as likely as any other.
+pub fn magnitude(random: &mut Random, low: f64, high: f64) -> f64 {
+    10_f64.powf(random.between(low, high))
+}

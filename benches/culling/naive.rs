@@ -1,0 +1,33 @@
+//! How it is done elsewhere: planes from a matrix of f32 that takes the world to the picture (Gribb and Hartmann 2001), and
+//! places in the world in f32.
+
+use drawloom::glam::{DVec3, Mat4, Vec3, Vec4, Vec4Swizzles};
+use drawloom::scene::{Camera, Projection};
+use drawloom::view::RenderView;
+
+pub struct Naive {
+    planes: [Vec4; 6],
+}
+
+impl Naive {
+    /// `None` for a picture that no matrix makes.
+    pub fn new(camera: &Camera) -> Option<Self> {
+        if camera.projection == Projection::Paraboloid {
+            return None;
+        }
+        let place = Mat4::from_translation(-camera.position.as_vec3());
+        let clip = RenderView::new(camera).clip_from_relative() * place;
+        let [x, y, z, w] = [0, 1, 2, 3].map(|row| clip.row(row));
+        // The perspective matrix knows of no far plane: reversed depth only ends at 0.
+        let planes = [w + x, w - x, w + y, w - y, w - z, z].map(|plane| plane / plane.xyz().length().max(1e-30));
+        Some(Self { planes })
+    }
+
+    pub fn sees(&self, center: Vec3, radius: f32) -> bool {
+        self.planes.iter().all(|plane| plane.dot(center.extend(1.0)) >= -radius)
+    }
+
+    pub fn sees_in_world(&self, center: DVec3, radius: f32) -> bool {
+        self.sees(center.as_vec3(), radius)
+    }
+}

@@ -1,0 +1,157 @@
+//! Where one vertex comes to lie in a picture: as shaders work it out, as f32 in the world would have it, and where it is.
+
+use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
+use drawloom::scene::{Camera, Projection, Scene, ViewKind};
+use drawloom::view::{ObjectRecord, RenderView, ViewRecord};
+
+/// A vertex of an object in a view.
+#[derive(Clone, Debug)]
+pub struct Case {
+    pub camera: Camera,
+    /// Of the object, in the world.
+    pub position: DVec3,
+    pub orientation: Quat,
+    pub scale: Vec3,
+    /// In object space.
+    pub vertex: Vec3,
+}
+
+impl Case {
+    /// Where the vertex is, relative to the camera, along the world's axes: in f64. The camera's place is taken from the
+    /// object's first, which loses nothing that counts; a sum in the world would round to 10⁻⁷ m at 10⁹ m.
+    pub fn relative(&self) -> DVec3 {
+        let turned = unit(self.orientation) * (self.scale.as_dvec3() * self.vertex.as_dvec3());
+        (self.position - self.camera.position) + turned
+    }
+
+    /// Where it belongs in the picture, in pixels from the upper left: in f64, from what a camera is said to be.
+    pub fn truth(&self) -> DVec2 {
+        let local = unit(self.camera.orientation).inverse() * self.relative();
+        let [width, height] = self.camera.size.map(f64::from);
+        let clip = match self.camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let tangent = (f64::from(field_of_view) * 0.5).tan();
+                DVec2::new(local.x / (tangent * width / height), local.y / tangent) / -local.z
+            }
+            Projection::Orthographic { height: picture } => {
+                let half = f64::from(picture) * 0.5;
+                DVec2::new(local.x / (half * width / height), local.y / half)
+            }
+            // Half of the angle from the axis, as the mirror shows it (Brabec et al. 2002).
+            _ => {
+                let direction = local.normalize();
+                DVec2::new(direction.x, direction.y) / (1.0 - direction.z)
+            }
+        };
+        self.pixels(clip)
+    }
+
+    /// Where the shaders put it: `vertex` of `surface.wgsl`, in f32 and in the same order.
+    pub fn shaded(&self, object: &ObjectRecord, view: &ViewRecord) -> DVec2 {
+        let origin = fixed_difference(object, view);
+        let turned = rotate(Quat::from_array(object.orientation), Vec3::from(object.scale) * self.vertex);
+        self.placed(times(&view.clip_from_relative, origin + turned))
+    }
+
+    /// Where it would be, were all places in the world f32: object to world, world to view and view to clip space, each with
+    /// a matrix of its own, as most engines have it.
+    pub fn absolute(&self, view: &RenderView) -> DVec2 {
+        let camera = &self.camera;
+        let model = Mat4::from_scale_rotation_translation(self.scale, self.orientation, self.position.as_vec3());
+        let world_from_view = Mat4::from_rotation_translation(camera.orientation, camera.position.as_vec3());
+        let upright = RenderView::new(&Camera { orientation: Quat::IDENTITY, ..view.camera.clone() });
+        let world = times(&model, self.vertex).truncate();
+        let local = times(&world_from_view.inverse(), world).truncate();
+        self.placed(times(&upright.clip_from_relative(), local))
+    }
+
+    /// How far the vertex is from the middle of the picture, in pixels.
+    pub fn eccentricity(&self) -> f64 {
+        let [width, height] = self.camera.size.map(f64::from);
+        self.truth().distance(DVec2::new(width, height) * 0.5)
+    }
+
+    /// What comes after the matrix, as `clip_position` of `drawloom.wgsl` has it. What comes after the shader is the device's: it
+    /// is done in f64, so that only what the shader lost is measured.
+    fn placed(&self, clip: Vec4) -> DVec2 {
+        if self.camera.projection == Projection::Paraboloid {
+            let place = clip.truncate();
+            let distance = place.length();
+            let forward = -place.z / distance.max(1e-30);
+            let across = distance.max(1e-30) * (1.0 + forward).max(0.1);
+            return self.pixels(DVec2::new(f64::from(place.x / across), f64::from(place.y / across)));
+        }
+        let clip = clip.as_dvec4();
+        self.pixels(DVec2::new(clip.x, clip.y) / clip.w)
+    }
+
+    fn pixels(&self, clip: DVec2) -> DVec2 {
+        let [width, height] = self.camera.size.map(f64::from);
+        DVec2::new((clip.x * 0.5 + 0.5) * width, (0.5 - clip.y * 0.5) * height)
+    }
+}
+
+/// How many pixels a radian is, at most, at this distance from the middle of a perspective picture: towards the edge the
+/// picture is stretched. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, whose derivative
+/// is f(1 + tan² a).
+pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
+    match camera.projection {
+        Projection::Perspective { field_of_view } => {
+            let focal = f64::from(camera.size[1]) * 0.5 / (f64::from(field_of_view) * 0.5).tan();
+            focal + eccentricity * eccentricity / focal
+        }
+        // tan(a / 2) times half the picture, whose derivative is half of that at the rim, and less before it.
+        _ => f64::from(camera.size[1]) * 0.5,
+    }
+}
+
+/// The view's record as every backend has it.
+///
+/// # Panics
+/// If the camera is out of reach.
+pub fn record_of(view: &RenderView) -> ViewRecord {
+    ViewRecord::new(view, &Scene::new().as_scene_ref(), 0).expect("the camera is within reach")
+}
+
+fn unit(orientation: Quat) -> DQuat {
+    orientation.as_dquat().normalize()
+}
+
+fn rotate(orientation: Quat, direction: Vec3) -> Vec3 {
+    let axis = Vec3::new(orientation.x, orientation.y, orientation.z);
+    let twice = 2.0 * axis.cross(direction);
+    direction + orientation.w * twice + axis.cross(twice)
+}
+
+fn times(matrix: &Mat4, place: Vec3) -> Vec4 {
+    matrix.x_axis * place.x + matrix.y_axis * place.y + matrix.z_axis * place.z + matrix.w_axis
+}
+
+fn fixed_difference(object: &ObjectRecord, view: &ViewRecord) -> Vec3 {
+    let (low, from_low) = (UVec3::from(object.position_low), UVec3::from(view.position_low));
+    let mut difference = Vec3::ZERO;
+    for axis in 0..3 {
+        let borrow = i32::from(low[axis] < from_low[axis]);
+        let low = low[axis].wrapping_sub(from_low[axis]);
+        let high = object.position_high[axis].wrapping_sub(view.position_high[axis]).wrapping_sub(borrow);
+        let negative = high < 0;
+        let magnitude_low = if negative { (!low).wrapping_add(1) } else { low };
+        let magnitude_high = if negative { (!(high as u32)).wrapping_add(u32::from(low == 0)) } else { high as u32 };
+        let magnitude = magnitude_high as f32 * 4.0 + magnitude_low as f32 * STEP;
+        difference[axis] = if negative { -magnitude } else { magnitude };
+    }
+    difference
+}
+
+/// 2⁻³⁰ m.
+const STEP: f32 = 1.0 / (1_u32 << 30) as f32;
+
+/// Whether what the camera sees of that point is in its picture, and not before its near plane.
+pub fn is_seen(case: &Case) -> bool {
+    let local = unit(case.camera.orientation).inverse() * case.relative();
+    let place = case.truth();
+    let [width, height] = case.camera.size.map(f64::from);
+    let distance = if case.camera.projection == Projection::Paraboloid { local.length() } else { -local.z };
+    let near = case.camera.kind == ViewKind::Shadow || distance >= f64::from(case.camera.near);
+    near && distance > 0.0 && (0.0..=width).contains(&place.x) && (0.0..=height).contains(&place.y)
+}

@@ -1,0 +1,132 @@
+//! Nothing that a camera sees is left out, whatever stands for it: the cases of `benches/culling.rs`, and frames.
+
+#[path = "../benches/culling/boxes.rs"]
+#[expect(dead_code, reason = "nothing is added up here")]
+mod boxes;
+#[path = "../benches/culling/cameras.rs"]
+mod cameras;
+#[path = "../benches/culling/naive.rs"]
+mod naive;
+#[path = "../benches/culling/oracle.rs"]
+mod oracle;
+#[path = "../benches/shared/random.rs"]
+#[expect(dead_code, reason = "there is more to draw by chance elsewhere")]
+mod random;
+#[path = "../benches/culling/spheres.rs"]
+#[expect(dead_code, reason = "nothing is added up here")]
+mod spheres;
+#[path = "../benches/culling/tally.rs"]
+mod tally;
+
+use std::error::Error;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::{CullingVolume, Quality};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
+use drawloom::task::Scheduler;
+use drawloom::view::{Frustum, ObjectTable};
+
+use boxes::{BoxTallies, Shapes, VOLUMES};
+use tally::Tallies;
+
+/// Of what is outside and anywhere, the share that may be kept.
+const MOST_FALSE_VISIBLES: f64 = 1e-3;
+
+/// Neither is a test passed by seeing everything, nor by cases that are all far from where it is decided.
+fn check(what: &str, tallies: &Tallies) {
+    assert_eq!(tallies.false_culls(), 0, "{what}: of {} cases", tallies.cases());
+    let share = tallies.anywhere.false_share();
+    assert!(share <= MOST_FALSE_VISIBLES, "{what}: {share} of {:?}", tallies.anywhere);
+    for tally in [tallies.tangent, tallies.anywhere] {
+        assert!(tally.outside > tally.cases / 10, "{what}: {tally:?}");
+    }
+}
+
+#[test]
+fn no_sphere_that_is_seen_is_culled() {
+    let tallies = spheres::try_batches(0..2_000);
+    check("sphere", &tallies.ours);
+    // The cases are hard: how it is commonly done fails one in ten.
+    assert!(tallies.naive.tangent.false_culls > tallies.naive.tangent.cases / 20, "{:?}", tallies.naive);
+}
+
+#[test]
+fn no_object_that_is_seen_is_culled_by_what_stands_for_it() -> Result<(), Box<dyn Error>> {
+    let BoxTallies { volumes, rejected } = boxes::try_batches(&Shapes::new()?, 0..400);
+    assert_eq!(rejected, 0);
+    for (volume, tallies) in VOLUMES.iter().zip(&volumes) {
+        check(&format!("{volume:?}"), tallies);
+    }
+    Ok(())
+}
+
+/// Poles 3 m beside the picture, whose balls reach into it. One stands upright, and so does its box; one lies along the picture's
+/// edge, where the box along the world's axes reaches into it and the pole does not.
+#[test]
+fn frames_draw_what_the_volume_holds() -> Result<(), Box<dyn Error>> {
+    let mut scene = Scene::new();
+    let half = Vec3::new(0.1, 0.1, 10.0);
+    let vertices = [-1.0, 1.0, 1.0].map(|sign| Vertex { position: (half * sign).to_array(), ..Vertex::default() });
+    let pole = scene.add(Mesh::new("pole", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
+    let paint = scene.add(Material::default())?;
+    // The camera looks along −z, and 10 m along the picture ends 10.3 m to the right, at 45.7°.
+    let beside = RenderObject::new(pole, paint, DVec3::new(14.5, 0.0, -10.0));
+    for orientation in [Quat::from_rotation_x(90_f32.to_radians()), Quat::from_rotation_y(-45.7_f32.to_radians())] {
+        scene.add_object(RenderObject { orientation, ..beside })?;
+    }
+    // Seen, and far behind.
+    scene.add_object(RenderObject::new(pole, paint, DVec3::new(0.0, 0.0, -10.0)))?;
+    scene.add_object(RenderObject::new(pole, paint, DVec3::new(0.0, 0.0, 100.0)))?;
+    scene.cameras.push(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let (mut renderer, submitter) = builder.build(scheduler)?;
+    let mut visible = |volume| -> Result<usize, Box<dyn Error>> {
+        renderer.set_quality(Quality { culling: volume, ..Quality::balanced() })?;
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+        Ok(submitted.statistics.views[0].visible)
+    };
+    for _ in 0..2 {
+        let counts = [CullingVolume::None, CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox];
+        assert_eq!(counts.map(|volume| visible(volume).ok()), [4, 3, 2, 1].map(Some));
+    }
+    Ok(())
+}
+
+/// Nothing is hidden for want of a box: an engine's own bounds are what counts, and what cannot be drawn is not.
+#[test]
+fn bounds_of_an_engine_are_its_word() -> Result<(), Box<dyn Error>> {
+    let mut scene = Scene::new();
+    let vertices = [0.0, 0.1, 0.1].map(|size| Vertex { position: [size; 3], ..Vertex::default() });
+    let speck = scene.add(Mesh::new("speck", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
+    let paint = scene.add(Material::default())?;
+    // Behind the camera: seen only by who believes that it moves its vertices 9 m.
+    for _ in 0..3 {
+        scene.add_object(RenderObject::new(speck, paint, DVec3::new(0.0, 0.0, 5.0)))?;
+    }
+    let lent = scene.as_scene_ref();
+    let mut bounds = lent.bounds.to_vec();
+    bounds[1].radius = 9.0;
+    bounds[2].radius = f32::NAN;
+    let lent = drawloom::scene::SceneRef { bounds: &bounds, ..lent };
+    let frustum = Frustum::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+    for (volume, seen) in [
+        (CullingVolume::None, 0b011),
+        (CullingVolume::Sphere, 0b010),
+        (CullingVolume::Box, 0b010),
+        (CullingVolume::OrientedBox, 0b010),
+    ] {
+        let mut table = ObjectTable::default();
+        table.hold(volume);
+        table.reset(3);
+        table.fill(&lent, 0..3);
+        assert_eq!(table.block(0).seen(&frustum, volume, 0..3), seen, "{volume:?}");
+        assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
+    }
+    Ok(())
+}

@@ -1,0 +1,229 @@
+//! Lights: at surfaces, in them, behind them, and as bright and as dim as numbers go.
+
+use std::f32::consts::FRAC_PI_2;
+
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::look::Look;
+use crate::scenes::{cube, sized, square};
+use crate::signs::told;
+use crate::stage::Studio;
+
+pub const CASES: &[Case] = &[
+    ("lights_at_a_surface_in_it_and_a_hair_before_it", at_a_surface),
+    ("lights_as_bright_as_f32_goes_leave_no_pixel_that_is_not_a_number", blinding),
+    ("an_opaque_pane_hides_what_is_too_bright_for_half_floats", pane),
+    ("lights_of_every_range_light_what_they_reach", ranges),
+    ("cones_from_nothing_to_a_half_space", cones),
+    ("a_lights_brightness_falls_off_as_it_should_from_a_millimetre_to_a_megametre", falloff),
+    ("a_camera_in_a_light_and_at_it", camera_at_light),
+];
+
+const SIZE: [u32; 2] = [33, 33];
+
+/// A wall of 20 m at the origin that faces +Z, seen from 5 m.
+fn wall(diffuse: f32) -> Result<Scene, Failed> {
+    let mut scene = Scene::new();
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), SIZE)];
+    let material = scene.add(Material { diffuse: Vec3::splat(diffuse), ..Material::default() })?;
+    let mesh = scene.add(square(Topology::TriangleList))?;
+    scene.add_object(RenderObject { scale: Vec3::splat(10.0), ..RenderObject::new(mesh, material, DVec3::ZERO) })?;
+    Ok(scene)
+}
+
+/// A light of every kind that has a place, with and without a shadow.
+fn lamps(position: DVec3, intensity: Vec3, range: f32, direction: Vec3) -> Vec<Light> {
+    let mut lamps = vec![Light::Point { position, intensity, range }];
+    for casts_shadow in [false, true] {
+        let (inner_angle, outer_angle) = (0.2, 0.8);
+        lamps.push(Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow });
+        lamps.push(Light::Hemispherical { position, direction, intensity, range, casts_shadow });
+    }
+    lamps
+}
+
+fn drawn(studio: &mut Studio, what: &str, scene: &Scene) -> Result<Option<Look>, Failed> {
+    Ok(studio.draw(scene).map_err(|failed| told(what, failed))?.look)
+}
+
+/// Fails where there is light of a channel that no light has: what is not a number becomes any once it is cut off.
+fn only_of(look: &Look, color: Vec3) -> Result<(), Failed> {
+    let greatest = look.greatest();
+    let is_dark = |(greatest, color): (f64, f32)| color > 0.0 || greatest == 0.0;
+    let holds = greatest.into_iter().zip(color.to_array()).all(is_dark);
+    if holds { Ok(()) } else { Err(format!("{color} becomes {greatest:?}").into()) }
+}
+
+fn at_a_surface(studio: &mut Studio) -> Result<(), Failed> {
+    for height in [0.0, -0.0, 1e-30, 1e-20, 1e-9, -1e-9, 1e-6, -1e-6, 1e-3, -1e-3] {
+        for direction in [Vec3::NEG_Z, Vec3::X, Vec3::Z] {
+            // The middle pixel sees just the place on the surface that the light is at.
+            for intensity in [1.0, 1e10, 1e38] {
+                for lamp in lamps(DVec3::Z * height, Vec3::X * intensity, 10.0, direction) {
+                    let what = format!("{lamp:?}");
+                    let mut scene = wall(0.5)?;
+                    scene.lights = vec![lamp];
+                    let Some(look) = drawn(studio, &what, &scene)? else { continue };
+                    only_of(&look, Vec3::X).map_err(|failed| told(&what, failed))?;
+                    let behind = height < 0.0 || (direction.z > 0.0 && !matches!(lamp, Light::Point { .. }));
+                    // What is behind a surface, or shines away from it, does not light it.
+                    if behind && look.covered() > 0.0 {
+                        return Err(format!("{what}: lights {:.1}% from behind", look.covered() * 100.0).into());
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn blinding(studio: &mut Studio) -> Result<(), Failed> {
+    for intensity in [1e5, 1e20, 1e38, f32::MAX] {
+        for color in [Vec3::ONE, Vec3::X, Vec3::new(0.0, 1.0, 1e-30)] {
+            for diffuse in [1.0, 1e-30, f32::MAX] {
+                for blend in [Blend::None, Blend::Alpha, Blend::Additive, Blend::Subtractive] {
+                    let mut scene = wall(diffuse)?;
+                    let (mesh, wall) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
+                    let pane = Material { blend, opacity: 0.5, ..scene.assets().get(wall)?.clone() };
+                    let pane = scene.add(pane)?;
+                    scene.add_object(RenderObject::new(mesh, pane, DVec3::Z * 0.5))?;
+                    let sun = |casts_shadow| Light::Directional {
+                        direction: Vec3::NEG_Z,
+                        illuminance: color * intensity,
+                        casts_shadow,
+                    };
+                    scene.lights = lamps(DVec3::Z, color * intensity, f32::MAX, Vec3::NEG_Z);
+                    scene.lights.extend([sun(false), sun(true)]);
+                    let what = format!("{color} * {intensity:e} on {diffuse:e}, {blend:?}");
+                    let Some(look) = drawn(studio, &what, &scene)? else { continue };
+                    only_of(&look, color).map_err(|failed| told(&what, failed))?;
+                    if look.radiance(2, 2)[1..] == [0.0; 2] && color.y == 1.0 && diffuse == 1.0 {
+                        return Err(format!("{what}: the wall is dark").into());
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn pane(studio: &mut Studio) -> Result<(), Failed> {
+    let mut scene = wall(1.0)?;
+    let mesh = scene.as_scene_ref().meshes[0];
+    let dark =
+        Material { diffuse: Vec3::ZERO, emission: Vec3::splat(0.25), blend: Blend::Alpha, ..Material::default() };
+    let dark = scene.add(dark)?;
+    scene.add_object(RenderObject::new(mesh, dark, DVec3::Z * 0.5))?;
+    scene.lights = lamps(DVec3::Z, Vec3::splat(1e30), 100.0, Vec3::NEG_Z);
+    let Some(look) = drawn(studio, "a pane", &scene)? else { return Ok(()) };
+    if look.middle() == [0.25; 3] { Ok(()) } else { Err(format!("it shows {:?}", look.middle()).into()) }
+}
+
+fn ranges(studio: &mut Studio) -> Result<(), Failed> {
+    for range in [f32::from_bits(1), f32::MIN_POSITIVE, 1e-20, 1e-6, 0.5, 2.0, 1e3, 1e9, 1e20, 1e38, f32::MAX] {
+        for lamp in lamps(DVec3::Z, Vec3::splat(10.0), range, Vec3::NEG_Z) {
+            let mut scene = wall(0.5)?;
+            scene.lights = vec![lamp];
+            let what = format!("{lamp:?}");
+            let Some(look) = drawn(studio, &what, &scene)? else { continue };
+            let middle = look.middle()[0];
+            // 1 m away: 10 lux on a surface of diffuse 0.5, windowed by the range.
+            let window = (1.0 - f64::from(range).powi(-4)).max(0.0);
+            let expected = 10.0 * 0.5 / std::f64::consts::PI * window * window;
+            let expected = if range > 1.0 { expected } else { 0.0 };
+            if (middle - expected).abs() > 0.02 * expected + 1e-6 {
+                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn cones(studio: &mut Studio) -> Result<(), Failed> {
+    let angles = [[0.0, 1e-3], [0.0, 0.05], [1.0, 1.001], [0.0, FRAC_PI_2], [1.5, FRAC_PI_2], [1.569, FRAC_PI_2]];
+    for [inner_angle, outer_angle] in angles {
+        for casts_shadow in [false, true] {
+            let mut scene = wall(0.5)?;
+            let (position, direction, intensity) = (DVec3::Z, Vec3::NEG_Z, Vec3::splat(10.0));
+            scene.lights = vec![Light::Spot {
+                position,
+                direction,
+                intensity,
+                range: 1e3,
+                inner_angle,
+                outer_angle,
+                casts_shadow,
+            }];
+            let what = format!("{inner_angle}..{outer_angle}, shadow {casts_shadow}");
+            let Some(look) = drawn(studio, &what, &scene)? else { continue };
+            let middle = look.middle()[0];
+            let expected = 10.0 * 0.5 / std::f64::consts::PI;
+            // The middle pixel is 0.17 m wide.
+            if outer_angle > 0.3 && (middle - expected).abs() > 0.02 * expected {
+                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+            }
+            let corner = look.radiance(0, 0)[0];
+            if outer_angle < 1.2 && corner != 0.0 {
+                return Err(format!("{what}: the corner is {corner}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn falloff(studio: &mut Studio) -> Result<(), Failed> {
+    for distance in [1e-3, 1.0, 1e3, 1e6] {
+        for lamp in lamps(
+            DVec3::Z * distance,
+            Vec3::splat((distance * distance * 3.0) as f32),
+            (distance * 100.0) as f32,
+            Vec3::NEG_Z,
+        ) {
+            let mut scene = wall(0.5)?;
+            let camera = &mut scene.cameras[0];
+            (camera.position, camera.near) = (DVec3::Z * distance * 5.0, (distance * 0.01) as f32);
+            let handle = scene.objects().next().ok_or("there is a wall")?;
+            let mut object = scene.object(handle)?;
+            object.scale = Vec3::splat((distance * 2.0) as f32);
+            scene.replace_object(handle, object)?;
+            scene.lights = vec![lamp];
+            let what = format!("{lamp:?}");
+            let Some(look) = drawn(studio, &what, &scene)? else { continue };
+            let (middle, expected) = (look.middle()[0], 3.0 * 0.5 / std::f64::consts::PI);
+            if (middle - expected).abs() > 0.02 * expected {
+                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn camera_at_light(studio: &mut Studio) -> Result<(), Failed> {
+    for offset in [DVec3::ZERO, DVec3::splat(1e-9), DVec3::X * 0.05, DVec3::Z * 0.5] {
+        for range in [6.0, 1e3, 1e9] {
+            let position = DVec3::Z * 5.0 + offset;
+            for lamp in lamps(position, Vec3::splat(100.0), range, Vec3::NEG_Z) {
+                let mut scene = wall(0.5)?;
+                // A box behind the camera, and the camera in another that has no inside.
+                let block = scene.add(cube())?;
+                let material = scene.as_scene_ref().materials[0];
+                let around = RenderObject::new(block, material, position + DVec3::Z * 2.5);
+                scene.add_object(RenderObject { orientation: Quat::from_rotation_z(0.5), ..around })?;
+                scene.lights = vec![lamp];
+                let what = format!("{lamp:?}");
+                let Some(look) = drawn(studio, &what, &scene)? else { continue };
+                let away = 5.0 + offset.z;
+                let window = 1.0 - (away / f64::from(range)).powi(4);
+                let expected = 100.0 * 0.5 / std::f64::consts::PI * window * window / (away * away);
+                let middle = look.middle()[0];
+                if (middle - expected).abs() > 0.03 * expected {
+                    return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! Every knob of the quality at its ends, and beyond.
+
+use drawloom::BuildError;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::quality::{
+    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, QualityError, ShadowQuality, ToneCurve,
+    TransformPrecision, VertexFormat,
+};
+use drawloom::scene::{Camera, Light, Material, Scene};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::scenes::everything::everything;
+use crate::signs::{RED, Sign, Signs, camera, told};
+use crate::stage::{OpenError, Studio};
+
+pub const CASES: &[Case] = &[
+    ("presets_draw_every_scene", presets),
+    ("every_knob_at_its_ends_draws_every_scene", ends),
+    ("a_quality_that_cannot_be_is_refused_by_the_knobs_name", invalid),
+];
+
+/// As bright as numbers go, with everything that can be in a scene.
+fn blinding() -> Result<Scene, Failed> {
+    let mut scene = everything();
+    let bright = Vec3::splat(f32::MAX);
+    for light in &mut scene.lights {
+        match light {
+            Light::Directional { illuminance: color, .. }
+            | Light::Point { intensity: color, .. }
+            | Light::Spot { intensity: color, .. }
+            | Light::Hemispherical { intensity: color, .. } => *color = Vec3::new(f32::MAX, 0.0, 1.0),
+            _ => {}
+        }
+    }
+    let materials: Vec<_> = scene.assets().iter::<Material>().map(|(handle, one)| (handle, one.clone())).collect();
+    for (handle, material) in materials {
+        scene.replace(handle, Material { diffuse: bright, emission: bright, ..material })?;
+    }
+    (scene.ambient, scene.background) = (bright, bright);
+    Ok(scene)
+}
+
+/// Scenes of which some are known to every pixel.
+fn expect_all(studio: &mut Studio, what: &str) -> Result<(), Failed> {
+    for position in [DVec3::ZERO, DVec3::new(1e3, -2e3, 5e2)] {
+        let camera = Camera { position, ..camera([48, 32]) };
+        let signs = [
+            Sign::before(&camera, 5.0, 1.5).moved(&camera, 1.5, 1.0),
+            Sign::before(&camera, 9.0, 3.0).moved(&camera, -1.0, 0.0).colored(RED),
+        ];
+        Signs::new(camera, signs)?.expect(studio, what, 2)?;
+    }
+    Signs::new(camera([48, 32]), [])?.expect(studio, what, 0)?;
+    for (name, scene) in [("everything", everything()), ("blinding", blinding()?)] {
+        let drawn = studio.draw_whole(&scene).map_err(|failed| told(&format!("{what}: {name}"), failed))?;
+        if drawn.look.is_some_and(|look| look.covered() < 0.9) {
+            return Err(format!("{what}: {name} is dark").into());
+        }
+    }
+    Ok(())
+}
+
+fn presets(studio: &mut Studio) -> Result<(), Failed> {
+    for (name, quality) in [("fast", Quality::fast()), ("balanced", Quality::balanced()), ("exact", Quality::exact())] {
+        let quality = studio.name().affordable(quality);
+        let mut studio = studio.with_quality(quality).map_err(|error| error.to_string())?;
+        // More than once: what is kept from frame to frame is to be right as well.
+        for _ in 0..2 {
+            expect_all(&mut studio, name)?;
+        }
+    }
+    Ok(())
+}
+
+fn ends(studio: &mut Studio) -> Result<(), Failed> {
+    let usual = studio.name().affordable(Quality::balanced());
+    let shadows = usual.shadows;
+    let key = |bits, curve| DepthKey { bits, curve };
+    let linear = |far| DepthCurve::Linear { far };
+    for quality in [
+        Quality { opaque_order: key(1, DepthCurve::Logarithmic), ..usual },
+        Quality { opaque_order: key(DepthKey::MOST_OPAQUE_BITS, linear(f32::MAX)), ..usual },
+        Quality { opaque_order: key(1, linear(f32::MIN_POSITIVE)), ..usual },
+        Quality { blended_order: key(1, linear(f32::from_bits(1))), ..usual },
+        Quality { blended_order: key(31, linear(f32::MAX)), ..usual },
+        Quality { culling: CullingVolume::None, ..usual },
+        Quality { culling: CullingVolume::Box, ..usual },
+        Quality { culling: CullingVolume::OrientedBox, ..usual },
+        Quality { occlusion: Some(1), ..usual },
+        Quality { occlusion: Some(16), culling: CullingVolume::OrientedBox, ..usual },
+        Quality { normals: NormalFormat::Octahedral8, ..usual },
+        Quality { normals: NormalFormat::Octahedral10, ..usual },
+        Quality { normals: NormalFormat::Octahedral16, ..usual },
+        Quality { diffuse: DiffuseFormat::HalfFloat, ..usual },
+        Quality { vertices: VertexFormat::Packed, ..usual },
+        Quality { depth_pre_pass: true, ..usual },
+        Quality { shadows: ShadowQuality { side: 1, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { side: 1, filter: 4, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { filter: 4, side: 64, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { bias: 0.0, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { bias: f32::MAX, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { interval: u32::MAX, ..shadows }, ..usual },
+        Quality { shadows: ShadowQuality { widest_edge: 90.0, ..shadows }, ..usual },
+        Quality { light_cut_off: f32::MAX, ..usual },
+        Quality { light_cut_off: f32::from_bits(1), ..usual },
+        Quality { tone_curve: ToneCurve::Clipped, ..usual },
+        Quality { transforms: TransformPrecision::Absolute, ..usual },
+    ] {
+        let changed = format!("{quality:?}");
+        let mut studio = studio.with_quality(quality).map_err(|error| error.to_string())?;
+        expect_all(&mut studio, &changed)?;
+    }
+    Ok(())
+}
+
+fn invalid(studio: &mut Studio) -> Result<(), Failed> {
+    let usual = Quality::exact();
+    let shadows = usual.shadows;
+    let key = |bits, curve| DepthKey { bits, curve };
+    for (wrong, knob) in [
+        (Quality { occlusion: Some(32), ..usual }, "occlusion"),
+        (Quality { light_cut_off: f32::NAN, ..usual }, "light_cut_off"),
+        (Quality { light_cut_off: -f32::from_bits(1), ..usual }, "light_cut_off"),
+        (Quality { opaque_order: key(0, DepthCurve::Logarithmic), ..usual }, "opaque_order"),
+        (Quality { opaque_order: key(u32::MAX, DepthCurve::Logarithmic), ..usual }, "opaque_order"),
+        (Quality { blended_order: key(32, DepthCurve::Linear { far: f32::NAN }), ..usual }, "blended_order"),
+        (Quality { blended_order: key(32, DepthCurve::Linear { far: -1.0 }), ..usual }, "blended_order"),
+        (Quality { shadows: ShadowQuality { side: 0, ..shadows }, ..usual }, "shadows.side"),
+        (Quality { shadows: ShadowQuality { filter: u32::MAX, ..shadows }, ..usual }, "shadows.filter"),
+        (Quality { shadows: ShadowQuality { bias: f32::INFINITY, ..shadows }, ..usual }, "shadows.bias"),
+        (Quality { shadows: ShadowQuality { interval: 0, ..shadows }, ..usual }, "shadows.interval"),
+        (Quality { shadows: ShadowQuality { widest_edge: f32::NAN, ..shadows }, ..usual }, "shadows.widest_edge"),
+    ] {
+        match studio.with_quality(wrong).err() {
+            Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { knob: named, .. })))
+                if named == knob => {}
+            Some(error) => return Err(format!("{knob}: {error}").into()),
+            None => return Err(format!("{knob}: it was taken").into()),
+        }
+    }
+    let blind = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };
+    match studio.with_quality(blind).err() {
+        Some(OpenError::Build(BuildError::Quality(QualityError::OcclusionWithoutVolume))) => Ok(()),
+        Some(error) => Err(error.to_string().into()),
+        None => Err("occlusion without a volume was taken".into()),
+    }
+}

@@ -1,0 +1,106 @@
+//! What a quality does to a frame's commands.
+
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::{DepthCurve, DepthKey, Quality, ShadowQuality};
+use drawloom::queue::DrawList;
+use drawloom::scene::{Blend, Light, Scene};
+use drawloom::task::Scheduler;
+
+use crate::scenes::field;
+
+/// What a process draws in a view of a frame of this quality.
+fn drawn(scene: &Scene, quality: Quality, process: &str, view: usize) -> DrawList {
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let (mut renderer, _) = builder.build(scheduler).unwrap();
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    renderer.draw_list(process, view).unwrap().clone()
+}
+
+/// How far each object is along the first camera's axis, in the order they are drawn.
+fn depths(scene: &Scene, list: &DrawList) -> Vec<f32> {
+    let camera = &scene.cameras[0];
+    let forward = camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
+    let place = |object: &u32| scene.as_scene_ref().positions[*object as usize];
+    // What f32 can tell apart of the exact distances.
+    list.objects.iter().map(|object| forward.dot(place(object) - camera.position) as f32).collect()
+}
+
+#[test]
+fn keys_have_as_many_bits_of_depth_as_asked_for() {
+    let scene = field(2_000);
+    for bits in [6, 12] {
+        for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }] {
+            let order = DepthKey { bits, curve };
+            let quality = Quality { opaque_order: order, blended_order: order, ..Quality::balanced() };
+            for (process, lowest) in [("geometry buffer", 20 - bits), ("transparency", 62 - bits)] {
+                let list = drawn(&scene, quality, process, 0);
+                let keys: Vec<_> = list.commands().map(|command| command.key.bits()).collect();
+                let differing = keys.iter().fold(0, |differing, key| differing | (key ^ keys[0]));
+                let width = if process == "transparency" { 62 } else { 20 };
+                let of_depth = differing & ((1 << width) - 1);
+                assert!(of_depth != 0 && of_depth.trailing_zeros() >= lowest, "{process}: {order:?} {of_depth:x}");
+            }
+        }
+    }
+}
+
+#[test]
+fn blended_objects_are_in_the_wrong_order_by_a_step_at_most() {
+    let scene = field(3_000);
+    let (near, far) = (scene.cameras[0].near, scene.cameras[0].far);
+    let mut orders = vec![DepthKey::EXACT];
+    for bits in [4, 9, 18] {
+        orders
+            .extend([DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }].map(|curve| DepthKey { bits, curve }));
+    }
+    for blended_order in orders {
+        let quality = Quality { blended_order, ..Quality::balanced() };
+        let list = drawn(&scene, quality, "transparency", 0);
+        assert!(list.commands().all(|command| command.state.blend() != Blend::None));
+        let mut depths = depths(&scene, &list);
+        if blended_order == DepthKey::EXACT {
+            assert!(depths.is_sorted_by(|one, next| one >= next));
+        }
+        depths.retain(|&depth| (near..=far).contains(&depth));
+        assert!(depths.len() > 300);
+        let mut nearest = f32::INFINITY;
+        for &depth in &depths {
+            let before_by = f64::from(depth) - f64::from(nearest);
+            assert!(before_by <= blended_order.step(depth, near, far), "{nearest} {depth} {blended_order:?}");
+            nearest = nearest.min(depth);
+        }
+    }
+}
+
+#[test]
+fn half_the_angle_is_a_halving_more() {
+    let mut scene = field(300);
+    scene.lights = vec![Light::Hemispherical {
+        position: DVec3::new(0.0, 30.0, 0.0),
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(100.0),
+        range: 100.0,
+        casts_shadow: true,
+    }];
+    let halvings = |widest_edge: f32| {
+        let shadows = ShadowQuality { widest_edge, ..ShadowQuality::default() };
+        let list = drawn(&scene, Quality { shadows, ..Quality::balanced() }, "shadow casters", 2);
+        let mut of_objects: Vec<_> =
+            list.commands().map(|command| (command.object, command.state.halvings())).collect();
+        of_objects.sort();
+        of_objects
+    };
+    // No edge is seen under that.
+    assert!(halvings(90.0).iter().all(|(_, halvings)| *halvings == 0));
+    let fine = halvings(0.5);
+    assert!(fine.len() > 100 && fine.iter().any(|(_, halvings)| *halvings > 1));
+    for ((object, fine), (other, coarse)) in fine.into_iter().zip(halvings(1.0)) {
+        assert_eq!((object, fine.saturating_sub(1)), (other, coarse));
+    }
+}

@@ -1,0 +1,174 @@
+//! Shadow maps that are drawn in every so many-th frame, and when that is not enough.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::{Quality, ShadowQuality};
+use drawloom::scene::{Light, Scene};
+use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
+use drawloom::{Renderer, Submitter};
+
+use crate::scenes::field;
+
+/// A renderer whose shadow maps are drawn in every so many-th frame.
+struct Studio {
+    renderer: Renderer<NullBackend>,
+    submitter: Submitter<NullBackend>,
+}
+
+impl Studio {
+    fn new(interval: u32) -> Self {
+        let scheduler = Arc::new(Scheduler::new(2).unwrap());
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(every(interval));
+        let (renderer, submitter) = builder.build(scheduler).unwrap();
+        Self { renderer, submitter }
+    }
+
+    /// Draws a frame, and says of which views it draws the shadow map.
+    fn drawn(&mut self, scene: &Scene) -> Vec<usize> {
+        let recorded = self.renderer.record(scene.as_scene_ref()).unwrap();
+        let passes = self.submitter.submit(recorded).unwrap().submission.passes;
+        assert!(passes.iter().any(|pass| pass.process == "shadowed spot lights"));
+        let casters = passes.iter().filter(|pass| pass.process == "shadow casters");
+        casters.map(|pass| pass.view).collect()
+    }
+}
+
+fn every(interval: u32) -> Quality {
+    let quality = Quality::balanced();
+    Quality { shadows: ShadowQuality { interval, ..quality.shadows }, ..quality }
+}
+
+fn spot(x: f64) -> Light {
+    Light::Spot {
+        position: DVec3::new(x, 30.0, 3.0),
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(100.0),
+        range: 60.0,
+        inner_angle: 0.3,
+        outer_angle: 0.4,
+        casts_shadow: true,
+    }
+}
+
+fn sun() -> Light {
+    Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true }
+}
+
+/// Casts no shadow.
+fn lamp() -> Light {
+    Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 9.0 }
+}
+
+/// Two views, and behind them those of two lights.
+fn two_lights() -> Scene {
+    let mut scene = field(300);
+    scene.lights = vec![spot(3.0), sun()];
+    scene
+}
+
+#[test]
+fn maps_are_drawn_in_every_so_many_th_frame() {
+    for interval in 1..=4 {
+        let (scene, mut studio) = (two_lights(), Studio::new(interval));
+        for frame in 0..9 {
+            let expected = if frame % interval == 0 { vec![2, 3] } else { Vec::new() };
+            assert_eq!(studio.drawn(&scene), expected, "frame {frame} of {interval}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_done_for_a_map_that_is_kept() {
+    let (scene, mut studio) = (two_lights(), Studio::new(2));
+    studio.drawn(&scene);
+    assert!(studio.renderer.draw_list("shadow casters", 2).is_some());
+    let recorded = studio.renderer.record(scene.as_scene_ref()).unwrap();
+    for view in &recorded.statistics().views[2..] {
+        assert_eq!((view.visible, view.commands, view.batches, view.bundles), (0, 0, 0, 0));
+    }
+    assert!(recorded.queues()[2..].iter().all(|queue| queue.passes.is_empty()));
+    assert!(studio.renderer.draw_list("shadow casters", 2).is_none());
+    assert!(!studio.renderer.jobs_to_dot().unwrap().contains("shadow casters"));
+}
+
+#[test]
+fn what_moves_leaves_maps_as_they_are() {
+    let (mut scene, mut studio) = (two_lights(), Studio::new(100));
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    let handle = scene.objects().next().unwrap();
+    let object = scene.object(handle).unwrap();
+    let moves: [&dyn Fn(&mut Scene); 4] = [
+        &|scene| scene.lights[0] = spot(3.5),
+        &|scene| scene.cameras[0].position.x += 0.5,
+        &|scene| scene.cameras[1].size = [50, 40],
+        &|scene| scene.replace_object(handle, object).unwrap(),
+    ];
+    for change in moves {
+        change(&mut scene);
+        assert!(studio.drawn(&scene).is_empty());
+    }
+}
+
+#[test]
+fn other_maps_are_drawn_at_once() {
+    let (mut scene, mut studio) = (two_lights(), Studio::new(100));
+    studio.drawn(&scene);
+    type Change<'a> = &'a dyn Fn(&mut Scene);
+    let changes: [(&str, Change<'_>, &[usize]); 9] = [
+        ("another plan", &|scene| scene.lights.push(lamp()), &[2, 3]),
+        ("a light more", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4]),
+        ("a light in between", &|scene| scene.lights.insert(0, lamp()), &[2, 3, 4]),
+        ("two that change places", &|scene| scene.lights.swap(1, 2), &[2, 3, 4]),
+        ("a light less", &|scene| _ = scene.lights.pop(), &[2, 3]),
+        ("a light again", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4]),
+        ("a camera more", &|scene| scene.cameras.push(scene.cameras[0].clone()), &[3, 4, 5]),
+        ("a camera less", &|scene| _ = scene.cameras.pop(), &[2, 3, 4]),
+        ("one that casts shadows too", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5]),
+    ];
+    for (what, change, drawn) in changes {
+        change(&mut scene);
+        assert_eq!(studio.drawn(&scene), drawn, "{what}");
+        assert!(studio.drawn(&scene).is_empty(), "the frame after {what}");
+    }
+}
+
+#[test]
+fn another_quality_or_pipeline_draws_them_at_once() {
+    let (scene, mut studio) = (two_lights(), Studio::new(100));
+    studio.drawn(&scene);
+    studio.renderer.set_quality(every(50)).unwrap();
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    assert!(studio.drawn(&scene).is_empty());
+    let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
+    studio.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    assert!(studio.drawn(&scene).is_empty());
+    studio.renderer.set_quality(every(1)).unwrap();
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+}
+
+#[test]
+fn maps_that_nobody_drew_are_not_kept() {
+    let (scene, mut studio) = (two_lights(), Studio::new(100));
+    // Never submitted.
+    drop(studio.renderer.record(scene.as_scene_ref()).unwrap());
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    // Recorded before it is known that the one before is never submitted.
+    studio.renderer.set_quality(every(100)).unwrap();
+    let first = studio.renderer.record(scene.as_scene_ref()).unwrap();
+    let second = studio.renderer.record(scene.as_scene_ref()).unwrap();
+    drop(first);
+    studio.submitter.submit(second).unwrap();
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    // Failed.
+    let mut bad = two_lights();
+    bad.cameras[0].position.x = 1e300;
+    assert!(studio.renderer.record(bad.as_scene_ref()).is_err());
+    assert_eq!(studio.drawn(&scene), [2, 3]);
+    assert!(studio.drawn(&scene).is_empty());
+}

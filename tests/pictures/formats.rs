@@ -1,0 +1,424 @@
+//! What a quality says of formats: of the geometry buffer's targets, of vertices, and of the picture's tones.
+
+use drawloom::backend::Picture;
+use drawloom::glam::{DVec3, Vec2, Vec3};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, Draws, Exposure, Format, FullScreen, RenderProcess, ToneMapping,
+};
+use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, ToneCurve, VertexFormat};
+use drawloom::scene::{Camera, Material, Mesh, Projection, RenderObject, Scene, Texture, Topology, Vertex};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::judge::{Distance, as_image, assert_color, tone_mapped};
+use crate::references::colonnade;
+use crate::scenes::everything::everything;
+use crate::scenes::{field, sized};
+use crate::studio::{Studio, draw, from_half, pixel};
+
+pub const CASES: &[Case] = &[
+    ("normals_read_back_are_within_their_bound", normals),
+    ("packed_normals_read_back_are_within_their_bound", packed_normals),
+    ("vertices_that_pack_without_loss_change_no_byte", packed_without_loss),
+    ("packed_vertices_show_the_same_to_the_eye", packed_alike),
+    ("normals_and_diffuse_colours_of_a_quality_show_the_same_to_the_eye", targets_alike),
+    ("formats_that_change_between_frames_leave_no_trace", changes),
+    ("a_frame_on_its_way_keeps_its_vertices", frame_on_its_way),
+    ("diffuse_colours_read_back_are_within_their_bound", diffuse),
+    ("the_clipped_curve_cuts_off_at_1", clipped),
+    ("a_quality_changes_the_curve_and_leaves_other_steps_alone", curve_of_quality),
+];
+
+const NORMALS: [NormalFormat; 4] =
+    [NormalFormat::Octahedral8, NormalFormat::Octahedral10, NormalFormat::Octahedral16, NormalFormat::HalfFloat];
+
+fn studio(quality: Quality) -> Result<Studio, Failed> {
+    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+}
+
+/// Pixels along a side of the pictures that show a vertex a pixel.
+const SIDE: usize = 128;
+
+/// A scene that shows in each pixel, row by row, a square that faces the camera, of one of these normals and texture coordinates.
+fn one_a_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+    for (number, (normal, uv)) in shown.iter().enumerate() {
+        let left_top = [(number % SIDE) as f32 - SIDE as f32 / 2.0, SIDE as f32 / 2.0 - (number / SIDE) as f32];
+        let first = vertices.len() as u32;
+        for (right, down) in [(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)] {
+            let position = [left_top[0] + right, left_top[1] - down, 0.0];
+            vertices.push(Vertex { position, normal: normal.to_array(), uv: uv.to_array() });
+        }
+        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+    }
+    let mut scene = Scene::new();
+    let mesh = scene.add(Mesh::new("pixels", Topology::TriangleList, vertices, indices)?)?;
+    let mut material = material;
+    for texture in textures {
+        material.texture = Some(scene.add(texture)?);
+    }
+    let material = scene.add(material)?;
+    scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+    let mut camera = sized(Camera::looking_at("main", DVec3::Z * 10.0, DVec3::ZERO), [SIDE as u32; 2]);
+    (camera.projection, camera.far) = (Projection::Orthographic { height: SIDE as f32 }, 100.0);
+    scene.cameras = vec![camera];
+    Ok(scene)
+}
+
+/// As many normals as there are pixels: the axes, some beside the fold of the octahedron, those in the middle between the steps
+/// of each format where these are widest apart, and the rest spread evenly (a Fibonacci spiral).
+fn directions() -> Vec<Vec3> {
+    let mut all = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    for index in 0..200 {
+        let (sine, cosine) = (index as f32 * 0.0314).sin_cos();
+        all.extend([-0.0, 0.0, 1e-30, -1e-30, 1e-7, -1e-7].map(|z| Vec3::new(cosine, sine, z)));
+    }
+    for steps in [127.0, 511.0, 32_767.0] {
+        let near = |offset: i32| ((steps / 3.0_f32).floor() + offset as f32 + 0.5) / steps;
+        for (x, y) in (-8..8).flat_map(|x| (-8..8).map(move |y| (near(x), near(y)))) {
+            let signs = [(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (1.0, 1.0, -1.0), (-1.0, -1.0, -1.0)];
+            all.extend(signs.map(|(right, up, out)| Vec3::new(x * right, y * up, (1.0 - x - y) * out)));
+        }
+    }
+    let rest = SIDE * SIDE - all.len();
+    all.extend((0..rest).map(|index| {
+        let z = 1.0 - (index as f64 + 0.5) * 2.0 / rest as f64;
+        let (sine, cosine) = (index as f64 * 2.399_963_229_728_653).sin_cos();
+        (DVec3::new(cosine, sine, 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z).as_vec3()
+    }));
+    all
+}
+
+/// The normals that a target holds, worked out in f64 from its bytes.
+fn decoded(picture: &Picture) -> Result<Vec<DVec3>, Failed> {
+    let of_point = |x: f64, y: f64| {
+        let z = 1.0 - x.abs() - y.abs();
+        let away = |other: f64, own: f64| (1.0 - other.abs()).copysign(own);
+        if z < 0.0 { DVec3::new(away(y, x), away(x, y), z).normalize() } else { DVec3::new(x, y, z).normalize() }
+    };
+    let half = |bytes: &[u8]| from_half(u16::from_le_bytes([bytes[0], bytes[1]]));
+    let point = |pixel: &[u8]| match picture.format {
+        Format::Rg8Unorm => Some((f64::from(pixel[0]) / 127.0 - 1.0, f64::from(pixel[1]) / 127.0 - 1.0)),
+        Format::Rgb10a2Unorm => {
+            let bits = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+            Some((f64::from(bits & 1023) / 511.0 - 1.0, f64::from(bits >> 10 & 1023) / 511.0 - 1.0))
+        }
+        Format::Rgba8Unorm => {
+            let number = |high, low| f64::from(u16::from_be_bytes([high, low])) / 32_767.0 - 1.0;
+            Some((number(pixel[0], pixel[2]), number(pixel[1], pixel[3])))
+        }
+        Format::Rg16Float => Some((half(pixel), half(&pixel[2..]))),
+        _ => None,
+    };
+    let points: Option<Vec<_>> = picture.bytes.chunks_exact(picture.format.bytes()).map(point).collect();
+    let points = points.ok_or_else(|| format!("{:?} was not asked for", picture.format))?;
+    Ok(points.into_iter().map(|(x, y)| of_point(x, y)).collect())
+}
+
+fn off(one: DVec3, other: DVec3) -> f64 {
+    one.cross(other).length().atan2(one.dot(other)).to_degrees()
+}
+
+/// The target `normal` of a scene of these normals.
+fn normals_of(directions: &[Vec3], quality: Quality) -> Result<Vec<DVec3>, Failed> {
+    let shown: Vec<_> = directions.iter().map(|&normal| (normal, Vec2::ZERO)).collect();
+    let scene = one_a_pixel(&shown, Material::default(), Vec::new())?;
+    let mut studio = studio(quality)?;
+    let recorded = studio.record(&scene)?;
+    decoded(&studio.submit(recorded)?.read(0, "normal")?)
+}
+
+/// How far the normals of the target are off at most, in degrees.
+fn worst(directions: &[Vec3], quality: Quality) -> Result<f64, Failed> {
+    let found = normals_of(directions, quality)?;
+    Ok(found.iter().zip(directions).map(|(found, meant)| off(*found, meant.as_dvec3())).fold(0.0, f64::max))
+}
+
+fn normals() -> Result<(), Failed> {
+    let directions = directions();
+    for normals in NORMALS {
+        let quality = Quality { normals, ..Quality::balanced() };
+        let worst = worst(&directions, quality)?;
+        println!("{normals:?}: up to {worst:.5} degrees off, of {}", normals.bound());
+        // Or else the directions are not those that are hard.
+        if !(normals.bound() * 0.4..=normals.bound()).contains(&worst) {
+            return Err(format!("{normals:?} is {worst} off, of {}", normals.bound()).into());
+        }
+        let axes = &directions[..6];
+        for (found, axis) in normals_of(axes, quality)?.into_iter().zip(axes) {
+            // f32 in the shader.
+            if off(found, axis.as_dvec3()) > 1e-4 {
+                return Err(format!("{normals:?}: {axis} is {found}").into());
+            }
+        }
+        // A normal of 0 stands for the triangle's own, which is found by differences of places a pixel apart.
+        for found in &normals_of(&[Vec3::ZERO; SIDE], quality)?[..SIDE] {
+            if off(*found, DVec3::Z) > normals.bound() + 0.002 {
+                return Err(format!("{normals:?}: none is {found}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn packed_normals() -> Result<(), Failed> {
+    let normals = NormalFormat::Octahedral16;
+    let directions = directions();
+    let quality = Quality { normals, vertices: VertexFormat::Packed, ..Quality::balanced() };
+    let (worst, bound) = (worst(&directions, quality)?, VertexFormat::Packed.normal_bound() + normals.bound());
+    println!("packed: up to {worst:.5} degrees off, of {bound}");
+    if !(0.3..=bound).contains(&worst) {
+        return Err(format!("{worst} degrees off, of {bound}").into());
+    }
+    // A packed vertex is what its unpacked form says.
+    let unpacked = |normal: &Vec3| {
+        let vertex = Vertex { normal: normal.to_array(), ..Vertex::default() };
+        DVec3::from(drawloom::scene::PackedVertex::new(&vertex, Default::default()).unpacked().normal.map(f64::from))
+    };
+    for (found, normal) in normals_of(&directions, quality)?.into_iter().zip(&directions) {
+        if off(found, unpacked(normal)) > normals.bound() {
+            return Err(format!("{normal} is {found}, and should be {}", unpacked(normal)).into());
+        }
+    }
+    Ok(())
+}
+
+fn diffuse() -> Result<(), Failed> {
+    for diffuse in (0..=40).map(|step| Vec3::new(0.025, 0.02, 0.0247) * step as f32) {
+        let material = Material { diffuse, ..Material::default() };
+        let scene = one_a_pixel(&[(Vec3::Z, Vec2::ZERO)], material, Vec::new())?;
+        let read = |diffuse| -> Result<_, Failed> {
+            let mut studio = studio(Quality { diffuse, ..Quality::balanced() })?;
+            let recorded = studio.record(&scene)?;
+            Ok(studio.submit(recorded)?.read(0, "diffuse")?)
+        };
+        let (bytes, halves) = (read(DiffuseFormat::Srgb8)?, read(DiffuseFormat::HalfFloat)?);
+        if [bytes.format, halves.format] != [Format::Rgba8Srgb, Format::Rgba16Float] {
+            return Err(format!("{:?} and {:?}", bytes.format, halves.format).into());
+        }
+        for channel in 0..3 {
+            let meant = f64::from(diffuse[channel]);
+            let byte = f64::from(bytes.bytes[channel]);
+            let half = from_half(u16::from_le_bytes([halves.bytes[channel * 2], halves.bytes[channel * 2 + 1]]));
+            let off = [(byte - srgb(meant) * 255.0).abs() / 0.6, (half - meant).abs() / (meant / 1024.0).max(1e-7)];
+            if off.iter().any(|off| *off > 1.0) {
+                return Err(format!("{meant} became {byte} and {half}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn packed() -> Quality {
+    Quality { vertices: VertexFormat::Packed, ..Quality::balanced() }
+}
+
+/// A scene with a texture of which each pixel shows another texel, by coordinates that half floats hold.
+fn texels() -> Result<Scene, Failed> {
+    let pixels = (0..=255_u8).flat_map(|row| (0..=255_u8).flat_map(move |column| [column, row, column ^ row, 255]));
+    let texture = Texture::new("numbers", 256, 256, pixels.collect())?;
+    let texel = |number: usize| {
+        let (column, row) = (number % SIDE * 2, number / SIDE * 2 + 1);
+        (Vec3::Z, Vec2::new(5.0 + (column as f32 + 0.5) / 256.0, -9.0 + (row as f32 + 0.5) / 256.0))
+    };
+    let shown: Vec<_> = (0..SIDE * SIDE).map(texel).collect();
+    one_a_pixel(&shown, Material { diffuse: Vec3::ONE, ..Material::default() }, vec![texture])
+}
+
+fn packed_without_loss() -> Result<(), Failed> {
+    for (name, scene) in [("everything", everything()), ("field", field(400)), ("texels", texels()?)] {
+        let read = |quality| -> Result<_, Failed> {
+            let mut studio = studio(quality)?;
+            let recorded = studio.record(&scene)?;
+            let uploaded = recorded.statistics().uploaded;
+            let submission = studio.submit(recorded)?;
+            let targets = ["picture", "depth", "normal", "diffuse"].map(|target| submission.read(0, target));
+            Ok((targets.into_iter().collect::<Result<Vec<_>, _>>()?, uploaded))
+        };
+        let (full, full_bytes) = read(Quality::balanced())?;
+        let (small, small_bytes) = read(packed())?;
+        if full != small {
+            return Err(format!("{name} differs").into());
+        }
+        if name == "texels" {
+            let mut colors: Vec<_> = full[3].bytes.chunks_exact(4).collect();
+            colors.sort_unstable();
+            colors.dedup();
+            if colors.len() != SIDE * SIDE {
+                return Err(format!("{} texels are seen", colors.len()).into());
+            }
+            let saved = (SIDE * SIDE * 4 * 12) as u64;
+            if full_bytes - small_bytes != saved {
+                return Err(format!("{full_bytes} bytes became {small_bytes}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn small_colonnade() -> Result<Scene, Failed> {
+    let mut scene = colonnade()?;
+    scene.cameras[0].size = [160, 90];
+    Ok(scene)
+}
+
+/// Fails where a quality's picture of a scene is farther from that of the balanced one than these.
+fn expect_alike(name: &str, scene: &Scene, quality: Quality, most: Distance) -> Result<(), Failed> {
+    let distance = Distance::between(&as_image(&studio(quality)?.draw(scene)?)?, &as_image(&draw(scene)?)?)?;
+    println!("{name}: {distance:?}");
+    if distance.root_mean_square > most.root_mean_square || distance.worst_square > most.worst_square {
+        return Err(format!("{name}: {distance:?}").into());
+    }
+    Ok(())
+}
+
+/// A cosine is off by no more than the angle, 0.0068; a picture by at most as much (the curve's slope is below that of sRGB's
+/// inverse where it counts) and half a step of 255, and in one square by a few pixels of a texture besides.
+fn packed_alike() -> Result<(), Failed> {
+    let most = Distance { root_mean_square: 0.0068 + 0.002, worst_square: 0.03 };
+    expect_alike("colonnade", &small_colonnade()?, packed(), most)
+}
+
+fn targets_alike() -> Result<(), Failed> {
+    let balanced = Quality::balanced();
+    for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
+        for normals in NORMALS {
+            // As above, of the angles by which both are off.
+            let angle = (normals.bound() + NormalFormat::HalfFloat.bound()).to_radians();
+            let most = Distance { root_mean_square: angle + 0.002, worst_square: 2.0 * angle + 0.004 };
+            expect_alike(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, most)?;
+        }
+        let quality = Quality { diffuse: DiffuseFormat::HalfFloat, ..balanced };
+        let most = Distance { root_mean_square: 0.003, worst_square: 0.005 };
+        expect_alike(&format!("{name}, diffuse as half floats"), &scene, quality, most)?;
+    }
+    Ok(())
+}
+
+fn qualities() -> Vec<Quality> {
+    let balanced = Quality::balanced();
+    vec![
+        packed(),
+        balanced,
+        Quality { normals: NormalFormat::Octahedral8, ..packed() },
+        Quality { normals: NormalFormat::Octahedral16, diffuse: DiffuseFormat::HalfFloat, ..packed() },
+        Quality { tone_curve: ToneCurve::Clipped, ..balanced },
+        Quality { normals: NormalFormat::Octahedral10, ..balanced },
+        balanced,
+    ]
+}
+
+fn changes() -> Result<(), Failed> {
+    for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
+        let mut changing = Studio::new()?;
+        changing.draw(&scene)?;
+        for quality in qualities() {
+            changing.renderer.set_quality(quality)?;
+            let expected = studio(quality)?.draw(&scene)?;
+            for frame in 0..3 {
+                if changing.draw(&scene)? != expected {
+                    return Err(format!("{name}, frame {frame} of {quality:?}").into());
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn frame_on_its_way() -> Result<(), Failed> {
+    let scene = small_colonnade()?;
+    let (full, small) = (draw(&scene)?, studio(packed())?.draw(&scene)?);
+    let mut studio = Studio::new()?;
+    let mut previous = studio.record(&scene)?;
+    for (index, (quality, expected)) in [(packed(), &full), (Quality::balanced(), &small)].into_iter().enumerate() {
+        studio.renderer.set_quality(quality)?;
+        let next = studio.record(&scene)?;
+        if studio.submit(previous)?.read(0, "picture")? != *expected {
+            return Err(format!("frame {index} shows what came after it").into());
+        }
+        previous = next;
+    }
+    if studio.submit(previous)?.read(0, "picture")? == full { Ok(()) } else { Err("the last frame differs".into()) }
+}
+
+/// The picture of a scene that is all background.
+fn background(deferred: Deferred, quality: Option<Quality>, radiance: Vec3) -> Result<[u8; 3], Failed> {
+    let mut scene = Scene::new();
+    scene.background = radiance;
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z, DVec3::ZERO), [4, 4])];
+    let mut studio = Studio::with(1, |builder| {
+        let builder = builder.deferred(deferred);
+        if let Some(quality) = quality { builder.quality(quality) } else { builder }
+    })?;
+    Ok(pixel(&studio.draw(&scene)?, 1, 2))
+}
+
+/// sRGB of what is cut off at 1, worked out in f64.
+fn cut_off(radiance: Vec3) -> [u8; 3] {
+    radiance.to_array().map(|radiance| (srgb(f64::from(radiance).clamp(0.0, 1.0)) * 255.0).round() as u8)
+}
+
+fn srgb(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+fn clipped() -> Result<(), Failed> {
+    let tone_mapping = |exposure: f32| ToneMapping { exposure: exposure.into(), curve: ToneCurve::Clipped };
+    for (radiance, exposure) in [
+        (Vec3::new(0.0, 0.25, 0.5), 1.0),
+        (Vec3::new(0.9, 1.0, 1.1), 1.0),
+        (Vec3::new(0.1, 60_000.0, 1.0), 0.5),
+        (Vec3::splat(0.001), 100.0),
+        (Vec3::new(0.0, 1.0, 5.0), f32::INFINITY),
+        (Vec3::ONE, f32::NAN),
+    ] {
+        let times = if exposure > 0.0 { exposure.min(1e30) } else { 0.0 };
+        let found = background(Deferred::new().post(tone_mapping(exposure)), None, radiance)?;
+        assert_color(found, cut_off(radiance * times))?;
+    }
+    Ok(())
+}
+
+/// Takes away red.
+struct WithoutRed(String, String);
+
+impl RenderProcess for WithoutRed {
+    fn name(&self) -> &str {
+        "without red"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples(&self.0);
+        declare.clears_color(&self.1, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen {
+            shader: "
+                @group(2) @binding(1) var source: texture_2d<f32>;
+
+                @fragment
+                fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                    return textureLoad(source, vec2<i32>(in.position.xy), 0) * vec4<f32>(0.0, 1.0, 1.0, 1.0);
+                }
+            ",
+            ..FullScreen::default()
+        })
+    }
+}
+
+fn curve_of_quality() -> Result<(), Failed> {
+    let radiance = Vec3::new(0.4, 0.6, 0.8);
+    let exposure = Exposure::new(0.5);
+    let without_red = |source: &str, target: &str| WithoutRed(source.to_owned(), target.to_owned());
+    let deferred = || Deferred::new().post(without_red).post(ToneMapping::new(exposure.clone()));
+    let with = |tone_curve| Some(Quality { tone_curve, ..Quality::balanced() });
+    let seen = Vec3::new(0.0, 0.6, 0.8);
+    let filmic = |exposure: f32| tone_mapped((seen * exposure).to_array().map(f64::from));
+    assert_color(background(deferred(), None, radiance)?, filmic(0.5))?;
+    assert_color(background(deferred(), with(ToneCurve::Filmic), radiance)?, filmic(0.5))?;
+    assert_color(background(deferred(), with(ToneCurve::Clipped), radiance)?, cut_off(seen * 0.5))?;
+    // It still is the engine's exposure.
+    exposure.set(1.0);
+    assert_color(background(deferred(), with(ToneCurve::Clipped), radiance)?, cut_off(seen))
+}

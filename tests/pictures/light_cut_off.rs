@@ -1,0 +1,101 @@
+//! Lights that end where little is left of them.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::Quality;
+use drawloom::scene::{Light, Scene};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::rays::{Panel, Stage};
+use crate::scenes::field;
+use crate::shadows::{MAPS, camera, hemisphere, spot};
+use crate::studio::{Studio, radiance};
+
+pub const CASES: &[Case] =
+    &[("no_light_that_ends_early_takes_more_away_than_stated", bound), ("a_light_that_ends_early_reaches_less", reach)];
+
+fn with_cut_off(light_cut_off: f32) -> Result<Studio, Failed> {
+    let quality = Quality { light_cut_off, ..Quality::balanced() };
+    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+}
+
+fn radiance_of(studio: &mut Studio, scene: &Scene) -> Result<Vec<[f64; 3]>, Failed> {
+    let recorded = studio.record(scene)?;
+    radiance(&studio.submit(recorded)?, 0)
+}
+
+/// The field in lights of each kind that falls off, which reach far beyond it.
+fn scene() -> Scene {
+    let mut scene = field(300);
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    let place = DVec3::new(0.0, 6.0, 12.0);
+    let point =
+        Light::Point { position: DVec3::new(0.0, 3.0, -5.0), intensity: Vec3::new(30.0, 10.0, 5.0), range: 1e3 };
+    scene.lights = vec![point, spot(place, down, 60.0), hemisphere(DVec3::new(-3.0, 5.0, 10.0), down)];
+    for light in &mut scene.lights {
+        if let Light::Spot { range, .. } | Light::Hemispherical { range, .. } = light {
+            *range = 1e3;
+        }
+    }
+    scene
+}
+
+/// A white floor below a light, at all heights around the one where the most is taken away: (2/3)^¼ of where it ends.
+fn bound() -> Result<(), Failed> {
+    let (cut_off, end) = (0.125_f32, 3.0_f64);
+    let (mut whole, mut ending) = (with_cut_off(0.0)?, with_cut_off(cut_off)?);
+    let bound = 1.089 * f64::from(cut_off) / std::f64::consts::PI;
+    for kind in 0..3 {
+        let mut worst = 0.0_f64;
+        for share in [0.3, 0.6, 0.8, 0.85, 0.9036, 0.95, 1.0, 1.2, 2.0] {
+            let mut light = scene().lights[kind];
+            if let Light::Point { position, intensity, .. }
+            | Light::Spot { position, intensity, .. }
+            | Light::Hemispherical { position, intensity, .. } = &mut light
+            {
+                (*position, *intensity) = (DVec3::Y * end * share, Vec3::splat(cut_off * (end * end) as f32));
+            }
+            if let Light::Spot { direction, .. } | Light::Hemispherical { direction, .. } = &mut light {
+                *direction = Vec3::NEG_Y;
+            }
+            let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 2.0);
+            let stage = Stage { panels: vec![floor], lights: vec![light], maps: MAPS };
+            let scene = stage.scene(&[camera(DVec3::new(0.5, 2.0, 1.0), DVec3::ZERO, 60.0)])?;
+            let (expected, found) = (radiance_of(&mut whole, &scene)?, radiance_of(&mut ending, &scene)?);
+            for (expected, found) in expected.iter().flatten().zip(found.iter().flatten()) {
+                // Both are half floats.
+                let rounding = 2.0 * 2_f64.powi(-11) * expected;
+                if (expected - found).abs() > bound + rounding {
+                    return Err(format!("{found} for {expected} at {share} of where light {kind} ends").into());
+                }
+                worst = worst.max(expected - found);
+            }
+        }
+        // So nothing less than the bound holds.
+        if worst < 0.95 * bound {
+            return Err(format!("{worst} of {bound} in light {kind}").into());
+        }
+    }
+    Ok(())
+}
+
+fn reach() -> Result<(), Failed> {
+    let mut scene = scene();
+    for light in &mut scene.lights {
+        if let Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } =
+            light
+        {
+            position.z += 100.0;
+        }
+    }
+    for (cut_off, lights) in [(0.0, 3), (1e-4, 3), (0.5, 0)] {
+        let recorded = with_cut_off(cut_off)?.record(&scene)?;
+        let (found, views) = (recorded.statistics().views[0].lights, recorded.statistics().views.len());
+        // Who reaches no view needs no map either.
+        if (found, views) != (lights, if lights == 0 { 2 } else { 4 }) {
+            return Err(format!("{found} lights in one of {views} views, cut off at {cut_off}").into());
+        }
+    }
+    Ok(())
+}

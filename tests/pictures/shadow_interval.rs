@@ -1,0 +1,154 @@
+//! Shadow maps that are drawn in every so many-th frame.
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::{Quality, ShadowQuality};
+use drawloom::scene::{Light, Scene, SceneError};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::judge::{assert_alike, assert_different};
+use crate::scenes::field;
+use crate::shadows::{hemisphere, spot, sun};
+use crate::studio::Studio;
+
+pub const CASES: &[Case] = &[
+    ("where_nothing_moves_kept_shadow_maps_are_as_good_as_new", nothing_moves),
+    ("the_shadow_of_what_moves_lags_and_catches_up", moved_casters),
+    ("a_moved_light_lags_together_with_its_shadow", moved_light),
+    ("shadows_stay_in_the_world_when_the_camera_moves", moved_camera),
+    ("a_frame_that_is_dropped_takes_no_shadow_with_it", dropped),
+    ("another_number_of_lights_or_views_leaves_no_old_shadow", other_lists),
+];
+
+fn every(interval: u32) -> Result<Studio, Failed> {
+    let quality = Quality::balanced();
+    let quality = Quality { shadows: ShadowQuality { interval, side: 512, ..quality.shadows }, ..quality };
+    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+}
+
+fn lights() -> Vec<Light> {
+    let down = DVec3::new(0.2, -0.9, -0.3).normalize();
+    let mut lights =
+        vec![sun(down), spot(DVec3::new(0.0, 6.0, 12.0), down, 60.0), hemisphere(DVec3::new(-3.0, 5.0, 10.0), down)];
+    for light in &mut lights[1..] {
+        if let Light::Spot { range, .. } | Light::Hemispherical { range, .. } = light {
+            *range = 40.0;
+        }
+    }
+    lights
+}
+
+fn scene() -> Scene {
+    let mut scene = field(300);
+    scene.lights = lights();
+    scene
+}
+
+/// Moves all objects.
+fn shift(scene: &mut Scene, way: DVec3) -> Result<(), SceneError> {
+    for handle in scene.objects().collect::<Vec<_>>() {
+        let mut object = scene.object(handle)?;
+        object.position += way;
+        scene.replace_object(handle, object)?;
+    }
+    Ok(())
+}
+
+fn nothing_moves() -> Result<(), Failed> {
+    let scene = scene();
+    let expected = every(1)?.draw(&scene)?;
+    let mut unlit = field(300);
+    unlit.lights.clear();
+    assert_different(&expected, &every(1)?.draw(&unlit)?)?;
+    for interval in [2, 3] {
+        let mut studio = every(interval)?;
+        for frame in 0..5 {
+            if studio.draw(&scene)? != expected {
+                return Err(format!("frame {frame} of {interval}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn moved_casters() -> Result<(), Failed> {
+    let mut scene = scene();
+    let mut studio = every(3)?;
+    studio.draw(&scene)?;
+    shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
+    let expected = every(1)?.draw(&scene)?;
+    let late = [studio.draw(&scene)?, studio.draw(&scene)?];
+    if late[0] == expected || late[0] != late[1] {
+        return Err("the shadows are not those of the frame before".into());
+    }
+    if studio.draw(&scene)? == expected { Ok(()) } else { Err("the shadows do not catch up".into()) }
+}
+
+fn moved_light() -> Result<(), Failed> {
+    for index in 0..3 {
+        let mut scene = field(300);
+        scene.lights = vec![lights()[index]];
+        let mut studio = every(2)?;
+        let before = studio.draw(&scene)?;
+        match &mut scene.lights[0] {
+            Light::Spot { position, .. } | Light::Hemispherical { position, .. } => position.x += 1.0,
+            Light::Directional { direction, .. } => *direction = Vec3::new(0.5, -0.8, 0.1).normalize(),
+            other => return Err(format!("{other:?}").into()),
+        }
+        let expected = every(1)?.draw(&scene)?;
+        assert_different(&before, &expected)?;
+        if studio.draw(&scene)? != before {
+            return Err(format!("light {index} moved without its map").into());
+        }
+        if studio.draw(&scene)? != expected {
+            return Err(format!("light {index} does not catch up").into());
+        }
+    }
+    Ok(())
+}
+
+fn moved_camera() -> Result<(), Failed> {
+    let mut scene = scene();
+    let mut studio = every(2)?;
+    studio.draw(&scene)?;
+    for camera in &mut scene.cameras {
+        camera.position += DVec3::new(2.0, 0.5, -3.0);
+    }
+    // The sun's map is another, whose pixels lie elsewhere.
+    assert_alike(&studio.draw(&scene)?, &every(1)?.draw(&scene)?)
+}
+
+fn dropped() -> Result<(), Failed> {
+    let mut scene = scene();
+    let mut studio = every(2)?;
+    studio.draw(&scene)?;
+    studio.draw(&scene)?;
+    shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
+    drop(studio.record(&scene)?);
+    let expected = every(1)?.draw(&scene)?;
+    if studio.draw(&scene)? == expected { Ok(()) } else { Err("the dropped frame's maps are missing".into()) }
+}
+
+fn other_lists() -> Result<(), Failed> {
+    let mut studio = every(100)?;
+    let mut scene = scene();
+    let changes: [&dyn Fn(&mut Scene); 6] = [
+        &|_| {},
+        &|scene| _ = scene.lights.remove(0),
+        &|scene| scene.lights = lights(),
+        &|scene| _ = scene.cameras.pop(),
+        &|scene| scene.lights.extend(lights()),
+        &|scene| scene.lights.truncate(1),
+    ];
+    for (step, change) in changes.into_iter().enumerate() {
+        change(&mut scene);
+        let expected = every(1)?.draw(&scene)?;
+        for frame in 0..2 {
+            if studio.draw(&scene)? != expected {
+                return Err(format!("frame {frame} of step {step}").into());
+            }
+        }
+    }
+    Ok(())
+}

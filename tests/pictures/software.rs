@@ -1,0 +1,83 @@
+//! wgpu's pictures, and those of the software backend, against what they should be.
+
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::{Picture, SoftwareBackend};
+use drawloom::process::Deferred;
+use drawloom::scene::{Scene, obj, sample};
+use drawloom::task::Scheduler;
+use libtest_mimic::Failed;
+
+use crate::scenes::everything::everything;
+use crate::scenes::field;
+use crate::studio::draw;
+use crate::{Case, shared_scenes};
+
+pub const CASES: &[Case] = &[
+    ("software_draws_the_projects_own_scene_as_wgpu_does", || judge(sample::colonnade()?)),
+    ("software_draws_everything_as_wgpu_does", || judge(everything())),
+    ("software_draws_a_field_of_boxes_as_wgpu_does", || judge(field(400))),
+];
+
+pub const CASES_OF_SHARED_SCENES: &[Case] = &[
+    ("software_draws_cornell_as_wgpu_does", || judge(shared("cornell/CornellBox-Original.obj")?)),
+    ("software_draws_sponza_as_wgpu_does", || judge(shared("sponza/sponza_part.obj")?)),
+];
+
+fn shared(path: &str) -> Result<Scene, Failed> {
+    Ok(obj::load(shared_scenes().join(path))?.scene)
+}
+
+/// wgpu against the reference, and against the software backend in f32.
+fn judge(mut scene: Scene) -> Result<(), Failed> {
+    for camera in &mut scene.cameras {
+        // Without optimisation the processor takes some thirty times as long.
+        camera.size = if cfg!(debug_assertions) { [240, 135] } else { [960, 540] };
+    }
+    let by_wgpu = draw(&scene)?;
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let single = draw_on(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, &scene)?;
+    let double = draw_on(SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?), &scene)?;
+    let differences = [("f32", &single), ("the reference", &double)]
+        .map(|(name, picture)| (name, Difference::new(&by_wgpu, picture)));
+    println!("{differences:?}");
+    if differences.iter().all(|(_, difference)| difference.is_within_bound()) {
+        return Ok(());
+    }
+    Err(format!("wgpu's picture and that of the processor differ: {differences:?}").into())
+}
+
+fn draw_on(backend: SoftwareBackend, scheduler: Arc<Scheduler>, scene: &Scene) -> Result<Picture, Failed> {
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+    Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
+}
+
+/// How far two pictures are apart.
+#[derive(Debug)]
+struct Difference {
+    /// Root of the mean square over all pixels and colours, 0 to 255.
+    root_mean_square: f64,
+    /// The share of pixels of which no colour is off by more than 3 of 255.
+    near: f64,
+}
+
+impl Difference {
+    fn new(one: &Picture, other: &Picture) -> Self {
+        let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
+        let (mut squares, mut near, mut count) = (0.0, 0.0, 0.0);
+        for (one, other) in pixels {
+            let apart = [0, 1, 2].map(|channel| one[channel].abs_diff(other[channel]));
+            squares += apart.iter().map(|apart| f64::from(*apart).powi(2)).sum::<f64>() / 3.0;
+            near += f64::from(u8::from(apart.iter().all(|apart| *apart <= 3)));
+            count += 1.0;
+        }
+        Self { root_mean_square: (squares / count).sqrt(), near: near / count }
+    }
+
+    /// What is asked of every scene. Where rounding decides which of two surfaces a pixel on an edge shows, the pixel is off as a
+    /// whole, and so are edges of shadows.
+    fn is_within_bound(&self) -> bool {
+        self.root_mean_square <= 2.0 && self.near >= 0.99
+    }
+}

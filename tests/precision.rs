@@ -1,0 +1,42 @@
+//! A vertex is where it belongs in every picture, wherever in the world the camera is.
+
+#[path = "../benches/precision/cases.rs"]
+mod cases;
+#[path = "../benches/precision/measure.rs"]
+mod measure;
+#[path = "../benches/shared/random.rs"]
+#[expect(dead_code, reason = "orders are for benches")]
+mod random;
+#[path = "../benches/precision/vertex.rs"]
+mod vertex;
+
+use measure::{BOUND, HELD, MAGNIFYING, Origin, WORST_ANGLE, measure};
+use random::Random;
+
+const CASES: usize = 5000;
+
+#[test]
+fn vertices_are_within_a_thousandth_of_a_pixel_anywhere_in_the_world() {
+    let mut random = Random::new();
+    for kind in HELD {
+        let found = measure(kind, Origin::Anywhere, CASES, &mut random).unwrap();
+        assert!(found.cases > CASES * 9 / 10, "{}: {} of {CASES} were seen", kind.name(), found.cases);
+        assert!(found.greatest <= BOUND, "{}: {:.2e} pixels", kind.name(), found.greatest);
+    }
+}
+
+#[test]
+fn a_view_that_magnifies_angles_magnifies_no_more_than_what_f32_loses_of_them() {
+    let mut random = Random::new();
+    for kind in MAGNIFYING {
+        let found = measure(kind, Origin::Anywhere, CASES, &mut random).unwrap();
+        assert!(found.cases > CASES * 9 / 10, "{}: {} of {CASES} were seen", kind.name(), found.cases);
+        assert!(found.greatest_angle <= WORST_ANGLE, "{}: {:.1} u", kind.name(), found.greatest_angle);
+    }
+}
+
+#[test]
+fn f32_places_in_the_world_are_off_by_pixels_a_hundred_kilometres_out() {
+    let found = measure(HELD[2], Origin::At(1e5), CASES, &mut Random::new()).unwrap();
+    assert!(found.absolute_greatest > 1.0, "{:.2e} pixels", found.absolute_greatest);
+}

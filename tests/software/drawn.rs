@@ -1,0 +1,153 @@
+//! What is drawn.
+
+use drawloom::Granularity;
+use drawloom::backend::Picture;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{Deferred, Format};
+use drawloom::scene::{Camera, Light, Material, Projection, RenderObject, Scene, Topology};
+
+use crate::scenes::everything::everything;
+use crate::scenes::{cube, field, sized, square};
+use crate::{Studio, deferred, pixel};
+
+/// A square of 2 m, 5 m before the camera, that gives off this radiance and reflects nothing.
+fn lit_square(radiance: Vec3) -> Scene {
+    let mut scene = Scene::new();
+    let mesh = scene.add(square(Topology::TriangleStrip)).unwrap();
+    let material = Material { diffuse: Vec3::ZERO, emission: radiance, ..Material::default() };
+    let material = scene.add(material).unwrap();
+    scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+    scene.background = Vec3::new(0.0, 0.25, 0.5);
+    let camera = Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO);
+    let projection = Projection::Orthographic { height: 4.0 };
+    scene.cameras = vec![sized(Camera { projection, far: 10.0, ..camera }, [80, 40])];
+    scene
+}
+
+#[test]
+fn a_square_is_where_it_is_and_the_background_is_around_it() {
+    let scene = lit_square(Vec3::new(1.0, 0.5, 0.25));
+    for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
+        let submission = studio.draw(&scene);
+        let radiance = submission.numbers(0, "radiance").unwrap();
+        // 2 of 4 m in 40 rows, and as many columns in the middle of 80: half floats hold these numbers exactly.
+        for (index, found) in radiance.iter().enumerate() {
+            let (x, y) = (index % 80, index / 80);
+            let is_inside = (30..50).contains(&x) && (10..30).contains(&y);
+            let expected = if is_inside { [1.0, 0.5, 0.25, 1.0] } else { [0.0, 0.25, 0.5, 1.0] };
+            assert_eq!(*found, expected, "({x}, {y})");
+        }
+        let depth = submission.numbers(0, "depth").unwrap();
+        let expected = (10.0 - 5.0) / (10.0 - 0.05);
+        assert!((depth[20 * 80 + 40][0] - expected).abs() < 1e-6 && depth[0][0] == 0.0, "{:?}", depth[20 * 80 + 40]);
+    }
+}
+
+#[test]
+fn what_is_nearer_hides_what_is_farther_in_either_order() {
+    for turned in [false, true] {
+        let mut scene = lit_square(Vec3::X);
+        let near = scene.add(Material { diffuse: Vec3::ZERO, emission: Vec3::Y, ..Material::default() }).unwrap();
+        let mesh = scene.add(square(Topology::TriangleList)).unwrap();
+        let place = if turned { DVec3::NEG_Z } else { DVec3::Z };
+        scene.add_object(RenderObject::new(mesh, near, place)).unwrap();
+        let radiance = Studio::cut(1, Granularity::Adaptive).draw(&scene).numbers(0, "radiance").unwrap();
+        let expected = if turned { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0, 1.0] };
+        assert_eq!(radiance[20 * 80 + 40], expected);
+    }
+}
+
+#[test]
+fn an_empty_scene_is_its_background() {
+    let mut scene = field(0);
+    scene.lights.clear();
+    let picture = Studio::cut(2, Granularity::Adaptive).picture(&scene);
+    let first = pixel(&picture, 0, 0);
+    assert!(first[2] > first[0] && (0..180).all(|y| (0..320).all(|x| pixel(&picture, x, y) == first)), "{first:?}");
+}
+
+#[test]
+fn each_of_many_views_is_what_it_is_alone() {
+    let mut scene = field(150);
+    let sizes = [[64, 64], [65, 30], [1, 1], [200, 3], [96, 54]];
+    let base = scene.cameras[0].clone();
+    scene.cameras = sizes.into_iter().map(|size| sized(base.clone(), size)).collect();
+    for (index, camera) in scene.cameras.iter_mut().enumerate() {
+        (camera.name, camera.position.x) = (format!("view {index}"), index as f64 - 2.0);
+    }
+    let together = Studio::cut(2, Granularity::Adaptive).draw(&scene);
+    for (view, camera) in scene.cameras.clone().into_iter().enumerate() {
+        let mut alone = field(150);
+        alone.cameras = vec![camera];
+        let expected = Studio::cut(2, Granularity::Adaptive).picture(&alone);
+        assert!(together.read(view, "picture").unwrap() == expected, "{view}");
+    }
+}
+
+#[test]
+fn a_depth_pre_pass_changes_nothing() {
+    let scene = everything();
+    let mut with = Studio::new(2, |builder| builder.deferred(deferred().depth_pre_pass(true)));
+    assert!(with.picture(&scene) == Studio::cut(2, Granularity::Adaptive).picture(&scene));
+}
+
+#[test]
+fn shares_of_the_geometry_buffer_change_nothing() {
+    let scene = everything();
+    let mut shared = Studio::new(2, |builder| builder.deferred(deferred().geometry_shares(3)));
+    assert!(shared.picture(&scene) == Studio::cut(2, Granularity::Adaptive).picture(&scene));
+}
+
+/// What light a fraction of a texel's width more or less brings is no more than what a pixel of the map is worth, so a few
+/// pixels on a shadow's edge differ.
+#[test]
+fn the_reference_is_the_same_picture() {
+    for scene in [everything(), field(120)] {
+        let single = Studio::cut(2, Granularity::Adaptive).picture(&scene);
+        let double = Studio::reference().picture(&scene);
+        assert_eq!((double.format, double.bytes.len()), (Format::Rgba8Srgb, single.bytes.len()));
+        let share = share_within(&single, &double, 3);
+        assert!(share >= 0.99, "{share}");
+        assert!(single.bytes.iter().any(|byte| *byte != single.bytes[0]));
+    }
+}
+
+fn share_within(one: &Picture, other: &Picture, bound: u8) -> f64 {
+    let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
+    let is_near =
+        |(one, other): &(&[u8], &[u8])| one.iter().zip(*other).all(|(one, other)| one.abs_diff(*other) <= bound);
+    pixels.filter(is_near).count() as f64 / (one.bytes.len() / 4) as f64
+}
+
+/// The light's ball touches every square of the picture in one of the places.
+#[test]
+fn a_light_reaches_no_less_for_being_looked_for_only_where_it_may() {
+    let mut scene = Scene::new();
+    let mesh = scene.add(cube()).unwrap();
+    let material = scene.add(Material::default()).unwrap();
+    let floor = RenderObject { scale: Vec3::new(30.0, 0.1, 30.0), ..RenderObject::new(mesh, material, DVec3::NEG_Y) };
+    scene.add_object(floor).unwrap();
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 4.0, 12.0), DVec3::ZERO), [150, 100])];
+    let light = |position| Light::Point { position, intensity: Vec3::splat(20.0), range: 3.0 };
+    let mut studio = Studio::new(2, |builder| builder.deferred(Deferred::to_picture()));
+    for place in [[0.0, 0.5, 0.0], [-9.0, 0.5, -6.0], [1.0, 4.0, 12.5], [0.0, 2.0, 9.0], [7.0, 1.0, 4.0]] {
+        scene.lights = vec![light(DVec3::from(place))];
+        let submission = studio.draw(&scene);
+        let depth = submission.numbers(0, "depth").unwrap();
+        let radiance = submission.numbers(0, "radiance").unwrap();
+        let camera = &scene.cameras[0];
+        let tangent = (60_f64.to_radians() * 0.5).tan();
+        for (index, (depth, radiance)) in depth.iter().zip(&radiance).enumerate() {
+            let (x, y) = ((index % 150) as f64 + 0.5, (index / 150) as f64 + 0.5);
+            let ray = DVec3::new((x / 75.0 - 1.0) * tangent * 1.5, (1.0 - y / 50.0) * tangent, -1.0);
+            let surface = camera.position + camera.orientation.as_dquat() * ray * (0.05 / depth[0]);
+            // Well inside of the ball, above the floor, light arrives; outside none does.
+            let distance = surface.distance(DVec3::from(place));
+            if depth[0] > 0.0 && distance < 2.7 && surface.y > -0.95 {
+                assert!(radiance[0] > 1e-4, "{place:?}: {surface} at {distance} is dark");
+            } else if depth[0] == 0.0 || distance > 3.01 {
+                assert_eq!(radiance[0], 0.0, "{place:?}: {surface} at {distance}");
+            }
+        }
+    }
+}

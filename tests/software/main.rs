@@ -1,0 +1,69 @@
+//! Frames on the software backend, which need no graphics adapter.
+
+mod drawn;
+mod refused;
+#[path = "../scenes/mod.rs"]
+mod scenes;
+mod same_bytes;
+
+use std::sync::Arc;
+
+use drawloom::backend::{Picture, SoftwareBackend, SoftwareSubmission};
+use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::scene::Scene;
+use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
+use drawloom::{Granularity, Renderer, RendererBuilder, Submitter};
+
+/// A renderer on the software backend.
+struct Studio {
+    renderer: Renderer<SoftwareBackend>,
+    submitter: Submitter<SoftwareBackend>,
+}
+
+impl Studio {
+    /// In f32, with as many workers.
+    fn new(
+        workers: usize,
+        build: impl FnOnce(RendererBuilder<SoftwareBackend>) -> RendererBuilder<SoftwareBackend>,
+    ) -> Self {
+        let scheduler = Arc::new(Scheduler::new(workers).unwrap());
+        let backend = SoftwareBackend::new(Arc::clone(&scheduler));
+        let (renderer, submitter) = build(Renderer::builder(backend)).build(scheduler).unwrap();
+        Self { renderer, submitter }
+    }
+
+    /// The shipped processes in f32.
+    fn cut(workers: usize, granularity: Granularity) -> Self {
+        Self::new(workers, |builder| builder.deferred(deferred()).granularity(granularity))
+    }
+
+    /// The shipped processes in f64.
+    fn reference() -> Self {
+        let scheduler = Arc::new(Scheduler::new(2).unwrap());
+        let builder = Renderer::builder(SoftwareBackend::reference()).deferred(deferred());
+        let (renderer, submitter) = builder.build(scheduler).unwrap();
+        Self { renderer, submitter }
+    }
+
+    fn draw(&mut self, scene: &Scene) -> SoftwareSubmission {
+        let recorded = self.renderer.record(scene.as_scene_ref()).unwrap();
+        self.submitter.submit(recorded).unwrap().submission
+    }
+
+    fn picture(&mut self, scene: &Scene) -> Picture {
+        self.draw(scene).read(0, "picture").unwrap()
+    }
+}
+
+/// Every process there is, with small shadow maps.
+fn deferred() -> Deferred {
+    let maps = ShadowMaps { side: 100, ..ShadowMaps::default() };
+    Deferred::new().shadow_maps(Some(maps)).post(ToneMapping::default()).post(Fxaa::default())
+}
+
+/// Red, green and blue of a pixel.
+fn pixel(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
+    let start = (y as usize * picture.width as usize + x as usize) * 4;
+    [picture.bytes[start], picture.bytes[start + 1], picture.bytes[start + 2]]
+}

@@ -1,0 +1,80 @@
+//! However a frame is shared out, it has the same bytes.
+
+use drawloom::backend::SoftwareBackend;
+use drawloom::quality::{CullingVolume, Quality};
+use drawloom::scene::Scene;
+use drawloom::{Granularity, RendererBuilder};
+
+use crate::scenes::everything::everything;
+use crate::scenes::field;
+use crate::{Studio, deferred};
+
+/// A field in pictures of odd sizes, with edges inside of the squares that are drawn by one job.
+fn odd_field() -> Scene {
+    let mut scene = field(300);
+    scene.cameras[0].size = [131, 77];
+    scene.cameras[1].size = [65, 64];
+    scene
+}
+
+#[test]
+fn workers_and_granularity_change_nothing() {
+    for scene in [odd_field(), everything()] {
+        let mut expected = Vec::new();
+        let whole = Granularity::PerCamera;
+        for (workers, granularity) in [(1, whole), (2, whole), (2, Granularity::Chunk(7)), (4, Granularity::Adaptive)] {
+            let submission = Studio::cut(workers, granularity).draw(&scene);
+            let found: Vec<_> = (0..scene.cameras.len())
+                .flat_map(|view| ["depth", "normal", "radiance", "picture"].map(|target| (view, target)))
+                .map(|(view, target)| submission.read(view, target).unwrap())
+                .collect();
+            if expected.is_empty() {
+                expected = found;
+            } else {
+                assert!(found == expected, "{workers} workers, {granularity:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frame_does_not_depend_on_those_before_it() {
+    let (small, mut large) = (odd_field(), everything());
+    large.cameras[0].size = [140, 90];
+    let expected = [&small, &large].map(|scene| Studio::cut(2, Granularity::Adaptive).picture(scene));
+    let mut studio = Studio::cut(2, Granularity::Adaptive);
+    for turn in [0, 0, 1, 0, 1, 1] {
+        assert!(studio.picture([&small, &large][turn]) == expected[turn], "{turn}");
+    }
+}
+
+#[test]
+fn a_frame_that_was_recorded_draws_what_the_scene_was_then() {
+    let scene = everything();
+    let expected = Studio::cut(2, Granularity::Adaptive).picture(&scene);
+    let mut studio = Studio::cut(2, Granularity::Adaptive);
+    let mut changed = everything();
+    let recorded = studio.renderer.record(changed.as_scene_ref()).unwrap();
+    changed.lights.clear();
+    let objects: Vec<_> = changed.objects().collect();
+    objects.into_iter().for_each(|object| _ = changed.remove_object(object).unwrap());
+    drop(changed);
+    let submitted = studio.submitter.submit(recorded).unwrap();
+    assert!(submitted.submission.read(0, "picture").unwrap() == expected);
+}
+
+#[test]
+fn what_is_hidden_does_not_show() {
+    for scene in [odd_field(), everything()] {
+        let quality = Quality { culling: CullingVolume::OrientedBox, ..Quality::balanced() };
+        let draw = |occlusion| {
+            let quality = Quality { occlusion, ..quality };
+            let maps = |builder: RendererBuilder<SoftwareBackend>| builder.deferred(deferred()).quality(quality);
+            Studio::new(2, maps).picture(&scene)
+        };
+        let whole = draw(None);
+        for square in Quality::OCCLUSION_SQUARES {
+            assert!(draw(Some(square)) == whole, "squares of {square}");
+        }
+    }
+}
