@@ -1,0 +1,58 @@
+//! The Pareto front as a picture: what each setting takes, and how far its picture is from the reference.
+
+use std::path::Path;
+
+use plotters::prelude::*;
+
+use crate::Failure;
+use crate::charts::{label, text};
+use crate::results::{Entry, Results};
+
+/// Writes `front.svg` into the folder: a dot for each setting, and a line through those to which no other is preferable.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
+    let path = folder.join("front.svg");
+    let root = SVGBackend::new(&path, (960, 420)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let places = || results.entries.iter().map(place);
+    let slowest = places().map(|(time, _)| time).fold(f64::MIN_POSITIVE, f64::max);
+    let nearest = places().map(|(_, distance)| distance).fold(f64::MAX, f64::min);
+    let farthest = places().map(|(_, distance)| distance).fold(nearest, f64::max);
+    let mut chart = ChartBuilder::on(&root)
+        .caption(format!("{}, {}", results.scene(), results.backend()), text(17))
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(62)
+        .build_cartesian_2d(0.0..slowest * 1.1, (nearest * 0.7..farthest * 1.5).log_scale())?;
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .label_style(text(13))
+        .axis_desc_style(text(14))
+        .x_desc("a frame, ms")
+        .y_desc("RMSE of 255 from the reference in f64")
+        .draw()?;
+    let others = results.entries.iter().filter(|entry| !entry.pareto);
+    chart.draw_series(others.map(|entry| Circle::new(place(entry), 4, OTHERS.filled())))?;
+    let front = results.front();
+    chart.draw_series(LineSeries::new(front.iter().map(|entry| place(entry)), FRONT.stroke_width(2)))?;
+    chart.draw_series(front.iter().map(|entry| Circle::new(place(entry), 5, FRONT.filled())))?;
+    chart.draw_series(
+        front
+            .iter()
+            .map(|entry| EmptyElement::at(place(entry)) + Text::new(label(entry, ""), (9, -7), text(13).color(&FRONT))),
+    )?;
+    root.present()?;
+    Ok(())
+}
+
+const FRONT: RGBColor = RGBColor(213, 94, 0);
+const OTHERS: RGBAColor = RGBAColor(0, 114, 178, 0.45);
+
+/// A frame in milliseconds, and the distance of 255; there is no place for 0 on a scale of factors.
+fn place(entry: &Entry) -> (f64, f64) {
+    (entry.frame_ms(), (entry.rmse_from_reference * 255.0).max(1e-3))
+}

@@ -1,0 +1,212 @@
+//! What was measured, as a table and as JSON.
+
+use std::error::Error;
+use std::path::Path;
+
+use drawloom::scene::{Camera, Scene};
+use serde::{Deserialize, Serialize};
+
+use crate::Failure;
+use crate::errors::{self, KnobError};
+use crate::measure::{Measurement, Measurements};
+use crate::settings::{Knob, Setting};
+
+/// What was measured of a scene.
+pub struct Results {
+    scene: String,
+    backend: String,
+    pub entries: Vec<Entry>,
+}
+
+/// What was measured of a knob at a setting.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Entry {
+    pub scene: String,
+    pub backend: String,
+    pub knob: String,
+    pub setting: String,
+    /// From the scene's hand-over to the return of submit, in nanoseconds; of the median frame.
+    pub cpu_ns: u64,
+    /// Until the frame is drawn, in nanoseconds; of the median frame.
+    pub frame_ns: u64,
+    /// How far off the knob is, in the unit of its metric; none where the scene has nothing that it is about.
+    pub error: Option<f64>,
+    pub metric: String,
+    /// What the error can be at most; none where nobody knows.
+    pub bound: Option<f64>,
+    /// What the error is measured against.
+    pub oracle: String,
+    /// Of the picture, from that of `Quality::exact`: 0 to 1.
+    pub rmse: f64,
+    /// Of the picture, from that of `Quality::exact`: 1 if they are the same.
+    pub mssim: f64,
+    /// Of the picture, from that of the reference in f64: 0 to 1.
+    pub rmse_from_reference: f64,
+    /// Of the picture, from that of the reference in f64: 1 if they are the same.
+    pub mssim_from_reference: f64,
+    /// Of the picture, from that of the reference in f64, as eyes see it; none without the feature `flip`.
+    pub flip_from_reference: Option<f64>,
+    /// Whether it is faster than all that are as near to the reference.
+    pub pareto: bool,
+}
+
+impl Entry {
+    /// Whether it is farther off than it can be.
+    pub fn exceeds(&self) -> bool {
+        // What is no number is beyond every bound.
+        self.error.zip(self.bound).is_some_and(|(error, bound)| error > bound || error.is_nan())
+    }
+
+    pub fn frame_ms(&self) -> f64 {
+        self.frame_ns as f64 * 1e-6
+    }
+}
+
+impl Results {
+    /// # Errors
+    /// If an error cannot be worked out.
+    pub fn new(
+        scene_name: String,
+        backend: &str,
+        scene: &Scene,
+        path: &[Camera],
+        settings: &[Setting],
+        measurements: &Measurements,
+    ) -> Result<Self, Failure> {
+        let mut entries = Vec::new();
+        for (setting, measured) in settings.iter().zip(&measurements.of_settings) {
+            let KnobError { error, metric, bound, oracle } = errors::of(setting, scene, path, measurements, measured)?;
+            entries.push(Entry {
+                scene: scene_name.clone(),
+                backend: backend.to_owned(),
+                knob: setting.knob.name().to_owned(),
+                setting: setting.name.clone(),
+                cpu_ns: measured.cpu().as_nanos() as u64,
+                frame_ns: measured.frame().as_nanos() as u64,
+                error,
+                metric: metric.to_owned(),
+                bound,
+                oracle: oracle.to_owned(),
+                rmse: measured.from_exact.rmse,
+                mssim: measured.from_exact.mssim,
+                rmse_from_reference: measured.from_reference.rmse,
+                mssim_from_reference: measured.from_reference.mssim,
+                flip_from_reference: measured.from_reference.flip,
+                pareto: false,
+            });
+        }
+        mark_front(&mut entries, &measurements.of_settings);
+        Ok(Self { scene: scene_name, backend: backend.to_owned(), entries })
+    }
+
+    /// What the scene is called.
+    pub fn scene(&self) -> &str {
+        &self.scene
+    }
+
+    /// What drew.
+    pub fn backend(&self) -> &str {
+        &self.backend
+    }
+
+    /// Those that are farther off than they can be.
+    pub fn exceeded(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| entry.exceeds())
+    }
+
+    /// Those on the Pareto front, from the fastest to the most accurate.
+    pub fn front(&self) -> Vec<&Entry> {
+        let mut front: Vec<_> = self.entries.iter().filter(|entry| entry.pareto).collect();
+        front.sort_by_key(|entry| entry.frame_ns);
+        front
+    }
+
+    /// The table, in Markdown, and the front.
+    pub fn print(&self) {
+        println!("{}, {}; each knob alone, all else as in exact\n", self.scene, self.backend);
+        println!("| knob | setting | CPU, ms | frame, ms | of exact | error | bound | metric | RMSE × 255 | MSSIM |");
+        println!("| --- | --- | --: | --: | --: | --: | --: | --- | --: | --: |");
+        let exact = self.entries.first().map_or(1.0, Entry::frame_ms);
+        for entry in &self.entries {
+            let number = |value: Option<f64>| value.map_or_else(|| String::from("–"), short);
+            println!(
+                "| {} | {} | {:.2} | {:.2} | {:.2} | {} | {} | {} | {:.3} | {:.4} |",
+                entry.knob,
+                entry.setting,
+                entry.cpu_ns as f64 * 1e-6,
+                entry.frame_ms(),
+                entry.frame_ms() / exact,
+                number(entry.error),
+                number(entry.bound),
+                entry.metric,
+                entry.rmse * 255.0,
+                entry.mssim,
+            );
+        }
+        println!("\nPareto front, by the frame's time and RMSE from the reference in f64:\n");
+        for entry in self.front() {
+            println!(
+                "{:>8.2} ms  RMSE {:.3}/255  MSSIM {:.4}  {}: {}",
+                entry.frame_ms(),
+                entry.rmse_from_reference * 255.0,
+                entry.mssim_from_reference,
+                entry.knob,
+                entry.setting
+            );
+        }
+        println!();
+    }
+
+    /// Writes the entries, beside those of other scenes and backends that the file has already.
+    ///
+    /// # Errors
+    /// If the file cannot be written, or what is there is something else.
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
+        let mut all: Vec<Entry> = match std::fs::read(path) {
+            Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| told(path, &error))?,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(told(path, &error)),
+        };
+        all.retain(|entry| entry.scene != self.scene || entry.backend != self.backend);
+        all.extend(self.entries.iter().cloned());
+        std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n").map_err(|error| told(path, &error))?;
+        println!("{} written", path.display());
+        Ok(())
+    }
+}
+
+fn told(path: &Path, error: &dyn Error) -> Failure {
+    format!("{}: {error}", path.display()).into()
+}
+
+/// Marks those to which no other is preferable: from the nearest to the reference on, each whose frames are faster than those of all
+/// before. Each knob alone counts, and each preset.
+fn mark_front(entries: &mut [Entry], measured: &[Measurement]) {
+    let mut order: Vec<_> = (0..entries.len()).collect();
+    // Stable, so `exact` stands for those that draw the same.
+    order.sort_by(|&one, &other| entries[one].rmse_from_reference.total_cmp(&entries[other].rmse_from_reference));
+    let mut front: Vec<usize> = Vec::new();
+    for entry in order {
+        if front.iter().all(|&before| measured[entry].is_faster_than(&measured[before])) {
+            entries[entry].pareto = true;
+            front.push(entry);
+        }
+    }
+}
+
+/// A number to three digits.
+pub fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => String::from("0"),
+        size if !(1e-3..1e4).contains(&size) => format!("{value:.1e}"),
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+/// The entries of one knob, with `exact` behind them.
+pub fn of_knob(entries: &[Entry], knob: Knob) -> Vec<&Entry> {
+    let own = entries.iter().filter(|entry| entry.knob == knob.name() && entry.setting != "exact");
+    own.chain(entries.first()).collect()
+}
