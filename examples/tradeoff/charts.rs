@@ -23,6 +23,7 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
             title: metric.to_owned(),
             value: &|entry| entry.error.filter(|_| entry.metric == metric),
             bound: &|entry| entry.bound.filter(|_| entry.metric == metric),
+            longest: None,
             color: RGBColor(213, 94, 0),
         };
         draw_one(&folder.join(file_name(knob)), knob.name(), results, &entries, own)?;
@@ -32,6 +33,7 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         title: String::from("error, % of its bound"),
         value: &|entry| entry.error.zip(entry.bound).map(|(error, bound)| share(error, bound) * 100.0),
         bound: &nothing,
+        longest: Some(100.0),
         color: RGBColor(213, 94, 0),
     };
     draw_one(
@@ -76,6 +78,8 @@ struct Column<'a> {
     value: &'a dyn Fn(&Entry) -> Option<f64>,
     /// What it can be at most.
     bound: &'a dyn Fn(&Entry) -> Option<f64>,
+    /// How long a bar can be; from what there is, if not given.
+    longest: Option<f64>,
     color: RGBColor,
 }
 
@@ -101,12 +105,14 @@ fn draw_one(
             title: String::from("a frame, ms"),
             value: &|entry| Some(entry.frame_ms()),
             bound: &nothing,
+            longest: None,
             color: RGBColor(0, 114, 178),
         },
         Column {
             title: String::from("picture: RMSE from f64, of 255"),
             value: &|entry| Some(entry.rmse_from_reference * 255.0),
             bound: &nothing,
+            longest: None,
             color: RGBColor(230, 159, 0),
         },
         of_knobs,
@@ -126,12 +132,7 @@ fn draw_column(
     entries: &[&Entry],
 ) -> Result<(), Failure> {
     root.draw(&Text::new(column.title.clone(), (left, HEAD - 22), text(14)))?;
-    let mut values: Vec<_> = entries.iter().filter_map(|entry| (column.value)(entry)).collect();
-    values.sort_by(f64::total_cmp);
-    let middle = values.get(values.len() / 2).copied().unwrap_or_default();
-    // What is many times as long as most would leave nothing to see of these.
-    let longest = values.last().copied().unwrap_or_default();
-    let longest = if middle > 0.0 { longest.min(middle * MOST) } else { longest }.max(f64::MIN_POSITIVE);
+    let longest = column.longest.unwrap_or_else(|| longest(entries.iter().filter_map(|entry| (column.value)(entry))));
     for (row, entry) in (0..).zip(entries) {
         let Some(value) = (column.value)(entry) else { continue };
         let top = HEAD + ROW * row;
@@ -149,6 +150,15 @@ fn draw_column(
         }
     }
     Ok(())
+}
+
+/// The longest bar. What is many times as long as most would leave nothing to see of these.
+fn longest(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<_> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let middle = values.get(values.len() / 2).copied().unwrap_or_default();
+    let longest = values.last().copied().unwrap_or_default();
+    if middle > 0.0 { longest.min(middle * MOST) } else { longest.max(f64::MIN_POSITIVE) }
 }
 
 pub fn text(size: i32) -> TextStyle<'static> {

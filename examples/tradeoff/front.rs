@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::Failure;
 use crate::charts::{label, text};
 use crate::results::{Entry, Results};
+use crate::settings::Knob;
 
 /// Writes `front.svg` into the folder: a dot for each setting, and a line through those to which no other is preferable.
 ///
@@ -25,7 +27,7 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         .margin(12)
         .x_label_area_size(42)
         .y_label_area_size(62)
-        .build_cartesian_2d(0.0..slowest * 1.1, (nearest * 0.7..farthest * 1.5).log_scale())?;
+        .build_cartesian_2d(0.0..slowest * 1.1, (nearest * 0.6..farthest * 1.6).log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -40,11 +42,11 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     let front = results.front();
     chart.draw_series(LineSeries::new(front.iter().map(|entry| place(entry)), FRONT.stroke_width(2)))?;
     chart.draw_series(front.iter().map(|entry| Circle::new(place(entry), 5, FRONT.filled())))?;
-    chart.draw_series(
-        front
-            .iter()
-            .map(|entry| EmptyElement::at(place(entry)) + Text::new(label(entry, ""), (9, -7), text(13).color(&FRONT))),
-    )?;
+    // By turns above and below, so that neighbours' names have room.
+    chart.draw_series(front.iter().zip([-17, 17].into_iter().cycle()).map(|(entry, aside)| {
+        let style = text(13).color(&FRONT).pos(Pos::new(HPos::Center, VPos::Center));
+        EmptyElement::at(place(entry)) + Text::new(label(entry, Knob::Preset.name()), (0, aside), style)
+    }))?;
     root.present()?;
     Ok(())
 }
