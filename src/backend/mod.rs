@@ -3,7 +3,7 @@
 mod null;
 mod picture;
 mod software;
-mod subdivided;
+mod subdivisions;
 mod texels;
 #[cfg(feature = "wgpu")]
 mod wgpu;

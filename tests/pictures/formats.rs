@@ -7,6 +7,7 @@ use drawloom::process::{
 };
 use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, ToneCurve, VertexFormat};
 use drawloom::scene::{Camera, Material, Mesh, Projection, RenderObject, Scene, Texture, Topology, Vertex};
+use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -14,7 +15,7 @@ use crate::judge::{Distance, as_image, assert_color, tone_mapped};
 use crate::references::colonnade;
 use crate::scenes::everything::everything;
 use crate::scenes::{field, sized};
-use crate::studio::{Studio, draw, from_half, pixel};
+use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[
     ("normals_read_back_are_within_their_bound", normals),
@@ -96,7 +97,7 @@ fn decoded(picture: &Picture) -> Result<Vec<DVec3>, Failed> {
         let away = |other: f64, own: f64| (1.0 - other.abs()).copysign(own);
         if z < 0.0 { DVec3::new(away(y, x), away(x, y), z).normalize() } else { DVec3::new(x, y, z).normalize() }
     };
-    let half = |bytes: &[u8]| from_half(u16::from_le_bytes([bytes[0], bytes[1]]));
+    let half = |bytes: &[u8]| f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
     let point = |pixel: &[u8]| match picture.format {
         Format::Rg8Unorm => Some((f64::from(pixel[0]) / 127.0 - 1.0, f64::from(pixel[1]) / 127.0 - 1.0)),
         Format::Rgb10a2Unorm => {
@@ -199,7 +200,7 @@ fn diffuse() -> Result<(), Failed> {
         for channel in 0..3 {
             let meant = f64::from(diffuse[channel]);
             let byte = f64::from(bytes.bytes[channel]);
-            let half = from_half(u16::from_le_bytes([halves.bytes[channel * 2], halves.bytes[channel * 2 + 1]]));
+            let half = f16::from_le_bytes([halves.bytes[channel * 2], halves.bytes[channel * 2 + 1]]).to_f64();
             let off = [(byte - srgb(meant) * 255.0).abs() / 0.6, (half - meant).abs() / (meant / 1024.0).max(1e-7)];
             if off.iter().any(|off| *off > 1.0) {
                 return Err(format!("{meant} became {byte} and {half}").into());

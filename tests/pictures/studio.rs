@@ -7,6 +7,7 @@ use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Recorded, Renderer, RendererBuilder, Submitter, wgpu};
+use half::f16;
 use libtest_mimic::Failed;
 
 use crate::adapter;
@@ -74,19 +75,7 @@ pub fn pixel(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
 /// Red, green and blue of every pixel of a view's `radiance`, which is in half floats.
 pub fn radiance(submission: &WgpuSubmission, view: usize) -> Result<Vec<[f64; 3]>, Failed> {
     let picture = submission.read(view, "radiance")?;
-    let channel = |bytes: &[u8]| from_half(u16::from_le_bytes([bytes[0], bytes[1]]));
+    let channel = |bytes: &[u8]| f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
     let pixels = picture.bytes.chunks_exact(8);
     Ok(pixels.map(|pixel| [channel(&pixel[0..]), channel(&pixel[2..]), channel(&pixel[4..])]).collect())
-}
-
-/// The number that a half float stands for.
-pub fn from_half(bits: u16) -> f64 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff) / 1024.0);
-    let magnitude = match exponent {
-        0 => fraction * 2_f64.powi(-14),
-        0x1f if fraction == 0.0 => f64::INFINITY,
-        0x1f => f64::NAN,
-        _ => (1.0 + fraction) * 2_f64.powi(exponent - 15),
-    };
-    if bits >> 15 == 0 { magnitude } else { -magnitude }
 }

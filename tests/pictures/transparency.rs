@@ -7,6 +7,7 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
 use drawloom::view::ShadowMaps;
+use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -71,21 +72,9 @@ fn middle(radiance: &Picture) -> [f64; 3] {
     let pixel = (radiance.height / 2 * radiance.width + radiance.width / 2) as usize;
     let channel = |index: usize| {
         let start = pixel * 8 + index * 2;
-        from_half(u16::from_le_bytes([radiance.bytes[start], radiance.bytes[start + 1]]))
+        f16::from_le_bytes([radiance.bytes[start], radiance.bytes[start + 1]]).to_f64()
     };
     [channel(0), channel(1), channel(2)]
-}
-
-/// A half float (IEEE 754 binary16).
-fn from_half(bits: u16) -> f64 {
-    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
-    sign * match exponent {
-        0 => fraction * 2_f64.powi(-14),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1.0 + fraction) * 2_f64.powi(exponent - 15),
-    }
 }
 
 /// Fails where the middle of the picture is not what a radiance, worked out in f64, makes of it.

@@ -1,5 +1,7 @@
 //! What is drawn.
 
+use std::collections::HashSet;
+
 use drawloom::Granularity;
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec3};
@@ -108,8 +110,17 @@ fn the_reference_is_the_same_picture() {
         assert_eq!((double.format, double.bytes.len()), (Format::Rgba8Srgb, single.bytes.len()));
         let share = share_within(&single, &double, 3);
         assert!(share >= 0.99, "{share}");
-        assert!(single.bytes.iter().any(|byte| *byte != single.bytes[0]));
+        let rmse = rmse(&single, &double);
+        assert!(rmse <= 2.0, "{rmse}");
+        let colors: HashSet<_> = single.bytes.chunks_exact(4).collect();
+        assert!(colors.len() > 500, "a picture of {} colours shows little", colors.len());
     }
+}
+
+/// Of 255.
+fn rmse(one: &Picture, other: &Picture) -> f64 {
+    let squares = one.bytes.iter().zip(&other.bytes).map(|(one, other)| f64::from(one.abs_diff(*other)).powi(2));
+    (squares.sum::<f64>() / one.bytes.len() as f64).sqrt()
 }
 
 fn share_within(one: &Picture, other: &Picture, bound: u8) -> f64 {

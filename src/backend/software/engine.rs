@@ -5,17 +5,18 @@ use std::sync::Arc;
 use parking_lot::Mutex;
 
 use super::StartsFrames;
-use super::assets::{MeshCache, Subdivisions};
 use super::crew::Crew;
 use super::frame::{Frame, FramePass, PassDraws, Recording, ViewState};
 use super::materials::MaterialCache;
+use super::meshes::MeshCache;
 use super::number::{CameraPlace, Number};
 use super::pass::{Attachments, ColorTarget, DepthTarget};
 use super::targets::{FrameTargets, Target, TargetCache};
+use crate::backend::subdivisions::Subdivisions;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, Draws, Pass, Twin, TwinShader};
 use crate::quality::VertexFormat;
-use crate::scene::ViewKind;
+use crate::scene::{Mesh, ViewKind};
 use crate::task::catch;
 use crate::view::{FixedPosition, ViewRecord};
 
@@ -24,7 +25,7 @@ pub(super) struct Engine<R: Number> {
     pub(super) crew: Crew,
     /// Held while a frame is drawn: one is drawn at a time.
     pub(super) drawing: Mutex<()>,
-    pub(super) subdivisions: Subdivisions,
+    pub(super) subdivisions: Subdivisions<Arc<Mesh>>,
     meshes: Mutex<MeshCache>,
     materials: Mutex<MaterialCache>,
     targets: Mutex<TargetCache<R>>,
@@ -66,6 +67,7 @@ impl<R: Number> StartsFrames for Engine<R> {
             views: views_of_frame,
             passes,
             objects: R::objects(scene),
+            vertices,
             meshes,
             subdivided: Mutex::default(),
             materials,

@@ -1,14 +1,13 @@
 //! A frame on its way through the software backend.
 
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::assets::Meshes;
 use super::engine::Engine;
 use super::materials::MaterialTable;
+use super::meshes::{Meshes, fetched};
 use super::number::{CameraPlace, Number};
 use super::object_pass::ObjectPass;
 use super::pass::{Attachments, DrawingPass};
@@ -16,11 +15,13 @@ use super::picture_pass::{draw_full_screen, draw_lights};
 use super::pieces::pieces;
 use super::submission::SoftwareSubmission;
 use super::targets::FrameTargets;
+use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, PassRequest};
 use crate::process::{FullScreenTwin, LightTwin, LightValues, ObjectTwin, Pass, ViewValues};
+use crate::quality::VertexFormat;
 use crate::queue::{Batch, DrawList};
 use crate::scene::{Blend, Mesh};
-use crate::view::{ObjectTable, RejectionReason};
+use crate::view::ObjectTable;
 
 /// A frame on its way, in either kind of number.
 pub(super) trait Recording: Send + Sync {
@@ -60,9 +61,11 @@ pub(super) struct Frame<R: Number> {
     /// In the order they are submitted.
     pub(super) passes: Vec<FramePass<R>>,
     pub(super) objects: R::Objects,
+    /// How the vertices lie that it draws from.
+    pub(super) vertices: VertexFormat,
     pub(super) meshes: Meshes,
     /// By the mesh's slot, and how often its edges are halved.
-    pub(super) subdivided: Mutex<HashMap<(u32, u32), Arc<Mesh>>>,
+    pub(super) subdivided: Mutex<SubdividedMeshes<Arc<Mesh>>>,
     pub(super) materials: Arc<MaterialTable>,
     pub(super) targets: Arc<FrameTargets<R>>,
 }
@@ -97,18 +100,10 @@ impl<R: Number> Recording for Frame<R> {
     }
 
     fn prepare(&self, &PassRequest { frame: request, list, .. }: &PassRequest<'_>) -> Result<(), BackendError> {
-        for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
-            let halvings = batch.state.halvings();
-            let found = self.engine.subdivisions.find(request.scene.assets, batch.mesh, halvings);
-            let found = found.ok_or_else(no_such_mesh)?;
-            if found.is_coarse {
-                for &object in &list.objects[batch.first as usize..][..batch.count as usize] {
-                    request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
-                }
-            }
-            self.subdivided.lock().insert((batch.mesh, halvings), Arc::clone(&found.mesh));
-        }
-        Ok(())
+        let make = |mesh| Ok(Arc::new(fetched(mesh, self.vertices)));
+        self.engine.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
+            self.subdivided.lock().insert(key, mesh);
+        })
     }
 
     fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError> {
@@ -133,7 +128,7 @@ impl<R: Number> Frame<R> {
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.halvings() {
                         0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
-                        halvings => subdivided.get(&(batch.mesh, halvings)),
+                        halvings => subdivided.get(&(batch.mesh, halvings)).map(|mesh| &mesh.drawn),
                     };
                     mesh.cloned().ok_or_else(no_such_mesh)
                 };
@@ -147,8 +142,4 @@ impl<R: Number> Frame<R> {
         };
         outcome.map_err(|panic| BackendError::TwinPanicked { process: pass.process.clone(), message: panic.message })
     }
-}
-
-fn no_such_mesh() -> BackendError {
-    BackendError::BrokenRule { rule: "a batch draws a mesh that is there".to_owned() }
 }

@@ -9,13 +9,14 @@
 //! with its triangles in the order of the commands. Pieces and squares depend on nothing but the frame, so neither the number
 //! of workers nor how they share the work changes a byte.
 
-mod assets;
 mod crew;
 mod engine;
 mod formats;
 mod frame;
 mod light_bounds;
 mod materials;
+mod meshes;
+mod mip_chain;
 mod number;
 mod object_pass;
 mod pass;

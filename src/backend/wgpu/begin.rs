@@ -5,11 +5,12 @@ use std::sync::atomic::Ordering;
 
 use super::error_scope::{caught, checked};
 use super::kept::{ProcessGroup, Surroundings};
+use super::subdivided_mesh::SubdividedMesh;
 use super::{Record, WgpuBackend, WgpuFrame};
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, Pass};
 use crate::queue::DrawList;
-use crate::view::RejectionReason;
+use crate::scene::Mesh;
 
 impl WgpuBackend {
     /// Makes what all passes of a frame need.
@@ -103,17 +104,10 @@ impl WgpuBackend {
         request: &FrameRequest<'_>,
         list: &DrawList,
     ) -> Result<(), BackendError> {
-        for batch in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
-            let halvings = batch.state.halvings();
-            let (assets, vertices) = (request.scene.assets, request.quality.vertices);
-            let mesh = self.subdivisions.find(&self.device, &self.uploads, assets, vertices, batch.mesh, halvings)?;
-            if mesh.is_coarse {
-                for rank in batch.first..batch.first + batch.count {
-                    request.rejections.count_once(RejectionReason::CoarseEdges, list.objects[rank as usize] as usize);
-                }
-            }
-            frame.buffers.subdivided().write().insert((batch.mesh, halvings), mesh);
-        }
-        Ok(())
+        let vertices = request.quality.vertices;
+        let make = |mesh: Mesh| SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices);
+        self.subdivisions.collect(request, list, vertices, make, |key, mesh| {
+            frame.buffers.subdivided().write().insert(key, mesh);
+        })
     }
 }

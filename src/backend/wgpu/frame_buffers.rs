@@ -9,10 +9,11 @@ use parking_lot::{Mutex, RwLock};
 
 use super::frame_pass::FramePass;
 use super::growing_buffer::{ALIGNMENT, GrowingBuffer, MirroredBuffer, append_aligned, check_storage, roomy};
-use super::kept::Subdivided;
 use super::layouts::Layouts;
+use super::subdivided_mesh::SubdividedMesh;
 use super::timestamps::Timestamps;
 use super::uploads::Uploads;
+use crate::backend::subdivisions::SubdividedMeshes;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
 use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
@@ -156,7 +157,7 @@ impl FrameBuffers {
     }
 
     /// The meshes that the frame draws subdivided.
-    pub(super) fn subdivided(&self) -> &RwLock<Subdivided> {
+    pub(super) fn subdivided(&self) -> &RwLock<SubdividedMeshes<SubdividedMesh>> {
         &self.buffers.subdivided
     }
 
@@ -196,7 +197,7 @@ struct Buffers {
     /// What the passes' bind groups were made for, and what this frame's are to be for.
     key: GroupsKey,
     next_key: GroupsKey,
-    subdivided: RwLock<Subdivided>,
+    subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
     timestamps: Option<Timestamps>,
     /// How many frames went by that had others.
     unused: u32,

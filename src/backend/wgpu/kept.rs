@@ -3,18 +3,15 @@
 //! Everything is compared as a whole with what it was made of, and what it was made of is held meanwhile, so nothing else
 //! can come to have its identity.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
 
 use super::assets::AssetSnapshot;
 use super::pipelines::ProcessPipelines;
-use super::subdivisions::SubdividedMesh;
+use super::subdivided_mesh::SubdividedMesh;
+use crate::backend::subdivisions::{Subdivided, SubdividedMeshes};
 use crate::queue::Batch;
-
-/// The subdivided meshes of a frame, by mesh slot and how often its edges are halved.
-pub(super) type Subdivided = HashMap<(u32, u32), Arc<SubdividedMesh>>;
 
 /// What all bundles of a pass are recorded with. Pipelines know the formats of their targets; the snapshot knows where meshes
 /// lie in the arenas.
@@ -45,7 +42,7 @@ pub(super) struct KeptBundles {
 struct KeptBundle {
     batches: Vec<Batch>,
     /// Those of the batches that draw one, in their order.
-    subdivided: Vec<Arc<SubdividedMesh>>,
+    subdivided: Vec<Arc<Subdivided<SubdividedMesh>>>,
     bundle: wgpu::RenderBundle,
 }
 
@@ -74,7 +71,12 @@ impl KeptBundles {
     }
 
     /// The bundle at a place, if it draws these batches.
-    pub(super) fn find(&self, place: usize, batches: &[Batch], subdivided: &Subdivided) -> Option<wgpu::RenderBundle> {
+    pub(super) fn find(
+        &self,
+        place: usize,
+        batches: &[Batch],
+        subdivided: &SubdividedMeshes<SubdividedMesh>,
+    ) -> Option<wgpu::RenderBundle> {
         let by_place = self.by_place.lock();
         let kept = by_place.get(place)?.as_ref()?;
         let draws = drawn(batches, subdivided).map(Arc::as_ptr).eq(kept.subdivided.iter().map(Arc::as_ptr));
@@ -82,7 +84,13 @@ impl KeptBundles {
     }
 
     /// Keeps a bundle in the place of the one there.
-    pub(super) fn keep(&self, place: usize, batches: &[Batch], subdivided: &Subdivided, bundle: wgpu::RenderBundle) {
+    pub(super) fn keep(
+        &self,
+        place: usize,
+        batches: &[Batch],
+        subdivided: &SubdividedMeshes<SubdividedMesh>,
+        bundle: wgpu::RenderBundle,
+    ) {
         let drawn = drawn(batches, subdivided).cloned();
         let mut by_place = self.by_place.lock();
         let Some(slot) = by_place.get_mut(place) else { return };
@@ -99,7 +107,10 @@ impl KeptBundles {
     }
 }
 
-fn drawn<'a>(batches: &'a [Batch], subdivided: &'a Subdivided) -> impl Iterator<Item = &'a Arc<SubdividedMesh>> {
+fn drawn<'a>(
+    batches: &'a [Batch],
+    subdivided: &'a SubdividedMeshes<SubdividedMesh>,
+) -> impl Iterator<Item = &'a Arc<Subdivided<SubdividedMesh>>> {
     let halved = batches.iter().filter(|batch| batch.state.halvings() > 0);
     halved.filter_map(|batch| subdivided.get(&(batch.mesh, batch.state.halvings())))
 }

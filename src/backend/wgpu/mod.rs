@@ -32,7 +32,7 @@ mod pass_times;
 mod picture;
 mod pipelines;
 mod record;
-mod subdivisions;
+mod subdivided_mesh;
 mod targets;
 mod textures;
 mod timestamps;
@@ -55,11 +55,12 @@ use self::frame_buffers::BufferPool;
 use self::layouts::Layouts;
 use self::light_meshes::LightMeshes;
 use self::pipelines::ProcessPipelines;
-use self::subdivisions::Subdivisions;
+use self::subdivided_mesh::SubdividedMesh;
 use self::targets::TargetCache;
 use self::timestamps::Timing;
 use self::uploads::Uploads;
 use self::ways::Ways;
+use super::subdivisions::Subdivisions;
 use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, Pass};
 use crate::task::Worker;
@@ -88,7 +89,7 @@ pub struct WgpuBackend {
     /// Made when a plan draws lights for the first time.
     light_meshes: Mutex<Option<Arc<LightMeshes>>>,
     assets: Mutex<AssetCache>,
-    subdivisions: Subdivisions,
+    subdivisions: Subdivisions<SubdividedMesh>,
     targets: Mutex<TargetCache>,
     buffers: Arc<BufferPool>,
     ways: Ways,

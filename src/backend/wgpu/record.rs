@@ -9,9 +9,10 @@ use super::arguments::Arguments;
 use super::assets::{AssetSnapshot, MeshRange};
 use super::frame::{Part, WgpuFrame, WgpuPart};
 use super::frame_pass::FramePass;
-use super::kept::Subdivided;
 use super::pipelines::fixed_state;
+use super::subdivided_mesh::SubdividedMesh;
 use super::ways::{Record, Share};
+use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawState;
 use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
@@ -60,7 +61,7 @@ fn new_bundle(
     frame: &WgpuFrame,
     pass: &FramePass,
     batches: &[Batch],
-    subdivided: &Subdivided,
+    subdivided: &SubdividedMeshes<SubdividedMesh>,
 ) -> Result<wgpu::RenderBundle, BackendError> {
     let pipelines = frame.pipelines(pass.pass);
     let by_state = pipelines.prepared();
@@ -75,7 +76,7 @@ struct Prepared<'a> {
     frame: &'a WgpuFrame,
     pass: &'a FramePass,
     by_state: &'a HashMap<DrawState, wgpu::RenderPipeline>,
-    subdivided: &'a Subdivided,
+    subdivided: &'a SubdividedMeshes<SubdividedMesh>,
 }
 
 impl<'a> Prepared<'a> {
@@ -121,6 +122,7 @@ impl<'a> Prepared<'a> {
         for batch in run {
             let mesh = self.subdivided.get(&(batch.mesh, batch.state.halvings()));
             let mesh = mesh.ok_or_else(|| broken("a mesh is subdivided before it is drawn"))?;
+            let mesh = &mesh.drawn;
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
             encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
@@ -211,7 +213,7 @@ pub(super) fn fixed(
     let by_state = frame.pipelines(pass.pass).prepared();
     let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
     let pipeline = pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?;
-    let subdivided = Subdivided::new();
+    let subdivided = SubdividedMeshes::new();
     let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
     let mut render_pass = begin_pass(encoder, frame, request, index, Share::WHOLE);
     render_pass.set_pipeline(pipeline);
@@ -265,7 +267,7 @@ pub(super) fn raw(
 /// If there is no such mesh: an error of Drawloom's own.
 pub(super) fn mesh_of(assets: &AssetSnapshot, batch: &Batch) -> Result<MeshRange, BackendError> {
     let mesh = assets.meshes.get(batch.mesh as usize).copied().flatten();
-    mesh.ok_or_else(|| broken("a batch draws a mesh that is there"))
+    mesh.ok_or_else(no_such_mesh)
 }
 
 /// No device has more colour targets.

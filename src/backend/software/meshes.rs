@@ -1,0 +1,50 @@
+//! Meshes, kept from frame to frame.
+
+use std::sync::Arc;
+
+use crate::quality::VertexFormat;
+use crate::scene::{Assets, Mesh};
+
+/// What frames draw, by the mesh's slot.
+pub(super) type Meshes = Arc<[Option<Arc<Mesh>>]>;
+
+/// Keeps the meshes of a scene: a frame that is drawn later needs them, whatever becomes of the scene.
+#[derive(Default)]
+pub(super) struct MeshCache {
+    /// Whose meshes they are, as of when, and how their vertices lie.
+    assets: (u64, u64, VertexFormat),
+    /// With the revision of each.
+    kept: Vec<Option<(u64, Arc<Mesh>)>>,
+    meshes: Meshes,
+}
+
+impl MeshCache {
+    /// The meshes of these assets, as a device would fetch their vertices.
+    pub(super) fn update(&mut self, assets: &Assets, vertices: VertexFormat) -> Meshes {
+        let wanted = (assets.meshes.identity(), assets.meshes.revision(), vertices);
+        if self.assets == wanted {
+            return Arc::clone(&self.meshes);
+        }
+        let mut before = std::mem::take(&mut self.kept);
+        if (self.assets.0, self.assets.2) != (wanted.0, wanted.2) {
+            before.clear();
+        }
+        self.kept.resize(assets.meshes.slot_count(), None);
+        for (handle, revision, mesh) in assets.meshes.iter_revised() {
+            let slot = handle.index() as usize;
+            let same = before.get_mut(slot).and_then(Option::take).filter(|(kept, _)| *kept == revision);
+            self.kept[slot] = Some(same.unwrap_or_else(|| (revision, Arc::new(fetched(mesh.clone(), vertices)))));
+        }
+        self.assets = wanted;
+        self.meshes = self.kept.iter().map(|kept| kept.as_ref().map(|(_, mesh)| Arc::clone(mesh))).collect();
+        Arc::clone(&self.meshes)
+    }
+}
+
+/// The mesh as a device would fetch its vertices.
+pub(super) fn fetched(mesh: Mesh, vertices: VertexFormat) -> Mesh {
+    match vertices {
+        VertexFormat::Full => mesh,
+        VertexFormat::Packed => mesh.as_packed(),
+    }
+}

@@ -1,0 +1,178 @@
+//! Textures, sampled as devices do.
+
+use std::sync::LazyLock;
+
+use crate::backend::texels::{SIDES, array_for, linear, mip_chain};
+use crate::raster::{Real, Vector, Vector2, Vector4};
+use crate::scene::Texture;
+
+/// All mip levels of a texture, as [`mip_chain`] has them.
+pub(super) struct MipChain {
+    /// Of the first level, in pixels: a power of two.
+    side: usize,
+    levels: Vec<Vec<u8>>,
+}
+
+/// What the bytes of red, green and blue stand for.
+static LIGHT: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|byte| linear(byte as f64 / 255.0)));
+
+impl MipChain {
+    pub(super) fn of(texture: &Texture) -> Self {
+        let side = SIDES[array_for(texture)];
+        Self { side: side as usize, levels: mip_chain(texture, side) }
+    }
+
+    /// The level of detail is where a step to the next column, or to the next row if that is longer, is as long as a pixel (Vulkan,
+    /// "Level-of-Detail Operation"). Between two levels, both are blended.
+    pub(super) fn trilinear<R: Real>(&self, uv: Vector2<R>, across: Vector2<R>, down: Vector2<R>) -> Vector4<R> {
+        // What is no number stands for 0, as on devices; it would lead to no pixel at all.
+        let finite = |value: R| if value.is_finite() { value } else { R::zero() };
+        let uv = uv.map(finite);
+        let longest = finite(across.dot(across).max(down.dot(down)).sqrt() * R::of(self.side as f64));
+        let last = self.levels.len() - 1;
+        let level = longest.max(R::one()).log2().min(R::of(last as f64));
+        let finer = level.floor();
+        let share = level - finer;
+        let finer = finer.as_f64() as usize;
+        let one = self.bilinear(finer, uv);
+        if share == R::zero() {
+            return one;
+        }
+        one.with(self.bilinear(finer + 1, uv), |one, other| one + (other - one) * share)
+    }
+
+    /// Of the four pixels around a place, each by how near its middle is. The picture repeats beyond its border.
+    fn bilinear<R: Real>(&self, level: usize, uv: Vector2<R>) -> Vector4<R> {
+        let side = self.side >> level;
+        // Taken to between 0 and 1 first, so that far places keep what f32 has of them.
+        let place = uv.map(|value| (value - value.floor()) * R::of(side as f64) - R::of(0.5));
+        let [x, y] = place.map(R::floor).0;
+        let [right, lower] = (place - Vector([x, y])).0;
+        let wrapped = |first: R, step: i64| (first.as_f64() as i64 + step).rem_euclid(side as i64) as usize;
+        let columns = [(wrapped(x, 0), R::one() - right), (wrapped(x, 1), right)];
+        let rows = [(wrapped(y, 0), R::one() - lower), (wrapped(y, 1), lower)];
+        let mut sum = Vector::zero();
+        for (row, row_weight) in rows {
+            for (column, weight) in columns {
+                sum = sum + self.pixel(level, row * side + column) * (weight * row_weight);
+            }
+        }
+        sum
+    }
+
+    fn pixel<R: Real>(&self, level: usize, index: usize) -> Vector4<R> {
+        let bytes = &self.levels[level][index * 4..index * 4 + 4];
+        let of_light = |byte: u8| R::of(LIGHT[usize::from(byte)]);
+        Vector([of_light(bytes[0]), of_light(bytes[1]), of_light(bytes[2]), R::of(f64::from(bytes[3]) / 255.0)])
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// How far f32 rounds, as a share of the value.
+    const UNIT: f64 = 1.0 / 16_777_216.0;
+
+    fn noise(side: u32) -> Texture {
+        let mut state = 1_u32;
+        let byte = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        Texture::new("noise", side, side, (0..side * side * 4).map(byte).collect()).unwrap()
+    }
+
+    fn texel<R: Real>(chain: &MipChain, uv: [f64; 2], gradients: [[f64; 2]; 2]) -> [f64; 4] {
+        let [uv, across, down] = [uv, gradients[0], gradients[1]].map(|vector| Vector(vector.map(R::of)));
+        chain.trilinear(uv, across, down).0.map(R::as_f64)
+    }
+
+    /// Of every pixel of a level, those by a tent as wide as two pixels around the place, wherever it repeats.
+    fn expected(levels: &[Vec<u8>], level: usize, uv: [f64; 2]) -> [f64; 4] {
+        let side = 256_usize >> level;
+        let tent = |index: usize, place: f64| {
+            let distance = (index as f64 + 0.5) / side as f64 - place;
+            (1.0 - (distance - distance.round()).abs() * side as f64).max(0.0)
+        };
+        // A level of one pixel is its own neighbour.
+        let weight = |index: usize, place: f64| if side == 1 { 1.0 } else { tent(index, place) };
+        let mut sum = [0.0; 4];
+        for (index, pixel) in levels[level].chunks_exact(4).enumerate() {
+            let weight = weight(index % side, uv[0]) * weight(index / side, uv[1]);
+            let color = |byte: u8| {
+                let value = f64::from(byte) / 255.0;
+                if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+            };
+            for channel in 0..3 {
+                sum[channel] += weight * color(pixel[channel]);
+            }
+            sum[3] += weight * f64::from(pixel[3]) / 255.0;
+        }
+        sum
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// In f32, the place in a level's pixels is off by u·(|uv| + 2·side), and so is each weight; a step of one pixel changes what
+        /// is found by 1 at most in each direction. The level is off by 8u and a few u of its logarithm, whose logarithm is 9 at most:
+        /// 20u; sums and products add 10u.
+        #[test]
+        fn it_is_trilinear(
+            uv in prop::array::uniform2(-3.0..3.0_f32),
+            longest in -2.0..10.0_f64,
+            around in 0.0..6.3_f64,
+            shorter in 0.0..1.0_f64,
+            is_down in any::<bool>(),
+        ) {
+            let texture = noise(256);
+            let levels = mip_chain(&texture, 256);
+            let chain = MipChain::of(&texture);
+            let uv = uv.map(f64::from);
+            let length = longest.exp2() / 256.0;
+            let long = [around.cos() * length, around.sin() * length].map(|value| f64::from(value as f32));
+            let mut gradients = [long, [shorter * long[1], -shorter * long[0]].map(|value| f64::from(value as f32))];
+            if is_down {
+                gradients.swap(0, 1);
+            }
+            let level = (long[0].hypot(long[1]) * 256.0).log2().clamp(0.0, 8.0);
+            let [finer, coarser] = [level.floor(), level.ceil()].map(|level| expected(&levels, level as usize, uv));
+            let double = texel::<f64>(&chain, uv, gradients);
+            let single = texel::<f32>(&chain, uv, gradients);
+            for channel in 0..4 {
+                let between = finer[channel] + (coarser[channel] - finer[channel]) * level.fract();
+                prop_assert!((double[channel] - between).abs() < 1e-9, "{level} {double:?} {between}");
+                let bound = UNIT * (2.0 * (3.0 * 256.0 + 2.0 * 256.0) + 30.0);
+                prop_assert!((single[channel] - double[channel]).abs() <= bound, "{single:?} {double:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_middle_of_a_pixel_is_that_pixel() {
+        let texture = noise(256);
+        let chain = MipChain::of(&texture);
+        let pixels: Vec<_> = texture.pixels().chunks_exact(4).collect();
+        for [x, y] in [[0, 0], [255, 0], [17, 200], [255, 255]] {
+            let uv = [x, y].map(|place| (place as f64 + 0.5) / 256.0 - 2.0);
+            let found = texel::<f64>(&chain, uv, [[0.0; 2]; 2]);
+            let [red, .., alpha] = pixels[y * 256 + x] else { unreachable!() };
+            assert_eq!([found[0], found[3]], [LIGHT[usize::from(*red)], f64::from(*alpha) / 255.0]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_finds_a_colour_all_the_same() {
+        let chain = MipChain::of(&noise(8));
+        for strange in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e38, -1e38, -1e-30] {
+            for [uv, across] in [[[strange, 0.3], [0.0; 2]], [[0.3, 0.3], [strange, 0.1]]] {
+                let found =
+                    [texel::<f32>(&chain, uv, [across, [0.0; 2]]), texel::<f64>(&chain, uv, [across, [0.0; 2]])];
+                assert!(found.iter().flatten().all(|value| (0.0..=1.0).contains(value)), "{strange} {found:?}");
+            }
+        }
+    }
+}
