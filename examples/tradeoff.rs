@@ -43,6 +43,7 @@ mod vertices;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use drawloom::raster::CulledTriangles;
 use drawloom::scene::{Camera, Scene};
@@ -72,13 +73,15 @@ fn tell_triangles(scene: &Scene, path: &[Camera]) {
     let Some(view) = path.first().map(RenderView::new) else { return };
     let (scene, mut kept) = (scene.as_scene_ref(), Vec::new());
     let mut culled = CulledTriangles::default();
+    let start = Instant::now();
     for object in 0..scene.object_count() {
         kept.clear();
         culled += view.cull_triangles(&scene, object, &mut kept);
     }
+    let each = start.elapsed().as_nanos() as f64 / culled.triangles.max(1) as f64;
     println!(
         "triangles: {}, of which the CPU could leave out {:.1}%: {} face away, {} are outside of the picture, {} cover no pixel, {} \
-         are none\n",
+         are none; {each:.0} ns each\n",
         culled.triangles,
         culled.share() * 100.0,
         culled.back_facing,

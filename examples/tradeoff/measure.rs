@@ -112,7 +112,7 @@ impl Measurements {
             if index == 0 {
                 exact.clone_from(&drawn.pictures);
             }
-            of_settings.push(drawn.compare(stage, &exact, &reference)?);
+            of_settings.push(drawn.compare(stage, &exact, &reference, rounds == 0)?);
             progress.inc(1);
         }
 
@@ -152,7 +152,7 @@ impl Measurement {
 /// Pictures along the path.
 struct Pictures {
     pictures: Vec<Picture>,
-    occluded: usize,
+    times: Vec<FrameTime>,
 }
 
 /// Draws each place of the path. Where what is hidden is looked for it is looked for in each picture, whether it pays or not.
@@ -162,7 +162,7 @@ fn draw_pictures(
     path: &[Camera],
     setting: &Setting,
 ) -> Result<Pictures, Failure> {
-    let mut drawn = Pictures { pictures: Vec::new(), occluded: 0 };
+    let mut drawn = Pictures { pictures: Vec::new(), times: Vec::new() };
     stage.set_quality(&setting.quality)?;
     for camera in path {
         if setting.quality.occlusion.is_some() {
@@ -170,27 +170,34 @@ fn draw_pictures(
             stage.set_quality(&Quality::exact())?;
             stage.set_quality(&setting.quality)?;
         }
-        drawn.occluded += stage.draw(seen_from(scene, camera))?.occluded;
+        drawn.times.push(stage.draw(seen_from(scene, camera))?);
         drawn.pictures.push(stage.read("picture")?);
     }
     Ok(drawn)
 }
 
 impl Pictures {
-    fn compare(self, stage: &dyn Stage, exact: &[Picture], reference: &[Picture]) -> Result<Measurement, Failure> {
-        let Self { pictures, occluded } = self;
+    /// If `timed`, these frames are all that is timed of the setting.
+    fn compare(
+        self,
+        stage: &dyn Stage,
+        exact: &[Picture],
+        reference: &[Picture],
+        timed: bool,
+    ) -> Result<Measurement, Failure> {
+        let Self { pictures, times } = self;
         let differing = [0, VISIBLE].map(|tolerance| {
             let pairs = pictures.iter().zip(exact);
             pairs.map(|(one, other)| share_that_differs(one, other, tolerance)).fold(0.0, f64::max)
         });
         Ok(Measurement {
-            times: Vec::new(),
+            times: if timed { vec![FrameTime::mean(&times)] } else { Vec::new() },
             insides: Insides::of(stage)?,
             from_exact: distance(&pictures, exact)?,
             from_reference: distance(&pictures, reference)?,
             picture: pictures.into_iter().next().ok_or("the path has no place")?,
             differing,
-            occluded,
+            occluded: times.iter().map(|time| time.occluded).sum(),
         })
     }
 }
@@ -210,13 +217,8 @@ pub fn time_along(
     for _ in 0..UNCOUNTED {
         stage.draw(seen_from(scene, start))?;
     }
-    let mut sum = FrameTime::default();
-    for camera in path {
-        let time = stage.draw(seen_from(scene, camera))?;
-        (sum.cpu, sum.frame) = (sum.cpu + time.cpu, sum.frame + time.frame);
-    }
-    let count = path.len() as u32;
-    Ok(FrameTime { cpu: sum.cpu / count, frame: sum.frame / count, ..sum })
+    let times: Vec<_> = path.iter().map(|camera| stage.draw(seen_from(scene, camera))).collect::<Result<_, _>>()?;
+    Ok(FrameTime::mean(&times))
 }
 
 /// The scene with this camera and no other.

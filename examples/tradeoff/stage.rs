@@ -54,6 +54,16 @@ pub struct FrameTime {
     pub occluded: usize,
 }
 
+impl FrameTime {
+    /// Of the mean of some frames.
+    pub fn mean(times: &[Self]) -> Self {
+        let count = times.len().max(1) as u32;
+        let mean = |of: fn(&Self) -> Duration| times.iter().map(of).sum::<Duration>() / count;
+        let occluded = times.iter().map(|time| time.occluded).sum::<usize>() / times.len().max(1);
+        Self { cpu: mean(|time| time.cpu), frame: mean(|time| time.frame), occluded }
+    }
+}
+
 /// What the command line asks for: wgpu, unless there is no adapter and nobody insists.
 ///
 /// # Errors
