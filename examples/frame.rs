@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, NullBackend, Picture, SoftwareBackend, WgpuBackend};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
-use drawloom::scene::{Scene, obj, sample};
+use drawloom::scene::{Mesh, Scene, obj, sample};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
@@ -142,6 +142,12 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
         camera.size = arguments.size.0;
     }
     scene.duplicate_objects(arguments.copies as usize);
+    if arguments.cull_triangles {
+        let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
+        for (handle, mesh) in meshes {
+            scene.replace(handle, mesh.with_triangles_culled())?;
+        }
+    }
     Ok(scene)
 }
 

@@ -59,6 +59,10 @@ pub struct Arguments {
     #[arg(long)]
     pub depth_pre_pass: bool,
 
+    /// Leaves triangles that nobody sees to the CPU: those that face away or cover no pixel of a view are not drawn there.
+    #[arg(long)]
+    pub cull_triangles: bool,
+
     /// Writes the graph of the frame's processes and targets in the DOT language.
     #[arg(long, value_name = "FILE")]
     pub graph: Option<PathBuf>,

@@ -40,6 +40,10 @@ struct View {
     commands: usize,
     batches: usize,
     bundles: usize,
+    /// That were looked at before they were drawn.
+    triangles: usize,
+    /// Those of them that were left out.
+    culled_triangles: usize,
 }
 
 /// Thread time, summed over workers, of the median frame.
@@ -81,6 +85,8 @@ impl Report {
             commands: view.commands,
             batches: view.batches,
             bundles: view.bundles,
+            triangles: view.triangles.triangles,
+            culled_triangles: view.triangles.culled(),
         };
         let rejections = frame.rejections.iter();
         Self {
@@ -137,8 +143,12 @@ impl Report {
             "view", "kind", "visible", "lights", "commands", "batches", "bundles"
         );
         for view in &self.views {
-            let View { name, kind, visible, lights, commands, batches, bundles } = view;
-            println!("{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}");
+            let View { name, kind, visible, lights, commands, batches, bundles, .. } = view;
+            print!("{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}");
+            match view.triangles {
+                0 => println!(),
+                looked_at => println!("   {} of {looked_at} triangles left out", view.culled_triangles),
+            }
         }
         println!();
         let stages = &self.stages_ms;

@@ -7,7 +7,7 @@ use parking_lot::Mutex;
 
 use super::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::process::{Draws, Pass};
-use crate::queue::{Batch, DrawList};
+use crate::queue::DrawList;
 use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::view::{ObjectTable, ViewRecord};
@@ -145,7 +145,7 @@ impl Backend for NullBackend {
         for bundle in bundles {
             let first_time = frame.recorded.lock().insert((pass, bundle));
             ensure(first_time, || format!("bundle {bundle} of {pass:?} was recorded twice"))?;
-            put(record_bundle(frame, list.bundle(bundle))?);
+            put(record_bundle(frame, list, bundle)?);
         }
         Ok(())
     }
@@ -193,18 +193,26 @@ impl Backend for NullBackend {
     }
 }
 
-fn record_bundle(frame: &NullFrame, batches: &[Batch]) -> Result<NullBundle, BackendError> {
+fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
+    let batches = list.bundle(bundle);
     let within = (1..=DrawList::BATCHES_PER_BUNDLE).contains(&batches.len());
     ensure(within, || format!("a bundle of {} batches", batches.len()))?;
     let start = batches[0].first;
     let (mut end, mut triangles) = (start, 0);
-    for batch in batches {
+    for (place, batch) in (bundle * DrawList::BATCHES_PER_BUNDLE..).zip(batches) {
         ensure(batch.first == end && batch.count > 0, || format!("a gap or an overlap at object {end}"))?;
         let mesh = frame.triangles.get(batch.mesh as usize).copied().flatten();
         let Some(of_mesh) = mesh else {
             return Err(BackendError::BrokenRule { rule: format!("slot {} holds no mesh", batch.mesh) });
         };
-        triangles += of_mesh * batch.count as usize;
+        triangles += match list.kept_triangles(place) {
+            None => of_mesh * batch.count as usize,
+            Some(kept) => {
+                let holds = batch.count == 1 && kept.len() <= of_mesh * 3 && kept.end as usize <= list.indices.len();
+                ensure(holds, || format!("the triangles left of batch {place} are one object's"))?;
+                kept.len() / 3
+            }
+        };
         end += batch.count;
     }
     Ok(NullBundle { batches: batches.len(), objects: start as usize..end as usize, triangles })

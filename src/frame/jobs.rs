@@ -30,6 +30,8 @@ pub(super) struct FrameJobs {
     hides: Vec<bool>,
     /// In what squares what is hidden is looked for.
     occlusion: Option<u32>,
+    /// Whether triangles are looked at.
+    culls_triangles: bool,
     /// For each view, which objects hide others; `None` where that is not looked for.
     pub(super) occluders: Vec<Option<Vec<Selection>>>,
     /// For each view, whether it pays.
@@ -39,7 +41,7 @@ pub(super) struct FrameJobs {
 impl FrameJobs {
     /// Draws up the jobs: each process in each view of its kind that is not kept goes through its phases one after the other,
     /// and nothing else waits for anything. The order of passes concerns the device alone, so it binds submission, not
-    /// recording. If `occlusion`, what is hidden is looked for where it can be.
+    /// recording. If `occlusion`, what is hidden is looked for where it can be; if `culls_triangles`, triangles are looked at.
     ///
     /// # Errors
     /// If a view is drawn by no process.
@@ -48,6 +50,7 @@ impl FrameJobs {
         draws: &[Draws<'_>],
         views: &[RenderView],
         occlusion: Option<u32>,
+        culls_triangles: bool,
     ) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
@@ -83,14 +86,19 @@ impl FrameJobs {
                     nodes.add(name, Phase::Compact { view }, None, of_view.clone(), Some(seen))
                 });
                 previous = Some(seen);
-                for phase in [
+                let looks_on =
+                    |phase: &Phase| culls_triangles || !matches!(phase, Phase::Join { .. } | Phase::Triangles { .. });
+                let phases = [
                     Phase::Fill { pass: index },
                     Phase::Split { pass: index },
                     Phase::Sort { pass: index },
                     Phase::Instance { pass: index },
+                    Phase::Join { pass: index },
+                    Phase::Triangles { pass: index },
                     Phase::Prepare { pass: index },
                     Phase::Record { pass: index },
-                ] {
+                ];
+                for phase in phases.into_iter().filter(looks_on) {
                     let name = format!("{}, {view_name}, {}", process.name(), phase.name());
                     previous = Some(nodes.add(name, phase, Some(pass.process), of_pass.clone(), previous));
                 }
@@ -106,7 +114,19 @@ impl FrameJobs {
         let hides = draws.iter().map(Draws::hides).collect();
         let payoffs = vec![Payoff::default(); occluders.len()];
         let plan = Arc::clone(plan);
-        Ok(Self { schedule, costs, passes, plan, views, selections, hides, occlusion, occluders, payoffs })
+        Ok(Self {
+            schedule,
+            costs,
+            passes,
+            plan,
+            views,
+            selections,
+            hides,
+            occlusion,
+            culls_triangles,
+            occluders,
+            payoffs,
+        })
     }
 
     /// Whether they are what this plan, these draws and these views need.
@@ -116,10 +136,12 @@ impl FrameJobs {
         draws: &[Draws<'_>],
         views: &[RenderView],
         occlusion: Option<u32>,
+        culls_triangles: bool,
     ) -> bool {
         let names = self.views.iter().map(|(name, kind, is_kept)| (name.as_str(), *kind, *is_kept));
         self.plan.identity() == plan.identity()
             && self.occlusion == occlusion
+            && self.culls_triangles == culls_triangles
             && self.hides.iter().copied().eq(draws.iter().map(Draws::hides))
             && names.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_kept)))
             && self.selections.iter().copied().eq(draws.iter().map(Draws::selection))
@@ -195,11 +217,13 @@ impl JobsCache {
         draws: &[Draws<'_>],
         views: &[RenderView],
         occlusion: Option<u32>,
+        culls_triangles: bool,
     ) -> Result<&mut FrameJobs, FrameError> {
-        let found = match self.latest_first.iter().position(|jobs| jobs.fit(plan, draws, views, occlusion)) {
-            Some(index) => self.latest_first.remove(index),
-            None => FrameJobs::new(plan, draws, views, occlusion)?,
-        };
+        let found =
+            match self.latest_first.iter().position(|jobs| jobs.fit(plan, draws, views, occlusion, culls_triangles)) {
+                Some(index) => self.latest_first.remove(index),
+                None => FrameJobs::new(plan, draws, views, occlusion, culls_triangles)?,
+            };
         self.latest_first.truncate(Self::MOST - 1);
         self.latest_first.insert(0, found);
         Ok(&mut self.latest_first[0])

@@ -12,6 +12,7 @@ mod plans;
 mod recorded;
 mod renderer;
 mod statistics;
+mod triangles;
 mod views;
 
 pub use builder::RendererBuilder;

@@ -8,6 +8,7 @@ use super::Granularity;
 use super::cost_model::CostModel;
 use super::occlusion::{ViewOcclusion, choose_occluders};
 use super::statistics::{Stage, StageClock};
+use super::triangles::{AskingMeshes, PassTriangles};
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::blocks::Blocks;
 use crate::command::RenderCommand;
@@ -41,6 +42,10 @@ pub(super) enum Phase {
     Sort { pass: usize },
     /// Merges a part's equal runs.
     Instance { pass: usize },
+    /// Joins the parts where triangles are to be looked at; where none are, that is not worth a phase.
+    Join { pass: usize },
+    /// Looks at the triangles of meshes that ask for it.
+    Triangles { pass: usize },
     /// Joins the parts, uploads which objects are drawn, and makes pipelines.
     Prepare { pass: usize },
     /// Records the pass's parts: bundles, say.
@@ -63,6 +68,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) costs: &'a CostModel,
     /// For each view, which objects hide others, if that is looked for.
     pub(super) occluders: &'a [Option<Vec<Selection>>],
+    /// Whether triangles are looked at.
+    pub(super) culls_triangles: bool,
     pub(super) workers: usize,
 }
 
@@ -76,6 +83,8 @@ pub(super) struct FrameTables {
     pub(super) occlusion: Vec<ViewOcclusion>,
     /// What of meshes hides; of no use to frames without occlusion.
     pub(super) occluder_meshes: OccluderMeshes,
+    /// The meshes whose triangles are looked at.
+    pub(super) asking: AskingMeshes,
     /// One for each view.
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
@@ -94,6 +103,7 @@ pub(super) struct PassTable {
     /// As many as there may be at most.
     parts: Vec<RwLock<DrawPart>>,
     pub(super) list: RwLock<DrawList>,
+    pub(super) triangles: RwLock<PassTriangles>,
 }
 
 impl PassTable {
@@ -102,6 +112,7 @@ impl PassTable {
         self.selection = selection;
         // Another pass may have stood here in the frame before, and this frame may fail.
         self.list.get_mut().clear();
+        self.triangles.get_mut().clear();
         if selection.is_some() {
             self.commands.reserve(objects, RenderCommand::NOTHING);
             self.parts.resize_with(Split::MOST_PARTS, RwLock::default);
@@ -203,6 +214,8 @@ impl Phase {
             Self::Split { .. } => "split",
             Self::Sort { .. } => "sort",
             Self::Instance { .. } => "instance",
+            Self::Join { .. } => "join",
+            Self::Triangles { .. } => "triangles",
             Self::Prepare { .. } => "prepare",
             Self::Record { .. } => "record",
             Self::Finish { .. } => "finish",
@@ -222,8 +235,13 @@ impl Phase {
             Self::CoarseDepth { .. } | Self::Occlusion { .. } => 0,
             Self::Fill { pass } => visible_count(frame, pass),
             Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().part_count(),
+            Self::Triangles { pass } => tables.passes[pass].triangles.read().len(),
             Self::Record { pass } => part_count(frame, pass),
-            Self::Compact { .. } | Self::Split { .. } | Self::Prepare { .. } | Self::Finish { .. } => 1,
+            Self::Compact { .. }
+            | Self::Split { .. }
+            | Self::Join { .. }
+            | Self::Prepare { .. }
+            | Self::Finish { .. } => 1,
         }
     }
 
@@ -246,6 +264,7 @@ impl Phase {
                 | Self::CoarseDepth { .. }
                 | Self::Occlusion { .. }
                 | Self::Fill { .. }
+                | Self::Triangles { .. }
                 | Self::Record { .. }
         )
     }
@@ -259,6 +278,8 @@ impl Phase {
             | Self::Split { pass }
             | Self::Sort { pass }
             | Self::Instance { pass }
+            | Self::Join { pass }
+            | Self::Triangles { pass }
             | Self::Prepare { pass }
             | Self::Record { pass }
             | Self::Finish { pass } => frame.request.passes[pass].view,
@@ -286,7 +307,7 @@ impl Phase {
             | Self::Compact { .. } => Stage::Visibility,
             Self::Fill { .. } => Stage::Fill,
             Self::Split { .. } | Self::Sort { .. } => Stage::Sort,
-            Self::Instance { .. } => Stage::Instance,
+            Self::Instance { .. } | Self::Join { .. } | Self::Triangles { .. } => Stage::Instance,
             Self::Upload | Self::Prepare { .. } | Self::Record { .. } | Self::Finish { .. } => Stage::Record,
         }
     }
@@ -332,12 +353,29 @@ impl FrameNode {
                 }
             }
             Phase::Instance { pass } => {
-                range.for_each(|part| instance(&mut tables.passes[pass].parts[part].write(), frame.merges));
+                range.for_each(|part| {
+                    instance(&mut tables.passes[pass].parts[part].write(), |mesh| merges(frame, mesh))
+                });
+            }
+            Phase::Join { pass } => {
+                join(frame, pass);
+                let table = &tables.passes[pass];
+                table.triangles.write().find(&table.list.read(), &tables.asking);
+            }
+            Phase::Triangles { pass } => {
+                let table = &tables.passes[pass];
+                let (triangles, list) = (table.triangles.read(), table.list.read());
+                let view = &frame.request.views[frame.request.passes[pass].view];
+                range.for_each(|number| triangles.look_at(number, view, frame.request.scene, &list));
             }
             Phase::Prepare { pass } => {
-                join(&tables.passes[pass], frame.merges);
+                let table = &tables.passes[pass];
+                match frame.culls_triangles {
+                    true => table.triangles.read().put(&mut table.list.write()),
+                    false => join(frame, pass),
+                }
                 frame.recordings[pass].parts.lock().resize_with(part_count(frame, pass), || None);
-                let list = tables.passes[pass].list.read();
+                let list = table.list.read();
                 return frame.backend.prepare(worker, frame.frame, &pass_request(frame, pass, &list));
             }
             Phase::Record { pass } => return record(frame, pass, range, worker),
@@ -359,11 +397,17 @@ fn part_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
     frame.backend.parts(frame.frame, &pass_request(frame, pass, &frame.tables.passes[pass].list.read()))
 }
 
-fn join(table: &PassTable, merges: bool) {
+/// Whether equal commands of the mesh in a slot become one draw. What is looked at is drawn by itself.
+fn merges<B: Backend>(frame: &FrameContext<'_, B>, mesh: u32) -> bool {
+    frame.merges && !(frame.culls_triangles && frame.tables.asking.contains(mesh))
+}
+
+fn join<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) {
+    let table = &frame.tables.passes[pass];
     let mut list = table.list.write();
     list.clear();
     for part in &table.parts[..table.split.read().part_count()] {
-        list.append(&mut part.write(), merges);
+        list.append(&mut part.write(), |mesh| merges(frame, mesh));
     }
 }
 

@@ -14,8 +14,9 @@ use super::views::{ValidLights, views_of};
 use super::{BuildError, FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
 use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::process::{Deferred, FramePlan, Pass};
-use crate::quality::Quality;
+use crate::quality::{Quality, TransformPrecision};
 use crate::queue::DrawList;
+use crate::raster::CulledTriangles;
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
 use crate::view::{Rejection, RejectionReason, RenderView};
@@ -115,7 +116,10 @@ impl<B: Backend> Renderer<B> {
         let maps = self.kept_maps.follow(interval, &plan, &mut views, &mut lights.lights);
         let scene = SceneRef { lights: &lights.lights, ..scene };
         let draws = plan.draws()?;
-        let jobs = self.jobs.find(&plan, &draws, &views, self.quality.occlusion)?;
+        self.tables.asking.follow(scene.assets);
+        // What is told of places relative to the camera is not so of absolute ones.
+        let culls_triangles = self.tables.asking.any() && self.quality.transforms == TransformPrecision::CameraRelative;
+        let jobs = self.jobs.find(&plan, &draws, &views, self.quality.occlusion, culls_triangles)?;
         jobs.reset(&mut self.tables.passes, scene.object_count());
         self.tables.reset(views.len(), self.scheduler.workers());
         self.tables.reset_occlusion(&scene, &views, jobs, self.quality.occlusion);
@@ -152,6 +156,7 @@ impl<B: Backend> Renderer<B> {
             clock: &clock,
             costs: &jobs.costs,
             occluders: &jobs.occluders,
+            culls_triangles,
             workers: self.scheduler.workers(),
         };
         let outcome = jobs.schedule.run(&self.scheduler, &context);
@@ -275,12 +280,14 @@ fn statistics_of(
             commands: 0,
             batches: 0,
             bundles: 0,
+            triangles: CulledTriangles::default(),
         };
         for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
             let list = table.list.read();
             statistics.commands += list.objects.len();
             statistics.batches += list.batches.len();
             statistics.bundles += list.bundle_count();
+            statistics.triangles += table.triangles.read().culled();
         }
         statistics
     };

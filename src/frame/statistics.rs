@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::raster::CulledTriangles;
 use crate::scene::ViewKind;
 use crate::view::Rejection;
 
@@ -42,6 +43,9 @@ pub struct ViewStatistics {
     pub batches: usize,
     /// Bundles that those fill, whether they are recorded as bundles or not.
     pub bundles: usize,
+    /// Triangles that were looked at before they were drawn, and left out, over all its processes: see
+    /// [`Mesh::with_triangles_culled`](crate::scene::Mesh::with_triangles_culled).
+    pub triangles: CulledTriangles,
 }
 
 /// Thread time of each stage, summed over workers.

@@ -1,5 +1,7 @@
 //! What one process draws in one view.
 
+use std::ops::Range;
+
 use crate::command::{DrawState, RenderCommand};
 
 /// What one process draws in one view: sorted commands, the batches they merge into, and the objects of each batch.
@@ -12,6 +14,11 @@ pub struct DrawList {
     pub batches: Vec<Batch>,
     /// The index of each command's object: the 4 bytes an object that a view uploads.
     pub objects: Vec<u32>,
+    /// The vertices of the triangles that are left of batches of which not all are drawn, three each: see
+    /// [`DrawList::kept_triangles`].
+    pub indices: Vec<u32>,
+    /// The places of these batches, ascending, and where their indices are.
+    kept: Vec<(u32, Range<u32>)>,
 }
 
 /// A part of a draw list, on its way.
@@ -31,13 +38,15 @@ impl DrawList {
         self.parts = 0;
         self.batches.clear();
         self.objects.clear();
+        self.indices.clear();
+        self.kept.clear();
     }
 
     /// Joins a part on behind those that are there. What it held is this list's, and it has other memory instead.
     ///
-    /// Where one part ends and the next begins in the middle of a run of equals, the two batches become one if `merges`: the
-    /// list does not depend on where it was cut.
-    pub fn append(&mut self, part: &mut DrawPart, merges: bool) {
+    /// Where one part ends and the next begins in the middle of a run of equals, the two batches become one if their mesh's slot is one
+    /// that `merges`: the list does not depend on where it was cut.
+    pub fn append(&mut self, part: &mut DrawPart, merges: impl Fn(u32) -> bool) {
         if self.parts == self.commands.len() {
             self.commands.push(Vec::new());
         }
@@ -50,13 +59,39 @@ impl DrawList {
         }
         let first = self.objects.len() as u32;
         let mut batches = part.batches.iter().map(|batch| Batch { first: first + batch.first, ..*batch }).peekable();
-        if let Some(last) = self.batches.last_mut().filter(|_| merges)
+        if let Some(last) = self.batches.last_mut().filter(|last| merges(last.mesh))
             && let Some(same) = batches.next_if(|next| (next.state, next.mesh) == (last.state, last.mesh))
         {
             last.count += same.count;
         }
         self.batches.extend(batches);
         self.objects.extend_from_slice(&part.objects);
+    }
+
+    /// Has only these triangles drawn of the batch at a place, which draws one object: the indices of their vertices, three each.
+    /// Batches come in order.
+    pub fn keep_triangles(&mut self, batch: u32, indices: &[u32]) {
+        let first = self.indices.len() as u32;
+        self.indices.extend_from_slice(indices);
+        self.kept.push((batch, first..self.indices.len() as u32));
+    }
+
+    /// Where in [`DrawList::indices`] the triangles are that are drawn of the batch at a place; `None` for all of its mesh's.
+    pub fn kept_triangles(&self, batch: usize) -> Option<Range<u32>> {
+        let place = self.kept.binary_search_by_key(&(batch as u32), |(batch, _)| *batch).ok()?;
+        Some(self.kept[place].1.clone())
+    }
+
+    /// Whether of each batch all triangles are drawn.
+    pub fn draws_whole_meshes(&self) -> bool {
+        self.kept.is_empty()
+    }
+
+    /// Whether there is a batch among those of a bundle of which not all triangles are drawn.
+    pub fn keeps_triangles(&self, bundle: usize) -> bool {
+        let first = (bundle * Self::BATCHES_PER_BUNDLE) as u32;
+        let place = self.kept.partition_point(|(batch, _)| *batch < first);
+        self.kept.get(place).is_some_and(|(batch, _)| *batch < first + Self::BATCHES_PER_BUNDLE as u32)
     }
 
     /// The sorted commands.
@@ -85,7 +120,10 @@ impl DrawList {
 
 impl PartialEq for DrawList {
     fn eq(&self, other: &Self) -> bool {
-        self.batches == other.batches && self.objects == other.objects && self.commands().eq(other.commands())
+        self.batches == other.batches
+            && self.objects == other.objects
+            && (&self.indices, &self.kept) == (&other.indices, &other.kept)
+            && self.commands().eq(other.commands())
     }
 }
 

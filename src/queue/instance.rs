@@ -4,17 +4,18 @@ use super::{Batch, DrawPart};
 use crate::command::RenderCommand;
 
 /// Merges the part's sorted commands into batches: neighbours with the same mesh and state become one instanced draw,
-/// or, unless it `merges`, each of them a draw of its own.
+/// or, where the mesh in a slot is not one that `merges`, each of them a draw of its own.
 ///
 /// Neighbours of different materials share a batch, because shaders find materials by object. Redundant state is
 /// filtered by the same stroke: what stays the same from one batch to the next is not set again when they are recorded.
-pub fn instance(part: &mut DrawPart, merges: bool) {
+pub fn instance(part: &mut DrawPart, merges: impl Fn(u32) -> bool) {
     part.batches.clear();
     part.objects.clear();
     part.objects.extend(part.commands.iter().map(|command| command.object));
     let mut first = 0;
-    let is_same =
-        |one: &RenderCommand, next: &RenderCommand| merges && (one.state, one.mesh) == (next.state, next.mesh);
+    let is_same = |one: &RenderCommand, next: &RenderCommand| {
+        (one.state, one.mesh) == (next.state, next.mesh) && merges(one.mesh)
+    };
     for run in part.commands.chunk_by(is_same) {
         let RenderCommand { mesh, state, .. } = run[0];
         let count = run.len() as u32;
@@ -69,13 +70,13 @@ mod tests {
             let sorted = |pair: &[SortKey]| {
                 let mut part = DrawPart::default();
                 sort(&slots, commands.len(), Part::between(pair[0], pair[1]), &mut memory, &mut part.commands);
-                instance(&mut part, merges);
+                instance(&mut part, |_| merges);
                 part
             };
             let mut parts: Vec<_> = edges.windows(2).map(sorted).collect();
             let mut list = DrawList::default();
             list.clear();
-            parts.iter_mut().for_each(|part| list.append(part, merges));
+            parts.iter_mut().for_each(|part| list.append(part, |_| merges));
 
             let mut expected: Vec<_> = commands.into_iter().filter(|command| command.key != SortKey::LAST).collect();
             expected.sort_by_key(|command| (command.key, command.object));

@@ -18,6 +18,7 @@ pub struct Mesh {
     bounds: Bounds,
     corners: [Vec3; 2],
     longest_edge: f32,
+    culls_triangles: bool,
 }
 
 impl Mesh {
@@ -60,12 +61,32 @@ impl Mesh {
             let place = Vec3::from(vertex.position);
             [low.min(place), high.max(place)]
         });
-        let mut mesh = Self { name, topology, vertices, indices, bounds, corners, longest_edge: 0.0 };
+        let mut mesh =
+            Self { name, topology, vertices, indices, bounds, corners, longest_edge: 0.0, culls_triangles: false };
         let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
         let edges = triangles.filter(has_three_places).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
         mesh.longest_edge = root_rounded_up(longest_squared);
         mesh
+    }
+
+    /// The same, whose triangles are looked at for every view, each frame, before they are drawn: those that nobody sees are left out,
+    /// as [`RenderView::cull_triangles`](crate::view::RenderView::cull_triangles) tells them. A strip becomes a list for it.
+    ///
+    /// It pays for large meshes where the device is what is waited for, and has more to do for a vertex than a processor for a
+    /// triangle. Each object of such a mesh is a draw of its own. It is for meshes that are drawn where they stand: a shader that moves
+    /// vertices would be without triangles that it brings into view.
+    pub fn with_triangles_culled(mut self) -> Self {
+        if self.topology == Topology::TriangleStrip {
+            (self.topology, self.indices) = (Topology::TriangleList, self.triangles().flatten().collect());
+        }
+        self.culls_triangles = true;
+        self
+    }
+
+    /// Whether triangles of it that nobody sees are left out of each view: see [`Mesh::with_triangles_culled`].
+    pub fn culls_triangles(&self) -> bool {
+        self.culls_triangles
     }
 
     /// What it is called in reports.

@@ -7,8 +7,8 @@ use crate::raster::{CulledTriangles, Vector, Winding, cull_triangles};
 use crate::scene::{Projection, SceneRef, ViewKind};
 
 impl RenderView {
-    /// Looks at each triangle of an object, and appends the indices of those that a device could draw a pixel of to `kept`: what is
-    /// left out faces away, lies outside of the picture, covers no pixel's middle or is no triangle, "up to 70%" of them (S 9.6). It
+    /// Looks at each triangle of an object, and appends the indices of those that a device could draw a pixel of to `kept`: frames do so
+    /// for meshes that [ask for it](crate::scene::Mesh::with_triangles_culled). What is left out faces away, lies outside of the picture, covers no pixel's middle or is no triangle, "up to 70%" of them (S 9.6). It
     /// pays where a device has more to do for a vertex than the 20 ns or so that this takes a triangle: for a large mesh that is drawn
     /// in many passes, say. Nothing is left out of a paraboloid's view, nor of a shadow's in which what is too near is drawn, nor where
     /// f32 does not say to a 256th of a pixel where a corner is: of a mesh that is far larger than it is far away, say. Places are those

@@ -10,6 +10,7 @@ mod rules;
 mod same_result;
 mod shadow_interval;
 mod timeline;
+mod triangles;
 #[cfg(feature = "wgpu")]
 mod uploads;
 mod views;

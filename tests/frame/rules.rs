@@ -92,7 +92,7 @@ fn commands_out_of_order_are_refused() {
             objects: list.objects.clone(),
         };
         let mut reversed = DrawList::default();
-        reversed.append(&mut part, true);
+        reversed.append(&mut part, |_| true);
         NullBackend.prepare(worker, frame, &pass(request, &reversed))
     });
     assert!(rule.contains("not sorted"), "{rule}");

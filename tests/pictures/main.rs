@@ -35,6 +35,7 @@ mod studio;
 mod techniques;
 mod transforms;
 mod transparency;
+mod triangles;
 
 use std::path::PathBuf;
 
@@ -73,6 +74,7 @@ fn main() {
         (software::CASES, Needs::Adapter),
         (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (transforms::CASES, Needs::Adapter),
+        (triangles::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];

@@ -67,7 +67,8 @@ pub fn studio_of(backend: WgpuBackend) -> Result<Studio, Failed> {
     Ok(Studio { renderer, submitter })
 }
 
-fn studio(record: Record, encode: Encode) -> Result<Studio, Failed> {
+/// One that draws by one technique alone.
+pub fn technique(record: Record, encode: Encode) -> Result<Studio, Failed> {
     let (device, queue) = device()?;
     studio_of(WgpuBackend::new(device, queue)?.record(record)?.encode(encode))
 }
@@ -86,7 +87,7 @@ fn draw(studio: &mut Studio, scene: &Scene) -> Result<Vec<Picture>, Failed> {
 
 /// What a renderer draws that has drawn nothing before.
 pub fn drawn_anew(scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    draw(&mut studio(Record::Bundles, Encode::PerPass)?, scene)
+    draw(&mut technique(Record::Bundles, Encode::PerPass)?, scene)
 }
 
 /// The colonnade in a small picture. Its lamp casts no shadow: to halve the edges of all that is near it takes each technique
@@ -167,7 +168,7 @@ const STORY: [Change; 8] = [
 fn alike() -> Result<(), Failed> {
     let mut studios = Vec::new();
     for (record, encode) in techniques()? {
-        studios.push((record, encode, studio(record, encode)?));
+        studios.push((record, encode, technique(record, encode)?));
     }
     for mut scene in [small_colonnade()?, many_batches(), everything()] {
         for (frame, change) in STORY.into_iter().enumerate() {
@@ -209,7 +210,7 @@ fn on_their_way() -> Result<(), Failed> {
     }
     expect(expected.windows(2).all(|pair| pair[0] != pair[1]), || "nothing changes".to_owned())?;
     for (record, encode) in techniques()? {
-        let (mut scene, mut studio) = (many_batches(), studio(record, encode)?);
+        let (mut scene, mut studio) = (many_batches(), technique(record, encode)?);
         for round in 0..3 {
             let told = |which| Failed::from(format!("the {which} differs: {record:?}, {encode:?}, round {round}"));
             let first = studio.record(&scene)?;
@@ -265,7 +266,7 @@ pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> 
 
 fn moving() -> Result<(), Failed> {
     for encode in ENCODES {
-        let (mut scene, mut studio) = (many_batches(), studio(Record::Kept, encode)?);
+        let (mut scene, mut studio) = (many_batches(), technique(Record::Kept, encode)?);
         draw(&mut studio, &scene)?;
         let (recorded, replayed) = counts(&studio, |_| true);
         expect(recorded > 10 && replayed == 0, || format!("at first {recorded} and {replayed}"))?;
@@ -289,7 +290,7 @@ fn moving() -> Result<(), Failed> {
 }
 
 fn recorded_anew() -> Result<(), Failed> {
-    let (mut scene, mut studio) = (many_batches(), studio(Record::Kept, Encode::PerPass)?);
+    let (mut scene, mut studio) = (many_batches(), technique(Record::Kept, Encode::PerPass)?);
     let steady = |studio: &mut Studio, scene: &Scene, after: &str| {
         draw(studio, scene)?;
         let (recorded, replayed) = counts(studio, |_| true);
@@ -339,7 +340,7 @@ fn recorded_anew() -> Result<(), Failed> {
 
 /// As the lamp of `everything` comes near, edges are halved more often; and as meshes change, what is subdivided does.
 fn subdivided_otherwise() -> Result<(), Failed> {
-    let (mut scene, mut studio) = (everything(), studio(Record::Kept, Encode::PerPass)?);
+    let (mut scene, mut studio) = (everything(), technique(Record::Kept, Encode::PerPass)?);
     draw(&mut studio, &scene)?;
     draw(&mut studio, &scene)?;
     let shadows = |studio: &Studio| counts(studio, |pass| pass.process == "shadow casters");

@@ -48,6 +48,24 @@ pub fn square(topology: Topology) -> Mesh {
     Mesh::new("square", topology, corners, indices).unwrap()
 }
 
+/// The scene with every mesh as `change` makes it.
+pub fn with_meshes(mut scene: Scene, change: impl Fn(&Mesh) -> Mesh) -> Scene {
+    let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, change(mesh))).collect();
+    meshes.into_iter().for_each(|(handle, mesh)| scene.replace(handle, mesh).unwrap());
+    scene
+}
+
+/// The mesh as a list of triangles.
+pub fn as_list(mesh: &Mesh) -> Mesh {
+    let indices = mesh.triangles().flatten().collect();
+    Mesh::new(mesh.name(), Topology::TriangleList, mesh.vertices().to_vec(), indices).unwrap()
+}
+
+/// The mesh, whose triangles are to be looked at.
+pub fn culled(mesh: &Mesh) -> Mesh {
+    mesh.clone().with_triangles_culled()
+}
+
 /// Some hundreds of boxes in every direction, of several meshes and materials, opaque and blended, some mirrored, with
 /// several lights and two cameras. The same on every call.
 pub fn field(count: usize) -> Scene {

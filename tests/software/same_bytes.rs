@@ -6,7 +6,7 @@ use drawloom::scene::Scene;
 use drawloom::{Granularity, RendererBuilder};
 
 use crate::scenes::everything::everything;
-use crate::scenes::field;
+use crate::scenes::{as_list, culled, field, with_meshes};
 use crate::{Studio, deferred};
 
 /// A field in pictures of odd sizes, with edges inside of the squares that are drawn by one job.
@@ -75,6 +75,21 @@ fn what_is_hidden_does_not_show() {
         let whole = draw(None);
         for square in Quality::OCCLUSION_SQUARES {
             assert!(draw(Some(square)) == whole, "squares of {square}");
+        }
+    }
+}
+
+#[test]
+fn triangles_that_are_culled_change_nothing() {
+    for scene in [odd_field, everything] {
+        let list = with_meshes(scene(), as_list);
+        let asking = with_meshes(scene(), culled);
+        for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
+            let expected = studio.picture(&list);
+            let recorded = studio.renderer.record(asking.as_scene_ref()).unwrap();
+            assert!(recorded.statistics().views[0].triangles.culled() > 0);
+            let submission = studio.submitter.submit(recorded).unwrap().submission;
+            assert!(submission.read(0, "picture").unwrap() == expected);
         }
     }
 }

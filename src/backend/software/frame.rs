@@ -12,7 +12,7 @@ use super::number::{CameraPlace, Number};
 use super::object_pass::ObjectPass;
 use super::pass::{Attachments, DrawingPass};
 use super::picture_pass::{draw_full_screen, draw_lights};
-use super::pieces::pieces;
+use super::pieces::{PassDraw, pieces};
 use super::submission::SoftwareSubmission;
 use super::targets::FrameTargets;
 use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
@@ -44,13 +44,20 @@ pub(super) trait Recording: Send + Sync {
 /// A recorded pass: what it draws.
 #[derive(Debug)]
 pub struct SoftwareCommands {
-    batches: Vec<Batch>,
+    draws: Vec<PassDraw>,
     objects: Vec<u32>,
+    /// Of the batches of which not all triangles are drawn.
+    indices: Arc<[u32]>,
 }
 
 impl SoftwareCommands {
     pub(super) fn new(list: &DrawList) -> Self {
-        Self { batches: list.batches.clone(), objects: list.objects.clone() }
+        let draws = list.batches.iter().enumerate();
+        Self {
+            draws: draws.map(|(place, &batch)| (batch, list.kept_triangles(place))).collect(),
+            objects: list.objects.clone(),
+            indices: list.indices.as_slice().into(),
+        }
     }
 }
 
@@ -132,7 +139,7 @@ impl<R: Number> Frame<R> {
                     };
                     mesh.cloned().ok_or_else(no_such_mesh)
                 };
-                let pieces = pieces(&commands.batches, &commands.objects, mesh_of)?;
+                let pieces = pieces(&commands.draws, &commands.objects, &commands.indices, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
                 let (twin, writes_depth) = (&**twin, *writes_depth);
                 ObjectPass { drawing, twin, writes_depth, pieces: &pieces, object_of: &object_of }.run()

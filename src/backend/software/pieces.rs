@@ -17,8 +17,23 @@ pub(super) struct Run {
     pub(super) batch: Batch,
     /// The object.
     pub(super) object: u32,
-    /// Among the mesh's.
+    /// Among the mesh's, or among those that are left of it.
     pub(super) triangles: Range<usize>,
+    /// The vertices of triangles that are left, where not all are drawn.
+    left: Option<Arc<[u32]>>,
+}
+
+/// A batch, and where the indices of its triangles are where not all are drawn.
+pub(super) type PassDraw = (Batch, Option<Range<u32>>);
+
+impl Run {
+    /// Calls `visit` with the indices of each triangle's corners.
+    fn each_triangle(&self, mut visit: impl FnMut([u32; 3])) {
+        match &self.left {
+            Some(indices) => indices.as_chunks().0[self.triangles.clone()].iter().copied().for_each(visit),
+            None => self.mesh.triangles_in(self.triangles.clone()).for_each(&mut visit),
+        }
+    }
 }
 
 /// Squares that are written down for a triangle at most.
@@ -32,19 +47,25 @@ const LARGEST: usize = 1024;
 /// # Errors
 /// Whatever `mesh_of` says of a batch.
 pub(super) fn pieces<E>(
-    batches: &[Batch],
+    draws: &[PassDraw],
     objects: &[u32],
+    indices: &Arc<[u32]>,
     mesh_of: impl Fn(&Batch) -> Result<Arc<Mesh>, E>,
 ) -> Result<Vec<Vec<Run>>, E> {
     let (mut pieces, mut piece, mut room) = (Vec::new(), Vec::new(), LARGEST);
-    for batch in batches {
+    for (batch, left) in draws {
         let mesh = mesh_of(batch)?;
-        let count = mesh.triangle_count();
+        let all = match left {
+            Some(left) => left.start as usize / 3..left.end as usize / 3,
+            None => 0..mesh.triangle_count(),
+        };
+        let left = left.as_ref().map(|_| indices);
         for &object in &objects[batch.first as usize..][..batch.count as usize] {
-            let mut start = 0;
-            while start < count {
-                let end = count.min(start + room);
-                piece.push(Run { mesh: Arc::clone(&mesh), batch: *batch, object, triangles: start..end });
+            let mut start = all.start;
+            while start < all.end {
+                let end = all.end.min(start + room);
+                let (mesh, left) = (Arc::clone(&mesh), left.cloned());
+                piece.push(Run { mesh, batch: *batch, object, triangles: start..end, left });
                 room -= end - start;
                 start = end;
                 if room == 0 {
@@ -94,10 +115,10 @@ impl<R: Number, const V: usize> SetUp<R, V> {
             let face = Face { material: object.material, blend: run.batch.state.blend() };
             let culled = culled(run.batch.state.cull());
             let mut shaded = Shaded::new(twin, view, &object, run.mesh.vertices());
-            for corners in run.mesh.triangles_in(run.triangles.clone()) {
+            run.each_triangle(|corners| {
                 let corners = corners.map(|corner| shaded.corner(corner));
                 Triangle::set_up(&corners, tiling.size(), culled, &mut set_up.triangles);
-            }
+            });
             set_up.faces.resize(set_up.triangles.len(), face);
         }
         for (index, triangle) in (0..).zip(&set_up.triangles) {

@@ -8,7 +8,7 @@ use super::growing_buffer::MirroredBuffer;
 use super::record::mesh_of;
 use super::uploads::Uploads;
 use crate::backend::BackendError;
-use crate::queue::Batch;
+use crate::queue::DrawList;
 
 /// The arguments of a pass's indirect draws: those of each batch at its own place.
 #[derive(Default)]
@@ -38,14 +38,14 @@ impl Arguments {
         device: &wgpu::Device,
         uploads: &Uploads,
         assets: &AssetSnapshot,
-        batches: &[Batch],
+        list: &DrawList,
     ) -> Result<(), BackendError> {
         let mut buffer = self.buffer.write();
         let buffer = buffer.get_or_insert_with(|| MirroredBuffer::new("indirect draws", wgpu::BufferUsages::INDIRECT));
         let bytes = buffer.rewrite();
-        for batch in batches {
-            let arguments = match batch.state.halvings() {
-                0 => {
+        for (place, batch) in list.batches.iter().enumerate() {
+            let arguments = match (batch.state.halvings(), list.kept_triangles(place)) {
+                (0, None) => {
                     let mesh = mesh_of(assets, batch)?;
                     DrawIndexedIndirectArgs {
                         index_count: mesh.index_count,
@@ -55,7 +55,7 @@ impl Arguments {
                         first_instance: batch.first,
                     }
                 }
-                // It has buffers of its own, and is drawn directly.
+                // It has an index buffer of its own, and is drawn directly.
                 _ => DrawIndexedIndirectArgs::default(),
             };
             bytes.extend_from_slice(arguments.as_bytes());

@@ -4,10 +4,15 @@ use std::fmt::Write;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
+use parking_lot::RwLock;
+
 use super::arguments::Arguments;
 use super::chooser::Sample;
+use super::growing_buffer::GrowingBuffer;
 use super::kept::{KeptBundles, ProcessGroup};
+use super::uploads::Uploads;
 use super::ways::{Encode, Record, Way, WgpuPass};
+use crate::backend::BackendError;
 use crate::process::Pass;
 
 /// One pass of a frame, with what is kept for it until the next frame that has these buffers.
@@ -32,6 +37,8 @@ pub(super) struct FramePass {
     is_warm: bool,
     pub(super) kept: KeptBundles,
     pub(super) arguments: Arguments,
+    /// Of the triangles that are left of batches of which not all are drawn.
+    pub(super) indices: RwLock<GrowingBuffer>,
     pub(super) spent: Spent,
 }
 
@@ -50,6 +57,7 @@ impl Default for FramePass {
             is_warm: false,
             kept: KeptBundles::default(),
             arguments: Arguments::default(),
+            indices: RwLock::new(GrowingBuffer::new("triangles that are left", wgpu::BufferUsages::INDEX)),
             spent: Spent::default(),
         }
     }
@@ -83,6 +91,24 @@ impl FramePass {
     pub(super) fn forget(&mut self) {
         self.process_group = None;
         self.kept.forget();
+    }
+
+    /// Uploads the triangles that are left of batches of which not all are drawn.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(super) fn upload_indices(
+        &self,
+        device: &wgpu::Device,
+        uploads: &Uploads,
+        indices: &[u32],
+    ) -> Result<(), BackendError> {
+        if !indices.is_empty() {
+            let mut buffer = self.indices.write();
+            buffer.reserve(device, size_of_val(indices))?;
+            buffer.write(uploads, 0, bytemuck::cast_slice(indices));
+        }
+        Ok(())
     }
 
     /// How it was recorded.

@@ -346,11 +346,12 @@ impl Backend for WgpuBackend {
         pass.spent.set_size(list.batches.len(), list.bundle_count(), pass.way.parts(list));
         let made = checked(&self.device, &pass.label, || {
             frame.buffers.write_drawn(&self.uploads, index, &list.objects);
+            pass.upload_indices(&self.device, &self.uploads, &list.indices)?;
             self.subdivide(frame, request, list)?;
             match pass.way.record {
                 Record::Kept => pass.kept.set_count(list.bundle_count()),
                 Record::Indirect => {
-                    let upload = || pass.arguments.upload(&self.device, &self.uploads, &frame.assets, &list.batches);
+                    let upload = || pass.arguments.upload(&self.device, &self.uploads, &frame.assets, list);
                     pass.spent.alone(upload)?;
                 }
                 Record::Direct | Record::Bundles => {}

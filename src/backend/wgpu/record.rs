@@ -21,7 +21,7 @@ use crate::queue::{Batch, DrawList};
 /// An earlier frame's bundle at a place of a pass that has one encoder, if that way is taken and there is one.
 pub(super) fn kept(frame: &WgpuFrame, index: usize, list: &DrawList, place: usize) -> Option<WgpuPart> {
     let pass = frame.pass(index);
-    if pass.way.record != Record::Kept || pass.way.encoders(list.bundle_count()) > 1 {
+    if !keeps_bundle(pass, list, place) || pass.way.encoders(list.bundle_count()) > 1 {
         return None;
     }
     let bundle = pass.kept.find(place, list.bundle(place), &frame.buffers.subdivided().read())?;
@@ -42,32 +42,41 @@ pub(super) fn bundle(
 ) -> Result<wgpu::RenderBundle, BackendError> {
     let (pass, batches) = (frame.pass(index), list.bundle(place));
     let subdivided = frame.buffers.subdivided().read();
-    if pass.way.record != Record::Kept {
+    if !keeps_bundle(pass, list, place) {
         pass.spent.count_bundle(false);
-        return new_bundle(device, frame, pass, batches, &subdivided);
+        return new_bundle(device, frame, pass, list, place, &subdivided);
     }
     let kept = pass.kept.find(place, batches, &subdivided);
     pass.spent.count_bundle(kept.is_some());
     if let Some(kept) = kept {
         return Ok(kept);
     }
-    let bundle = new_bundle(device, frame, pass, batches, &subdivided)?;
+    let bundle = new_bundle(device, frame, pass, list, place, &subdivided)?;
     pass.kept.keep(place, batches, &subdivided, bundle.clone());
     Ok(bundle)
+}
+
+/// Whether the bundle at a place is one to be kept for later frames. In those, others of its triangles may be left.
+fn keeps_bundle(pass: &FramePass, list: &DrawList, place: usize) -> bool {
+    pass.way.record == Record::Kept && !list.keeps_triangles(place)
 }
 
 fn new_bundle(
     device: &wgpu::Device,
     frame: &WgpuFrame,
     pass: &FramePass,
-    batches: &[Batch],
+    list: &DrawList,
+    place: usize,
     subdivided: &SubdividedMeshes<SubdividedMesh>,
 ) -> Result<wgpu::RenderBundle, BackendError> {
     let pipelines = frame.pipelines(pass.pass);
     let by_state = pipelines.prepared();
     let mut encoder = device.create_render_bundle_encoder(&pipelines.bundle_descriptor(&pass.label));
-    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided };
-    prepared.draw(&mut encoder, batches, |encoder, run| prepared.draw_each(encoder, &batches[run]))?;
+    let indices = pass.indices.read();
+    let prepared = Prepared { frame, pass, list, by_state: &by_state, subdivided, indices: indices.buffer() };
+    let first = place * DrawList::BATCHES_PER_BUNDLE;
+    let batches = first..first + list.bundle(place).len();
+    prepared.draw(&mut encoder, batches, |encoder, run| prepared.draw_each(encoder, &list.batches[run]))?;
     Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(&pass.label) }))
 }
 
@@ -75,38 +84,71 @@ fn new_bundle(
 struct Prepared<'a> {
     frame: &'a WgpuFrame,
     pass: &'a FramePass,
+    list: &'a DrawList,
     by_state: &'a HashMap<DrawState, wgpu::RenderPipeline>,
     subdivided: &'a SubdividedMeshes<SubdividedMesh>,
+    /// Of the triangles that are left of batches of which not all are drawn.
+    indices: Option<&'a wgpu::Buffer>,
 }
 
 impl<'a> Prepared<'a> {
-    /// Draws batches. Whatever stays the same from one batch to the next is set once. Those of one state whose meshes lie in
-    /// the arenas are left to `draw_run`.
+    /// Draws the batches at some places of the list. Whatever stays the same from one batch to the next is set once. Those of one
+    /// state whose meshes lie in the arenas, and are drawn whole, are left to `draw_run`.
     ///
     /// # Errors
     /// If what a batch needs was not made before: an error of Drawloom's own.
     fn draw<E: RenderEncoder<'a>>(
         &self,
         encoder: &mut E,
-        batches: &[Batch],
+        places: Range<usize>,
         mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
         self.set_groups(encoder);
         self.set_arenas(encoder);
-        let mut start = 0;
-        for run in batches.chunk_by(|one, next| one.state == next.state) {
+        let mut start = places.start;
+        for run in self.list.batches[places].chunk_by(|one, next| one.state == next.state) {
             let state = run[0].state;
             let pipeline = self.by_state.get(&state.of_pipeline());
             encoder.set_pipeline(pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?);
-            if state.halvings() == 0 {
-                draw_run(encoder, start..start + run.len())?;
-            } else {
+            let end = start + run.len();
+            if state.halvings() > 0 {
                 self.draw_subdivided(encoder, run)?;
                 self.set_arenas(encoder);
+            } else if self.list.draws_whole_meshes() {
+                draw_run(encoder, start..end)?;
+            } else {
+                self.draw_whole_or_not(encoder, start..end, &mut draw_run)?;
             }
-            start += run.len();
+            start = end;
         }
         Ok(())
+    }
+
+    /// Draws batches of one state: those of which all triangles are drawn, run by run, by `draw_run`.
+    fn draw_whole_or_not<E: RenderEncoder<'a>>(
+        &self,
+        encoder: &mut E,
+        places: Range<usize>,
+        draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        let mut start = places.start;
+        for place in places.clone() {
+            let Some(left) = self.list.kept_triangles(place) else { continue };
+            if start < place {
+                draw_run(encoder, start..place)?;
+            }
+            start = place + 1;
+            if left.is_empty() {
+                continue;
+            }
+            let indices = self.indices.ok_or_else(|| broken("indices are uploaded before they are drawn with"))?;
+            let batch = &self.list.batches[place];
+            encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            let base_vertex = mesh_of(&self.frame.assets, batch)?.base_vertex;
+            encoder.draw_indexed(left, base_vertex, batch.first..batch.first + batch.count);
+            encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+        }
+        if start < places.end { draw_run(encoder, start..places.end) } else { Ok(()) }
     }
 
     fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
@@ -161,21 +203,23 @@ pub(super) fn batches(
     let by_state = frame.pipelines(pass.pass).prepared();
     let subdivided = frame.buffers.subdivided().read();
     let arguments = pass.arguments.read();
-    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
+    let indices = pass.indices.read();
+    let prepared =
+        Prepared { frame, pass, list, by_state: &by_state, subdivided: &subdivided, indices: indices.buffer() };
     let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
-    let batches = &list.batches[first..end.min(list.batches.len())];
+    let places = first..end.min(list.batches.len());
     let mut render_pass = begin_pass(encoder, frame, request, index, share);
-    if batches.is_empty() {
+    if places.is_empty() {
         return Ok(());
     }
     if pass.way.record != Record::Indirect {
-        return prepared.draw(&mut render_pass, batches, |encoder, run| prepared.draw_each(encoder, &batches[run]));
+        return prepared.draw(&mut render_pass, places, |encoder, run| prepared.draw_each(encoder, &list.batches[run]));
     }
     let buffer = arguments.as_ref().and_then(|arguments| arguments.on_device.buffer());
     let buffer = buffer.ok_or_else(|| broken("arguments are uploaded before they are drawn with"))?;
-    prepared.draw(&mut render_pass, batches, |render_pass, run| {
+    prepared.draw(&mut render_pass, places, |render_pass, run| {
         for start in run.clone().step_by(MOST_INDIRECT) {
-            let offset = (first + start) as u64 * Arguments::STRIDE;
+            let offset = start as u64 * Arguments::STRIDE;
             render_pass.multi_draw_indexed_indirect(buffer, offset, (run.end - start).min(MOST_INDIRECT) as u32);
         }
         Ok(())
@@ -213,8 +257,8 @@ pub(super) fn fixed(
     let by_state = frame.pipelines(pass.pass).prepared();
     let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
     let pipeline = pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?;
-    let subdivided = SubdividedMeshes::new();
-    let prepared = Prepared { frame, pass, by_state: &by_state, subdivided: &subdivided };
+    let (list, subdivided) = (DrawList::default(), SubdividedMeshes::new());
+    let prepared = Prepared { frame, pass, list: &list, by_state: &by_state, subdivided: &subdivided, indices: None };
     let mut render_pass = begin_pass(encoder, frame, request, index, Share::WHOLE);
     render_pass.set_pipeline(pipeline);
     prepared.set_groups(&mut render_pass);

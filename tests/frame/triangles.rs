@@ -1,0 +1,127 @@
+//! Triangles that nobody sees, of meshes that ask for it.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::process::Deferred;
+use drawloom::quality::{Quality, TransformPrecision};
+use drawloom::raster::CulledTriangles;
+use drawloom::scene::{Projection, Scene, Topology};
+use drawloom::task::Scheduler;
+use drawloom::view::RenderView;
+use drawloom::{FrameStatistics, Granularity, Renderer};
+
+use crate::renderer;
+use crate::scenes::everything::everything;
+use crate::scenes::{as_list, culled, field, square, with_meshes};
+
+/// What the first view's statistics and its lists tell of a frame.
+fn frame(scene: &Scene, workers: usize, granularity: Granularity) -> (FrameStatistics, Renderer<NullBackend>) {
+    let (mut renderer, submitter) = renderer(workers, granularity);
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    let submitted = submitter.submit(recorded).unwrap();
+    let of_views: usize = submitted.statistics.views.iter().map(|view| view.triangles.culled()).sum();
+    let (mut drawn, mut all) = (0, 0);
+    for pass in &submitted.submission.passes {
+        drawn += pass.triangles;
+        let list = renderer.draw_list(&pass.process, pass.view);
+        all += list.map_or(0, |list| list.commands().map(|command| triangles_of(scene, command.mesh)).sum());
+    }
+    assert_eq!(drawn, all - of_views, "what is not culled is drawn");
+    (submitted.statistics, renderer)
+}
+
+fn triangles_of(scene: &Scene, slot: u32) -> usize {
+    let mut meshes = scene.assets().iter::<drawloom::scene::Mesh>();
+    meshes.find(|(handle, _)| handle.index() == slot).unwrap().1.triangle_count()
+}
+
+#[test]
+fn what_is_left_is_what_the_view_says_of_each_object() {
+    let scene = with_meshes(field(400), culled);
+    for (workers, granularity) in
+        [(1, Granularity::Adaptive), (2, Granularity::Chunk(7)), (3, Granularity::PerDraw), (2, Granularity::PerCamera)]
+    {
+        let (statistics, renderer) = frame(&scene, workers, granularity);
+        for (index, camera) in scene.cameras.iter().enumerate() {
+            let view = RenderView::new(camera);
+            let mut expected = CulledTriangles::default();
+            for process in ["geometry buffer", "transparency"] {
+                let list = renderer.draw_list(process, index).unwrap();
+                for (place, batch) in list.batches.iter().enumerate() {
+                    assert_eq!(batch.count, 1, "each is a draw of its own");
+                    let mut kept = Vec::new();
+                    let object = list.objects[batch.first as usize] as usize;
+                    expected += view.cull_triangles(&scene.as_scene_ref(), object, &mut kept);
+                    let left = list.kept_triangles(place).expect("all meshes ask");
+                    assert_eq!(list.indices[left.start as usize..left.end as usize], kept[..]);
+                }
+            }
+            assert_eq!(statistics.views[index].triangles, expected);
+            assert!(expected.back_facing > 0 && expected.triangles > expected.culled());
+        }
+    }
+}
+
+#[test]
+fn nobody_looks_at_what_does_not_ask() {
+    let (statistics, renderer) = frame(&field(400), 2, Granularity::Adaptive);
+    assert!(statistics.views.iter().all(|view| view.triangles == CulledTriangles::default()));
+    assert!(!renderer.jobs_to_dot().unwrap().contains("triangles"));
+
+    let some = with_meshes(field(400), |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
+    let (statistics, renderer) = frame(&some, 2, Granularity::Adaptive);
+    let list = renderer.draw_list("geometry buffer", 0).unwrap();
+    let merged = list.batches.iter().enumerate().filter(|(place, _)| list.kept_triangles(*place).is_none());
+    assert!(merged.clone().count() > 0 && merged.clone().any(|(_, batch)| batch.count > 1));
+    assert!(statistics.views[0].triangles.back_facing > 0 && statistics.views[0].batches > list.batches.len());
+}
+
+#[test]
+fn asking_can_change_between_frames() {
+    let (mut renderer, submitter) = renderer(2, Granularity::Adaptive);
+    let mut scene = field(200);
+    let mut culled_in = |scene: &Scene| {
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        submitted.statistics.views.iter().map(|view| view.triangles.culled()).sum::<usize>()
+    };
+    assert_eq!(culled_in(&scene), 0);
+    for _ in 0..2 {
+        scene = with_meshes(scene, culled);
+        let first = culled_in(&scene);
+        assert!(first > 0);
+        assert_eq!(culled_in(&scene), first);
+        scene = with_meshes(scene, as_list);
+        assert_eq!(culled_in(&scene), 0);
+    }
+}
+
+#[test]
+fn absolute_places_and_paraboloids_keep_every_triangle() {
+    let scene = with_meshes(everything(), culled);
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    let absolute = Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() };
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(absolute);
+    let (mut renderer, _) = builder.build(scheduler).unwrap();
+    let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+    assert!(recorded.statistics().views.iter().all(|view| view.triangles.triangles == 0));
+
+    let (statistics, _) = frame(&scene, 2, Granularity::Adaptive);
+    let culled = |name: &str| statistics.views.iter().find(|view| view.name.contains(name)).unwrap().triangles.culled();
+    assert!(culled("main") > 0);
+    let paraboloid = scene
+        .lights
+        .iter()
+        .position(|light| matches!(light, drawloom::scene::Light::Hemispherical { casts_shadow: true, .. }));
+    assert_eq!(culled(&format!("shadow of light {}", paraboloid.unwrap())), 0);
+    assert!(scene.cameras.iter().all(|camera| camera.projection != Projection::Paraboloid));
+}
+
+#[test]
+fn a_strip_becomes_the_list_that_it_stands_for() {
+    let strip = square(Topology::TriangleStrip);
+    let asking = culled(&strip);
+    assert!(asking.culls_triangles() && !strip.culls_triangles());
+    assert_eq!((asking.topology(), asking.triangle_count()), (Topology::TriangleList, strip.triangle_count()));
+    assert!(asking.triangles().eq(strip.triangles()));
+}
