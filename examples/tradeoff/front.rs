@@ -16,7 +16,7 @@ use crate::settings::Knob;
 /// If the file cannot be written.
 pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     let path = folder.join("front.svg");
-    let root = SVGBackend::new(&path, (960, 420)).into_drawing_area();
+    let root = SVGBackend::new(&path, (WIDTH, 420)).into_drawing_area();
     root.fill(&WHITE)?;
     let places = || results.entries.iter().map(place);
     let slowest = places().map(|(time, _)| time).fold(f64::MIN_POSITIVE, f64::max);
@@ -25,6 +25,7 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     let mut chart = ChartBuilder::on(&root)
         .caption(format!("{}, {}", results.scene(), results.backend()), text(17))
         .margin(12)
+        .margin_right(NAMES + 12)
         .x_label_area_size(42)
         .y_label_area_size(62)
         .build_cartesian_2d(0.0..slowest * 1.1, (nearest * 0.6..farthest * 1.6).log_scale())?;
@@ -42,14 +43,23 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     let front = results.front();
     chart.draw_series(LineSeries::new(front.iter().map(|entry| place(entry)), FRONT.stroke_width(2)))?;
     chart.draw_series(front.iter().map(|entry| Circle::new(place(entry), 5, FRONT.filled())))?;
-    // By turns above and below, so that neighbours' names have room.
-    chart.draw_series(front.iter().zip([-17, 17].into_iter().cycle()).map(|(entry, aside)| {
+    let numbered = || front.iter().enumerate().map(|(index, entry)| (index + 1, entry));
+    chart.draw_series(numbered().map(|(number, entry)| {
         let style = text(13).color(&FRONT).pos(Pos::new(HPos::Center, VPos::Center));
-        EmptyElement::at(place(entry)) + Text::new(label(entry, Knob::Preset.name()), (0, aside), style)
+        EmptyElement::at(place(entry)) + Text::new(number.to_string(), (0, -14), style)
     }))?;
+    for (number, entry) in numbered() {
+        let name = format!("{number}  {}", label(entry, Knob::Preset.name()));
+        let row = (WIDTH as i32 - NAMES, 40 + 20 * number as i32);
+        root.draw(&Text::new(name, row, text(13).color(&FRONT)))?;
+    }
     root.present()?;
     Ok(())
 }
+
+/// In pixels: the picture, and the names to the right of what they are of.
+const WIDTH: u32 = 960;
+const NAMES: i32 = 210;
 
 const FRONT: RGBColor = RGBColor(213, 94, 0);
 const OTHERS: RGBAColor = RGBAColor(0, 114, 178, 0.45);

@@ -141,12 +141,6 @@ impl Measurement {
     pub fn frame(&self) -> Duration {
         median(self.times.iter().map(|time| time.frame))
     }
-
-    /// Whether its frames took less than the other's by a twentieth, in seven of eight rounds: by chance they seldom do.
-    pub fn is_faster_than(&self, other: &Self) -> bool {
-        let pairs = || self.times.iter().zip(&other.times);
-        pairs().filter(|(own, other)| own.frame * 20 < other.frame * 19).count() * 8 >= pairs().count() * 7
-    }
 }
 
 /// Pictures along the path.
