@@ -59,7 +59,7 @@ pub struct Arguments {
     #[arg(long)]
     pub depth_pre_pass: bool,
 
-    /// Leaves triangles that nobody sees to the CPU: those that face away or cover no pixel of a view are not drawn there.
+    /// Has the CPU leave out triangles that a view cannot show: those that face away, say, or cover no pixel.
     #[arg(long)]
     pub cull_triangles: bool,
 

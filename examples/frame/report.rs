@@ -85,8 +85,8 @@ impl Report {
             commands: view.commands,
             batches: view.batches,
             bundles: view.bundles,
-            triangles: view.triangles.triangles,
-            culled_triangles: view.triangles.culled(),
+            triangles: view.culled_triangles.triangles,
+            culled_triangles: view.culled_triangles.culled(),
         };
         let rejections = frame.rejections.iter();
         Self {

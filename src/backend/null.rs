@@ -13,7 +13,7 @@ use crate::task::Worker;
 use crate::view::{ObjectTable, ViewRecord};
 
 /// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
-/// that draw what is no mesh or that lie beyond a bundle, passes recorded twice or submitted out of order.
+/// that draw what is no mesh, that lie beyond a bundle or of which more remains than there was, passes recorded twice or submitted out of order.
 #[derive(Debug, Default)]
 pub struct NullBackend;
 
@@ -205,12 +205,12 @@ fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<Nu
         let Some(of_mesh) = mesh else {
             return Err(BackendError::BrokenRule { rule: format!("slot {} holds no mesh", batch.mesh) });
         };
-        triangles += match list.kept_triangles(place) {
+        triangles += match list.remaining(place) {
             None => of_mesh * batch.count as usize,
-            Some(kept) => {
-                let holds = batch.count == 1 && kept.len() <= of_mesh * 3 && kept.end as usize <= list.indices.len();
-                ensure(holds, || format!("the triangles left of batch {place} are one object's"))?;
-                kept.len() / 3
+            Some(remaining) => {
+                let holds = batch.count == 1 && remaining.len() < of_mesh * 3;
+                ensure(holds, || format!("what remains of batch {place} is a part of one object"))?;
+                remaining.len() / 3
             }
         };
         end += batch.count;

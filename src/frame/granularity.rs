@@ -1,7 +1,7 @@
 //! How finely a frame is cut into jobs.
 
 /// The job size of everything in a frame that can be cut: of what is done for all views together, and of each view's
-/// visibility, fill, sort, instance and record (M 10.5, "Better Load Balancing"). It decides who does what when, never what
+/// visibility, fill, sort, instance, triangles and record (M 10.5, "Better Load Balancing"). It decides who does what when, never what
 /// is drawn: bundles are cut at fixed places whatever it is, so every granularity gives the same picture to the byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Granularity {

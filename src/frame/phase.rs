@@ -46,7 +46,7 @@ pub(super) enum Phase {
     Join { pass: usize },
     /// Looks at the triangles of meshes that ask for it.
     Triangles { pass: usize },
-    /// Joins the parts, uploads which objects are drawn, and makes pipelines.
+    /// Joins the parts if nothing has yet, uploads which objects are drawn, and makes pipelines.
     Prepare { pass: usize },
     /// Records the pass's parts: bundles, say.
     Record { pass: usize },
@@ -354,25 +354,28 @@ impl FrameNode {
             }
             Phase::Instance { pass } => {
                 range.for_each(|part| {
-                    instance(&mut tables.passes[pass].parts[part].write(), |mesh| merges(frame, mesh))
+                    instance(&mut tables.passes[pass].parts[part].write(), |mesh| merges(frame, pass, mesh))
                 });
             }
             Phase::Join { pass } => {
                 join(frame, pass);
                 let table = &tables.passes[pass];
-                table.triangles.write().find(&table.list.read(), &tables.asking);
+                if looks_at_triangles(frame, pass) {
+                    table.triangles.write().find(&table.list.read(), &tables.asking, frame.request.scene.assets);
+                }
             }
             Phase::Triangles { pass } => {
                 let table = &tables.passes[pass];
                 let (triangles, list) = (table.triangles.read(), table.list.read());
                 let view = &frame.request.views[frame.request.passes[pass].view];
-                range.for_each(|number| triangles.look_at(number, view, frame.request.scene, &list));
+                triangles.look_at(range, view, frame.request.scene, &list);
             }
             Phase::Prepare { pass } => {
                 let table = &tables.passes[pass];
-                match frame.culls_triangles {
-                    true => table.triangles.read().put(&mut table.list.write()),
-                    false => join(frame, pass),
+                if frame.culls_triangles {
+                    table.triangles.read().put(&mut table.list.write());
+                } else {
+                    join(frame, pass);
                 }
                 frame.recordings[pass].parts.lock().resize_with(part_count(frame, pass), || None);
                 let list = table.list.read();
@@ -397,9 +400,14 @@ fn part_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
     frame.backend.parts(frame.frame, &pass_request(frame, pass, &frame.tables.passes[pass].list.read()))
 }
 
+/// Whether a pass looks at the triangles of meshes that ask.
+fn looks_at_triangles<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> bool {
+    frame.culls_triangles && frame.request.views[frame.request.passes[pass].view].can_cull_triangles()
+}
+
 /// Whether equal commands of the mesh in a slot become one draw. What is looked at is drawn by itself.
-fn merges<B: Backend>(frame: &FrameContext<'_, B>, mesh: u32) -> bool {
-    frame.merges && !(frame.culls_triangles && frame.tables.asking.contains(mesh))
+fn merges<B: Backend>(frame: &FrameContext<'_, B>, pass: usize, mesh: u32) -> bool {
+    frame.merges && !(looks_at_triangles(frame, pass) && frame.tables.asking.contains(mesh))
 }
 
 fn join<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) {
@@ -407,7 +415,7 @@ fn join<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) {
     let mut list = table.list.write();
     list.clear();
     for part in &table.parts[..table.split.read().part_count()] {
-        list.append(&mut part.write(), |mesh| merges(frame, mesh));
+        list.append(&mut part.write(), |mesh| merges(frame, pass, mesh));
     }
 }
 

@@ -280,14 +280,14 @@ fn statistics_of(
             commands: 0,
             batches: 0,
             bundles: 0,
-            triangles: CulledTriangles::default(),
+            culled_triangles: CulledTriangles::default(),
         };
         for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
             let list = table.list.read();
             statistics.commands += list.objects.len();
             statistics.batches += list.batches.len();
             statistics.bundles += list.bundle_count();
-            statistics.triangles += table.triangles.read().culled();
+            statistics.culled_triangles += table.triangles.read().culled();
         }
         statistics
     };

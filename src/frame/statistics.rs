@@ -45,7 +45,7 @@ pub struct ViewStatistics {
     pub bundles: usize,
     /// Triangles that were looked at before they were drawn, and left out, over all its processes: see
     /// [`Mesh::with_triangles_culled`](crate::scene::Mesh::with_triangles_culled).
-    pub triangles: CulledTriangles,
+    pub culled_triangles: CulledTriangles,
 }
 
 /// Thread time of each stage, summed over workers.
@@ -57,7 +57,7 @@ pub struct StageTimes {
     pub fill: Duration,
     /// Sorting them.
     pub sort: Duration,
-    /// Merging them into batches.
+    /// Merging them into batches, and looking at the triangles of meshes that ask for it.
     pub instance: Duration,
     /// Uploading, recording bundles, finishing passes.
     pub record: Duration,

@@ -1,5 +1,7 @@
 //! Triangles that nobody sees: left out of what a pass draws of the meshes that ask for it (S 9.6).
 
+use std::ops::Range;
+
 use parking_lot::Mutex;
 
 use crate::queue::DrawList;
@@ -45,51 +47,77 @@ impl AskingMeshes {
 /// What a pass draws of meshes that ask.
 #[derive(Debug, Default)]
 pub(super) struct PassTriangles {
-    /// The places of their batches in the list.
-    batches: Vec<u32>,
-    /// One for each; behind them there may be memory for more.
-    kept: Vec<Mutex<Vec<u32>>>,
+    items: Vec<Item>,
+    /// The indices of what remains of each; behind them there may be memory for more.
+    remaining: Vec<Mutex<Vec<u32>>>,
     culled: Mutex<CulledTriangles>,
 }
 
+/// Some triangles of a batch that draws one object: so few that a large mesh is shared out too.
+#[derive(Debug)]
+struct Item {
+    /// The batch's place in the list.
+    batch: u32,
+    triangles: Range<usize>,
+}
+
+/// Triangles of an item, at most.
+const LARGEST_ITEM: usize = 256;
+
+/// Indices that remain in a pass, at most: 128 MiB, half of what every device allows a buffer.
+const MOST_INDICES: usize = 1 << 25;
+
 impl PassTriangles {
-    /// Finds the batches of a list that are to be looked at. Subdivided ones are not: a matrix alone does not place those.
-    pub(super) fn find(&mut self, list: &DrawList, asking: &AskingMeshes) {
+    /// Finds what is to be looked at of a list.
+    pub(super) fn find(&mut self, list: &DrawList, asking: &AskingMeshes, assets: &Assets) {
         self.clear();
-        let is_asking = |place: &u32| {
-            let batch = &list.batches[*place as usize];
-            batch.state.halvings() == 0 && asking.contains(batch.mesh)
-        };
-        self.batches.extend((0..list.batches.len() as u32).filter(is_asking));
-        if self.kept.len() < self.batches.len() {
-            self.kept.resize_with(self.batches.len(), Mutex::default);
+        let asking = (0..).zip(&list.batches).filter(|(_, batch)| asking.contains(batch.mesh));
+        for (batch, drawn) in asking {
+            let count = assets.meshes.revised_at(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
+            let starts = (0..count).step_by(LARGEST_ITEM);
+            self.items.extend(starts.map(|start| Item { batch, triangles: start..count.min(start + LARGEST_ITEM) }));
+        }
+        if self.remaining.len() < self.items.len() {
+            self.remaining.resize_with(self.items.len(), Mutex::default);
         }
     }
 
     /// Leaves nothing to look at, and keeps the memory.
     pub(super) fn clear(&mut self) {
-        self.batches.clear();
+        self.items.clear();
         *self.culled.get_mut() = CulledTriangles::default();
     }
 
-    /// How many batches are to be looked at.
+    /// How many items are to be looked at.
     pub(super) fn len(&self) -> usize {
-        self.batches.len()
+        self.items.len()
     }
 
-    /// Looks at the triangles of one of these batches, which draws one object.
-    pub(super) fn look_at(&self, number: usize, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
-        let batch = &list.batches[self.batches[number] as usize];
-        let mut kept = self.kept[number].lock();
-        kept.clear();
-        let culled = view.cull_triangles(scene, list.objects[batch.first as usize] as usize, &mut kept);
+    /// Looks at some of the items.
+    pub(super) fn look_at(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
+        let mut culled = CulledTriangles::default();
+        for (item, remaining) in self.items[items.clone()].iter().zip(&self.remaining[items]) {
+            let object = list.objects[list.batches[item.batch as usize].first as usize] as usize;
+            let mut remaining = remaining.lock();
+            remaining.clear();
+            culled += view.cull_some_triangles(scene, object, item.triangles.clone(), &mut remaining);
+        }
         *self.culled.lock() += culled;
     }
 
-    /// Puts what is left into the list.
+    /// Has the list draw what remains. A batch of which everything does stays whole.
     pub(super) fn put(&self, list: &mut DrawList) {
-        for (&batch, kept) in self.batches.iter().zip(&self.kept) {
-            list.keep_triangles(batch, &kept.lock());
+        let mut first = 0;
+        for items in self.items.chunk_by(|one, next| one.batch == next.batch) {
+            let remaining = &self.remaining[first..first + items.len()];
+            first += items.len();
+            let all: usize = items.iter().map(|item| item.triangles.len() * 3).sum();
+            let count: usize = remaining.iter().map(|remaining| remaining.lock().len()).sum();
+            if count < all && list.remaining_indices().len() + count <= MOST_INDICES {
+                list.make_partial(items[0].batch, |indices| {
+                    remaining.iter().for_each(|remaining| indices.extend_from_slice(&remaining.lock()));
+                });
+            }
         }
     }
 

@@ -14,11 +14,10 @@ pub struct DrawList {
     pub batches: Vec<Batch>,
     /// The index of each command's object: the 4 bytes an object that a view uploads.
     pub objects: Vec<u32>,
-    /// The vertices of the triangles that are left of batches of which not all are drawn, three each: see
-    /// [`DrawList::kept_triangles`].
-    pub indices: Vec<u32>,
-    /// The places of these batches, ascending, and where their indices are.
-    kept: Vec<(u32, Range<u32>)>,
+    /// The corners of the triangles that remain of partial batches, three each.
+    indices: Vec<u32>,
+    /// The places of partial batches, ascending, and where their indices are.
+    partial: Vec<(u32, Range<u32>)>,
 }
 
 /// A part of a draw list, on its way.
@@ -39,7 +38,7 @@ impl DrawList {
         self.batches.clear();
         self.objects.clear();
         self.indices.clear();
-        self.kept.clear();
+        self.partial.clear();
     }
 
     /// Joins a part on behind those that are there. What it held is this list's, and it has other memory instead.
@@ -68,30 +67,35 @@ impl DrawList {
         self.objects.extend_from_slice(&part.objects);
     }
 
-    /// Has only these triangles drawn of the batch at a place, which draws one object: the indices of their vertices, three each.
-    /// Batches come in order.
-    pub fn keep_triangles(&mut self, batch: u32, indices: &[u32]) {
+    /// Makes the batch at a place, which draws one object, a partial one: of its triangles those remain whose indices `append` appends,
+    /// three each. Batches come in order.
+    pub(crate) fn make_partial(&mut self, batch: u32, append: impl FnOnce(&mut Vec<u32>)) {
         let first = self.indices.len() as u32;
-        self.indices.extend_from_slice(indices);
-        self.kept.push((batch, first..self.indices.len() as u32));
+        append(&mut self.indices);
+        self.partial.push((batch, first..self.indices.len() as u32));
     }
 
-    /// Where in [`DrawList::indices`] the triangles are that are drawn of the batch at a place; `None` for all of its mesh's.
-    pub fn kept_triangles(&self, batch: usize) -> Option<Range<u32>> {
-        let place = self.kept.binary_search_by_key(&(batch as u32), |(batch, _)| *batch).ok()?;
-        Some(self.kept[place].1.clone())
+    /// The corners of the triangles that remain of partial batches, three each: indices into their mesh's vertices.
+    pub fn remaining_indices(&self) -> &[u32] {
+        &self.indices
     }
 
-    /// Whether of each batch all triangles are drawn.
-    pub fn draws_whole_meshes(&self) -> bool {
-        self.kept.is_empty()
+    /// Where in [`DrawList::remaining_indices`] those of the batch at a place are; `None` where its mesh is drawn whole.
+    pub fn remaining(&self, batch: usize) -> Option<Range<u32>> {
+        let place = self.partial.binary_search_by_key(&(batch as u32), |(batch, _)| *batch).ok()?;
+        Some(self.partial[place].1.clone())
     }
 
-    /// Whether there is a batch among those of a bundle of which not all triangles are drawn.
-    pub fn keeps_triangles(&self, bundle: usize) -> bool {
+    /// Whether every batch draws its mesh whole.
+    pub fn is_whole(&self) -> bool {
+        self.partial.is_empty()
+    }
+
+    /// Whether every batch of a bundle draws its mesh whole.
+    pub fn bundle_is_whole(&self, bundle: usize) -> bool {
         let first = (bundle * Self::BATCHES_PER_BUNDLE) as u32;
-        let place = self.kept.partition_point(|(batch, _)| *batch < first);
-        self.kept.get(place).is_some_and(|(batch, _)| *batch < first + Self::BATCHES_PER_BUNDLE as u32)
+        let place = self.partial.partition_point(|(batch, _)| *batch < first);
+        self.partial.get(place).is_none_or(|(batch, _)| *batch >= first + Self::BATCHES_PER_BUNDLE as u32)
     }
 
     /// The sorted commands.
@@ -122,7 +126,7 @@ impl PartialEq for DrawList {
     fn eq(&self, other: &Self) -> bool {
         self.batches == other.batches
             && self.objects == other.objects
-            && (&self.indices, &self.kept) == (&other.indices, &other.kept)
+            && (&self.indices, &self.partial) == (&other.indices, &other.partial)
             && self.commands().eq(other.commands())
     }
 }

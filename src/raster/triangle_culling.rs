@@ -42,7 +42,7 @@ impl AddAssign for CulledTriangles {
     }
 }
 
-/// Appends to `kept` the indices of the `triangles` that may cover a pixel of a `picture` of so many pixels to the
+/// Appends to `remaining` the indices of the `triangles` that may cover a pixel of a `picture` of so many pixels to the
 /// right and down; in their order, three each. `clip` has the places of the mesh's vertices in clip space, with
 /// reversed depth: what is seen has 0 ≤ z ≤ w. `culled`: the winding in the picture that is left out; that of a
 /// mirrored object is the other one.
@@ -75,7 +75,7 @@ pub fn cull_triangles(
     triangles: impl Iterator<Item = [u32; 3]>,
     picture: [usize; 2],
     culled: Option<Winding>,
-    kept: &mut Vec<u32>,
+    remaining: &mut Vec<u32>,
 ) -> CulledTriangles {
     let corners: Vec<_> = clip.iter().map(|clip| Corner::new(clip, picture)).collect();
     let corner = |index| corners.get(index as usize)?.as_ref();
@@ -87,7 +87,7 @@ pub fn cull_triangles(
             _ => None,
         };
         match reason {
-            None => kept.extend(triangle),
+            None => remaining.extend(triangle),
             Some(Reason::Degenerate) => counts.degenerate += 1,
             Some(Reason::OffScreen) => counts.off_screen += 1,
             Some(Reason::BackFacing) => counts.back_facing += 1,

@@ -15,12 +15,12 @@ use crate::renderer;
 use crate::scenes::everything::everything;
 use crate::scenes::{as_list, culled, field, square, with_meshes};
 
-/// What the first view's statistics and its lists tell of a frame.
+/// A frame's statistics, and the renderer that still has its lists.
 fn frame(scene: &Scene, workers: usize, granularity: Granularity) -> (FrameStatistics, Renderer<NullBackend>) {
     let (mut renderer, submitter) = renderer(workers, granularity);
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let submitted = submitter.submit(recorded).unwrap();
-    let of_views: usize = submitted.statistics.views.iter().map(|view| view.triangles.culled()).sum();
+    let of_views: usize = submitted.statistics.views.iter().map(|view| view.culled_triangles.culled()).sum();
     let (mut drawn, mut all) = (0, 0);
     for pass in &submitted.submission.passes {
         drawn += pass.triangles;
@@ -53,11 +53,18 @@ fn what_is_left_is_what_the_view_says_of_each_object() {
                     let mut kept = Vec::new();
                     let object = list.objects[batch.first as usize] as usize;
                     expected += view.cull_triangles(&scene.as_scene_ref(), object, &mut kept);
-                    let left = list.kept_triangles(place).expect("all meshes ask");
-                    assert_eq!(list.indices[left.start as usize..left.end as usize], kept[..]);
+                    let all = triangles_of(&scene, batch.mesh) * 3;
+                    match list.remaining(place) {
+                        Some(remaining) => {
+                            let remaining = remaining.start as usize..remaining.end as usize;
+                            assert_eq!(list.remaining_indices()[remaining], kept[..]);
+                            assert!(kept.len() < all);
+                        }
+                        None => assert_eq!(kept.len(), all, "drawn whole"),
+                    }
                 }
             }
-            assert_eq!(statistics.views[index].triangles, expected);
+            assert_eq!(statistics.views[index].culled_triangles, expected);
             assert!(expected.back_facing > 0 && expected.triangles > expected.culled());
         }
     }
@@ -66,15 +73,15 @@ fn what_is_left_is_what_the_view_says_of_each_object() {
 #[test]
 fn nobody_looks_at_what_does_not_ask() {
     let (statistics, renderer) = frame(&field(400), 2, Granularity::Adaptive);
-    assert!(statistics.views.iter().all(|view| view.triangles == CulledTriangles::default()));
+    assert!(statistics.views.iter().all(|view| view.culled_triangles == CulledTriangles::default()));
     assert!(!renderer.jobs_to_dot().unwrap().contains("triangles"));
 
     let some = with_meshes(field(400), |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
     let (statistics, renderer) = frame(&some, 2, Granularity::Adaptive);
     let list = renderer.draw_list("geometry buffer", 0).unwrap();
-    let merged = list.batches.iter().enumerate().filter(|(place, _)| list.kept_triangles(*place).is_none());
+    let merged = list.batches.iter().enumerate().filter(|(place, _)| list.remaining(*place).is_none());
     assert!(merged.clone().count() > 0 && merged.clone().any(|(_, batch)| batch.count > 1));
-    assert!(statistics.views[0].triangles.back_facing > 0 && statistics.views[0].batches > list.batches.len());
+    assert!(statistics.views[0].culled_triangles.back_facing > 0 && statistics.views[0].batches > list.batches.len());
 }
 
 #[test]
@@ -83,7 +90,7 @@ fn asking_can_change_between_frames() {
     let mut scene = field(200);
     let mut culled_in = |scene: &Scene| {
         let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
-        submitted.statistics.views.iter().map(|view| view.triangles.culled()).sum::<usize>()
+        submitted.statistics.views.iter().map(|view| view.culled_triangles.culled()).sum::<usize>()
     };
     assert_eq!(culled_in(&scene), 0);
     for _ in 0..2 {
@@ -104,10 +111,11 @@ fn absolute_places_and_paraboloids_keep_every_triangle() {
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(absolute);
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
-    assert!(recorded.statistics().views.iter().all(|view| view.triangles.triangles == 0));
+    assert!(recorded.statistics().views.iter().all(|view| view.culled_triangles.triangles == 0));
 
     let (statistics, _) = frame(&scene, 2, Granularity::Adaptive);
-    let culled = |name: &str| statistics.views.iter().find(|view| view.name.contains(name)).unwrap().triangles.culled();
+    let culled =
+        |name: &str| statistics.views.iter().find(|view| view.name.contains(name)).unwrap().culled_triangles.culled();
     assert!(culled("main") > 0);
     let paraboloid = scene
         .lights

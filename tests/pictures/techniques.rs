@@ -60,11 +60,14 @@ pub fn techniques() -> Result<Vec<(Record, Encode)>, Failed> {
 
 pub fn studio_of(backend: WgpuBackend) -> Result<Studio, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    // Small maps are soon drawn, and hold as many draws as large ones.
-    let deferred = Deferred::to_picture().shadow_maps(Some(ShadowMaps { side: 64, ..ShadowMaps::default() }));
-    let builder = Renderer::builder(backend).deferred(deferred).granularity(Granularity::Chunk(300));
+    let builder = Renderer::builder(backend).deferred(small_maps()).granularity(Granularity::Chunk(300));
     let (renderer, submitter) = builder.build(scheduler)?;
     Ok(Studio { renderer, submitter })
+}
+
+/// Small shadow maps are soon drawn, and hold as many draws as large ones.
+pub fn small_maps() -> Deferred {
+    Deferred::to_picture().shadow_maps(Some(ShadowMaps { side: 64, ..ShadowMaps::default() }))
 }
 
 /// One that draws by one technique alone.

@@ -1,27 +1,48 @@
 //! Leaving out triangles that nobody sees changes no byte, whichever way frames are recorded.
 
-use drawloom::backend::WgpuBackend;
+use std::cell::Cell;
+
+use drawloom::Recorded;
+use drawloom::backend::{Encode, Record, WgpuBackend};
 use drawloom::glam::DVec3;
+use drawloom::quality::{Quality, TransformPrecision};
 use drawloom::scene::{RenderObject, Scene};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::references::colonnade;
 use crate::scenes::everything::everything;
-use crate::scenes::{as_list, culled, field, with_meshes};
-use crate::techniques::{device, drawn_anew, pictures, studio_of, technique, techniques};
+use crate::scenes::{as_list, field, with_meshes};
+use crate::techniques::{
+    device, drawn_anew, expect, many_batches, pictures, small_maps, studio_of, technique, techniques,
+};
 
 pub const CASES: &[Case] = &[
     ("culled_triangles_change_no_byte_by_any_technique", any_technique),
     ("culled_triangles_change_no_byte_while_ways_are_measured", measured),
+    ("culled_triangles_change_no_byte_whatever_else_changes", whatever_else_changes),
 ];
 
-const SCENES: [fn() -> Result<Scene, Failed>; 3] = [|| Ok(everything()), || Ok(field(300)), small_colonnade];
+type Make = fn() -> Result<Scene, Failed>;
+
+/// Scenes, and which of their meshes ask: every so many-th.
+const SCENES: [(Make, usize); 4] =
+    [(|| Ok(everything()), 1), (|| Ok(field(300)), 1), (small_colonnade, 1), (|| Ok(many_batches()), 2)];
 
 fn small_colonnade() -> Result<Scene, Failed> {
     let mut scene = colonnade()?;
     scene.cameras[0].size = [160, 90];
     Ok(scene)
+}
+
+/// The scene with the triangles of every so many-th mesh culled, and of lists only: what a strip's triangles are rounded to is not
+/// what a list's are.
+fn asking(scene: Scene, every: usize) -> Scene {
+    let number = Cell::new(0_usize);
+    with_meshes(scene, |mesh| {
+        number.set(number.get() + 1);
+        as_list(mesh).with_triangles_culled(number.get().is_multiple_of(every))
+    })
 }
 
 /// Moves what looks and something that is looked at: the draws stay the same, the triangles left of them do not.
@@ -36,8 +57,7 @@ fn change(scene: &mut Scene) -> Result<(), Failed> {
 }
 
 fn any_technique() -> Result<(), Failed> {
-    for scene in SCENES {
-        // Of lists only: what a strip's triangles are rounded to is not what a list's are.
+    for (scene, every) in SCENES {
         let mut whole = with_meshes(scene()?, as_list);
         let mut expected = Vec::new();
         for _ in 0..FRAMES {
@@ -45,31 +65,77 @@ fn any_technique() -> Result<(), Failed> {
             change(&mut whole)?;
         }
         for (record, encode) in techniques()? {
-            let (mut studio, mut asking) = (technique(record, encode)?, with_meshes(scene()?, culled));
+            let (mut studio, mut asking) = (technique(record, encode)?, asking(scene()?, every));
             for (frame, expected) in expected.iter().enumerate() {
                 let recorded = studio.record(&asking)?;
-                let culled: usize = recorded.statistics().views.iter().map(|view| view.triangles.culled()).sum();
+                let culled = culled_in(&recorded);
                 if culled == 0 || pictures(&studio, recorded, &asking)? != *expected {
                     return Err(format!("frame {frame} differs with {record:?}, {encode:?}; {culled} culled").into());
                 }
                 change(&mut asking)?;
             }
+            let is_split = studio.renderer.backend().passes().iter().any(|pass| pass.encoders > 1);
+            let has_to_be = encode == Encode::Split && every > 1;
+            expect(is_split || !has_to_be, || "no pass was split".to_owned())?;
         }
     }
     Ok(())
 }
 
-const FRAMES: usize = 4;
+fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
+    recorded.statistics().views.iter().map(|view| view.culled_triangles.culled()).sum()
+}
+
+/// With all that decides anew what is drawn where: depth drawn first, several frames on their way, another quality and back, and meshes
+/// that cease to ask.
+fn whatever_else_changes() -> Result<(), Failed> {
+    let expected = |scene: &Scene| drawn_anew(scene);
+    let mut whole = with_meshes(everything(), as_list);
+    let first = expected(&whole)?;
+    change(&mut whole)?;
+    let second = expected(&whole)?;
+
+    let mut studio = technique(Record::Kept, Encode::PerPass)?;
+    studio.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+    let mut scene = asking(everything(), 1);
+    for _ in 0..2 {
+        let on_its_way = studio.record(&scene)?;
+        let is_culled = culled_in(&on_its_way) > 0;
+        change(&mut scene)?;
+        drop(studio.record(&scene)?);
+        let later = studio.record(&scene)?;
+        let drawn = [pictures(&studio, on_its_way, &scene)?, pictures(&studio, later, &scene)?];
+        expect(is_culled && drawn == [first.clone(), second.clone()], || "a frame on its way differs".to_owned())?;
+
+        // Absolute places are culled nowhere.
+        studio.renderer.set_quality(Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() })?;
+        let recorded = studio.record(&scene)?;
+        expect(culled_in(&recorded) == 0, || "absolute places were culled".to_owned())?;
+        drop(studio.submit(recorded)?);
+        studio.renderer.set_quality(Quality::balanced())?;
+        studio.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+
+        scene = with_meshes(scene, as_list);
+        let recorded = studio.record(&scene)?;
+        let is_culled = culled_in(&recorded) > 0;
+        let same = pictures(&studio, recorded, &scene)? == second;
+        expect(same && !is_culled, || "what no longer asks differs".to_owned())?;
+        scene = asking(everything(), 1);
+    }
+    Ok(())
+}
+
+const FRAMES: usize = 3;
 
 fn measured() -> Result<(), Failed> {
     let (device, queue) = device()?;
     let mut studio = studio_of(WgpuBackend::new(device, queue)?)?;
-    let scene = with_meshes(everything(), as_list);
-    let expected = drawn_anew(&scene)?;
-    let some = with_meshes(scene, |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
+    let scene = asking(everything(), 3);
+    let expected = drawn_anew(&with_meshes(everything(), as_list))?;
     for frame in 0..40 {
-        let recorded = studio.record(&some)?;
-        if pictures(&studio, recorded, &some)? != expected {
+        let recorded = studio.record(&scene)?;
+        let culled = culled_in(&recorded);
+        if culled == 0 || pictures(&studio, recorded, &scene)? != expected {
             return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().passes()).into());
         }
     }

@@ -87,7 +87,7 @@ fn triangles_that_are_culled_change_nothing() {
         for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
             let expected = studio.picture(&list);
             let recorded = studio.renderer.record(asking.as_scene_ref()).unwrap();
-            assert!(recorded.statistics().views[0].triangles.culled() > 0);
+            assert!(recorded.statistics().views[0].culled_triangles.culled() > 0);
             let submission = studio.submitter.submit(recorded).unwrap().submission;
             assert!(submission.read(0, "picture").unwrap() == expected);
         }

@@ -46,7 +46,7 @@ pub(super) trait Recording: Send + Sync {
 pub struct SoftwareCommands {
     draws: Vec<PassDraw>,
     objects: Vec<u32>,
-    /// Of the batches of which not all triangles are drawn.
+    /// Of what remains of those that do not draw their mesh whole.
     indices: Arc<[u32]>,
 }
 
@@ -54,9 +54,9 @@ impl SoftwareCommands {
     pub(super) fn new(list: &DrawList) -> Self {
         let draws = list.batches.iter().enumerate();
         Self {
-            draws: draws.map(|(place, &batch)| (batch, list.kept_triangles(place))).collect(),
+            draws: draws.map(|(place, &batch)| (batch, list.remaining(place))).collect(),
             objects: list.objects.clone(),
-            indices: list.indices.as_slice().into(),
+            indices: list.remaining_indices().into(),
         }
     }
 }

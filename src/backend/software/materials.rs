@@ -128,16 +128,7 @@ impl<R: Real> Materials<R> for MaterialTable {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::scene::Texture;
-
-    fn noise(side: u32) -> Texture {
-        let mut state = 1_u32;
-        let byte = |_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
-        };
-        Texture::new("noise", side, side, (0..side * side * 4).map(byte).collect()).unwrap()
-    }
+    use crate::backend::software::mip_chain::tests::noise;
 
     fn texel(table: &MaterialTable, uv: [f32; 2]) -> [f32; 4] {
         Materials::<f32>::texel(table, 0, Vector(uv), Vector::zero(), Vector::zero()).0

@@ -34,15 +34,16 @@ impl MipChain {
         let finer = level.floor();
         let share = level - finer;
         let finer = finer.as_f64() as usize;
-        let one = self.bilinear(finer, uv);
+        let light = &*LIGHT;
+        let one = self.bilinear(light, finer, uv);
         if share == R::zero() {
             return one;
         }
-        one.with(self.bilinear(finer + 1, uv), |one, other| one + (other - one) * share)
+        one.with(self.bilinear(light, finer + 1, uv), |one, other| one + (other - one) * share)
     }
 
     /// Of the four pixels around a place, each by how near its middle is. The picture repeats beyond its border.
-    fn bilinear<R: Real>(&self, level: usize, uv: Vector2<R>) -> Vector4<R> {
+    fn bilinear<R: Real>(&self, light: &[f64; 256], level: usize, uv: Vector2<R>) -> Vector4<R> {
         let side = self.side >> level;
         // Taken to between 0 and 1 first, so that far places keep what f32 has of them.
         let place = uv.map(|value| (value - value.floor()) * R::of(side as f64) - R::of(0.5));
@@ -54,21 +55,21 @@ impl MipChain {
         let mut sum = Vector::zero();
         for (row, row_weight) in rows {
             for (column, weight) in columns {
-                sum = sum + self.pixel(level, row * side + column) * (weight * row_weight);
+                sum = sum + self.pixel(light, level, row * side + column) * (weight * row_weight);
             }
         }
         sum
     }
 
-    fn pixel<R: Real>(&self, level: usize, index: usize) -> Vector4<R> {
+    fn pixel<R: Real>(&self, light: &[f64; 256], level: usize, index: usize) -> Vector4<R> {
         let bytes = &self.levels[level][index * 4..index * 4 + 4];
-        let of_light = |byte: u8| R::of(LIGHT[usize::from(byte)]);
+        let of_light = |byte: u8| R::of(light[usize::from(byte)]);
         Vector([of_light(bytes[0]), of_light(bytes[1]), of_light(bytes[2]), R::of(f64::from(bytes[3]) / 255.0)])
     }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
-mod tests {
+pub(super) mod tests {
     use proptest::prelude::*;
 
     use super::*;
@@ -76,7 +77,7 @@ mod tests {
     /// How far f32 rounds, as a share of the value.
     const UNIT: f64 = 1.0 / 16_777_216.0;
 
-    fn noise(side: u32) -> Texture {
+    pub(in crate::backend::software) fn noise(side: u32) -> Texture {
         let mut state = 1_u32;
         let byte = |_| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -17,24 +17,24 @@ pub(super) struct Run {
     pub(super) batch: Batch,
     /// The object.
     pub(super) object: u32,
-    /// Among the mesh's, or among those that are left of it.
+    /// Among the mesh's, or among those that remain of it.
     pub(super) triangles: Range<usize>,
-    /// The vertices of triangles that are left, where not all are drawn.
-    left: Option<Arc<[u32]>>,
+    /// The corners of those that remain, where the mesh is not drawn whole.
+    remaining: Option<Arc<[u32]>>,
 }
-
-/// A batch, and where the indices of its triangles are where not all are drawn.
-pub(super) type PassDraw = (Batch, Option<Range<u32>>);
 
 impl Run {
     /// Calls `visit` with the indices of each triangle's corners.
     fn each_triangle(&self, mut visit: impl FnMut([u32; 3])) {
-        match &self.left {
+        match &self.remaining {
             Some(indices) => indices.as_chunks().0[self.triangles.clone()].iter().copied().for_each(visit),
             None => self.mesh.triangles_in(self.triangles.clone()).for_each(&mut visit),
         }
     }
 }
+
+/// A batch, and where the indices of what remains of it are if its mesh is not drawn whole.
+pub(super) type PassDraw = (Batch, Option<Range<u32>>);
 
 /// Squares that are written down for a triangle at most.
 const MOST_PLACES: usize = 16;
@@ -53,19 +53,18 @@ pub(super) fn pieces<E>(
     mesh_of: impl Fn(&Batch) -> Result<Arc<Mesh>, E>,
 ) -> Result<Vec<Vec<Run>>, E> {
     let (mut pieces, mut piece, mut room) = (Vec::new(), Vec::new(), LARGEST);
-    for (batch, left) in draws {
+    for (batch, remaining) in draws {
         let mesh = mesh_of(batch)?;
-        let all = match left {
-            Some(left) => left.start as usize / 3..left.end as usize / 3,
+        let all = match remaining {
+            Some(remaining) => remaining.start as usize / 3..remaining.end as usize / 3,
             None => 0..mesh.triangle_count(),
         };
-        let left = left.as_ref().map(|_| indices);
         for &object in &objects[batch.first as usize..][..batch.count as usize] {
             let mut start = all.start;
             while start < all.end {
                 let end = all.end.min(start + room);
-                let (mesh, left) = (Arc::clone(&mesh), left.cloned());
-                piece.push(Run { mesh, batch: *batch, object, triangles: start..end, left });
+                let remaining = remaining.as_ref().map(|_| Arc::clone(indices));
+                piece.push(Run { mesh: Arc::clone(&mesh), batch: *batch, object, triangles: start..end, remaining });
                 room -= end - start;
                 start = end;
                 if room == 0 {

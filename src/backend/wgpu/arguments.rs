@@ -44,7 +44,7 @@ impl Arguments {
         let buffer = buffer.get_or_insert_with(|| MirroredBuffer::new("indirect draws", wgpu::BufferUsages::INDIRECT));
         let bytes = buffer.rewrite();
         for (place, batch) in list.batches.iter().enumerate() {
-            let arguments = match (batch.state.halvings(), list.kept_triangles(place)) {
+            let arguments = match (batch.state.halvings(), list.remaining(place)) {
                 (0, None) => {
                     let mesh = mesh_of(assets, batch)?;
                     DrawIndexedIndirectArgs {

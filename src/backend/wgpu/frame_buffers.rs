@@ -40,7 +40,9 @@ impl BufferPool {
 
     /// The bytes of all buffers that no frame uses.
     pub(super) fn bytes(&self) -> u64 {
-        self.free.lock().buffers.iter().flat_map(|buffers| buffers.all().map(GrowingBuffer::size)).sum()
+        let of_passes = |buffers: &Buffers| buffers.passes.iter().map(|pass| pass.indices.read().size()).sum::<u64>();
+        let of = |buffers: &Buffers| buffers.all().map(GrowingBuffer::size).iter().sum::<u64>() + of_passes(buffers);
+        self.free.lock().buffers.iter().map(of).sum()
     }
 
     /// Drops everything, and what frames on their way have when they end, because a device error may have left it unusable.

@@ -37,7 +37,7 @@ pub(super) struct FramePass {
     is_warm: bool,
     pub(super) kept: KeptBundles,
     pub(super) arguments: Arguments,
-    /// Of the triangles that are left of batches of which not all are drawn.
+    /// Of the triangles that remain of partial batches.
     pub(super) indices: RwLock<GrowingBuffer>,
     pub(super) spent: Spent,
 }
@@ -57,7 +57,7 @@ impl Default for FramePass {
             is_warm: false,
             kept: KeptBundles::default(),
             arguments: Arguments::default(),
-            indices: RwLock::new(GrowingBuffer::new("triangles that are left", wgpu::BufferUsages::INDEX)),
+            indices: RwLock::new(index_buffer()),
             spent: Spent::default(),
         }
     }
@@ -93,7 +93,7 @@ impl FramePass {
         self.kept.forget();
     }
 
-    /// Uploads the triangles that are left of batches of which not all are drawn.
+    /// Uploads the triangles that remain of partial batches; where there are none, drops the buffer.
     ///
     /// # Errors
     /// If the device has no room.
@@ -103,8 +103,10 @@ impl FramePass {
         uploads: &Uploads,
         indices: &[u32],
     ) -> Result<(), BackendError> {
-        if !indices.is_empty() {
-            let mut buffer = self.indices.write();
+        let mut buffer = self.indices.write();
+        if indices.is_empty() {
+            *buffer = index_buffer();
+        } else {
             buffer.reserve(device, size_of_val(indices))?;
             buffer.write(uploads, 0, bytemuck::cast_slice(indices));
         }
@@ -134,6 +136,10 @@ impl FramePass {
         let price = own.max(critical * workers as f64 - (all - own));
         Sample { price, batches: self.spent.batches.load(Ordering::Relaxed), is_warm: self.is_warm }
     }
+}
+
+fn index_buffer() -> GrowingBuffer {
+    GrowingBuffer::new("remaining triangles", wgpu::BufferUsages::INDEX)
 }
 
 /// What a pass has spent. Written by jobs, read when the frame is submitted, which orders everything.

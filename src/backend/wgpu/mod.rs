@@ -301,7 +301,7 @@ pub struct WgpuResources {
     pub targets: usize,
     /// Their pixels.
     pub target_bytes: u64,
-    /// Of the buffers for objects, views, lights and parameters that no frame on its way is using.
+    /// Of the buffers for objects, views, lights, parameters and triangles that no frame on its way is using.
     pub buffer_bytes: u64,
 }
 
@@ -346,7 +346,7 @@ impl Backend for WgpuBackend {
         pass.spent.set_size(list.batches.len(), list.bundle_count(), pass.way.parts(list));
         let made = checked(&self.device, &pass.label, || {
             frame.buffers.write_drawn(&self.uploads, index, &list.objects);
-            pass.upload_indices(&self.device, &self.uploads, &list.indices)?;
+            pass.upload_indices(&self.device, &self.uploads, list.remaining_indices())?;
             self.subdivide(frame, request, list)?;
             match pass.way.record {
                 Record::Kept => pass.kept.set_count(list.bundle_count()),

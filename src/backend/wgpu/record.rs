@@ -1,6 +1,7 @@
 //! Recording: batches into bundles or passes, bundles into passes.
 
 use std::collections::HashMap;
+use std::mem;
 use std::ops::Range;
 
 use wgpu::util::RenderEncoder;
@@ -56,9 +57,9 @@ pub(super) fn bundle(
     Ok(bundle)
 }
 
-/// Whether the bundle at a place is one to be kept for later frames. In those, others of its triangles may be left.
+/// Whether the bundle at a place is one to be kept for later frames: in those, what remains of a partial batch may be something else.
 fn keeps_bundle(pass: &FramePass, list: &DrawList, place: usize) -> bool {
-    pass.way.record == Record::Kept && !list.keeps_triangles(place)
+    pass.way.record == Record::Kept && list.bundle_is_whole(place)
 }
 
 fn new_bundle(
@@ -87,7 +88,7 @@ struct Prepared<'a> {
     list: &'a DrawList,
     by_state: &'a HashMap<DrawState, wgpu::RenderPipeline>,
     subdivided: &'a SubdividedMeshes<SubdividedMesh>,
-    /// Of the triangles that are left of batches of which not all are drawn.
+    /// Of the triangles that remain of partial batches.
     indices: Option<&'a wgpu::Buffer>,
 }
 
@@ -114,41 +115,52 @@ impl<'a> Prepared<'a> {
             if state.halvings() > 0 {
                 self.draw_subdivided(encoder, run)?;
                 self.set_arenas(encoder);
-            } else if self.list.draws_whole_meshes() {
+            } else if self.list.is_whole() {
                 draw_run(encoder, start..end)?;
             } else {
-                self.draw_whole_or_not(encoder, start..end, &mut draw_run)?;
+                self.draw_in_parts(encoder, start..end, &mut draw_run)?;
             }
             start = end;
         }
         Ok(())
     }
 
-    /// Draws batches of one state: those of which all triangles are drawn, run by run, by `draw_run`.
-    fn draw_whole_or_not<E: RenderEncoder<'a>>(
+    /// Draws batches of one state: those whose meshes are drawn whole, run by run, by `draw_run`.
+    fn draw_in_parts<E: RenderEncoder<'a>>(
         &self,
         encoder: &mut E,
         places: Range<usize>,
         draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
-        let mut start = places.start;
-        for place in places.clone() {
-            let Some(left) = self.list.kept_triangles(place) else { continue };
-            if start < place {
-                draw_run(encoder, start..place)?;
+        let mut whole = places.start..places.start;
+        let mut has_own_indices = false;
+        for place in places {
+            let Some(remaining) = self.list.remaining(place) else {
+                whole.end = place + 1;
+                continue;
+            };
+            if !whole.is_empty() {
+                if mem::take(&mut has_own_indices) {
+                    self.set_arena_of_indices(encoder);
+                }
+                draw_run(encoder, whole)?;
             }
-            start = place + 1;
-            if left.is_empty() {
+            whole = place + 1..place + 1;
+            if remaining.is_empty() {
                 continue;
             }
-            let indices = self.indices.ok_or_else(|| broken("indices are uploaded before they are drawn with"))?;
+            if !mem::replace(&mut has_own_indices, true) {
+                let indices = self.indices.ok_or_else(|| broken("indices are uploaded before they are drawn with"))?;
+                encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            }
             let batch = &self.list.batches[place];
-            encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
             let base_vertex = mesh_of(&self.frame.assets, batch)?.base_vertex;
-            encoder.draw_indexed(left, base_vertex, batch.first..batch.first + batch.count);
-            encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+            encoder.draw_indexed(remaining, base_vertex, batch.first..batch.first + batch.count);
         }
-        if start < places.end { draw_run(encoder, start..places.end) } else { Ok(()) }
+        if has_own_indices {
+            self.set_arena_of_indices(encoder);
+        }
+        if whole.is_empty() { Ok(()) } else { draw_run(encoder, whole) }
     }
 
     fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
@@ -182,6 +194,10 @@ impl<'a> Prepared<'a> {
 
     fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) {
         encoder.set_vertex_buffer(0, Some(self.frame.assets.vertices.slice(..)));
+        self.set_arena_of_indices(encoder);
+    }
+
+    fn set_arena_of_indices(&self, encoder: &mut impl RenderEncoder<'a>) {
         encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }
