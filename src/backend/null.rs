@@ -13,7 +13,7 @@ use crate::task::Worker;
 use crate::view::{ObjectTable, ViewRecord};
 
 /// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
-/// that draw what is no mesh, that lie beyond a bundle or of which more remains than there was, passes recorded twice or submitted out of order.
+/// that draw what is no mesh, that lie beyond a bundle or of which all remains though they are partial, passes recorded twice or submitted out of order.
 #[derive(Debug, Default)]
 pub struct NullBackend;
 

@@ -151,7 +151,7 @@ impl FrameJobs {
     pub(super) fn reset(&self, tables: &mut Vec<PassTable>, objects: usize) {
         tables.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(tables) {
-            table.reset(self.selections[pass.process], objects);
+            table.reset(self.selections[pass.process], objects, self.culls_triangles);
         }
     }
 }

@@ -42,7 +42,7 @@ pub(super) enum Phase {
     Sort { pass: usize },
     /// Merges a part's equal runs.
     Instance { pass: usize },
-    /// Joins the parts where triangles are to be looked at; where none are, that is not worth a phase.
+    /// Joins the parts, in a scene with a mesh whose triangles are looked at; without one, that is not worth a phase.
     Join { pass: usize },
     /// Looks at the triangles of meshes that ask for it.
     Triangles { pass: usize },
@@ -108,11 +108,15 @@ pub(super) struct PassTable {
 
 impl PassTable {
     /// Makes room for a frame of `objects` objects, of which the pass draws those of the selection.
-    pub(super) fn reset(&mut self, selection: Option<Selection>, objects: usize) {
+    pub(super) fn reset(&mut self, selection: Option<Selection>, objects: usize, culls_triangles: bool) {
         self.selection = selection;
         // Another pass may have stood here in the frame before, and this frame may fail.
         self.list.get_mut().clear();
-        self.triangles.get_mut().clear();
+        if culls_triangles {
+            self.triangles.get_mut().clear();
+        } else {
+            *self.triangles.get_mut() = PassTriangles::default();
+        }
         if selection.is_some() {
             self.commands.reserve(objects, RenderCommand::NOTHING);
             self.parts.resize_with(Split::MOST_PARTS, RwLock::default);

@@ -43,7 +43,7 @@ pub struct ViewStatistics {
     pub batches: usize,
     /// Bundles that those fill, whether they are recorded as bundles or not.
     pub bundles: usize,
-    /// Triangles that were looked at before they were drawn, and left out, over all its processes: see
+    /// Triangles that were looked at before they were drawn, and how many of them were left out, over all its processes: see
     /// [`Mesh::with_triangles_culled`](crate::scene::Mesh::with_triangles_culled).
     pub culled_triangles: CulledTriangles,
 }

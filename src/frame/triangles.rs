@@ -64,25 +64,30 @@ struct Item {
 /// Triangles of an item, at most.
 const LARGEST_ITEM: usize = 256;
 
-/// Indices that remain in a pass, at most: 128 MiB, half of what every device allows a buffer.
-const MOST_INDICES: usize = 1 << 25;
+/// Triangles that a pass looks at, at most: their indices take 128 MiB, half of what every device allows a buffer.
+const MOST_TRIANGLES: usize = (1 << 25) / 3;
 
 impl PassTriangles {
-    /// Finds what is to be looked at of a list.
+    /// Finds what is to be looked at of a list: what there is room for, in the list's order.
     pub(super) fn find(&mut self, list: &DrawList, asking: &AskingMeshes, assets: &Assets) {
         self.clear();
+        let mut room = MOST_TRIANGLES;
         let asking = (0..).zip(&list.batches).filter(|(_, batch)| asking.contains(batch.mesh));
         for (batch, drawn) in asking {
             let count = assets.meshes.revised_at(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
+            let Some(left) = room.checked_sub(count) else { continue };
+            room = left;
             let starts = (0..count).step_by(LARGEST_ITEM);
             self.items.extend(starts.map(|start| Item { batch, triangles: start..count.min(start + LARGEST_ITEM) }));
         }
+        // A little more is kept than was needed, for the next frame.
+        self.remaining.truncate(self.items.len() * 2);
         if self.remaining.len() < self.items.len() {
             self.remaining.resize_with(self.items.len(), Mutex::default);
         }
     }
 
-    /// Leaves nothing to look at, and keeps the memory.
+    /// Leaves nothing to look at, and keeps the memory until the next frame finds what it needs of it.
     pub(super) fn clear(&mut self) {
         self.items.clear();
         *self.culled.get_mut() = CulledTriangles::default();
@@ -113,7 +118,7 @@ impl PassTriangles {
             first += items.len();
             let all: usize = items.iter().map(|item| item.triangles.len() * 3).sum();
             let count: usize = remaining.iter().map(|remaining| remaining.lock().len()).sum();
-            if count < all && list.remaining_indices().len() + count <= MOST_INDICES {
+            if count < all {
                 list.make_partial(items[0].batch, |indices| {
                     remaining.iter().for_each(|remaining| indices.extend_from_slice(&remaining.lock()));
                 });

@@ -21,5 +21,5 @@ pub use pixel_bounds::PixelBounds;
 pub use real::Real;
 pub use silhouettes::Silhouettes;
 pub use triangle::{Interpolated, Triangle};
-pub use triangle_culling::{CulledTriangles, cull_triangles};
+pub use triangle_culling::{CullCorner, CulledTriangles, cull_triangles};
 pub use vector::{Quaternion, Vector, Vector2, Vector3, Vector4};

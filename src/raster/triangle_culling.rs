@@ -42,9 +42,18 @@ impl AddAssign for CulledTriangles {
     }
 }
 
+/// A mesh's vertex, for [`cull_triangles`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CullCorner {
+    /// Where it is in clip space, with reversed depth: what is seen has 0 ≤ z ≤ w. A device may have it elsewhere by 2⁻¹³ of
+    /// |x| + |y| + |z| + |w|.
+    pub clip: Vector4<f64>,
+    /// Whether a device has it less than a 256th of a pixel from where that is in the picture, before it snaps it.
+    pub is_placed: bool,
+}
+
 /// Appends to `remaining` the indices of the `triangles` that may cover a pixel of a `picture` of so many pixels to the
-/// right and down; in their order, three each. `clip` has the places of the mesh's vertices in clip space, with
-/// reversed depth: what is seen has 0 ≤ z ≤ w. `culled`: the winding in the picture that is left out; that of a
+/// right and down; in their order, three each. `corners` are the mesh's vertices. `culled`: the winding in the picture that is left out; that of a
 /// mirrored object is the other one.
 ///
 /// It never leaves out what a device would have drawn, although the device knows the places in f32 only:
@@ -54,7 +63,7 @@ impl AddAssign for CulledTriangles {
 ///   within some units of 2⁻²⁴ of the sum of their magnitudes, and these may be a thousand times those of the result.
 ///   If all corners are outside of a plane, so are all points between them, in front of the camera and behind it.
 /// - **Degenerate** is what has two corners with the same four numbers: a device puts them at the same place as well.
-/// - **Back-facing** and **zero-size** are decided after corners are snapped to steps of a 256th of a pixel, in
+/// - **Back-facing** and **zero-size** are decided of corners that are [placed](CullCorner::is_placed), after these are snapped to steps of a 256th of a pixel, in
 ///   integers, and so that each corner may be a step off along both axes. This holds if a device's corner is less than
 ///   a step away before it snaps it: the nearest integers of two numbers less than 1 apart are at most 1 apart. Drawn
 ///   relative to the camera, corners are within 1e-3 pixels, a quarter of a step, unless they are nearer to the camera
@@ -68,16 +77,16 @@ impl AddAssign for CulledTriangles {
 ///   the same at all three corners: then it is a constant, and the device's as well.
 ///
 /// So what has exactly no area after snapping is kept if its corners differ and its rectangle has a pixel's middle: a
-/// step farther, it has one. Triangles with an index beyond `clip`, or a corner that is not finite, are kept too: it is
+/// step farther, it has one. Triangles with an index beyond `corners`, or a corner that is not finite, are kept too: it is
 /// for who draws to refuse them.
 pub fn cull_triangles(
-    clip: &[Vector4<f64>],
+    corners: &[CullCorner],
     triangles: impl Iterator<Item = [u32; 3]>,
     picture: [usize; 2],
     culled: Option<Winding>,
     remaining: &mut Vec<u32>,
 ) -> CulledTriangles {
-    let corners: Vec<_> = clip.iter().map(|clip| Corner::new(clip, picture)).collect();
+    let corners: Vec<_> = corners.iter().map(|corner| Corner::new(corner, picture)).collect();
     let corner = |index| corners.get(index as usize)?.as_ref();
     let mut counts = CulledTriangles::default();
     for triangle in triangles {
@@ -123,7 +132,7 @@ struct Corner {
 
 impl Corner {
     /// None if it is not finite.
-    fn new(clip: &Vector4<f64>, picture: [usize; 2]) -> Option<Self> {
+    fn new(&CullCorner { clip, is_placed }: &CullCorner, picture: [usize; 2]) -> Option<Self> {
         let [x, y, z, w] = clip.0;
         // Of numbers so large that this is infinite nothing is decided: the comparisons below are false then.
         let margin = CLIP_MARGIN * (x.abs() + y.abs() + z.abs() + w.abs());
@@ -131,8 +140,8 @@ impl Corner {
         let outside = planes.iter().fold(0, |outside, &distance| outside << 1 | u8::from(distance < -margin));
         let band = GUARD_BAND * w - margin;
         let is_within = w > 0.0 && w - z > margin && x.abs() < band && y.abs() < band;
-        let is_drawable = is_within && picture.iter().all(|&side| side <= LARGEST_SIDE);
-        let place = is_drawable.then(|| grid::snap(clip, picture));
+        let is_drawable = is_placed && is_within && picture.iter().all(|&side| side <= LARGEST_SIDE);
+        let place = is_drawable.then(|| grid::snap(&clip, picture));
         let is_finite = clip.0.iter().all(|number| number.is_finite());
         is_finite.then_some(Self { clip: clip.0, outside, is_within_far_plane: z > margin, place })
     }

@@ -250,6 +250,9 @@ impl Buffers {
             kept.pass = pass;
             kept.set_label(request.plan.processes()[pass.process].process.name(), request.views[pass.view].name());
             kept.drawn_place = if matches!(draws, Draws::Commands(_)) { drawn_places.next() } else { None };
+            if kept.drawn_place.is_none() {
+                kept.forget_indices();
+            }
             let parameters = draws.parameters();
             kept.parameters = (!parameters.is_empty()).then_some((bytes.len(), parameters.len()));
             append_aligned(bytes, parameters);

@@ -113,6 +113,11 @@ impl FramePass {
         Ok(())
     }
 
+    /// Drops what another pass that stood here has left.
+    pub(super) fn forget_indices(&mut self) {
+        *self.indices.get_mut() = index_buffer();
+    }
+
     /// How it was recorded.
     pub(super) fn report(&self, process: String) -> WgpuPass {
         let spent = &self.spent;

@@ -142,7 +142,8 @@ fn most_of_what_cannot_be_seen_of_a_ball_is_left_out() {
 
 fn cull(clip: &[Vector4<f64>], triangles: &[[u32; 3]], culled: Option<Winding>) -> (Vec<u32>, CulledTriangles) {
     let mut kept = Vec::new();
-    let counts = cull_triangles(clip, triangles.iter().copied(), PICTURE, culled, &mut kept);
+    let corners: Vec<_> = clip.iter().map(|&clip| CullCorner { clip, is_placed: true }).collect();
+    let counts = cull_triangles(&corners, triangles.iter().copied(), PICTURE, culled, &mut kept);
     (kept, counts)
 }
 
