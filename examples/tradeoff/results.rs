@@ -25,9 +25,9 @@ pub struct Entry {
     pub backend: String,
     pub knob: String,
     pub setting: String,
-    /// From the scene's hand-over to the return of submit, in nanoseconds; of the median frame.
+    /// From the scene's hand-over to the return of submit, in nanoseconds; of the mean frame in the median round.
     pub cpu_ns: u64,
-    /// Until the frame is drawn, in nanoseconds; of the median frame.
+    /// Until the frame is drawn, in nanoseconds; of the mean frame in the median round.
     pub frame_ns: u64,
     /// How far off the knob is, in the unit of its metric; none where the scene has nothing that it is about.
     pub error: Option<f64>,
@@ -180,7 +180,7 @@ fn told(path: &Path, error: &dyn Error) -> Failure {
 }
 
 /// Marks those to which no other is preferable: `exact`, and from the nearest to the reference on, each whose frames take less than those
-/// of all that were marked before, by a twentieth at least: nearer times are not told apart. Each knob alone counts, and each preset.
+/// of all that were marked before, by an eighth at least: nearer times are not told apart. Each knob alone counts, and each preset.
 fn mark_front(entries: &mut [Entry]) {
     let mut order: Vec<_> = (0..entries.len()).collect();
     let distance = |entry: usize| entries[entry].rmse_from_reference;
@@ -189,7 +189,7 @@ fn mark_front(entries: &mut [Entry]) {
     let mut fastest: Option<u64> = None;
     for place in order {
         let entry = &mut entries[place];
-        entry.pareto = fastest.is_none_or(|fastest| entry.frame_ns * 20 < fastest * 19);
+        entry.pareto = fastest.is_none_or(|fastest| entry.frame_ns * 8 < fastest * 7);
         if entry.pareto {
             fastest = Some(entry.frame_ns);
         }

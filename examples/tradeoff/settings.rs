@@ -119,7 +119,7 @@ pub fn all() -> Vec<Setting> {
     let far = 1000.0;
     let key = |bits, curve| DepthKey { bits, curve };
     for bits in [1, 8, 16] {
-        let name = format!("{bits} bits, logarithmic");
+        let name = format!("{bits} {}, logarithmic", if bits == 1 { "bit" } else { "bits" });
         add(Knob::OpaqueOrder, &name, Quality { opaque_order: key(bits, DepthCurve::Logarithmic), ..exact });
     }
     add(
