@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     pub backend: Option<BackendName>,
 
-    /// The most accurate settings whose frame takes no longer than this, in milliseconds.
+    /// Looks for the most accurate settings whose frame takes no longer than this, in milliseconds.
     #[arg(long, value_name = "X")]
     pub budget_ms: Option<f64>,
 
