@@ -24,6 +24,8 @@ mod cameras;
 mod naive;
 #[path = "culling/oracle.rs"]
 mod oracle;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 mod random;
 #[path = "culling/report.rs"]
@@ -50,19 +52,9 @@ use drawloom::task::Scheduler;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use boxes::{BoxTallies, Shapes};
+use quick::Quick;
 use report::Report;
 use spheres::SphereTallies;
-
-/// Measures and tries what cameras see.
-#[derive(Parser)]
-struct Arguments {
-    /// Few cases, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
 
 /// How much is measured and tried.
 struct Extent {
@@ -84,8 +76,7 @@ impl Extent {
 const AT_A_TIME: usize = 50;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = Quick::parse().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     let progress = ProgressBar::new(2 * extent.rounds as u64);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}, {eta} left")?);

@@ -12,6 +12,8 @@
 
 #[path = "shared/draw_lists.rs"]
 mod draw_lists;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "nothing here has a direction")]
 mod random;
@@ -38,24 +40,13 @@ use drawloom::scene::{obj, sample};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use draw_lists::draw_lists;
+use quick::Quick;
 use random::Random;
 use report::{Report, Row};
 use stopwatch::median;
 
-/// Compares delta commands with the fixed form.
-#[derive(Parser)]
-struct Arguments {
-    /// Few rounds, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = Quick::parse().is_quick();
     let rounds = if quick { 15 } else { 1_001 };
     let cases = cases()?;
     let progress = ProgressBar::new((cases.len() * rounds) as u64);

@@ -36,6 +36,8 @@ mod interruption;
 mod mode;
 #[path = "load_balance/prediction.rs"]
 mod prediction;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 mod random;
 #[path = "load_balance/report.rs"]

@@ -37,6 +37,8 @@ mod charts;
 mod growth;
 #[path = "shared/moving.rs"]
 mod moving;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "directions are for other benches")]
 mod random;

@@ -19,6 +19,8 @@ mod city;
 mod measured;
 #[path = "occlusion/naive.rs"]
 mod naive;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "a city's boxes are between limits, and no more")]
 mod random;
@@ -36,21 +38,10 @@ use drawloom::quality::Quality;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use measured::{Row, Sight};
-
-/// Measures coarse occlusion.
-#[derive(Parser)]
-struct Arguments {
-    /// A small city and few rounds, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
+use quick::Quick;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = Quick::parse().is_quick();
     let (boxes, picture, rounds) = if quick { (1_500, [240, 136], 3) } else { (20_000, [960, 540], 31) };
     let city = city::new(boxes, picture)?;
     let scene = city.as_scene_ref();

@@ -18,6 +18,8 @@ mod cases;
 mod chart;
 #[path = "precision/measure.rs"]
 mod measure;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "orders are for other benches")]
 mod random;
@@ -37,26 +39,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use cases::Kind;
 use measure::{HELD, MAGNIFYING, Origin, measure};
+use quick::Quick;
 use random::Random;
 use report::{Report, Row};
-
-/// Measures where vertices come to lie.
-#[derive(Parser)]
-struct Arguments {
-    /// Few cases: to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
 
 /// What most cameras are.
 const USUAL: Kind = Kind::Perspective { degrees: 60.0, size: Kind::FULL_HD };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = Quick::parse().is_quick();
     let [by_distance, by_view] = if quick { [500, 1_000] } else { [200_000, 100_000] };
     let distances: Vec<_> = (0..10).map(|power| 10_f64.powi(power)).collect();
     let steps = distances.len() + HELD.len() + MAGNIFYING.len();

@@ -54,6 +54,8 @@ mod ours;
 mod parallel;
 #[path = "record/pictures.rs"]
 mod pictures;
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 mod random;
 #[path = "record/report.rs"]

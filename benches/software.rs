@@ -8,6 +8,8 @@
 //! is drawn. Medians are compared, and both must have the same bytes. What was measured is written to
 //! `drawloom/software.json` in the target folder too.
 
+#[path = "shared/quick.rs"]
+mod quick;
 #[path = "shared/random.rs"]
 #[expect(dead_code, reason = "only the order of turns is drawn")]
 mod random;
@@ -33,20 +35,10 @@ use drawloom::{Renderer, Submitter};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use quick::Quick;
 use random::Random;
 use stopwatch::{WARM_UP, median, timed_frame};
 use table::Table;
-
-/// Measures frames that the processor draws.
-#[derive(Parser)]
-struct Arguments {
-    /// Few rounds, small pictures and small shadow maps, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
 
 /// A frame of one scene and size.
 #[derive(Serialize)]
@@ -61,8 +53,7 @@ struct Row {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = Quick::parse().is_quick();
     let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (3, &[[96, 54]]) } else { (15, &[[480, 270], [960, 540]]) };
     let maps = ShadowMaps::default();
     let maps = if quick { ShadowMaps { side: 64, ..maps } } else { maps };

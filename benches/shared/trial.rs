@@ -3,25 +3,22 @@
 use clap::Args;
 
 use crate::backends::BackendName;
+use crate::quick::Quick;
 
 /// How much is measured, and on which backends.
 #[derive(Args)]
 pub struct Trial {
-    /// Few rounds and small scenes, to see that it works.
-    #[arg(long)]
-    quick: bool,
+    #[command(flatten)]
+    quick: Quick,
     /// Measures on this backend only.
     #[arg(long, value_parser = ["noop", "adapter"])]
     backend: Option<String>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 impl Trial {
     /// Whether it is only a trial, which must not take the place of what was measured.
     pub fn is_quick(&self) -> bool {
-        self.quick || !self.bench
+        self.quick.is_quick()
     }
 
     /// Those that are asked for and that this machine has.
