@@ -76,7 +76,7 @@ impl Sharing {
     /// The way of the next run if it is to be shared in any case.
     pub(crate) fn share(&self) -> Way {
         let is_one_of_the_first = (1..=FIRST_MEASURED).contains(&self.shared_runs);
-        Way::Shared { is_measured: is_one_of_the_first || self.since_measured + 1 >= MEASURED_EVERY }
+        Way::Shared { is_measured: is_one_of_the_first || self.since_measured >= MEASURED_EVERY - 1 }
     }
 
     /// A run went alone and took that long.
@@ -99,7 +99,7 @@ impl Sharing {
     pub(crate) fn was_shared(&mut self, took: Duration, work: Option<Duration>) {
         self.shared_runs = self.shared_runs.saturating_add(1);
         let Some(work) = work else {
-            self.since_measured += 1;
+            self.since_measured = self.since_measured.saturating_add(1);
             return;
         };
         let has_measured = self.since_measured < MEASURED_EVERY && self.shared_runs > 2;
@@ -185,6 +185,17 @@ mod tests {
         let mut sharing = Sharing::default();
         assert_eq!(run(&mut sharing, 100, 400, 500), 10);
         assert_eq!(run(&mut sharing, 300, 400, 100), 0);
+    }
+
+    /// At a thousand frames a second that is after 50 days.
+    #[test]
+    fn more_runs_than_can_be_counted_change_nothing() {
+        let mut sharing = Sharing { shared_runs: u32::MAX, since_measured: u32::MAX, ..Sharing::default() };
+        sharing.was_shared(PRICE, None);
+        sharing.went_alone(PRICE);
+        assert_eq!((sharing.shared_runs, sharing.since_measured), (u32::MAX, u32::MAX));
+        assert_eq!(sharing.share(), Way::Shared { is_measured: true });
+        assert_eq!(run(&mut sharing, 100, 1_700, 850), 0);
     }
 
     #[test]
