@@ -53,9 +53,10 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
     check_names(graph)?;
     let roles = Roles::of_all(graph);
     let mut edges = edges::derive(graph, &roles);
-    let order = in_order(&edges);
-    if order.len() < graph.processes.len() {
-        let processes = circle(&edges, &order).into_iter().map(|node| name(graph, node)).collect();
+    let order = in_order(&edges, graph.processes.len());
+    if order.len() < edges.node_count() {
+        let circle = circle(&edges, graph.processes.len(), &order);
+        let processes = circle.into_iter().map(|node| name(graph, node)).collect();
         return Err(GraphProblem::Cycle { processes });
     }
     let place = places(order.len(), &order);
@@ -76,7 +77,11 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
             remaining.add_edge(NodeIndex::new(dependency), NodeIndex::new(process), ());
         }
     }
-    let order = in_order(&remaining).into_iter().map(NodeIndex::index).filter(|&process| needed[process]).collect();
+    let order = in_order(&remaining, needed.len())
+        .into_iter()
+        .map(NodeIndex::index)
+        .filter(|&process| needed[process])
+        .collect();
     Ok(Plan { needed, order, dependencies })
 }
 
@@ -98,13 +103,14 @@ struct Facts<'a, P> {
     roles: &'a [Roles],
     edges: &'a Edges,
     needed: &'a [bool],
-    /// Per process, its place in the order of all, dropped ones included.
+    /// Per node, its place in the order of all, dropped ones included.
     place: &'a [usize],
 }
 
 impl<P> Facts<'_, P> {
+    /// Whether it is a process that is needed. A junction is none.
     fn is_needed(&self, node: NodeIndex) -> bool {
-        self.needed[node.index()]
+        self.needed.get(node.index()).is_some_and(|&needed| needed)
     }
 
     fn place(&self, node: NodeIndex) -> usize {
@@ -138,13 +144,13 @@ impl<P> Facts<'_, P> {
 
     /// All makers of a resource have an order if each, in the order of all processes, leads to the next.
     fn check_writers(&self) -> Result<(), GraphProblem> {
-        let mut walk = Walk::new(self.edges);
+        let mut walk = Walk::new();
         for (resource, roles) in self.graph.resources.iter().zip(self.roles) {
             let mut makers: Vec<NodeIndex> = roles.makers().filter(|&maker| self.is_needed(maker)).collect();
             makers.sort_unstable_by_key(|&maker| self.place(maker));
             for pair in makers.windows(2) {
                 let end = self.place(pair[1]);
-                walk.from(self.edges, pair[0], Direction::Outgoing, |node, _| self.place(node) <= end);
+                walk.from(self.edges, &[pair[0]], Direction::Outgoing, |node, _| self.place(node) <= end);
                 if !walk.has_met(pair[1]) {
                     return Err(GraphProblem::UnorderedWriters {
                         resource: resource.name.clone(),
@@ -159,11 +165,12 @@ impl<P> Facts<'_, P> {
 
     /// Per process, the needed ones it waits for, if it is needed itself.
     fn dependencies(&self) -> Vec<Vec<usize>> {
-        let mut passed = vec![usize::MAX; self.needed.len()];
+        let last_maker = self.last_makers_of_junctions();
+        let mut passed = vec![usize::MAX; self.edges.node_count()];
         let mut dependencies = vec![Vec::new(); self.needed.len()];
         for node in self.edges.node_indices().filter(|&node| self.is_needed(node)) {
             let dependencies = &mut dependencies[node.index()];
-            self.add_last_makers(node, dependencies);
+            self.add_last_makers(node, &last_maker, dependencies);
             // An order that leads through dropped processes ends at the needed ones before them.
             let mut open = vec![node];
             while let Some(after) = open.pop() {
@@ -186,14 +193,25 @@ impl<P> Facts<'_, P> {
         dependencies
     }
 
+    /// Per node, the last of the makers that lead to it, if it is a junction.
+    fn last_makers_of_junctions(&self) -> Vec<Option<NodeIndex>> {
+        let last_maker = |node: NodeIndex| {
+            let is_junction = node.index() >= self.needed.len();
+            let makers = self.edges.neighbors_directed(node, Direction::Incoming).filter(|_| is_junction);
+            makers.max_by_key(|&maker| self.place(maker))
+        };
+        self.edges.node_indices().map(last_maker).collect()
+    }
+
     /// Of all makers of a resource that a process needs, it has to wait for the last one only, since they have an order.
-    fn add_last_makers(&self, node: NodeIndex, dependencies: &mut Vec<usize>) {
+    fn add_last_makers(&self, node: NodeIndex, of_junction: &[Option<NodeIndex>], dependencies: &mut Vec<usize>) {
         let mut last: HashMap<usize, NodeIndex> = HashMap::new();
         for edge in self.edges.edges_directed(node, Direction::Incoming) {
             if let Relation::Data(resource) = *edge.weight() {
-                let maker = last.entry(resource).or_insert(edge.source());
-                if self.place(edge.source()) > self.place(*maker) {
-                    *maker = edge.source();
+                let source = of_junction[edge.source().index()].unwrap_or(edge.source());
+                let maker = last.entry(resource).or_insert(source);
+                if self.place(source) > self.place(*maker) {
+                    *maker = source;
                 }
             }
         }

@@ -22,7 +22,7 @@ impl<P> FrameGraph<P> {
     pub fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
-        let place = places(self.processes.len(), &in_order(&edges));
+        let place = places(edges.node_count(), &in_order(&edges, self.processes.len()));
         edges::add_versions(&mut edges, &roles, &place);
         let needed = edges::needed(self, &roles, &edges);
 

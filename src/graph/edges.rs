@@ -1,4 +1,8 @@
 //! Who waits for whom, and why: the rules of [`FrameGraph`] turned into edges.
+//!
+//! Where many read what many make, an edge from each maker to each reader would be their product. So all makers lead to one
+//! *junction*, and that to all readers, which means the same with an edge each. Junctions are nodes behind those of the
+//! processes: whoever follows edges passes through them, and they are in no result.
 
 use petgraph::{
     Direction,
@@ -11,7 +15,8 @@ use super::{
     order::Walk,
 };
 
-/// An edge per reason to wait, from the process waited for. The node of a process is its position in the graph.
+/// An edge per reason to wait, from the process waited for. The node of a process is its position in the graph; those of
+/// junctions follow.
 pub(super) type Edges = DiGraph<(), Relation>;
 
 /// Why one process waits for another.
@@ -67,7 +72,7 @@ pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
     for (before, after) in &graph.orders {
         edges.add_edge(NodeIndex::new(*before), NodeIndex::new(*after), Relation::Order);
     }
-    let mut walk = Walk::new(&edges);
+    let mut walk = Walk::new();
     for (resource, roles) in roles.iter().enumerate() {
         link(&mut edges, &mut walk, resource, &roles.writers, &roles.modifiers);
         // A reader that goes before a writer finds that writer's modifiers behind it, through the edges just made.
@@ -80,18 +85,20 @@ pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
 /// Lets every sink wait for every source, but for the pairs in which the sink has been put before the source.
 fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
     let told = |_: NodeIndex, relation| relation == Relation::Order || relation == Relation::Data(resource);
-    let mut pairs = Vec::new();
-    // One walk finds all that is before a source, or behind a sink: the fewer of the two are walked from.
-    if sources.len() <= sinks.len() {
-        for &source in sources {
-            walk.from(edges, source, Direction::Incoming, told);
-            pairs.extend(sinks.iter().filter(|sink| !walk.has_met(**sink)).map(|&sink| (source, sink)));
-        }
+    walk.from(edges, sources, Direction::Incoming, told);
+    let (some_before, all_after): (Vec<NodeIndex>, Vec<NodeIndex>) =
+        sinks.iter().copied().partition(|&sink| walk.has_met(sink));
+    let mut pairs: Vec<(NodeIndex, NodeIndex)> = Vec::new();
+    for &sink in &some_before {
+        walk.from(edges, &[sink], Direction::Outgoing, told);
+        pairs.extend(sources.iter().filter(|&&source| !walk.has_met(source)).map(|&source| (source, sink)));
+    }
+    if sources.len() > 1 && all_after.len() > 1 {
+        let junction = edges.add_node(());
+        pairs.extend(sources.iter().map(|&source| (source, junction)));
+        pairs.extend(all_after.iter().map(|&sink| (junction, sink)));
     } else {
-        for &sink in sinks {
-            walk.from(edges, sink, Direction::Outgoing, told);
-            pairs.extend(sources.iter().filter(|source| !walk.has_met(**source)).map(|&source| (source, sink)));
-        }
+        pairs.extend(all_after.iter().flat_map(|&sink| sources.iter().map(move |&source| (source, sink))));
     }
     for (source, sink) in pairs {
         edges.add_edge(source, sink, Relation::Data(resource));
@@ -103,7 +110,7 @@ fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeInde
 /// Modifiers have no order of their own, so only once all edges are known is it known which of them come before which, and
 /// `place` is where. That one needs what the other left is no new order, but it is a reason to keep the other.
 pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) {
-    let mut walk = Walk::new(edges);
+    let mut walk = Walk::new();
     let mut made = vec![usize::MAX; edges.node_count()];
     for (resource, roles) in roles.iter().enumerate() {
         if roles.modifiers.len() < 2 {
@@ -113,7 +120,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
         for &modifier in &roles.modifiers {
             // What stands behind another maker is that maker's affair: the walk goes no further there.
             let mut last = Vec::new();
-            walk.from(edges, modifier, Direction::Incoming, |before, _| {
+            walk.from(edges, &[modifier], Direction::Incoming, |before, _| {
                 let is_maker = made[before.index()] == resource;
                 last.extend(is_maker.then_some(before));
                 !is_maker
@@ -129,7 +136,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
                 let later = &last[at + 1..];
                 if let Some(end) = later.last() {
                     let is_between = |node: NodeIndex, _| place[node.index()] <= place[end.index()];
-                    walk.from(edges, maker, Direction::Outgoing, is_between);
+                    walk.from(edges, &[maker], Direction::Outgoing, is_between);
                 }
                 if !later.iter().any(|&other| walk.has_met(other)) {
                     edges.add_edge(maker, modifier, Relation::Data(resource));
@@ -142,6 +149,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
 /// Which processes are needed: kept ones, those that make an output, and all that these need.
 pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -> Vec<bool> {
     let mut needed: Vec<bool> = graph.processes.iter().map(|process| process.kept).collect();
+    needed.resize(edges.node_count(), false);
     for (resource, roles) in graph.resources.iter().zip(roles) {
         if resource.output {
             roles.makers().for_each(|maker| needed[maker.index()] = true);
@@ -157,5 +165,39 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
             }
         }
     }
+    needed.truncate(graph.processes.len());
     needed
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::{Roles, derive};
+    use crate::graph::FrameGraph;
+
+    #[test]
+    fn edges_grow_with_what_processes_do_and_not_with_pairs_of_them() {
+        const EACH: usize = 200;
+        let mut graph = FrameGraph::new();
+        let image = graph.resource("image");
+        let mut before = None;
+        for number in 0..3 * EACH {
+            let process = graph.add(number.to_string(), ());
+            graph.keep(process);
+            if number >= EACH {
+                graph.read(process, image);
+            }
+            if number < 2 * EACH {
+                graph.write(process, image);
+                if let Some(before) = before.replace(process) {
+                    graph.order(before, process);
+                }
+            }
+        }
+        let edges = derive(&graph, &Roles::of_all(&graph));
+        // Makers in a chain; writers to modifiers; both to readers.
+        assert_eq!(edges.edge_count(), (2 * EACH - 1) + 2 * EACH + 3 * EACH);
+        assert_eq!(edges.node_count(), 3 * EACH + 2);
+        let schedule = graph.compile().unwrap();
+        assert_eq!(schedule.dependencies(2 * EACH), [2 * EACH - 1]);
+    }
 }

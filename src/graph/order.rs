@@ -10,20 +10,21 @@ use petgraph::{
 
 use super::edges::{Edges, Relation};
 
-/// The nodes, each after all before it, the lowest first where several could be next. Nodes on a circle, and those
-/// behind one, are left out.
-pub(super) fn in_order<E>(graph: &DiGraph<(), E>) -> Vec<NodeIndex> {
+/// The nodes, each after all before it. Where several could be next, a junction is, and then the lowest of so many processes:
+/// as if each junction were the edges that it stands for. Nodes on a circle, and those behind one, are left out.
+pub(super) fn in_order<E>(graph: &DiGraph<(), E>, processes: usize) -> Vec<NodeIndex> {
+    let rank = |node: NodeIndex| Reverse((node.index() < processes, node));
     let mut waits_for: Vec<usize> =
         graph.node_indices().map(|node| graph.edges_directed(node, Direction::Incoming).count()).collect();
-    let mut ready: BinaryHeap<Reverse<NodeIndex>> =
-        graph.node_indices().filter(|node| waits_for[node.index()] == 0).map(Reverse).collect();
+    let mut ready: BinaryHeap<Reverse<(bool, NodeIndex)>> =
+        graph.node_indices().filter(|node| waits_for[node.index()] == 0).map(rank).collect();
     let mut order = Vec::with_capacity(waits_for.len());
-    while let Some(Reverse(node)) = ready.pop() {
+    while let Some(Reverse((_, node))) = ready.pop() {
         order.push(node);
         for after in graph.neighbors(node) {
             waits_for[after.index()] -= 1;
             if waits_for[after.index()] == 0 {
-                ready.push(Reverse(after));
+                ready.push(rank(after));
             }
         }
     }
@@ -39,8 +40,9 @@ pub(super) fn places(nodes: usize, order: &[NodeIndex]) -> Vec<usize> {
     places
 }
 
-/// The nodes of one circle, the lowest first, of a graph that has one; `ordered` is what [`in_order`] made of it.
-pub(super) fn circle(edges: &Edges, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
+/// The nodes of one circle, the lowest first, of a graph of so many processes that has one; `ordered` is what [`in_order`] made
+/// of it.
+pub(super) fn circle(edges: &Edges, processes: usize, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
     let mut stuck = vec![true; edges.node_count()];
     for node in ordered {
         stuck[node.index()] = false;
@@ -55,7 +57,10 @@ pub(super) fn circle(edges: &Edges, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
             break;
         }
         path.push(node);
-        next = edges.neighbors_directed(node, Direction::Incoming).filter(|before| stuck[before.index()]).min();
+        let before = |node| edges.neighbors_directed(node, Direction::Incoming).filter(|before| stuck[before.index()]);
+        // A junction stands for what leads to it.
+        let (direct, junctions): (Vec<_>, Vec<_>) = before(node).partition(|node| node.index() < processes);
+        next = direct.into_iter().chain(junctions.into_iter().flat_map(before)).min();
     }
     path.reverse();
     let lowest = (0..path.len()).min_by_key(|&at| path[at]).unwrap_or(0);
@@ -64,6 +69,7 @@ pub(super) fn circle(edges: &Edges, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
 }
 
 /// A walk along edges, from node to node, that remembers whom it met. It is used again and again, as to forget is free.
+#[derive(Default)]
 pub(super) struct Walk {
     /// Per node, the last walk that met it.
     met: Vec<usize>,
@@ -72,21 +78,22 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    pub(super) fn new(edges: &Edges) -> Self {
-        Self { met: vec![0; edges.node_count()], walks: 0, open: Vec::new() }
+    pub(super) fn new() -> Self {
+        Self::default()
     }
 
-    /// Forgets all, and walks from `start` against or along the edges, to every node that `enter` lets it enter.
+    /// Forgets all, and walks from each of `starts` against or along the edges, to every node that `enter` lets it enter.
     pub(super) fn from(
         &mut self,
         edges: &Edges,
-        start: NodeIndex,
+        starts: &[NodeIndex],
         direction: Direction,
         mut enter: impl FnMut(NodeIndex, Relation) -> bool,
     ) {
         self.walks += 1;
-        self.met[start.index()] = self.walks;
-        self.open.push(start);
+        self.met.resize(edges.node_count(), 0);
+        starts.iter().for_each(|start| self.met[start.index()] = self.walks);
+        self.open.extend(starts);
         while let Some(node) = self.open.pop() {
             for edge in edges.edges_directed(node, direction) {
                 let next = match direction {
