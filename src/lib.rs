@@ -63,6 +63,7 @@
 
 // The rooms, each using only those above it; `tests/architecture.rs` sees to that.
 mod sync;
+mod unwind;
 pub mod timeline;
 pub mod task;
 pub mod blocks;

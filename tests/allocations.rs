@@ -1,4 +1,4 @@
-//! A steady frame takes no memory: not from the graph, not from a loop, on no thread.
+//! A steady frame takes no memory: not from the graph, not from a loop, on no thread. And what is done leaves none behind.
 //!
 //! The allocator of this binary counts for all threads, so everything is in one test: a second one, or the harness that
 //! starts it, would be counted as well.
@@ -29,6 +29,9 @@ struct Counting;
 
 static REQUESTS: AtomicUsize = AtomicUsize::new(0);
 
+/// How many bytes have been asked for and not given back.
+static BYTES: AtomicUsize = AtomicUsize::new(0);
+
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
@@ -36,23 +39,27 @@ static ALLOCATOR: Counting = Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         REQUESTS.fetch_add(1, Ordering::Relaxed);
+        BYTES.fetch_add(layout.size(), Ordering::Relaxed);
         // SAFETY: Whoever calls this has promised the same.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         REQUESTS.fetch_add(1, Ordering::Relaxed);
+        BYTES.fetch_add(layout.size(), Ordering::Relaxed);
         // SAFETY: Whoever calls this has promised the same.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         REQUESTS.fetch_add(1, Ordering::Relaxed);
+        BYTES.fetch_add(size.wrapping_sub(layout.size()), Ordering::Relaxed);
         // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
         unsafe { System.realloc(memory, layout, size) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        BYTES.fetch_sub(layout.size(), Ordering::Relaxed);
         // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
         unsafe { System.dealloc(memory, layout) }
     }
@@ -216,8 +223,27 @@ fn requests_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, alw
     requests
 }
 
+/// Background jobs that were waited for before anybody had begun them are gone, wherever nobody takes them out of a queue.
+fn check_that_waiting_leaves_nothing(workers: usize) {
+    const JOBS: usize = 1_000;
+    const RESULT: usize = 16_384;
+    let scheduler = Scheduler::new(workers).unwrap();
+    let wait_for_all = || {
+        for job in 0..JOBS {
+            assert_eq!(scheduler.background(move || [job as u8; RESULT]).wait(), Ok([job as u8; RESULT]));
+        }
+    };
+    wait_for_all();
+    let before = BYTES.load(Ordering::Relaxed);
+    wait_for_all();
+    let left = BYTES.load(Ordering::Relaxed).saturating_sub(before);
+    assert!(left < 2 * RESULT, "{workers} workers: {JOBS} jobs that were waited for have left {left} bytes");
+}
+
 #[test]
 fn a_steady_frame_takes_no_memory() {
+    [1, 2].into_iter().for_each(check_that_waiting_leaves_nothing);
+
     // What counts must count, on every thread.
     let before = REQUESTS.load(Ordering::Relaxed);
     thread::spawn(|| drop(black_box(Box::new(7)))).join().unwrap();

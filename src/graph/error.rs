@@ -123,7 +123,7 @@ pub enum RunError {
         /// What the panic said.
         message: String,
     },
-    /// A job of the run panicked outside of every process.
+    /// Something panicked outside of every process, such as a subscriber of the run's spans.
     #[error("the run failed outside of its processes: {0}")]
     Scheduler(JobPanic),
 }

@@ -4,8 +4,9 @@ use std::{mem, ops::Range, time::Duration};
 
 use crate::{
     sync::{AtomicBool, Instant, Mutex, Ordering},
-    task::{Chunks, JobPanic, Scheduler, Worker, catch, discard},
+    task::{Chunks, Scheduler, Worker},
     timeline::Ended,
+    unwind::{JobPanic, catch, discard},
 };
 
 use super::{
@@ -51,16 +52,16 @@ impl<P> Schedule<P> {
             self.sharing.choose(worker.wake_price())
         };
         self.describe(worker);
-        let ran = match Watch::new(worker, self.graph.as_ref()) {
+        // Subscribers of spans are the engine's, and may panic between two processes too.
+        let ran = catch(|| match Watch::new(worker, self.graph.as_ref()) {
             Some(watch) => self.go(way, worker, context, watch),
             None => self.go(way, worker, context, Nobody),
-        };
-        let Ran { took, is_shared, failure, outcome } = ran;
-        if failure.is_some() {
+        });
+        let Ran { took, is_shared, failure, outcome } = ran.unwrap_or_else(Ran::panicked);
+        // What a run took that did not come to its end says nothing.
+        if failure.is_some() || outcome.is_err() {
             self.costs.forget_work();
-        }
-        // What a cancelled run took says nothing.
-        if failure.is_none() {
+        } else {
             match way {
                 Way::Alone { .. } if is_shared => self.sharing.gave_up(),
                 Way::Alone { .. } => self.sharing.went_alone(took),
@@ -105,7 +106,7 @@ impl<P> Schedule<P> {
         let took = start.elapsed();
         let failure = run.failure.lock().take();
         let failed = failure.is_some() || outcome.is_err();
-        run.watch.end(Ended { workers: worker.workers(), always_shares: self.always_shares, failed });
+        run.watch.end(Ended { always_shares: self.always_shares, failed });
         Ran { took, is_shared, failure, outcome }
     }
 
@@ -133,6 +134,13 @@ struct Ran {
     is_shared: bool,
     failure: Option<Failure>,
     outcome: Result<(), JobPanic>,
+}
+
+impl Ran {
+    /// A panic outside of every process and every job ended it.
+    fn panicked(panic: JobPanic) -> Self {
+        Self { took: Duration::ZERO, is_shared: false, failure: None, outcome: Err(panic) }
+    }
 }
 
 /// One run: what all its jobs share. `W` is who looks on.

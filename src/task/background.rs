@@ -1,15 +1,16 @@
 //! Work that no frame waits for: streaming, baking, whatever may take longer than a frame.
 
-use std::{fmt, sync::Arc};
-
-use crate::sync::{Condvar, Mutex};
-
-use super::{
-    job::{JobPanic, catch, discard},
-    locked_queue::LockedQueue,
-    seat,
-    worker::Worker,
+use std::{
+    fmt,
+    sync::{Arc, Weak},
 };
+
+use crate::{
+    sync::{Condvar, Mutex},
+    unwind::{JobPanic, catch, discard, report},
+};
+
+use super::background_queue::BackgroundQueue;
 
 /// A job that runs when no frame needs its worker, and what comes of it; made by
 /// [`Scheduler::background`](super::Scheduler::background).
@@ -19,18 +20,21 @@ use super::{
 #[must_use = "who drops it lets go of the job's result"]
 pub struct BackgroundJob<T> {
     ticket: Arc<Ticket<T>>,
+    /// The queue of its scheduler, as long as that is there, and the number of the job in it.
+    queue: Weak<BackgroundQueue>,
+    number: u64,
 }
 
 impl<T: Send + 'static> BackgroundJob<T> {
-    /// A job, and what is to be queued of it.
-    pub(super) fn new(job: impl FnOnce() -> T + Send + 'static) -> (Self, Arc<dyn Queued>) {
+    /// Queues a job.
+    pub(super) fn queued(queue: &Arc<BackgroundQueue>, job: impl FnOnce() -> T + Send + 'static) -> Self {
         let ticket = Arc::new(Ticket {
             job: Mutex::new(Some(Box::new(job))),
             outcome: Mutex::new(Outcome { result: None, is_abandoned: false }),
             finished: Condvar::new(),
         });
-        let queued: Arc<dyn Queued> = Arc::<Ticket<T>>::clone(&ticket);
-        (Self { ticket }, queued)
+        let number = queue.put(Arc::<Ticket<T>>::clone(&ticket));
+        Self { ticket, queue: Arc::downgrade(queue), number }
     }
 
     /// Whether the job has run, so that [`wait`](Self::wait) returns at once.
@@ -38,17 +42,20 @@ impl<T: Send + 'static> BackgroundJob<T> {
         self.ticket.outcome.lock().result.is_some()
     }
 
-    /// What the job returned. If it has not begun it is run here and now, on this thread, before all that were queued
-    /// earlier; otherwise the thread sleeps until it has run. This thread runs no other job meanwhile.
+    /// Returns what the job returned.
+    ///
+    /// If the job has not begun, this thread runs it here and now, before all that were queued earlier, and nothing of it
+    /// stays queued. Otherwise this thread blocks until the job has run, and runs no other job meanwhile. It may be called
+    /// anywhere: in a frame's jobs, in background jobs, and on threads that are no workers. A job that waits for itself, by
+    /// whatever detour, waits for ever.
     ///
     /// # Errors
     ///
     /// The [`JobPanic`] if the job panicked.
     pub fn wait(self) -> Result<T, JobPanic> {
-        if !self.ticket.run() {
-            // Somebody else is at it, and may wait for what lies in this thread's queues.
-            seat::with_all(Worker::part_with_background_jobs);
-        }
+        // Where the scheduler is gone, so is the queue.
+        drop(self.queue.upgrade().and_then(|queue| queue.remove(self.number)));
+        self.ticket.run();
         let mut outcome = self.ticket.outcome.lock();
         loop {
             if let Some(result) = outcome.result.take() {
@@ -117,9 +124,6 @@ impl<T: Send> Queued for Ticket<T> {
 fn abandon<T>(result: Result<T, JobPanic>) {
     match result {
         Ok(value) => discard(value),
-        Err(panic) => tracing::error!(message = %panic, "a background job that nobody waits for"),
+        Err(panic) => report(|| tracing::error!(message = %panic, "a background job that nobody waits for")),
     }
 }
-
-/// Background jobs that nobody has begun, first in, first out.
-pub(super) type BackgroundQueue = LockedQueue<Arc<dyn Queued>>;

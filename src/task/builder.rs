@@ -7,11 +7,11 @@ use thiserror::Error;
 use crate::{
     sync::{Arc, thread},
     timeline::{Setup, Timeline},
+    unwind::{AbortOnUnwind, JobPanic, catch, report},
 };
 
 use super::{
     affinity::AffinityMask,
-    job::{JobPanic, catch},
     placement::Placement,
     queue::Queues,
     scheduler::{Scheduler, Shared},
@@ -115,7 +115,10 @@ impl SchedulerBuilder {
     }
 
     /// The clock that the [timeline](Scheduler::timeline) reads, instead of the system's: the time since some moment, which
-    /// never goes back, whichever thread asks. It must not panic.
+    /// never goes back, whichever thread asks.
+    ///
+    /// If it panics it is not called again: time stands still at its latest reading, which is reported to [`tracing`] as an
+    /// error, and every [log](crate::timeline::Log::clock_panic) from then on says so. Jobs are not affected.
     pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
         self.timeline.clock = Some(Box::new(clock));
         self
@@ -149,7 +152,7 @@ impl SchedulerBuilder {
         let (ready, is_ready) = mpsc::channel();
         for ((index, queues), name) in (1..).zip(others).zip(names) {
             let builder = thread::Builder::new().name(name);
-            let affinity = self.affinity.as_ref().map(|affinity| affinity(index));
+            let affinity = self.checked_affinity(index)?;
             let hooks = [&self.on_start, &self.on_stop].map(Clone::clone);
             let life = Life { index, affinity, hooks, ready: ready.clone(), shared: Arc::clone(&shared) };
             let thread = spawn(builder, Box::new(move || life.run(queues)));
@@ -178,8 +181,16 @@ impl SchedulerBuilder {
     }
 
     fn checked_name(&self, worker: usize) -> Result<String, SchedulerError> {
-        let name = self.name.as_ref().map_or_else(|| format!("drawloom-{worker}"), |name| name(worker));
+        let name = match &self.name {
+            Some(name) => catch(|| name(worker)).map_err(|panic| SchedulerError::NameHook { worker, panic })?,
+            None => format!("drawloom-{worker}"),
+        };
         if name.contains('\0') { Err(SchedulerError::Name { worker, name }) } else { Ok(name) }
+    }
+
+    fn checked_affinity(&self, worker: usize) -> Result<Option<AffinityMask>, SchedulerError> {
+        let affinity = self.affinity.as_ref().map(|affinity| catch(|| affinity(worker)));
+        affinity.transpose().map_err(|panic| SchedulerError::AffinityHook { worker, panic })
     }
 }
 
@@ -215,11 +226,14 @@ impl Life {
             return;
         }
         let worker = Worker::new(index, queues, shared);
+        // A worker that were lost would keep whoever waits for its jobs waiting for ever.
+        let guard = AbortOnUnwind::new("a worker's thread");
         seat::occupy(&worker, || worker.work(Until::Shutdown));
+        guard.disarm();
         if let Some(on_stop) = on_stop
             && let Err(panic) = catch(|| on_stop(index))
         {
-            tracing::error!(worker = index, message = %panic, "the hook at the end of a worker's thread");
+            report(|| tracing::error!(worker = index, message = %panic, "the hook at the end of a worker's thread"));
         }
     }
 
@@ -268,6 +282,22 @@ pub enum SchedulerError {
         worker: usize,
         /// The name.
         name: String,
+    },
+    /// What was to name a thread panicked.
+    #[error("the hook that names the thread of worker {worker} failed: {}", panic.message)]
+    NameHook {
+        /// The [index](Worker::index) of the worker.
+        worker: usize,
+        /// The panic.
+        panic: JobPanic,
+    },
+    /// What was to place a thread panicked.
+    #[error("the hook that places the thread of worker {worker} failed: {}", panic.message)]
+    AffinityHook {
+        /// The [index](Worker::index) of the worker.
+        worker: usize,
+        /// The panic.
+        panic: JobPanic,
     },
     /// The system refused to start a thread.
     #[error("the thread of worker {worker} could not be started")]

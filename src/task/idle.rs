@@ -46,7 +46,6 @@ impl Idle {
     /// There was nothing again: pauses, or sleeps.
     pub(super) fn go_on(&mut self, worker: &Worker, until: Until) {
         if self.looks == 0 {
-            until.set_starves(true);
             worker.timeline().start_idle(worker.index(), IdleKind::Searching);
         }
         if SLEEP_AT_ONCE {
@@ -65,16 +64,15 @@ impl Idle {
 
     /// There is something, or it is time to stop.
     #[inline]
-    pub(super) fn end(&mut self, worker: &Worker, until: Until) {
+    pub(super) fn end(&mut self, worker: &Worker) {
         if self.looks > 0 {
-            self.end_looking(worker, until);
+            self.end_looking(worker);
         }
     }
 
     // Apart, so that one job after another costs no call.
     #[cold]
-    fn end_looking(&mut self, worker: &Worker, until: Until) {
-        until.set_starves(false);
+    fn end_looking(&mut self, worker: &Worker) {
         worker.timeline().end_idle(worker.index());
         if self.is_searcher {
             worker.shared().sleep().end_search(|| worker.sees_loot(&Band::FRAME));

@@ -30,24 +30,10 @@ impl<T> LockedQueue<T> {
         self.change(|items| items.push_back(item));
     }
 
-    pub(super) fn take_oldest(&self) -> Option<T> {
-        self.change_unless_empty(VecDeque::pop_front)
-    }
-
-    /// Takes what `take` takes, unless there is nothing.
-    pub(super) fn change_unless_empty(&self, take: impl FnOnce(&mut VecDeque<T>) -> Option<T>) -> Option<T> {
-        if self.is_empty() { None } else { self.change(take) }
-    }
-
     pub(super) fn change<R>(&self, change: impl FnOnce(&mut VecDeque<T>) -> R) -> R {
         let mut items = self.items.lock();
         let result = change(&mut items);
         self.count.store(items.len(), Ordering::Relaxed);
         result
-    }
-
-    /// Whether there is an item of that kind.
-    pub(super) fn has(&self, is_wanted: impl FnMut(&T) -> bool) -> bool {
-        !self.is_empty() && self.items.lock().iter().any(is_wanted)
     }
 }

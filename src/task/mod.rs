@@ -132,6 +132,7 @@
 
 mod affinity;
 mod background;
+mod background_queue;
 mod builder;
 mod chunks;
 mod closure;
@@ -158,12 +159,12 @@ mod shuttle_tests;
 pub use affinity::AffinityMask;
 pub use background::BackgroundJob;
 pub use builder::{SchedulerBuilder, SchedulerError};
-pub use job::{JobPanic, catch};
 pub use scheduler::Scheduler;
 pub use scope::Scope;
 pub use worker::Worker;
 
+pub use crate::unwind::{JobPanic, catch};
+
 pub(crate) use chunks::{Chunks, Pace, Tickets};
-pub(crate) use job::discard;
 pub(crate) use queue::Band;
 pub(crate) use region::{Crew, Tokens, run_tokens};

@@ -16,11 +16,13 @@ use std::ops::Range;
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::Instant;
+use crate::{
+    sync::Instant,
+    unwind::{JobPanic, catch},
+};
 
 use super::{
     chunks::{Chunks, Pace, Tickets},
-    job::{JobPanic, catch},
     queue::Band,
     region::{Crew, Tokens, run_tokens},
     worker::Worker,

@@ -6,19 +6,23 @@
 //! measured. If it is, the threads of the scheduler are kept off the processor that the caller is on, until a later call
 //! comes from another one.
 
-#[cfg(any(target_os = "linux", target_os = "android"))]
+// Miri has no processors to choose from.
+#[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
 pub(super) use self::linux::Placement;
-#[cfg(not(any(target_os = "linux", target_os = "android")))]
+#[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
 pub(super) use self::other::Placement;
 
-#[cfg(any(target_os = "linux", target_os = "android"))]
+#[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
 mod linux {
     use std::io;
 
     use parking_lot::Mutex;
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
-    use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+    use crate::{
+        sync::{AtomicBool, AtomicUsize, Ordering},
+        unwind::report,
+    };
 
     /// Where the threads of a scheduler may run.
     pub(in crate::task) struct Placement {
@@ -79,7 +83,7 @@ mod linux {
                 // The machine has changed. It costs time, and nothing else.
                 self.is_needed.store(false, Ordering::Relaxed);
                 self.let_run_anywhere();
-                tracing::debug!(%error, "workers cannot be kept off the processor of their caller");
+                report(|| tracing::debug!(%error, "workers cannot be kept off the processor of their caller"));
             }
         }
 
@@ -98,14 +102,14 @@ mod linux {
         fn let_run_anywhere(&self) {
             for (thread, allowed) in self.threads.lock().iter() {
                 if let Err(error) = sched_setaffinity(Some(*thread), allowed) {
-                    tracing::debug!(%error, "a worker cannot be let go from its processors");
+                    report(|| tracing::debug!(%error, "a worker cannot be let go from its processors"));
                 }
             }
         }
     }
 }
 
-#[cfg(not(any(target_os = "linux", target_os = "android")))]
+#[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
 mod other {
     /// Where the threads of a scheduler may run: wherever the system puts them.
     pub(in crate::task) struct Placement;

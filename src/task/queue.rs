@@ -16,7 +16,7 @@ use crossbeam_utils::CachePadded;
 
 use crate::sync::{Arc, Deque, Steal, Stealer};
 
-use super::{job::Job, locked_queue::LockedQueue, shuffle::Shuffle};
+use super::{job::Job, locked_queue::LockedQueue, region::Region, shuffle::Shuffle};
 
 /// How urgent a job is: of their own jobs workers take the more urgent ones first, and of others' too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,13 +80,13 @@ impl Queues {
         }
     }
 
-    /// Takes over the oldest jobs of somebody else, if there are any, as if they had been queued here at this depth, and
-    /// gives back the first.
-    pub(super) fn steal_from(&self, loot: &Loot, band: Band, depth: u32) -> Option<Job> {
+    /// Takes over the oldest jobs of somebody else, if there are any, as if they had been queued here, and gives back the
+    /// first.
+    pub(super) fn steal_from(&self, loot: &Loot, band: Band) -> Option<Job> {
         let loot = &loot.bands[band as usize];
         let mut stolen = loot.steal();
         if stolen.is_none() && !loot.overflow.is_empty() {
-            stolen = loot.overflow.take_oldest(|job| self.push(Job { depth, is_stolen: true, ..job }, band));
+            stolen = loot.overflow.take_oldest(|job| self.push(Job { is_stolen: true, ..job }, band));
         }
         stolen.map(|job| Job { is_stolen: true, ..job })
     }
@@ -96,15 +96,16 @@ impl Queues {
         let queue = &self.bands[band as usize];
         match &self.shuffle {
             None => queue.pop(),
-            Some(shuffle) => queue.overflow.take_any(shuffle, 0),
+            Some(shuffle) => queue.overflow.take_any(shuffle, |_job| true),
         }
     }
 
-    /// The newest job, if it was queued at this depth, where a wait has begun.
-    pub(super) fn pop_awaited(&self, band: Band, depth: u32) -> Popped {
+    /// The newest job, if it is one of this region, which the worker waits for.
+    pub(super) fn pop_awaited(&self, band: Band, region: &Region) -> Popped {
         let queue = &self.bands[band as usize];
         if let Some(shuffle) = &self.shuffle {
-            return queue.overflow.take_any(shuffle, depth).map_or(Popped::Nothing, Popped::Job);
+            let job = queue.overflow.take_any(shuffle, |job| job.region.is(region));
+            return job.map_or(Popped::Nothing, Popped::Job);
         }
         let since_wait = &self.since_wait[band as usize];
         // Without this count every look would take a job out that is not looked for, and hide it from others.
@@ -112,7 +113,7 @@ impl Queues {
             return Popped::Nothing;
         }
         match queue.pop() {
-            Some(job) if job.depth >= depth => {
+            Some(job) if job.region.is(region) => {
                 since_wait.set(since_wait.get() - 1);
                 Popped::Job(job)
             }
@@ -209,6 +210,11 @@ impl Loot {
     pub(super) fn of(&self, band: Band) -> &BandLoot {
         &self.bands[band as usize]
     }
+
+    /// How many jobs there are.
+    pub(super) fn len(&self) -> usize {
+        self.bands.iter().map(BandLoot::len).sum()
+    }
 }
 
 pub(super) struct BandLoot {
@@ -232,6 +238,10 @@ impl BandLoot {
 
     pub(super) fn is_empty(&self) -> bool {
         self.stealer.is_empty() && self.overflow.is_empty()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.stealer.len() + self.overflow.len()
     }
 }
 
@@ -260,25 +270,28 @@ impl Overflow {
         self.jobs.change(VecDeque::pop_back)
     }
 
-    /// Takes the oldest jobs, to spare others the lock: gives back the first, and calls `keep` with the others.
+    /// Takes the oldest jobs, to spare others the lock: gives back the first, and calls `keep` with the others. Those are of
+    /// an outermost region, as a worker [keeps](super::worker::Worker::push) no others but its own.
     fn take_oldest(&self, keep: impl FnMut(Job)) -> Option<Job> {
         let (first, others) = self.jobs.change(|jobs| {
             let count = (jobs.len() / 2).min(MOST_AT_ONCE);
             let first = jobs.pop_front();
-            let others: [Option<Job>; MOST_AT_ONCE] =
-                array::from_fn(|place| if place < count { jobs.pop_front() } else { None });
+            let others: [Option<Job>; MOST_AT_ONCE] = array::from_fn(|place| {
+                let may_keep = place < count && jobs.front().is_some_and(|job| job.region.is_outermost());
+                if may_keep { jobs.pop_front() } else { None }
+            });
             (first, others)
         });
         others.into_iter().flatten().for_each(keep);
         first
     }
 
-    /// Some job that was queued at this depth or a deeper one.
-    fn take_any(&self, shuffle: &Shuffle, depth: u32) -> Option<Job> {
+    /// Some job of those that are wanted.
+    fn take_any(&self, shuffle: &Shuffle, is_wanted: impl Fn(&Job) -> bool) -> Option<Job> {
         self.jobs.change(|jobs| {
-            let fitting = jobs.iter().filter(|job| job.depth >= depth).count();
-            let chosen = shuffle.below(fitting)?;
-            let (place, _) = jobs.iter().enumerate().filter(|(_, job)| job.depth >= depth).nth(chosen)?;
+            let wanted = jobs.iter().filter(|job| is_wanted(job)).count();
+            let chosen = shuffle.below(wanted)?;
+            let (place, _) = jobs.iter().enumerate().filter(|(_, job)| is_wanted(job)).nth(chosen)?;
             jobs.remove(place)
         })
     }
@@ -317,7 +330,7 @@ mod loom_tests {
         let loot = queues.loot();
         let thief = thread::spawn(move || {
             let own = Queues::new(None);
-            let mut stolen: Vec<u64> = (0..3).filter_map(|_| token(own.steal_from(&loot, Band::Normal, 0))).collect();
+            let mut stolen: Vec<u64> = (0..3).filter_map(|_| token(own.steal_from(&loot, Band::Normal))).collect();
             // What it took over beside those.
             stolen.extend(std::iter::from_fn(|| token(own.pop(Band::Normal))));
             stolen
@@ -327,7 +340,7 @@ mod loom_tests {
             if number == early {
                 taken_early = token(queues.pop(Band::Normal));
             }
-            queues.push(Job { work: Work::Token(number), region, depth: 0, is_stolen: false }, Band::Normal);
+            queues.push(Job { work: Work::Token(number), region, is_stolen: false }, Band::Normal);
         }
         let taken = std::iter::from_fn(|| token(queues.pop(Band::Normal))).collect();
         (taken_early, taken, thief.join().unwrap())

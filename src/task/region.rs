@@ -16,10 +16,13 @@ use std::{mem, ptr};
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Arc, AtomicBool, Mutex, Ordering};
+use crate::{
+    sync::{Arc, Mutex},
+    unwind::{AbortOnUnwind, JobPanic, catch},
+};
 
 use super::{
-    job::{Job, JobPanic, Work, catch},
+    job::{Job, Work},
     latch::Latch,
     queue::Band,
     scheduler::Shared,
@@ -55,7 +58,7 @@ impl<'worker> Crew<'worker> {
 
     /// Whether a pinned token waits for this worker, which nobody else can run.
     pub(crate) fn has_pinned(&self) -> bool {
-        self.is_owner() && self.worker.shared().mailbox(self.worker.index()).has(self.region)
+        self.is_owner() && self.worker.shared().mailbox(self.region.owner).has_pinned(self.region)
     }
 
     /// Keeps the panic for whoever waits for the region, unless there was one before.
@@ -89,24 +92,30 @@ pub(super) fn open<R>(
     tokens: &dyn Tokens,
     body: impl FnOnce(&'static Region) -> R,
 ) -> Result<R, JobPanic> {
-    // SAFETY: The types differ in lifetimes only. The reference is used by jobs of the region alone, which are counted,
-    // and this function neither returns nor unwinds before all that are counted have run: it catches the panic of the
-    // body, and `Job::run` that of a job.
+    // Whatever is called below, this function is left by returning from it, or the process ends.
+    let guard = AbortOnUnwind::new("an open region of jobs");
+    // SAFETY: The types differ in lifetimes only, and the referent outlives this call. Only jobs of the region use the
+    // reference. Each is counted from before it is queued until it has run, and `wait_inside` returns only when the count
+    // is zero. `guard` excludes that this function unwinds before.
     let tokens = unsafe { mem::transmute::<&dyn Tokens, &'static dyn Tokens>(tokens) };
     let storage = Region {
         latch: CachePadded::new(Latch::new(1)),
         owner: worker.index(),
+        level: worker.depth(),
+        is_outermost: worker.opens_outermost(),
         is_background: worker.is_in_background(),
-        owner_starves: AtomicBool::new(false),
         panic: Mutex::new(None),
         tokens,
         shared: Arc::clone(worker.shared()),
     };
-    // SAFETY: The storage is not moved, and is there for as long as anybody has the reference. That is the body, the
-    // counted jobs until they have run, and workers with credit, which is counted. Who takes the last count off uses the
-    // reference no more.
+    // SAFETY: The storage is not moved, and outlives every use of the reference. `body` uses it before it returns, counted
+    // jobs before they are counted off, and workers with credit before they give it back, which is counted too. Whoever
+    // takes the last count off does not use it afterwards. `wait_inside` returns only when the count is zero, and `guard`
+    // excludes that this function unwinds before.
     let region: &'static Region = unsafe { &*ptr::from_ref(&storage) };
-    worker.wait_inside(region, || catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone())))
+    let result = worker.wait_inside(region, || catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone())));
+    guard.disarm();
+    result
 }
 
 /// The jobs that one thread waits for.
@@ -114,10 +123,13 @@ pub(super) struct Region {
     latch: CachePadded<Latch>,
     /// The worker that opened the region.
     owner: usize,
+    /// How many regions the owner had open before.
+    level: usize,
+    /// Whether it was opened by a thread that called the scheduler from outside, for a frame. Its owner helps with
+    /// everything of the frame while it waits.
+    is_outermost: bool,
     /// Whether it is part of a background job, so that its jobs are too.
     is_background: bool,
-    /// Whether the owner waits, may not help anybody else, and has nothing to do.
-    owner_starves: AtomicBool,
     /// The first panic, if there was one.
     panic: Mutex<Option<JobPanic>>,
     tokens: &'static dyn Tokens,
@@ -131,6 +143,14 @@ impl Region {
 
     pub(super) fn owner(&self) -> usize {
         self.owner
+    }
+
+    pub(super) fn level(&self) -> usize {
+        self.level
+    }
+
+    pub(super) fn is_outermost(&self) -> bool {
+        self.is_outermost
     }
 
     pub(super) fn is_background(&self) -> bool {
@@ -154,23 +174,11 @@ impl Region {
         self.panic.lock().take()
     }
 
-    /// Whether the next job does better to go to the owner at once. One does, as nobody can take it off the owner again. It is
-    /// a hint, so it is relaxed: a job that is handed over is found in the mailbox in any case, and one that is not is
-    /// found by whoever steals.
-    pub(super) fn feed_owner(&self) -> bool {
-        // The look before the swap spares others the cache line.
-        self.owner_starves.load(Ordering::Relaxed) && self.owner_starves.swap(false, Ordering::Relaxed)
-    }
-
-    pub(super) fn set_owner_starves(&self, starves: bool) {
-        self.owner_starves.store(starves, Ordering::Relaxed);
-    }
-
     /// Hands a job to the owner, from a thread that is no worker. It is one that the scope was lent to by a job, which is
     /// counted.
     pub(super) fn post(&'static self, work: Work) {
         self.latch.add(1);
-        self.shared.mailbox(self.owner).put(Job { work, region: self, depth: 0, is_stolen: false });
+        self.shared.mailbox(self.owner).put_pinned(Job { work, region: self, is_stolen: false });
         self.shared.sleep().wake_worker(self.owner);
     }
 

@@ -12,19 +12,20 @@ use crossbeam_utils::CachePadded;
 use crate::{
     sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread},
     timeline::Timeline,
+    unwind::JobPanic,
 };
 
 use super::{
-    background::{BackgroundJob, BackgroundQueue},
+    background::BackgroundJob,
+    background_queue::BackgroundQueue,
     builder::{SchedulerBuilder, SchedulerError},
-    job::JobPanic,
     mailbox::Mailbox,
     parallel_for::Pass,
     placement::Placement,
     queue::{Band, Loot, Queues},
     scope::{self, Scope},
     seat::{self, Seat},
-    sleep::Sleep,
+    sleep::{Sleep, WakeFor},
     worker::Worker,
 };
 
@@ -154,8 +155,7 @@ impl Scheduler {
     /// for it: then it is part of that. Jobs that have not begun when the scheduler is dropped run only if they are waited
     /// for.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
-        let (job, queued) = BackgroundJob::new(job);
-        self.shared.background().put(queued);
+        let job = BackgroundJob::queued(self.shared.background(), job);
         self.shared.sleep().wake_beside(Band::Background);
         job
     }
@@ -218,9 +218,40 @@ impl Drop for Scheduler {
     }
 }
 
+/// What each worker has in its queues and its mailbox, and who sleeps until when: what one wants to see of a program that hangs.
+/// It may be printed at any time, from any thread, and waits for no job.
 impl fmt::Debug for Scheduler {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("Scheduler").field("workers", &self.workers()).finish_non_exhaustive()
+        let shared = &self.shared;
+        let asleep = shared.sleep.asleep();
+        let workers = shared.loot.iter().zip(shared.mailboxes()).enumerate().map(|(worker, (loot, mailbox))| {
+            let sleeps_until = asleep.iter().find(|(sleeper, _)| *sleeper == worker).map(|(_, wake_for)| wake_for);
+            WorkerState { queued: loot.len(), mailbox, sleeps_until }
+        });
+        formatter
+            .debug_struct("Scheduler")
+            .field("workers", &workers.collect::<Vec<_>>())
+            .field("background_jobs", &shared.background.len())
+            .field("serves_a_thread", &!shared.seat.is_free())
+            .finish_non_exhaustive()
+    }
+}
+
+/// What others see of a worker: how many jobs lie in its queues and its mailbox, and for what it sleeps, if it does.
+struct WorkerState<'state> {
+    queued: usize,
+    mailbox: &'state Mailbox,
+    sleeps_until: Option<&'state WakeFor>,
+}
+
+impl fmt::Debug for WorkerState<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Worker")
+            .field("queued", &self.queued)
+            .field("mailbox", self.mailbox)
+            .field("sleeps_until", &self.sleeps_until)
+            .finish()
     }
 }
 
@@ -229,9 +260,8 @@ pub(super) struct Shared {
     /// The way into the queues of each worker.
     loot: Box<[Loot]>,
     mailboxes: Box<[CachePadded<Mailbox>]>,
-    /// Jobs that were spawned into a region from inside of another one, on a worker that waits for that.
-    strays: CachePadded<Mailbox>,
-    background: BackgroundQueue,
+    /// Not the model checker's `Arc`, which has no weak form: whoever waits for a job may outlive the scheduler.
+    background: std::sync::Arc<BackgroundQueue>,
     sleep: Sleep,
     placement: Placement,
     seat: Seat,
@@ -248,8 +278,7 @@ impl Shared {
     pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, timeline: Timeline, is_shuffled: bool) -> Self {
         Self {
             mailboxes: loot.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
-            strays: CachePadded::new(Mailbox::new()),
-            background: BackgroundQueue::new(),
+            background: std::sync::Arc::new(BackgroundQueue::new()),
             sleep: Sleep::new(loot.len()),
             placement: Placement::new(),
             seat: Seat::new(first),
@@ -275,11 +304,11 @@ impl Shared {
         &self.mailboxes[worker]
     }
 
-    pub(super) fn strays(&self) -> &Mailbox {
-        &self.strays
+    pub(super) fn mailboxes(&self) -> impl Iterator<Item = &Mailbox> {
+        self.mailboxes.iter().map(|mailbox| &**mailbox)
     }
 
-    pub(super) fn background(&self) -> &BackgroundQueue {
+    pub(super) fn background(&self) -> &std::sync::Arc<BackgroundQueue> {
         &self.background
     }
 

@@ -2,9 +2,11 @@
 
 use std::{fmt, marker::PhantomData};
 
+use crate::unwind::JobPanic;
+
 use super::{
     closure::Closure,
-    job::{JobPanic, Work},
+    job::Work,
     queue::Band,
     region::{self, Crew, Region, Tokens},
     seat,
@@ -66,12 +68,12 @@ impl<'scope> Scope<'scope> {
     /// Takes the lifetime away from the closure.
     fn work(closure: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) -> Work {
         // SAFETY:
-        // 1. The closure is gone, run and dropped, before `'scope` ends. `'scope` outlives the call of `open` that opened
-        //    the region, as it is a parameter of that function. `open` returns only when the latch is released, and
-        //    cannot unwind before: the panic of its body is caught, and `Job::run` catches that of a job. The job is counted
-        //    when it is queued, and taken off after the closure is gone; and whoever spawns is counted itself: the body
-        //    until it has returned, a job until it has run, and nobody can keep the scope for longer, as both are lent it
-        //    for a lifetime of their own. A job that were lost would keep `open` waiting, not let it return.
+        // 1. The closure is gone, run and dropped, before `'scope` ends. `'scope` outlives the call of `region::open` that
+        //    opened the region, as it is a parameter of the function that calls it. `region::open` returns only when the
+        //    latch is released, and an abort guard in it excludes that it unwinds. The job is counted when it is queued,
+        //    and taken off after the closure is gone; and whoever spawns is counted itself: the body until it has
+        //    returned, a job until it has run, and nobody can keep the scope for longer, as both are lent it for a
+        //    lifetime of their own. A job that were lost would keep `region::open` waiting, not let it return.
         // 2. It is called with the region that its job was queued for, which is the one of this scope.
         Work::Closure(unsafe { Closure::new(closure) })
     }

@@ -41,16 +41,6 @@ pub(super) fn with_current<R>(shared: &Arc<Shared>, body: impl FnOnce(Option<&Wo
     body(None)
 }
 
-/// Calls `body` with every worker that this thread is.
-pub(super) fn with_all(body: impl Fn(&Worker)) {
-    let mut next = INNERMOST.with(|innermost| innermost.0.get());
-    // SAFETY: As in `with_current`.
-    while let Some(worker) = unsafe { next.as_ref() } {
-        body(worker);
-        next = worker.outer.get();
-    }
-}
-
 /// Makes this thread the worker while `body` runs.
 pub(super) fn occupy<R>(worker: &Worker, body: impl FnOnce() -> R) -> R {
     worker.outer.set(INNERMOST.with(|innermost| innermost.0.replace(ptr::from_ref(worker))));
@@ -93,6 +83,11 @@ impl Seat {
     /// Takes the seat if it is free.
     pub(super) fn try_take(&self) -> Option<Box<Queues>> {
         self.queues.lock().take()
+    }
+
+    /// Whether no thread from outside is being served.
+    pub(super) fn is_free(&self) -> bool {
+        self.queues.lock().is_some()
     }
 
     /// Frees the seat, for whoever has waited for it.

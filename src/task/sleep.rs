@@ -4,9 +4,9 @@
 //!
 //! # Protocol
 //!
-//! *Work* is whatever a worker may wait for: a job in somebody's queue, a pinned job, a released latch, the shutdown
-//! flag. A *sleeper* takes any work, or none but its own: so does one that waits in the midst of a job. A *searcher* is
-//! awake, has nothing to do, and is going to look at everybody's queues once more before it ceases to be one.
+//! *Work* is whatever a worker may wait for: a job in somebody's queue or mailbox, a released latch, the shutdown flag. A
+//! *sleeper* takes any work, or none but that of one region: so does one that waits in the midst of a job. A *searcher* is
+//! awake, has nothing to do, and is going to look at everybody's queues and mailboxes once more before it ceases to be one.
 //!
 //! ```text
 //!  sleeper                                        waker
@@ -41,6 +41,11 @@
 //! wakes a sleeper, unless there is none, or a searcher again, for whom the same holds. A searcher called at W4 is one like
 //! any other, whatever it was called for.
 //!
+//! *Where work has an owner*, it lies in the owner's mailbox, and W3 and W4 come twice: for the owner, then for others. An
+//! owner that sleeps until this region has work is met as any sleeper is, and called. One that does not sleep so is going to
+//! pass S2 after W2 before it does, and S3 sees the work. So an owner never sleeps while its mailbox has work for it, even if
+//! nobody else is free to take that. If the owner is called, others are not: it runs the work.
+//!
 //! *Where work moves.* A thief that takes several jobs at once, or puts one back that it had taken out, hides them for a
 //! moment from S3 and F3. When they can be seen again it passes W2 and W4 anew, without asking for searchers
 //! (`wake_beside`).
@@ -67,10 +72,10 @@ use super::{queue::Band, scheduler::Scheduler};
 /// What work a sleeper is to be woken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WakeFor {
-    /// Any that lies in a queue, and its own.
+    /// Any that lies in a queue or a mailbox, and its own.
     Any,
-    /// Its own: the end of its region, or a job handed to it.
-    ItsOwn,
+    /// What belongs to the region that it has open at this level: the end of the region, or a job in the mailbox.
+    Region { level: usize },
 }
 
 /// The beds of all workers, the list of those that sleep, and the counts of sleepers and searchers.
@@ -151,7 +156,22 @@ impl Sleep {
     pub(super) fn wake_beside(&self, band: Band) {
         fence(Ordering::SeqCst);
         if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
-            self.call(|&(sleeper, wake_for)| wake_for == WakeFor::Any && (sleeper != 0 || band != Band::Background));
+            self.call(|&sleeper| takes(sleeper, band));
+        }
+    }
+
+    /// Wakes the owner of a region for a job of that, if it sleeps until there is one, and else a worker that takes jobs of
+    /// this band. The job has been published where both look for it.
+    pub(super) fn wake_owner_or_other(&self, owner: usize, level: usize, band: Band) {
+        fence(Ordering::SeqCst);
+        let counts = self.counts.load(Ordering::Relaxed);
+        let waits_for_it = |wake_for| wake_for == WakeFor::Any || wake_for == WakeFor::Region { level };
+        if sleepers(counts) > 0 && self.call(|&(sleeper, wake_for)| sleeper == owner && waits_for_it(wake_for)) {
+            return;
+        }
+        // As in `wake_any` and `wake_beside`. The fence comes after the job and before the read of the counts there as here.
+        if any_sleepers(counts) > 0 && (band == Band::Background || searchers(counts) == 0) {
+            self.call(|&sleeper| takes(sleeper, band));
         }
     }
 
@@ -168,6 +188,11 @@ impl Sleep {
         // No fence: the lock is taken in any case, and whoever lies down after that sees what has been published
         // before.
         while self.call(|_| true) {}
+    }
+
+    /// What each worker that sleeps, or is about to, is to be woken for.
+    pub(super) fn asleep(&self) -> Vec<(usize, WakeFor)> {
+        self.sleepers.lock().clone()
     }
 
     /// How many workers sleep or are about to.
@@ -203,10 +228,15 @@ impl Sleep {
     }
 }
 
+/// Whether a sleeper takes jobs of this band, whoever waits for them.
+fn takes((worker, wake_for): (usize, WakeFor), band: Band) -> bool {
+    wake_for == WakeFor::Any && (worker != 0 || band != Band::Background)
+}
+
 fn weight(wake_for: WakeFor) -> usize {
     match wake_for {
         WakeFor::Any => SLEEPER + ANY_SLEEPER,
-        WakeFor::ItsOwn => SLEEPER,
+        WakeFor::Region { .. } => SLEEPER,
     }
 }
 

@@ -24,8 +24,8 @@ const NAP: Duration = Duration::from_micros(20);
 /// The time from the spawning of a job until a worker that slept begins on it. If one ever begins where the spawning
 /// thread runs, workers are kept off there from then on, if they `may_move`.
 pub(super) fn measure(scheduler: &Scheduler, may_move: bool) -> Duration {
-    // Where threads are modelled time does not pass as usual.
-    if scheduler.workers() == 1 || cfg!(any(drawloom_loom, drawloom_shuttle)) {
+    // Where threads are modelled or interpreted, time does not pass as usual.
+    if scheduler.workers() == 1 || cfg!(any(drawloom_loom, drawloom_shuttle, miri)) {
         return Duration::ZERO;
     }
     let mut tries = try_often(scheduler);

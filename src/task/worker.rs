@@ -2,12 +2,16 @@
 
 use std::{cell::Cell, fmt, marker::PhantomData, ptr, rc::Rc, time::Duration};
 
-use crate::{sync::Arc, timeline::Timeline};
+use crate::{
+    sync::Arc,
+    timeline::Timeline,
+    unwind::{JobPanic, discard},
+};
 
 use super::{
     background::Queued,
     idle::Idle,
-    job::{Job, JobPanic, Work, discard},
+    job::{Job, Work},
     queue::{Band, Popped, Queues},
     region::Region,
     scheduler::Shared,
@@ -39,7 +43,7 @@ pub struct Worker {
     /// Whom to steal from first: where there was something the last time.
     victim: Cell<usize>,
     /// How many regions are open on this worker, each inside a job of the one before.
-    depth: Cell<u32>,
+    depth: Cell<usize>,
     /// Whether what runs is a background job.
     is_in_background: Cell<bool>,
     /// Whether the job that runs was stolen, until it is [past](Self::forget_stolen) what it was stolen for.
@@ -145,26 +149,32 @@ impl Worker {
         self.queues
     }
 
-    /// Queues a job here, and wakes somebody for it. Only from within a counted job of the region, or its body.
+    /// How many regions are open on this worker.
+    pub(super) fn depth(&self) -> usize {
+        self.depth.get()
+    }
+
+    /// Whether a region opened now is one that a thread from outside waits for, and in the midst of no job.
+    pub(super) fn opens_outermost(&self) -> bool {
+        self.index == 0 && self.depth() == 0 && !self.is_in_background()
+    }
+
+    /// Queues a job, and wakes somebody for it. Only from within a counted job of the region, or its body.
+    ///
+    /// The job stays in this worker's queues only if no owner can wait for it in vain there: if this worker waits for the
+    /// region, and then for nothing further in; or if the region is an outermost one, whose owner steals.
     pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
         self.spend(region);
-        let job = Job { work, region, depth: self.depth.get(), is_stolen: false };
-        let is_stray = self.awaited.get().is_some_and(|awaited| !awaited.is(region));
-        if is_stray && !region.is_background() {
-            // It belongs further out, and would be run too soon from here.
-            self.shared.strays().put(job);
-            self.shared.sleep().wake_worker(region.owner());
-            self.shared.sleep().wake_any();
-            return;
-        }
-        if is_stray || (region.owner() != self.index && region.feed_owner()) {
-            self.shared.mailbox(region.owner()).put(job);
-            self.shared.sleep().wake_worker(region.owner());
-            return;
-        }
-        if region.is_background() {
-            self.queues.push(job, Band::Background);
-            self.shared.sleep().wake_beside(Band::Background);
+        let job = Job { work, region, is_stolen: false };
+        let band = if region.is_background() { Band::Background } else { band };
+        let may_keep = self.awaited.get().map_or(region.is_outermost(), |awaited| awaited.is(region));
+        let (owner, level) = (region.owner(), region.level());
+        if !may_keep {
+            self.shared.mailbox(owner).put_shared(job);
+            self.shared.sleep().wake_owner_or_other(owner, level, band);
+        } else if band == Band::Background {
+            self.queues.push(job, band);
+            self.shared.sleep().wake_beside(band);
         } else {
             self.queues.push(job, band);
             self.shared.sleep().wake_any();
@@ -174,8 +184,8 @@ impl Worker {
     /// Hands a job to the owner of the region. Only from within a counted job of the region, or its body.
     pub(super) fn push_pinned(&self, region: &'static Region, work: Work) {
         self.spend(region);
-        let job = Job { work, region, depth: self.depth.get(), is_stolen: false };
-        self.shared.mailbox(region.owner()).put(job);
+        let job = Job { work, region, is_stolen: false };
+        self.shared.mailbox(region.owner()).put_pinned(job);
         if region.owner() != self.index {
             self.shared.sleep().wake_worker(region.owner());
         }
@@ -187,7 +197,7 @@ impl Worker {
         region: &'static Region,
         body: impl FnOnce() -> Result<R, JobPanic>,
     ) -> Result<R, JobPanic> {
-        let is_outermost = self.index == 0 && self.depth.get() == 0 && !self.is_in_background();
+        let is_outermost = region.is_outermost();
         self.depth.set(self.depth.get() + 1);
         let outer = (self.awaited.replace((!is_outermost).then_some(region)), self.queues.start_wait());
         if is_outermost {
@@ -197,7 +207,7 @@ impl Worker {
         let result = body();
         // The count that the latch began with.
         self.earn(region);
-        self.work(Until::Finished { region, may_help: is_outermost });
+        self.work(Until::Finished { region });
         if is_outermost {
             self.shared.set_live(false);
         }
@@ -214,7 +224,7 @@ impl Worker {
         let mut idle = Idle::default();
         loop {
             if let Some(job) = self.next_job(until) {
-                idle.end(self, until);
+                idle.end(self);
                 self.run(job);
                 continue;
             }
@@ -225,13 +235,13 @@ impl Worker {
             if matches!(until, Until::Shutdown)
                 && let Some(job) = self.shared.background().take_oldest()
             {
-                idle.end(self, until);
+                idle.end(self);
                 self.run_in_background(&*job);
                 continue;
             }
             idle.go_on(self, until);
         }
-        idle.end(self, until);
+        idle.end(self);
     }
 
     /// Runs background jobs one after another, until there is none left or it is time to stop. Says how many have run.
@@ -251,21 +261,20 @@ impl Worker {
                 Until::Shutdown => {
                     self.sees_loot(&Band::ALL) || (self.index > 0 && !self.shared.background().is_empty())
                 }
-                Until::Finished { region, may_help } => {
-                    self.shared.mailbox(self.index).has(region)
-                        || self.shared.strays().has(region)
-                        || (may_help && self.sees_loot(&Band::FRAME))
+                Until::Finished { region } => {
+                    let mailbox = self.shared.mailbox(self.index);
+                    mailbox.has_pinned(region)
+                        || if region.is_outermost() { self.sees_loot(&Band::FRAME) } else { mailbox.has_shared(region) }
                 }
             }
     }
 
     /// Whether there is something in these bands that this worker could take up, and does not have itself.
     pub(super) fn sees_loot(&self, bands: &[Band]) -> bool {
-        if self.shared.strays().has_any() {
-            return true;
-        }
-        let others = self.shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
-        others.map(|(_, loot)| loot).any(|loot| bands.iter().any(|&band| !loot.of(band).is_empty()))
+        let shared = &self.shared;
+        let mut others = shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
+        others.any(|(_, loot)| bands.iter().any(|&band| !loot.of(band).is_empty()))
+            || shared.mailboxes().any(|mailbox| bands.iter().any(|&band| mailbox.has_any_shared(band)))
     }
 
     /// Takes over the count of a job of the region that has run here.
@@ -329,12 +338,17 @@ impl Worker {
             Until::Shutdown => self
                 .frame_job()
                 .or_else(|| self.own_job(&[Band::Background]))
-                .or_else(|| self.steal(&[Band::Background])),
-            Until::Finished { region, may_help } => {
-                let pinned = self.shared.mailbox(self.index).take(region);
+                .or_else(|| self.steal(&[Band::Background]))
+                .or_else(|| self.shared_job(Band::Background)),
+            Until::Finished { region } => {
+                let mailbox = self.shared.mailbox(self.index);
+                let pinned = mailbox.take_pinned(region);
                 pinned.or_else(|| {
-                    if may_help { self.frame_job() } else { self.awaited_job() }
-                        .or_else(|| self.shared.strays().take(region))
+                    if region.is_outermost() {
+                        self.frame_job()
+                    } else {
+                        self.awaited_job(region).or_else(|| mailbox.take_shared(region))
+                    }
                 })
             }
         }
@@ -343,25 +357,22 @@ impl Worker {
     /// A job of whatever belongs to the frame.
     fn frame_job(&self) -> Option<Job> {
         let own = self.own_job(&Band::FRAME);
-        own.or_else(|| self.steal(&Band::FRAME)).or_else(|| self.shared.strays().take_any())
+        own.or_else(|| self.steal(&Band::FRAME)).or_else(|| self.shared_job(Band::Normal))
     }
 
-    /// Hands its background jobs to those who wait for them, as this thread is going to wait for one itself.
-    pub(super) fn part_with_background_jobs(&self) {
-        while let Some(job) = self.queues.pop(Band::Background) {
-            let owner = job.region.owner();
-            self.shared.mailbox(owner).put(job);
-            self.shared.sleep().wake_worker(owner);
-        }
+    /// A job out of somebody's mailbox, for whoever looks for work of this band.
+    fn shared_job(&self, band: Band) -> Option<Job> {
+        let job = self.shared.mailboxes().find_map(|mailbox| mailbox.take_any_shared(band))?;
+        Some(Job { is_stolen: true, ..job })
     }
 
     fn own_job(&self, bands: &[Band]) -> Option<Job> {
         bands.iter().find_map(|&band| self.queues.pop(band))
     }
 
-    /// The newest job here that belongs to what this worker waits for in the midst of another.
-    fn awaited_job(&self) -> Option<Job> {
-        Band::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, self.depth.get()) {
+    /// The newest job here, if it is one of this region, which the worker waits for in the midst of another job.
+    fn awaited_job(&self, region: &Region) -> Option<Job> {
+        Band::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, region) {
             Popped::Job(job) => Some(job),
             Popped::Nothing => None,
             Popped::PutBack => {
@@ -379,7 +390,7 @@ impl Worker {
         bands.iter().find_map(|&band| {
             let mut victims = (first..loot.len()).chain(0..first).filter(|&victim| victim != self.index);
             victims.find_map(|victim| {
-                let job = self.queues.steal_from(&loot[victim], band, self.depth.get())?;
+                let job = self.queues.steal_from(&loot[victim], band)?;
                 if !loot[self.index].of(band).is_empty() {
                     // More came over than this one job. Whoever pushed them may have relied on this worker to look for
                     // more, and it is not going to look at what it has.
@@ -403,10 +414,10 @@ impl fmt::Debug for Worker {
 pub(super) enum Until {
     /// Until the scheduler ends.
     Shutdown,
-    /// Until the jobs of the region have run. The worker is the one that opened it, and runs its pinned jobs. Unless it
-    /// may help, it is in the midst of some job, and takes up nothing else meanwhile than what belongs to the region: a
-    /// job of somebody else might take long, or want what this one has borrowed.
-    Finished { region: &'static Region, may_help: bool },
+    /// Until the jobs of the region have run. The worker is the one that opened it, and runs its pinned jobs. Unless the
+    /// region is an outermost one, the worker is in the midst of some job, and takes up nothing else meanwhile than what
+    /// belongs to the region: a job of somebody else might take long, or want what this one has borrowed.
+    Finished { region: &'static Region },
 }
 
 impl Until {
@@ -420,15 +431,8 @@ impl Until {
     /// What a worker is woken for that sleeps meanwhile.
     pub(super) fn wake_for(self) -> WakeFor {
         match self {
-            Self::Finished { may_help: false, .. } => WakeFor::ItsOwn,
-            Self::Shutdown | Self::Finished { may_help: true, .. } => WakeFor::Any,
-        }
-    }
-
-    /// Lets others know whether the worker has nothing to do and may not look for it elsewhere.
-    pub(super) fn set_starves(self, starves: bool) {
-        if let Self::Finished { region, may_help: false } = self {
-            region.set_owner_starves(starves);
+            Self::Finished { region } if !region.is_outermost() => WakeFor::Region { level: region.level() },
+            Self::Shutdown | Self::Finished { .. } => WakeFor::Any,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What is told of frames, runs, spans and counters, which are few, and so go through a lock.
 
-use std::{mem, ops::Range, thread, time::Duration};
+use std::{collections::HashSet, mem, ops::Range, thread, time::Duration};
 
 use super::log::{Counter, Frame, Log, Run, Span};
 
@@ -18,8 +18,8 @@ pub(super) struct Book {
     /// The runs that are going on, and how many of them a frame waits for.
     open: Vec<u32>,
     awaited: usize,
-    /// Those of them of which something was lost as a log was taken.
-    cut: Vec<u32>,
+    /// Those of them of which chunks were taken out too early, and are lost.
+    incomplete: Vec<u32>,
     kept: Kept,
     /// Those that have spans which are kept.
     threads: Vec<(thread::ThreadId, String)>,
@@ -85,11 +85,11 @@ impl Book {
         (number, self.current_frame())
     }
 
-    /// A run has ended.
+    /// A run has ended, which is complete unless some of its chunks were taken out before.
     pub(super) fn end_run(&mut self, number: u32, mut run: Run) {
-        run.complete = !self.cut.contains(&number);
+        run.complete &= !self.incomplete.contains(&number);
         self.awaited -= usize::from(!run.in_background);
-        for list in [&mut self.open, &mut self.cut] {
+        for list in [&mut self.open, &mut self.incomplete] {
             list.retain(|&other| other != number);
         }
         self.keep(|kept| &mut kept.runs, (number, run));
@@ -119,10 +119,11 @@ impl Book {
         mem::take(&mut self.kept)
     }
 
-    /// What is going on, and what has ended while chunks were taken out, is not complete any more.
-    pub(super) fn cut_open_runs(&mut self) {
-        self.cut.clone_from(&self.open);
-        self.kept.runs.iter_mut().for_each(|(_, run)| run.complete = false);
+    /// Chunks of these runs were taken out before the runs had ended, and are lost.
+    pub(super) fn lose_chunks_of(&mut self, runs: &HashSet<u32>) {
+        self.incomplete.extend(self.open.iter().filter(|&run| runs.contains(run)));
+        let ended = self.kept.runs.iter_mut().filter(|(number, _)| runs.contains(number));
+        ended.for_each(|(_, run)| run.complete = false);
     }
 
     /// The calling thread's place among those that have spans.

@@ -5,14 +5,17 @@
 
 use std::{sync::OnceLock, thread, time::Duration};
 
-use crate::sync::Instant;
+use crate::{
+    sync::{AtomicU64, Instant, Ordering},
+    unwind::{JobPanic, catch, report},
+};
 
 use super::ticks;
 
 /// What tells the time.
 pub(super) enum Clock {
     Machine(Machine),
-    Other(Box<dyn Fn() -> Duration + Send + Sync>),
+    Engine(EngineClock),
 }
 
 /// The machine's clocks.
@@ -43,7 +46,15 @@ impl Clock {
         match self {
             Self::Machine(machine) if machine.tick() > 0 => Reader::Counter { built: machine.built.ticks },
             Self::Machine(machine) => Reader::System { built: machine.built.time },
-            Self::Other(clock) => Reader::Other(&**clock),
+            Self::Engine(clock) => Reader::Engine(clock),
+        }
+    }
+
+    /// What the engine's clock said when it panicked, if it did.
+    pub(super) fn panic_message(&self) -> Option<&str> {
+        match self {
+            Self::Machine(_) => None,
+            Self::Engine(clock) => clock.panic.get().map(|panic| panic.message.as_str()),
         }
     }
 
@@ -86,6 +97,45 @@ impl Machine {
     }
 }
 
+/// A clock that the engine supplies. Workers read it between two jobs, where no panic may pass.
+///
+/// If it panics, it is not called again, and time stands still at its latest reading.
+pub(super) struct EngineClock {
+    call: Box<dyn Fn() -> Duration + Send + Sync>,
+    /// The mark of the latest reading of any thread. Relaxed: it hands nothing over, and any recent reading will do.
+    latest: AtomicU64,
+    panic: OnceLock<JobPanic>,
+}
+
+impl EngineClock {
+    pub(super) fn new(call: Box<dyn Fn() -> Duration + Send + Sync>) -> Self {
+        Self { call, latest: AtomicU64::new(0), panic: OnceLock::new() }
+    }
+
+    fn read(&self) -> u64 {
+        if self.panic.get().is_none() {
+            match catch(&self.call) {
+                Ok(time) => {
+                    let mark = nanoseconds(time);
+                    self.latest.store(mark, Ordering::Relaxed);
+                    return mark;
+                }
+                Err(panic) => self.stop(panic),
+            }
+        }
+        self.latest.load(Ordering::Relaxed)
+    }
+
+    #[cold]
+    fn stop(&self, panic: JobPanic) {
+        let message = panic.message.clone();
+        // Of several threads whose readings panic at once, the first is reported.
+        if self.panic.set(panic).is_ok() {
+            report(|| tracing::error!(message = %message, "the timeline's clock panicked, and time stands still"));
+        }
+    }
+}
+
 impl Moment {
     /// In some tries, nobody comes between the two readings at least once.
     const TRIES: usize = 8;
@@ -107,7 +157,7 @@ impl Moment {
 pub(super) enum Reader<'clock> {
     Counter { built: u64 },
     System { built: Instant },
-    Other(&'clock (dyn Fn() -> Duration + Send + Sync)),
+    Engine(&'clock EngineClock),
 }
 
 impl Reader<'_> {
@@ -126,7 +176,7 @@ impl Reader<'_> {
         match self {
             Self::Counter { built } => ticks::read_in_order().saturating_sub(built),
             Self::System { built } => nanoseconds(built.elapsed()),
-            Self::Other(clock) => nanoseconds(clock()),
+            Self::Engine(clock) => clock.read(),
         }
     }
 }
@@ -142,11 +192,15 @@ fn nanoseconds(time: Duration) -> u64 {
 #[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
 mod tests {
     use std::{
+        sync::{
+            Arc,
+            atomic::{AtomicU64, Ordering},
+        },
         thread,
         time::{Duration, Instant},
     };
 
-    use super::Clock;
+    use super::{Clock, EngineClock};
 
     #[test]
     fn the_machines_clock_keeps_the_systems_time() {
@@ -172,8 +226,24 @@ mod tests {
 
     #[test]
     fn an_engines_clock_is_taken_as_it_is() {
-        let clock = Clock::Other(Box::new(|| Duration::new(3, 7)));
+        let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::new(3, 7))));
         assert_eq!(clock.now(), Duration::new(3, 7));
         assert_eq!(clock.reader().read(), 3_000_000_007);
+        assert_eq!(clock.panic_message(), None);
+    }
+
+    #[test]
+    fn a_clock_that_panics_stands_still_and_is_not_called_again() {
+        let calls = Arc::new(AtomicU64::new(0));
+        let clock = Clock::Engine(EngineClock::new(Box::new({
+            let calls = Arc::clone(&calls);
+            move || match calls.fetch_add(1, Ordering::Relaxed) {
+                0 => Duration::from_secs(5),
+                _ => panic!("as planned"),
+            }
+        })));
+        assert_eq!([(); 4].map(|()| clock.now()), [Duration::from_secs(5); 4]);
+        assert_eq!(clock.panic_message(), Some("as planned"));
+        assert_eq!(calls.load(Ordering::Relaxed), 2);
     }
 }

@@ -131,6 +131,8 @@ pub(crate) struct Lap<'run> {
     /// When the last chunk ended.
     since: u64,
     tag: u64,
+    /// How many chunks of the run there was no room for, on all workers.
+    dropped: &'run AtomicU64,
 }
 
 impl<'run> Lap<'run> {
@@ -142,11 +144,12 @@ impl<'run> Lap<'run> {
         [run, process]: [u32; 2],
         stolen: bool,
         opened: Option<u64>,
+        dropped: &'run AtomicU64,
     ) -> Self {
         let since = reader.in_order();
         let tag = if stolen { STOLEN_CHUNK } else { CHUNK };
         let run_and_process = u64::from(run) << 32 | u64::from(process);
-        Self { lane, reader, run_and_process, opened: opened.unwrap_or(since), since, tag }
+        Self { lane, reader, run_and_process, opened: opened.unwrap_or(since), since, tag, dropped }
     }
 
     /// When the process was opened.
@@ -177,7 +180,11 @@ impl<'run> Lap<'run> {
         // A reading out of order may be of a moment before the last one.
         let now = self.reader.read().max(self.since);
         let (start, length) = (items.start as u64, items.len() as u64);
-        self.lane.ring.push([self.run_and_process, start, length, self.opened << TAGS | tag, self.since, now]);
+        let event = [self.run_and_process, start, length, self.opened << TAGS | tag, self.since, now];
+        if !self.lane.ring.push(event) {
+            // Relaxed: whoever reads the count has come after the end of the run.
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
         self.since = now;
     }
 }

@@ -22,6 +22,9 @@ pub struct Log {
     pub device: Option<DeviceLog>,
     /// How many frames, runs, spans and readings there was no room for.
     pub dropped: u64,
+    /// What the engine's [clock](crate::task::SchedulerBuilder::timeline_clock) said when it panicked, if it did. All times after
+    /// that are its latest reading.
+    pub clock_panic: Option<String>,
 }
 
 /// What has been recorded of a worker, beside the chunks it ran.

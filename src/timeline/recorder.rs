@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     fmt,
     marker::PhantomData,
     sync::{Arc, OnceLock},
@@ -15,7 +15,7 @@ use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
 use super::{
     book::{Book, Kept, Marks, frames_of},
-    clock::{Clock, Reader},
+    clock::{Clock, EngineClock, Reader},
     lane::{Entry, Lane, Lap},
     log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog},
 };
@@ -64,7 +64,7 @@ impl Timeline {
         Self {
             is_on: AtomicBool::new(false),
             started: AtomicU64::new(0),
-            clock: setup.clock.map_or_else(Clock::of_this_machine, Clock::Other),
+            clock: setup.clock.map_or_else(Clock::of_this_machine, |clock| Clock::Engine(EngineClock::new(clock))),
             lanes: names.iter().map(|_| CachePadded::new(Lane::new(capacity))).collect(),
             taker: Mutex::new(names.iter().map(|_| Duration::ZERO).collect()),
             names: names.into(),
@@ -158,18 +158,17 @@ impl Timeline {
         let Kept { frames, runs, spans, counters, threads, dropped } = self.book.lock().take();
         let mut log = Log { spans, counters, threads, dropped, ..Log::default() };
         let mut places = HashMap::with_capacity(runs.len());
+        let mut too_early = HashSet::new();
         for (number, run) in runs {
             places.insert(number, log.runs.len());
             log.runs.push(run);
         }
         for (worker, lane) in self.lanes.iter().enumerate() {
-            let (drained, until) = self.drain(worker, lane, &mut told[worker], &places, &mut log.runs);
-            if let Some(until) = until {
-                log.runs.iter_mut().filter(|run| run.ended >= until).for_each(|run| run.complete = false);
-            }
+            let drained = self.drain(worker, lane, &mut told[worker], &places, &mut log.runs, &mut too_early);
             log.workers.push(drained);
         }
-        self.book.lock().cut_open_runs();
+        self.book.lock().lose_chunks_of(&too_early);
+        log.clock_panic = self.clock.panic_message().map(str::to_owned);
         for run in &mut log.runs {
             run.chunks.sort_unstable_by_key(|chunk| (chunk.process, chunk.items.start));
             run.empty.sort_unstable_by_key(|chunk| chunk.process);
@@ -178,8 +177,8 @@ impl Timeline {
         log
     }
 
-    /// Takes out what one worker has written, and its idle times from where the last log ended. If something was
-    /// dropped, also says until when everything is there.
+    /// Takes out what one worker has written, and its idle times from where the last log ended. Chunks of a run that has no
+    /// place are lost, and its number goes to those that were taken out too early.
     fn drain(
         &self,
         worker: usize,
@@ -187,12 +186,16 @@ impl Timeline {
         told: &mut Duration,
         places: &HashMap<u32, usize>,
         runs: &mut [Run],
-    ) -> (WorkerLog, Option<Duration>) {
+        too_early: &mut HashSet<u32>,
+    ) -> WorkerLog {
         let mut log = WorkerLog { name: self.names[worker].clone(), ..WorkerLog::default() };
         let (mut until, mut lost) = (Duration::ZERO, 0);
         let mut put = |run: u32, chunk: Chunk, list: fn(&mut Run) -> &mut Vec<Chunk>| match places.get(&run) {
             Some(&place) => list(&mut runs[place]).push(chunk),
-            None => lost += 1,
+            None => {
+                lost += 1;
+                too_early.insert(run);
+            }
         };
         // Who fell asleep while nothing was recorded has not said when.
         let started = self.clock.time(self.started.load(Ordering::Relaxed));
@@ -222,7 +225,7 @@ impl Timeline {
         *told = until.max(now.map_or(*told, |now| now.ended));
         log.idle.extend(now);
         log.dropped = dropped + lost;
-        (log, (dropped > 0).then_some(until))
+        log
     }
 
     /// A frame begins, unless the engine marks its own. Says which it is; `None` if nothing is recorded.
@@ -250,6 +253,8 @@ impl Timeline {
                 began,
                 in_background,
                 shared_from: OnceLock::new(),
+                dropped: AtomicU64::new(0),
+                how: Ended { failed: true, ..Ended::default() },
             }
         })
     }
@@ -314,11 +319,14 @@ pub(crate) struct OpenRun<'timeline> {
     began: Duration,
     in_background: bool,
     shared_from: OnceLock<Duration>,
+    /// How many of its chunks there was no room for.
+    dropped: AtomicU64,
+    how: Ended,
 }
 
 /// How a run has ended.
+#[derive(Default)]
 pub(crate) struct Ended {
-    pub(crate) workers: usize,
     pub(crate) always_shares: bool,
     pub(crate) failed: bool,
 }
@@ -343,31 +351,33 @@ impl OpenRun<'_> {
 
     #[inline]
     fn lap(&self, worker: usize, process: u32, stolen: bool, opened: Option<u64>) -> Lap<'_> {
-        Lap::new(&self.timeline.lanes[worker], self.reader, [self.number, process], stolen, opened)
+        Lap::new(&self.timeline.lanes[worker], self.reader, [self.number, process], stolen, opened, &self.dropped)
     }
 
-    /// The run has ended.
-    pub(crate) fn end(self, how: Ended) {
-        let Self { timeline, number, frame, graph, began, in_background, shared_from, .. } = self;
-        let Ended { workers, always_shares, failed } = how;
-        let ended = timeline.now();
-        let shared_from = shared_from.into_inner();
-        let (chunks, empty) = (Vec::new(), Vec::new());
-        let complete = true;
+    /// The run has ended. One that is dropped without this, as a panic passes through it, has failed.
+    pub(crate) fn end(mut self, how: Ended) {
+        self.how = how;
+    }
+}
+
+impl Drop for OpenRun<'_> {
+    fn drop(&mut self) {
+        let Ended { always_shares, failed } = self.how;
         let run = Run {
-            frame,
-            graph,
-            workers,
-            began,
-            ended,
-            shared_from,
+            frame: self.frame,
+            graph: Arc::clone(&self.graph),
+            workers: self.timeline.lanes.len(),
+            began: self.began,
+            ended: self.timeline.now(),
+            shared_from: self.shared_from.take(),
             always_shares,
-            in_background,
+            in_background: self.in_background,
             failed,
-            complete,
-            chunks,
-            empty,
+            // Relaxed: all who count are done.
+            complete: self.dropped.load(Ordering::Relaxed) == 0,
+            chunks: Vec::new(),
+            empty: Vec::new(),
         };
-        timeline.book.lock().end_run(number, run);
+        self.timeline.book.lock().end_run(self.number, run);
     }
 }

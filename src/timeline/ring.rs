@@ -54,18 +54,22 @@ impl Ring {
         self.words.get().map_or(0, |words| size_of_val(&**words))
     }
 
-    /// Writes an event, if there is room. One thread at a time may do so, each after the one before.
+    /// Writes an event, and says whether there was room. One thread at a time may do so, each after the one before.
     #[inline]
-    pub(super) fn push(&self, event: Event) {
+    pub(super) fn push(&self, event: Event) -> bool {
         // Relaxed: it is the writer's own.
         let written = self.written.load(Ordering::Relaxed);
         let room = self.capacity - written.wrapping_sub(self.taken.load(Ordering::Acquire));
-        let Some(words) = self.words.get().filter(|_| room > 0) else { return self.drop_one() };
+        let Some(words) = self.words.get().filter(|_| room > 0) else {
+            self.drop_one();
+            return false;
+        };
         let start = (written & (self.capacity - 1)) * WORDS;
         for (word, value) in words[start..start + WORDS].iter().zip(event) {
             word.store(value, Ordering::Relaxed);
         }
         self.written.store(written.wrapping_add(1), Ordering::Release);
+        true
     }
 
     /// Takes out all events that are there, the oldest first, and says how many were dropped since the last time. One thread at
@@ -115,7 +119,7 @@ mod tests {
         let ring = Ring::new(4);
         ring.make_room();
         for round in 0..10 {
-            (0..3).for_each(|step| ring.push(event(round * 3 + step)));
+            assert!((0..3).all(|step| ring.push(event(round * 3 + step))));
             assert_eq!(numbers(&ring), ((round * 3..round * 3 + 3).collect(), 0));
         }
     }
@@ -123,12 +127,12 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_dropped_and_counted_once() {
         let ring = Ring::new(3);
-        ring.push(event(7));
+        assert!(!ring.push(event(7)));
         assert_eq!(numbers(&ring), (vec![], 1), "there is no memory yet");
         ring.make_room();
-        (0..10).for_each(|number| ring.push(event(number)));
+        assert_eq!((0..10).filter(|&number| ring.push(event(number))).count(), 4);
         assert_eq!(numbers(&ring), (vec![0, 1, 2, 3], 6));
-        ring.push(event(10));
+        assert!(ring.push(event(10)));
         assert_eq!(numbers(&ring), (vec![10], 0));
     }
 }
@@ -138,7 +142,7 @@ mod loom_tests {
     use loom::{model, thread};
 
     use super::{Event, Ring, WORDS};
-    use crate::sync::Arc;
+    use crate::sync::{Arc, Mutex};
 
     fn event(number: u64) -> Event {
         [number; WORDS]
@@ -151,15 +155,51 @@ mod loom_tests {
             ring.make_room();
             let writer = {
                 let ring = Arc::clone(&ring);
-                thread::spawn(move || (1..4).for_each(|number| ring.push(event(number))))
+                thread::spawn(move || (1..4).filter(|&number| !ring.push(event(number))).count() as u64)
             };
             let mut taken = Vec::new();
             let early = ring.drain(|event| taken.push(event));
-            writer.join().unwrap();
+            let refused = writer.join().unwrap();
             let late = ring.drain(|event| taken.push(event));
             assert!(taken.iter().all(|words| *words == event(words[0])), "torn: {taken:?}");
             assert!(taken.is_sorted_by_key(|words| words[0]));
             assert_eq!(taken.len() as u64 + early + late, 3);
+            assert_eq!(early + late, refused, "the reader and the writer count the same");
+        });
+    }
+
+    /// The ring of worker 0 is written by whichever thread calls the scheduler: one after another, handed on with the lock of the
+    /// caller's slot, while some thread takes events out.
+    #[test]
+    fn one_thread_goes_on_where_another_stopped_writing() {
+        model(|| {
+            let ring = Arc::new(Ring::new(2));
+            ring.make_room();
+            let turn = Arc::new(Mutex::new(0));
+            let write = |number: u64| {
+                let (ring, turn) = (Arc::clone(&ring), Arc::clone(&turn));
+                move || {
+                    let mut written = turn.lock();
+                    ring.push(event(number));
+                    *written += 1;
+                }
+            };
+            let other = thread::spawn(write(1));
+            let reader = thread::spawn({
+                let ring = Arc::clone(&ring);
+                move || {
+                    let mut taken = Vec::new();
+                    let dropped = ring.drain(|event| taken.push(event));
+                    (taken, dropped)
+                }
+            });
+            write(2)();
+            other.join().unwrap();
+            let (mut taken, mut dropped) = reader.join().unwrap();
+            dropped += ring.drain(|event| taken.push(event));
+            assert_eq!((*turn.lock(), dropped), (2, 0));
+            taken.sort_unstable();
+            assert_eq!(taken, [event(1), event(2)], "none is lost, torn or written over");
         });
     }
 }

@@ -3,7 +3,11 @@
 use std::{
     hint::black_box,
     ops::Range,
-    sync::{Arc, Barrier, LazyLock, Mutex, mpsc},
+    sync::{
+        Arc, Barrier, LazyLock, Mutex,
+        atomic::{AtomicU64, Ordering},
+        mpsc,
+    },
     thread,
     time::Duration,
 };
@@ -197,6 +201,23 @@ fn what_there_is_no_room_for_is_counted_and_the_run_is_not_complete() {
     // There is room again.
     schedule.run(&scheduler, &Call { chunk: 4, fails: false }).unwrap();
     check(&scheduler.timeline().take(), &schedule, 4, 1);
+}
+
+#[test]
+fn a_run_that_lost_chunks_is_not_complete_even_if_the_clock_goes_back() {
+    let clock = {
+        let now = AtomicU64::new(1_000_000);
+        move || Duration::from_micros(now.fetch_sub(1, Ordering::Relaxed))
+    };
+    let scheduler = Scheduler::builder().workers(1).timeline_capacity(64).timeline_clock(clock).build().unwrap();
+    let mut schedule = one_process(Busy { width: 100, pinned: false });
+    scheduler.timeline().start();
+    for chunk in [4, 1, 4] {
+        schedule.run(&scheduler, &Call { chunk, fails: false }).unwrap();
+    }
+    let log = scheduler.timeline().take();
+    assert_eq!(log.runs.iter().map(|run| run.chunks.len()).collect::<Vec<_>>(), [25, 39, 0]);
+    assert_eq!(log.runs.iter().map(|run| run.complete).collect::<Vec<_>>(), [true, false, false]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The job system from outside: what an embedder can rely on, against plain loops and counts.
 
 mod background;
+mod callbacks;
 mod helping;
 mod panics;
 mod pools;
@@ -354,6 +355,30 @@ fn a_dropped_scheduler_leaves_no_thread() {
     let intact = scheduler(workers);
     assert_intact(&intact);
     assert_eq!(threads_named(last), 1);
+}
+
+/// Far more than could run in time if each had to be looked for among all others.
+#[test]
+fn any_number_of_pinned_jobs_is_run() {
+    const JOBS: usize = if cfg!(debug_assertions) { 200_000 } else { 1_000_000 };
+    waits::ends(|| {
+        for workers in [1, 2] {
+            let scheduler = scheduler(workers);
+            let ran = AtomicUsize::new(0);
+            let outcome = scheduler.scope(|outer| {
+                // Those of an outer scope wait meanwhile.
+                (0..JOBS)
+                    .for_each(|_job| outer.spawn_pinned(|_scope, _worker| _ = ran.fetch_add(1, Ordering::Relaxed)));
+                let inner = scheduler.scope(|inner| {
+                    for _job in 0..JOBS {
+                        inner.spawn_pinned(|_scope, _worker| _ = ran.fetch_add(1, Ordering::Relaxed));
+                    }
+                });
+                assert_eq!((inner, ran.load(Ordering::Relaxed)), (Ok(()), JOBS));
+            });
+            assert_eq!((outcome, ran.into_inner()), (Ok(()), 2 * JOBS));
+        }
+    });
 }
 
 #[test]

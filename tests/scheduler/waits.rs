@@ -15,7 +15,7 @@ use std::{
 use drawloom::task::{BackgroundJob, Scheduler};
 
 /// Runs `body` on a thread of its own, and fails if it does not end in a time that is long for the slowest machine.
-fn ends(body: impl FnOnce() + Send + 'static) {
+pub fn ends(body: impl FnOnce() + Send + 'static) {
     let (done, is_done) = mpsc::channel();
     let thread = thread::spawn(move || {
         body();
@@ -128,6 +128,81 @@ fn a_lock_may_be_held_over_a_wait() {
                         has_helped.raise();
                     });
                     has_helped.wait();
+                });
+                assert_eq!(outcome, Ok(()));
+            });
+            is_held.wait();
+        });
+        assert_eq!(outcome, Ok(()));
+    });
+}
+
+/// A worker has one of a background job's jobs left, and begins a job of a frame that waits for a scope. A job of that scope
+/// waits for the background job. The owner of the background job's scope finds its job wherever it lies.
+#[test]
+fn who_has_helped_a_background_job_may_wait_for_who_waits_for_it() {
+    ends(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let [helped, may_spawn, has_spawned] = [(); 3].map(|()| Arc::new(Flag::default()));
+        let background = scheduler.background({
+            let flags = [&helped, &may_spawn, &has_spawned].map(Arc::clone);
+            let scheduler = Arc::clone(&scheduler);
+            move || {
+                let [helped, may_spawn, has_spawned] = &flags;
+                let outcome = scheduler.scope(|scope| {
+                    scope.spawn(move |scope, _worker| {
+                        helped.raise();
+                        may_spawn.wait();
+                        scope.spawn(|_scope, _worker| ());
+                        has_spawned.raise();
+                    });
+                    has_spawned.wait();
+                });
+                assert_eq!(outcome, Ok(()));
+            }
+        });
+        helped.wait();
+        let [begins, waits] = &[(); 2].map(|()| Flag::default());
+        let frame = &*scheduler;
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(move |_scope, _worker| {
+                let outcome = frame.scope(|inner| {
+                    inner.spawn(move |_inner, _worker| {
+                        waits.raise();
+                        assert_eq!(background.wait(), Ok(()));
+                    });
+                    begins.raise();
+                    waits.wait();
+                });
+                assert_eq!(outcome, Ok(()));
+            });
+            // The third worker is in the background job, so the one that has helped with it begins this job.
+            may_spawn.raise();
+            begins.wait();
+        });
+        assert_eq!(outcome, Ok(()));
+    });
+}
+
+/// A job holds a lock while it waits for a scope of its own. A worker that has helped with that scope has spawned another job
+/// into it, and goes on to a job that wants the lock, which it finds first.
+#[test]
+fn what_is_spawned_into_a_scope_is_not_behind_what_a_worker_does_next() {
+    ends(|| {
+        let scheduler = &Scheduler::new(2).unwrap();
+        let lock = &Mutex::new(());
+        let [is_held, has_spawned] = &[(); 2].map(|()| Flag::default());
+        let outcome = scheduler.scope(|outer| {
+            outer.spawn(move |outer, _worker| {
+                let _guard = lock.lock().unwrap();
+                is_held.raise();
+                let outcome = scheduler.scope(|inner| {
+                    inner.spawn(move |inner, _worker| {
+                        inner.spawn(|_inner, _worker| ());
+                        outer.spawn(move |_outer, _worker| drop(lock.lock().unwrap()));
+                        has_spawned.raise();
+                    });
+                    has_spawned.wait();
                 });
                 assert_eq!(outcome, Ok(()));
             });

@@ -1,13 +1,15 @@
 //! Processes that fail, and subscribers that panic: nothing hangs, nothing stays entered, and the next run is as good as new.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
+use std::sync::{Arc, Barrier};
+use std::thread;
 
+use drawloom::task::Scheduler;
 use proptest::prelude::*;
 use tracing::level_filters::LevelFilter;
 use tracing::span::{Attributes, Id};
-use tracing::{Subscriber, dispatcher};
+use tracing::{Event, Subscriber, dispatcher};
 use tracing_subscriber::layer::{Context, Layer};
 use tracing_subscriber::registry::LookupSpan;
 
@@ -62,7 +64,8 @@ proptest! {
                             if !panicked && [MoveKind::Exit, MoveKind::Close].contains(&kind) {
                                 record.check_nesting();
                             }
-                            assert_eq!(matches!(outcome, Ok(Ok(()))), !panicked, "{kind:?}: {outcome:?}");
+                            let outcome = outcome.expect("no panic reaches the caller");
+                            assert_eq!(outcome.is_ok(), !panicked, "{kind:?}: {outcome:?}");
                             let done: usize = call.book.into_inner().unwrap().iter().map(|entry| entry.items.len()).sum();
                             let all: usize = schedule.processes().map(|(_, work)| work.width).sum();
                             assert!(panicked || done == all, "{done} items of {all}");
@@ -106,4 +109,40 @@ where
     fn on_close(&self, _id: Id, _context: Context<'_, S>) {
         self.hear(MoveKind::Close);
     }
+}
+
+/// Panics at every event.
+struct Objects {
+    told: Arc<AtomicIsize>,
+}
+
+impl<S: Subscriber> Layer<S> for Objects {
+    fn on_event(&self, _event: &Event<'_>, _context: Context<'_, S>) {
+        self.told.fetch_add(1, Ordering::Relaxed);
+        panic!("as planned");
+    }
+}
+
+#[test]
+fn a_subscriber_that_panics_at_a_report_kills_no_worker() {
+    const JOBS: isize = 8;
+    const WORKERS: usize = 4;
+    let told = Arc::new(AtomicIsize::new(0));
+    let dispatch = subscriber(Objects { told: Arc::clone(&told) }, LevelFilter::TRACE);
+    dispatcher::with_default(&dispatch, || {
+        let builder = Scheduler::builder().workers(WORKERS);
+        let scheduler = scheduler(builder.on_stop(|_worker| panic!("as planned")), &dispatch);
+        // Nobody waits for these: whoever is the last to have one, its worker or this thread, reports it.
+        (0..JOBS).for_each(|_job| drop(scheduler.background(|| panic!("as planned"))));
+        while told.load(Ordering::Relaxed) < JOBS {
+            thread::yield_now();
+        }
+        // Only that many workers together can pass this.
+        let together = Barrier::new(WORKERS);
+        let outcome = scheduler.parallel_for(WORKERS, 1, |_range, _worker| _ = together.wait());
+        assert_eq!(outcome, Ok(()));
+        // Each thread reports its last hook.
+        drop(scheduler);
+        assert_eq!(told.load(Ordering::Relaxed), JOBS + WORKERS as isize - 1);
+    });
 }

@@ -69,7 +69,7 @@ impl Room {
     /// What the owner of a region does that runs no jobs.
     fn wait(&self, worker: usize) {
         while !self.latch.is_released() {
-            self.sleep.sleep(worker, WakeFor::ItsOwn, false, || self.latch.is_released());
+            self.sleep.sleep(worker, WakeFor::Region { level: 0 }, false, || self.latch.is_released());
         }
     }
 
