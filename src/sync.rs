@@ -1,7 +1,7 @@
 //! The primitives that threads meet in, behind one switch.
 //!
-//! Everything in the crate that blocks, counts or hands work over takes its atomics, locks, threads and deques from
-//! here. Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with
+//! Everything in `task`, `graph` and `timeline` that blocks, counts or hands work over takes its atomics, locks, threads and
+//! deques from here. Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with
 //! `--cfg drawloom_loom` they are those of loom, a model checker that walks through all interleavings of a few threads and
 //! knows what each memory ordering leaves open; with `--cfg drawloom_shuttle` they are those of shuttle, which tries
 //! interleavings at random, in one total order, and so copes with whole runs. The tests for either stand beside the code.

@@ -51,7 +51,7 @@ impl<T> Subdivisions<T> {
 
     /// Begins a frame: drops what no frame has drawn for long.
     pub(super) fn begin(&self, assets: &Assets) {
-        // Frames begin one after the other, so nothing is ordered by these.
+        // Relaxed, here and below: frames begin one after the other, and the end of a frame's run orders what its jobs stored.
         let frame = self.frame.fetch_add(1, Ordering::Relaxed) + 1;
         let identity = assets.meshes.identity();
         let same_assets = self.assets.swap(identity, Ordering::Relaxed) == identity;

@@ -4,8 +4,10 @@
 
 use std::{iter, ops::Range, panic::resume_unwind, sync::Arc, time::Duration};
 
+use tracing::{Dispatch, Event, Metadata, Subscriber, dispatcher, span};
+
 use crate::{
-    sync::{AtomicUsize, Ordering, check},
+    sync::{AtomicUsize, Ordering, check, thread},
     task::{Scheduler, SchedulerBuilder, Worker},
 };
 
@@ -243,4 +245,103 @@ fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
             });
         }
     }
+}
+
+/// A subscriber that panics when it is told for the how-manieth time that a span is entered, and never where that is 0. All
+/// threads of a model are one of the system's, so all of them tell it.
+struct Objects {
+    left: std::sync::atomic::AtomicUsize,
+}
+
+impl Subscriber for Objects {
+    fn enabled(&self, _metadata: &Metadata<'_>) -> bool {
+        true
+    }
+
+    fn new_span(&self, _attributes: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+
+    fn record(&self, _span: &span::Id, _values: &span::Record<'_>) {}
+
+    fn record_follows_from(&self, _span: &span::Id, _follows: &span::Id) {}
+
+    fn event(&self, _event: &Event<'_>) {}
+
+    fn enter(&self, _span: &span::Id) {
+        let count_down = |left: usize| left.checked_sub(1);
+        if self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count_down) == Ok(1) {
+            resume_unwind(Box::new("as planned"));
+        }
+    }
+
+    fn exit(&self, _span: &span::Id) {}
+}
+
+#[test]
+fn shuttle_a_panic_between_processes_fails_the_run_and_the_next_frame_is_whole() {
+    use Kind::{Pinned, Plain};
+    let objects = Arc::new(Objects { left: std::sync::atomic::AtomicUsize::new(0) });
+    let dispatch = Dispatch::from(Arc::clone(&objects));
+    for (workers, always_share) in [(2, true), (3, true), (2, false)] {
+        let (objects, dispatch) = (Arc::clone(&objects), dispatch.clone());
+        let at = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+        check(move || {
+            let list: [(usize, Kind, &[usize]); 5] =
+                [(2, Plain, &[]), (3, Plain, &[0]), (1, Pinned, &[0]), (0, Plain, &[1]), (1, Plain, &[2, 3])];
+            let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
+            let mut schedule = schedule(&processes(&list));
+            schedule.always_share(always_share);
+            dispatcher::with_default(&dispatch, || {
+                objects.left.store(1 + at.fetch_add(1, Ordering::Relaxed) % 12, Ordering::Relaxed);
+                let (outcome, ran) = run_frame(&mut schedule, &scheduler, false);
+                let panicked = objects.left.swap(0, Ordering::Relaxed) == 0;
+                assert_eq!(outcome.is_err(), panicked, "{outcome:?}");
+                assert!(ran.iter().flatten().all(|&times| times <= 1), "{ran:?}");
+                (0..2).for_each(|_frame| run_all(&mut schedule, &scheduler));
+            });
+        });
+    }
+}
+
+#[test]
+fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
+    use Kind::Plain;
+    const WIDTHS: [usize; 3] = [3, 1, 0];
+    check(|| {
+        // Room for less than two runs.
+        let builder = Scheduler::builder().workers(2).wake_price(WAKE_PRICE).timeline_capacity(8);
+        let scheduler = Arc::new(builder.build().unwrap());
+        let looks = thread::spawn({
+            let scheduler = Arc::clone(&scheduler);
+            move || {
+                let timeline = scheduler.timeline();
+                timeline.start();
+                let logs = [(); 2].map(|()| timeline.take());
+                timeline.stop();
+                logs
+            }
+        });
+        let list: [(usize, Kind, &[usize]); 3] =
+            [(WIDTHS[0], Plain, &[]), (WIDTHS[1], Plain, &[0]), (WIDTHS[2], Plain, &[0])];
+        let mut schedule = schedule(&processes(&list));
+        schedule.always_share(true);
+        (0..3).for_each(|_frame| run_all(&mut schedule, &scheduler));
+        let mut logs = Vec::from(looks.join().unwrap());
+        logs.push(scheduler.timeline().take());
+        let (mut runs, mut events, mut dropped) = (0, 0, 0);
+        for log in &logs {
+            dropped += log.all_dropped();
+            for run in &log.runs {
+                runs += 1;
+                events += run.chunks.len() + run.empty.len();
+                if run.complete {
+                    assert_eq!([0, 1, 2].map(|process| run.width(process)), WIDTHS);
+                    assert_eq!(run.empty.len(), 1);
+                }
+            }
+        }
+        // Four chunks a run, and one process without any. Idle times are dropped too.
+        assert!(events + dropped as usize >= 5 * runs, "{events} events of {runs} runs, and {dropped} dropped");
+    });
 }

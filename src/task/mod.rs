@@ -110,18 +110,61 @@
 //! With one worker and a [seed](SchedulerBuilder::shuffle) all jobs run on one thread in an order that the seed decides, the
 //! same every time; with several workers and a seed, results that depend on an order show themselves.
 //!
-//! # Panics in jobs
+//! # Panics
 //!
 //! The panic of a job, of a loop's body or of a scope's is caught. It harms no worker, and the call returns it as a
 //! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the
 //! process ends on the spot, and no error names anything.
 //!
-//! # Who helps whom
+//! Everything else that an engine supplies may panic too. Hooks that name, place or start threads fail the
+//! [build](SchedulerBuilder::build); the hook that stops a thread is reported to [`tracing`]; a
+//! [clock](SchedulerBuilder::timeline_clock) stands still; a subscriber of `tracing` loses the event, or fails the run in whose
+//! spans it panicked.
 //!
-//! A thread that calls the scheduler from outside runs whatever there is to run until its call returns. A job that waits, for
-//! a scope, a loop or a graph of its own, runs jobs of that meanwhile, on top of its stack, and nothing else: it is late
-//! by no work but its own, and finds nothing borrowed that it had not borrowed itself. Jobs that open scopes in which jobs open
-//! scopes, without bound, need a stack without bound, as any recursion does.
+//! # What waiting means
+//!
+//! A thread that calls the scheduler from outside runs whatever there is to run of a frame until its call returns. A job that
+//! waits, for a scope, a loop or a graph of its own, runs jobs of that meanwhile, on top of its stack, and nothing else: it is
+//! late by no work but its own, and finds nothing borrowed that it had not borrowed itself. Jobs that open scopes in which jobs
+//! open scopes, without bound, need a stack without bound, as any recursion does.
+//!
+//! No thread keeps a job to itself that another one waits for: who waits for a scope, a loop or a graph finds each of its jobs
+//! that has not begun. So a program waits for ever only if a *running* job waits, by way of other running jobs, for itself. The
+//! ways to bring that about:
+//!
+//! - A job waits for a background job that waits for what the first job is part of.
+//! - A job holds a lock, and waits for a scope one of whose jobs wants the lock.
+//! - A job waits for a thread that calls the same scheduler from outside, or two threads call two schedulers crosswise
+//!   ([`Scheduler`] says when).
+//! - Jobs that are ready wait for each other to run at the same time: one thread may have both.
+//! - A job calls [`Scheduler::run_background`], which runs whatever is the oldest background job on top of it, and that
+//!   waits for what the first job is part of.
+//!
+//! # Which calls may block
+//!
+//! | call | blocks until | meanwhile, the thread |
+//! | --- | --- | --- |
+//! | [`Scheduler::scope`], [`Scheduler::parallel_for`], [`Schedule::run`](crate::graph::Schedule::run), from outside | calls of other threads from outside have returned | sleeps |
+//! | | all jobs of the call have run | runs jobs of the frame, sleeps if there is none |
+//! | the same in a job | all jobs of the call have run | runs jobs of the call, sleeps if there is none |
+//! | [`BackgroundJob::wait`] | the job has run | runs that job if nobody has begun it, and otherwise sleeps |
+//! | [`Scheduler::run_background`] | the last job that was begun in time has run | runs background jobs |
+//! | dropping a [`Scheduler`] | its threads have ended: until the jobs that they are at have run | sleeps |
+//! | [`Timeline::start`](crate::timeline::Timeline::start) for the first time | the scheduler is 10 ms old | sleeps |
+//!
+//! [`Scope::spawn`], [`Scope::spawn_pinned`], [`Scheduler::background`] and all else return at once.
+//!
+//! # What costs more than linear
+//!
+//! Jobs of all kinds cost the same however many there are, and so do levels of nesting, but for this:
+//!
+//! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all that lie in a queue: time grows with their square.
+//! - A worker that finds nothing in its own queues looks into those of all others, so an idle moment costs time that grows
+//!   with the number of workers.
+//! - A [graph](crate::graph::FrameGraph::compile) compiles in time that grows with its nodes and the accesses of resources. But
+//!   readers of a resource that are put before some of its makers have an edge for each of the makers before them.
+//! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out what follows from other edges, in time that grows with the
+//!   product of nodes and edges.
 //!
 //! # What it costs
 //!

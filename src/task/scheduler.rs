@@ -163,6 +163,9 @@ impl Scheduler {
     /// Runs background jobs on the calling thread, the oldest first, and says how many. It begins none when `budget` has
     /// passed, so it returns late by the length of a job at most. While another thread from outside is being served it
     /// runs none.
+    ///
+    /// The place for it is between two frames. In a job it runs background jobs on top of that job, as if that had called
+    /// them: they must not wait for what that job is part of.
     pub fn run_background(&self, budget: Duration) -> usize {
         let start = Instant::now();
         let work = |worker: &Worker| worker.work_in_background(|| start.elapsed() >= budget);
@@ -330,8 +333,8 @@ impl Shared {
         self.is_shuffled
     }
 
-    // The rest are hints and a flag that hand nothing over, so relaxed is enough; that sleepers see the flag is up to the
-    // fences of `Sleep`.
+    // The rest are hints and a flag that hand nothing over, so relaxed is enough. That sleepers see the flag is up to the lock
+    // that `Sleep::wake_all` takes.
 
     pub(super) fn wake_price(&self) -> Duration {
         Duration::from_nanos(self.wake_price.load(Ordering::Relaxed) as u64)

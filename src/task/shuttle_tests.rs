@@ -3,7 +3,7 @@
 //! What is asserted is that all is run, once, and where it may be. That nobody sleeps through it is asserted by shuttle: a
 //! call that never returns leaves all threads asleep, which it takes for a failure.
 
-use std::{iter, panic::resume_unwind, sync::Arc};
+use std::{iter, panic::resume_unwind, sync::Arc, time::Duration};
 
 use crate::sync::{AtomicUsize, Ordering, check, thread};
 
@@ -237,5 +237,124 @@ fn shuttle_a_scheduler_ends_whatever_its_workers_are_at() {
         assert_eq!(jobs.map(|job| job.wait()), [Ok(()), Ok(())]);
         assert!(before <= 2);
         assert_eq!(ran.load(Ordering::Relaxed), 2, "each has run once, before the end or when it was waited for");
+    });
+}
+
+/// One of the background job's jobs spawns another one and goes on to a frame's job, which waits for a scope; a job of that waits
+/// for the background job. So none of the three may keep a job from who waits for it.
+#[test]
+fn shuttle_a_frames_nested_job_waits_for_a_background_job() {
+    check(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let background = scheduler.background({
+            let scheduler = Arc::clone(&scheduler);
+            move || {
+                let ran = counters(4);
+                let outcome = scheduler.scope(|scope| {
+                    for jobs in ran.chunks(2) {
+                        scope.spawn(move |scope, _worker| {
+                            scope.spawn(move |_scope, _worker| count(&jobs[1]));
+                            count(&jobs[0]);
+                        });
+                    }
+                });
+                outcome.map(|()| counts(&ran))
+            }
+        });
+        let (frame, ran) = (&*scheduler, AtomicUsize::new(0));
+        let outcome = frame.scope(|scope| {
+            scope.spawn(|_scope, _worker| {
+                let inner = frame.scope(|inner| {
+                    inner.spawn(|_inner, _worker| assert_eq!(background.wait(), Ok(Ok(vec![1; 4]))));
+                });
+                assert_eq!(inner, Ok(()));
+                count(&ran);
+            });
+            scope.spawn(|_scope, _worker| count(&ran));
+        });
+        assert_eq!((outcome, ran.load(Ordering::Relaxed)), (Ok(()), 2));
+    });
+}
+
+/// A thief of an inner scope's job spawns into both scopes, and may then run either.
+#[test]
+fn shuttle_jobs_for_two_scopes_spawned_under_a_nested_wait_all_run() {
+    check_on_schedulers(|scheduler| {
+        let [inner_ran, outer_ran] = [(); 2].map(|()| AtomicUsize::new(0));
+        let (inner_ran, outer_ran) = (&inner_ran, &outer_ran);
+        let outcome = scheduler.scope(|outer| {
+            outer.spawn(move |outer, _worker| {
+                let outcome = scheduler.scope(|inner| {
+                    for _job in 0..2 {
+                        inner.spawn(move |inner, _worker| {
+                            inner.spawn(|_inner, _worker| count(inner_ran));
+                            outer.spawn(|_outer, _worker| count(outer_ran));
+                        });
+                    }
+                });
+                assert_eq!((outcome, inner_ran.load(Ordering::Relaxed)), (Ok(()), 2));
+            });
+        });
+        assert_eq!((outcome, outer_ran.load(Ordering::Relaxed)), (Ok(()), 2));
+    });
+}
+
+#[test]
+fn shuttle_whoever_runs_background_jobs_runs_each_once() {
+    check_on_schedulers(|scheduler| {
+        let ran = Arc::new(AtomicUsize::new(0));
+        let jobs = [(); 3].map(|()| {
+            let ran = Arc::clone(&ran);
+            scheduler.background(move || count(&ran))
+        });
+        let (here, outcomes) = thread::scope(|threads| {
+            let waiting = threads.spawn(|| jobs.map(|job| job.wait()));
+            (scheduler.run_background(Duration::MAX), waiting.join().unwrap())
+        });
+        assert_eq!(outcomes, [const { Ok(()) }; 3]);
+        assert_eq!(ran.load(Ordering::Relaxed), 3);
+        assert!(here <= 3);
+        assert_eq!(scheduler.run_background(Duration::MAX), 0, "what was waited for is not queued any more");
+    });
+}
+
+#[test]
+fn shuttle_a_scope_takes_jobs_from_a_thread_that_is_no_worker() {
+    check_on_schedulers(|scheduler| {
+        let ran = AtomicUsize::new(0);
+        let ran = &ran;
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(move |scope, _worker| {
+                thread::scope(|threads| {
+                    threads.spawn(|| {
+                        scope.spawn(|_scope, _worker| count(ran));
+                        scope.spawn_pinned(|scope, worker| {
+                            assert_eq!(worker.index(), 0);
+                            scope.spawn(|_scope, _worker| count(ran));
+                        });
+                    });
+                });
+            });
+        });
+        assert_eq!((outcome, ran.load(Ordering::Relaxed)), (Ok(()), 2));
+    });
+}
+
+#[test]
+fn shuttle_a_background_job_drops_the_last_share_of_its_scheduler() {
+    check(|| {
+        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let ran = Arc::new(AtomicUsize::new(0));
+        let jobs = [(); 2].map(|()| {
+            let (owned, ran) = (Arc::clone(&scheduler), Arc::clone(&ran));
+            scheduler.background(move || {
+                assert_eq!(owned.parallel_for(2, 1, |_range, _worker| count(&ran)), Ok(()));
+                drop(owned);
+            })
+        });
+        drop(scheduler);
+        // Whoever waits for one that nobody has begun runs it, and may be the one that drops the scheduler.
+        assert_eq!(jobs.map(|job| job.wait()), [const { Ok(()) }; 2]);
+        assert_eq!(ran.load(Ordering::Relaxed), 4);
     });
 }

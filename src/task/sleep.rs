@@ -39,7 +39,9 @@
 //! have to read what X wrote or something later. So W2 comes first, and the look that follows X's fence, S3 or F3, sees
 //! the work. At S3 it becomes a searcher once more, and finds that work or some other, and comes to F3 in the end. At F3 it
 //! wakes a sleeper, unless there is none, or a searcher again, for whom the same holds. A searcher called at W4 is one like
-//! any other, whatever it was called for.
+//! any other, whatever it was called for. X skips F2 and F3 only where another searcher is still counted in. That one is
+//! counted out later than X, so the fence that it passes next comes after W2 as well, and the same holds for it; the last of
+//! them skips nothing.
 //!
 //! *Where work has an owner*, it lies in the owner's mailbox, and W3 and W4 come twice: for the owner, then for others. An
 //! owner that sleeps until this region has work is met as any sleeper is, and called. One that does not sleep so is going to

@@ -102,7 +102,7 @@ impl Machine {
 /// If it panics, it is not called again, and time stands still at its latest reading.
 pub(super) struct EngineClock {
     call: Box<dyn Fn() -> Duration + Send + Sync>,
-    /// The mark of the latest reading of any thread. Relaxed: it hands nothing over, and any recent reading will do.
+    /// The mark of the latest reading of any thread. Relaxed: it hands nothing over.
     latest: AtomicU64,
     panic: OnceLock<JobPanic>,
 }
@@ -117,7 +117,7 @@ impl EngineClock {
             match catch(&self.call) {
                 Ok(time) => {
                     let mark = nanoseconds(time);
-                    self.latest.store(mark, Ordering::Relaxed);
+                    self.latest.fetch_max(mark, Ordering::Relaxed);
                     return mark;
                 }
                 Err(panic) => self.stop(panic),

@@ -51,12 +51,13 @@ impl Lane {
     /// but if it is asleep still when something is, it has been so for all of that time.
     pub(super) fn start_idle(&self, kind: IdleKind, now: Option<u64>) {
         self.end_idle(now);
-        // Relaxed, here and below: it hands nothing over.
-        self.idle.store(now.unwrap_or(0) << TAGS | tag_of(kind), Ordering::Relaxed);
+        // Release: whoever reads it finds the idle time before it in the ring.
+        self.idle.store(now.unwrap_or(0) << TAGS | tag_of(kind), Ordering::Release);
     }
 
     /// Whether the worker had nothing to do.
     pub(super) fn is_idle(&self) -> bool {
+        // Relaxed, here and below: it is the worker's own.
         self.idle.load(Ordering::Relaxed) != 0
     }
 
@@ -71,7 +72,7 @@ impl Lane {
 
     /// What the worker passes its time with at this moment.
     pub(super) fn idle_until(&self, now: Duration, clock: &Clock) -> Option<Idle> {
-        let idle = self.idle.load(Ordering::Relaxed);
+        let idle = self.idle.load(Ordering::Acquire);
         let kind = kind_of(idle & mask())?;
         let since = clock.time(idle >> TAGS);
         Some(Idle { kind, began: since, ended: now.max(since) })
@@ -186,5 +187,41 @@ impl<'run> Lap<'run> {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
         self.since = now;
+    }
+}
+
+#[cfg(all(test, drawloom_loom))]
+mod loom_tests {
+    use loom::{model, thread};
+
+    use super::{Clock, Duration, Entry, IdleKind, Lane};
+    use crate::{sync::Arc, timeline::clock::EngineClock};
+
+    #[test]
+    fn an_idle_time_that_goes_on_is_read_after_those_before_it() {
+        model(|| {
+            let lane = Arc::new(Lane::new(2));
+            lane.make_room();
+            let worker = thread::spawn({
+                let lane = Arc::clone(&lane);
+                move || {
+                    lane.start_idle(IdleKind::Searching, Some(1));
+                    lane.end_idle(Some(2));
+                    lane.start_idle(IdleKind::Asleep, Some(3));
+                }
+            });
+            let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::ZERO)));
+            let goes_on = lane.idle_until(Duration::from_nanos(4), &clock);
+            let mut ended = Vec::new();
+            let take = |entry| match entry {
+                Entry::Idle(idle) => ended.push((idle.began.as_nanos(), idle.ended.as_nanos())),
+                Entry::Chunk { .. } | Entry::Empty { .. } => unreachable!("the worker runs nothing"),
+            };
+            assert_eq!(lane.drain(0, &clock, take), 0);
+            if goes_on.is_some_and(|idle| idle.kind == IdleKind::Asleep) {
+                assert_eq!(ended, [(1, 2)]);
+            }
+            worker.join().unwrap();
+        });
     }
 }

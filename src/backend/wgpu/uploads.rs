@@ -20,7 +20,7 @@ impl Uploads {
 
     /// How many bytes have gone up so far.
     pub(super) fn bytes(&self) -> u64 {
-        // Relaxed, here and below: it is a count, which is read when the frame's jobs have ended.
+        // Relaxed, here and below: it is a count, which is read before a frame's jobs begin and when they have ended.
         self.bytes.load(Ordering::Relaxed)
     }
 

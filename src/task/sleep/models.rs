@@ -73,6 +73,20 @@ impl Room {
         }
     }
 
+    /// What the owner of a region does in the midst of a job: it takes what lies in its mailbox for that region, and nothing
+    /// else.
+    fn consume_own(&self, worker: usize, level: usize) {
+        while !self.try_consume() {
+            self.sleep.sleep(worker, WakeFor::Region { level }, false, || self.has_jobs());
+        }
+    }
+
+    /// Puts a job into the mailbox of worker 0, for the region of that level.
+    fn produce_for_owner(&self, level: usize) {
+        self.jobs.fetch_add(1, Ordering::Relaxed);
+        self.sleep.wake_owner_or_other(0, level, Band::Normal);
+    }
+
     /// What the owner of a region does that helps others: it looks for jobs, and for the end of its region only where there
     /// is none.
     fn wait_and_help(&self, worker: usize) {
@@ -240,6 +254,48 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
         // Worker 0 has no eyes for it.
         room.sleep.end_search(|| false);
         worker.join().unwrap();
+    });
+}
+
+#[test]
+fn a_job_in_a_mailbox_reaches_its_owner_though_a_searcher_is_late() {
+    bounded(4, || {
+        let room = Room::new(1);
+        // It is going to look one day, and has something else to do until then.
+        room.sleep.start_search();
+        let owner = start(&room, |room| room.consume_own(0, 1));
+        room.produce_for_owner(1);
+        owner.join().unwrap();
+    });
+}
+
+#[test]
+fn jobs_in_a_mailbox_reach_the_owner_and_a_helper() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let threads = [start(&room, |room| room.consume_own(0, 1)), start(&room, |room| room.consume(1))];
+        room.produce_for_owner(1);
+        room.produce_for_owner(1);
+        join(threads);
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
+    });
+}
+
+#[test]
+fn a_job_of_an_outer_region_wakes_a_helper_while_the_owner_sleeps_for_an_inner_one() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let owner = start(&room, |room| {
+            while !room.latch.is_released() {
+                room.sleep.sleep(0, WakeFor::Region { level: 2 }, false, || room.latch.is_released());
+            }
+        });
+        let helper = start(&room, |room| {
+            room.consume(1);
+            room.finish();
+        });
+        room.produce_for_owner(1);
+        join([owner, helper]);
     });
 }
 

@@ -1,0 +1,141 @@
+//! Rounds: a scheduler each, of a few threads' programs.
+
+use std::{
+    fmt,
+    ops::AddAssign,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use drawloom::{
+    task::{Scheduler, SchedulerBuilder},
+    timeline::Log,
+};
+
+use crate::{
+    program::{HEIGHT, World, panic_as_planned, run as run_program, value},
+    random::Random,
+    watchdog::{self, Activity, during},
+};
+
+/// What has been run.
+#[derive(Default)]
+pub struct Totals {
+    schedulers: u64,
+    programs: u64,
+    /// Jobs and other parts that were checked.
+    parts: u64,
+    recorded_runs: u64,
+}
+
+impl AddAssign for Totals {
+    fn add_assign(&mut self, other: Self) {
+        self.schedulers += other.schedulers;
+        self.programs += other.programs;
+        self.parts += other.parts;
+        self.recorded_runs += other.recorded_runs;
+    }
+}
+
+impl fmt::Display for Totals {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { schedulers, programs, parts, recorded_runs } = self;
+        write!(formatter, "{schedulers} schedulers, {programs} programs, {parts} parts, {recorded_runs} recorded runs")
+    }
+}
+
+/// The most programs of a thread in a round.
+const PROGRAMS: usize = 40;
+
+/// Runs the round of a seed.
+pub fn run(seed: u64) -> Totals {
+    let mut random = Random(seed);
+    let workers = 1 + random.below(8);
+    let builder = Scheduler::builder().workers(workers).timeline_capacity([64, 1 << 14][random.below(2)]);
+    let shuffle = random.one_in(4).then(|| random.next());
+    let builder = shuffle.into_iter().fold(builder, SchedulerBuilder::shuffle);
+    // Measured anew each time, it would take longer than the programs; and every price leads elsewhere.
+    let price = Duration::from_micros([0, 1, 20, 1_000][random.below(4)]);
+    let builder = match random.below(6) {
+        0..3 => builder,
+        3..5 => builder.timeline_clock(clock(u64::MAX)),
+        _ => builder.timeline_clock(clock(random.next() % 500)),
+    };
+    let scheduler = builder.wake_price(price).build().expect("threads can be started");
+    let world = World::new(format!("seed {seed}, {workers} workers, shuffled by {shuffle:?}"), scheduler);
+    watchdog::watch(&world);
+    let done_before = watchdog::done();
+    let seeds: Vec<u64> = (0..1 + random.below(3)).map(|_| random.next()).collect();
+    let totals = thread::scope(|threads| {
+        let threads: Vec<_> = seeds
+            .iter()
+            .map(|&seed| {
+                threads.spawn({
+                    let world = &world;
+                    move || run_thread(world, seed)
+                })
+            })
+            .collect();
+        threads.into_iter().map(|thread| thread.join().expect("what is wrong has been said")).fold(
+            Totals { schedulers: 1, ..Totals::default() },
+            |mut sum, totals| {
+                sum += totals;
+                sum
+            },
+        )
+    });
+    Totals { parts: watchdog::done() - done_before, ..totals }
+}
+
+/// An engine's clock that panics from its so many-th reading on.
+fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
+    let (start, left) = (Instant::now(), AtomicU64::new(readings));
+    move || {
+        let left = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        if left.is_err() { panic_as_planned() } else { start.elapsed() }
+    }
+}
+
+/// What a thread of an engine does: a frame after another, with something in between.
+fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
+    let mut random = Random(seed);
+    let mut totals = Totals::default();
+    let timeline = world.scheduler.timeline();
+    for _program in 0..1 + random.below(PROGRAMS) {
+        match random.below(5) {
+            0 => timeline.start(),
+            1 => timeline.stop(),
+            2 => totals.recorded_runs += check_log(&timeline.take()),
+            3 => timeline.mark_frame(),
+            _ => {}
+        }
+        let (seed, height) = (random.next(), 1 + random.below(HEIGHT));
+        assert_eq!(run_program(world, seed, height), value(seed, height), "{}: program {seed:x}", world.name);
+        totals.programs += 1;
+        if random.one_in(2) {
+            let budget = Duration::from_micros(random.next() % 200);
+            during(Activity::RunBackground, seed, || world.scheduler.run_background(budget));
+        }
+    }
+    totals
+}
+
+/// Checks that each run in the log which is said to be complete is, and says how many runs there are.
+fn check_log(log: &Log) -> u64 {
+    for run in log.runs.iter().filter(|run| run.complete && !run.failed) {
+        for (index, process) in run.graph.processes.iter().enumerate() {
+            let width = process.name.rsplit(' ').next().and_then(|width| width.parse().ok());
+            assert_eq!(Some(run.width(index)), width, "{:?} of a run that is said to be complete", process.name);
+            let mut ends = 0;
+            for chunk in run.chunks_of(index) {
+                assert_eq!(chunk.items.start, ends, "{:?} has a gap, or an item twice", process.name);
+                ends = chunk.items.end;
+            }
+        }
+    }
+    log.runs.len() as u64
+}
