@@ -1,8 +1,11 @@
 //! Background jobs that nobody has begun, the oldest first; any of them can be taken out.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, mem, sync::Arc};
 
-use crate::sync::{AtomicUsize, Mutex, Ordering};
+use crate::{
+    sync::{AtomicUsize, Mutex, Ordering},
+    unwind::discard,
+};
 
 use super::background::Queued;
 
@@ -58,5 +61,12 @@ impl BackgroundQueue {
         let result = change(&mut queue);
         self.count.store(queue.jobs.len(), Ordering::Relaxed);
         result
+    }
+}
+
+/// Jobs that nobody has begun are dropped by whoever drops the queue, and what they have captured may panic at that.
+impl Drop for BackgroundQueue {
+    fn drop(&mut self) {
+        mem::take(&mut self.jobs.lock().jobs).into_values().for_each(discard);
     }
 }

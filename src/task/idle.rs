@@ -30,8 +30,9 @@ const MOST_PAUSES: u32 = 8;
 /// by then.
 const SILENT_LOOKS: u32 = 16;
 
-/// Where workers that are model-checked sleep at once, as every look would be one more branch of the model.
-const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_loom, drawloom_shuttle));
+/// Where workers are model-checked they sleep at once, as every look would be one more branch of the model. Interpreted ones
+/// do, as a look takes them as long as a job.
+const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_loom, drawloom_shuttle, miri));
 
 /// A worker's time without work.
 #[derive(Default)]

@@ -202,26 +202,26 @@ mod loom_tests {
         model(|| {
             let lane = Arc::new(Lane::new(2));
             lane.make_room();
-            let worker = thread::spawn({
+            let reader = thread::spawn({
                 let lane = Arc::clone(&lane);
                 move || {
-                    lane.start_idle(IdleKind::Searching, Some(1));
-                    lane.end_idle(Some(2));
-                    lane.start_idle(IdleKind::Asleep, Some(3));
+                    let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::ZERO)));
+                    let goes_on = lane.idle_until(Duration::from_nanos(4), &clock);
+                    let mut ended = Vec::new();
+                    let take = |entry| match entry {
+                        Entry::Idle(idle) => ended.push((idle.began.as_nanos(), idle.ended.as_nanos())),
+                        Entry::Chunk { .. } | Entry::Empty { .. } => unreachable!("the worker runs nothing"),
+                    };
+                    assert_eq!(lane.drain(0, &clock, take), 0);
+                    if goes_on.is_some_and(|idle| idle.kind == IdleKind::Asleep) {
+                        assert_eq!(ended, [(1, 2)]);
+                    }
                 }
             });
-            let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::ZERO)));
-            let goes_on = lane.idle_until(Duration::from_nanos(4), &clock);
-            let mut ended = Vec::new();
-            let take = |entry| match entry {
-                Entry::Idle(idle) => ended.push((idle.began.as_nanos(), idle.ended.as_nanos())),
-                Entry::Chunk { .. } | Entry::Empty { .. } => unreachable!("the worker runs nothing"),
-            };
-            assert_eq!(lane.drain(0, &clock, take), 0);
-            if goes_on.is_some_and(|idle| idle.kind == IdleKind::Asleep) {
-                assert_eq!(ended, [(1, 2)]);
-            }
-            worker.join().unwrap();
+            lane.start_idle(IdleKind::Searching, Some(1));
+            lane.end_idle(Some(2));
+            lane.start_idle(IdleKind::Asleep, Some(3));
+            reader.join().unwrap();
         });
     }
 }

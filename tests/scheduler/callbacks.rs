@@ -77,3 +77,41 @@ fn a_hook_that_panics_while_the_scheduler_is_built_is_an_error_that_names_it() {
     assert!(matches!(&error, SchedulerError::AffinityHook { worker: 1, .. }));
     assert_eq!(error.to_string(), "the hook that places the thread of worker 1 failed: no place for 1");
 }
+
+/// Panics when it is dropped, once it has been counted.
+struct PanicsWhenDropped(Arc<AtomicUsize>);
+
+impl Drop for PanicsWhenDropped {
+    fn drop(&mut self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        panic!("it is dropped");
+    }
+}
+
+#[test]
+fn what_jobs_capture_may_panic_when_it_is_dropped() {
+    ends(|| {
+        for workers in [1, 3] {
+            let scheduler = Scheduler::new(workers).unwrap();
+            let dropped = Arc::new(AtomicUsize::new(0));
+            let captured = || PanicsWhenDropped(Arc::clone(&dropped));
+            let outcome = scheduler.scope(|scope| {
+                for _job in 0..4 {
+                    let captured = captured();
+                    scope.spawn(move |_scope, _worker| _ = &captured);
+                }
+            });
+            assert_eq!(outcome.unwrap_err().message, "it is dropped");
+            // The job's result is dropped by whoever is the last to have it.
+            drop(scheduler.background({
+                let captured = captured();
+                move || captured
+            }));
+            let captured = captured();
+            assert_eq!(scheduler.background(move || _ = &captured).wait().unwrap_err().message, "it is dropped");
+            assert_intact(&scheduler);
+            drop(scheduler);
+            assert_eq!(dropped.load(Ordering::Relaxed), 6, "with a job that nobody has begun");
+        }
+    });
+}

@@ -19,6 +19,9 @@ use crate::{
     watchdog::{Activity, during},
 };
 
+/// The most items of a node.
+const WIDEST: usize = if cfg!(miri) { 4 } else { 20 };
+
 /// A node, which waits for some of those before it.
 struct Plan {
     seed: u64,
@@ -34,7 +37,7 @@ fn plans(seed: u64) -> Vec<Plan> {
         .map(|index| Plan {
             seed: random.next(),
             waits_for: (0..random.below(3).min(index)).map(|_| random.below(index)).collect(),
-            width: [1, 1, random.below(20)][random.below(3)],
+            width: [1, 1, random.below(WIDEST)][random.below(3)],
             chunk: random.below(4),
             is_pinned: random.one_in(6),
         })

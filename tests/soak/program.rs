@@ -22,8 +22,11 @@ use crate::{
     watchdog::{Activity, during, progress},
 };
 
-/// The greatest height of a program.
-pub const HEIGHT: usize = 5;
+/// The greatest height of a program. Miri takes some thousand times as long.
+pub const HEIGHT: usize = if cfg!(miri) { 2 } else { 5 };
+
+/// The longest loop.
+const LONGEST_LOOP: usize = if cfg!(miri) { 6 } else { 60 };
 
 /// What all parts of a program share.
 pub struct World {
@@ -90,7 +93,7 @@ fn pieces(seed: u64, height: usize) -> Vec<Piece> {
                 4 => Piece::SpawnPinned(seed),
                 5 => Piece::SpawnOutside(seed),
                 6..8 => Piece::Scope { seed, panics },
-                8..10 => Piece::Loop { seed, length: random.below(60), chunk: random.below(6), panics },
+                8..10 => Piece::Loop { seed, length: random.below(LONGEST_LOOP), chunk: random.below(6), panics },
                 10 => Piece::Graph(seed),
                 11..14 => {
                     let wait = match random.below(6) {

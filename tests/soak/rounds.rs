@@ -49,13 +49,19 @@ impl fmt::Display for Totals {
 }
 
 /// The most programs of a thread in a round.
-const PROGRAMS: usize = 40;
+const PROGRAMS: usize = if cfg!(miri) { 3 } else { 40 };
+
+/// Little room for events, and more.
+const CAPACITIES: [usize; 2] = if cfg!(miri) { [8, 32] } else { [64, 1 << 14] };
+
+/// The most workers.
+const WORKERS: usize = if cfg!(miri) { 3 } else { 8 };
 
 /// Runs the round of a seed.
 pub fn run(seed: u64) -> Totals {
     let mut random = Random(seed);
-    let workers = 1 + random.below(8);
-    let builder = Scheduler::builder().workers(workers).timeline_capacity([64, 1 << 14][random.below(2)]);
+    let workers = 1 + random.below(WORKERS);
+    let builder = Scheduler::builder().workers(workers).timeline_capacity(CAPACITIES[random.below(2)]);
     let shuffle = random.one_in(4).then(|| random.next());
     let builder = shuffle.into_iter().fold(builder, SchedulerBuilder::shuffle);
     // Measured anew each time, it would take longer than the programs; and every price leads elsewhere.

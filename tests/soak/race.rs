@@ -1,0 +1,40 @@
+//! A race on purpose: what the thread sanitizer is shown first, so that its silence about the soak says something.
+
+use std::{
+    cell::UnsafeCell,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+use drawloom::task::Scheduler;
+
+/// A number that nothing protects.
+struct Unprotected(UnsafeCell<u64>);
+
+// SAFETY: It is not true. Two threads change the number at once in a test that runs under the thread sanitizer alone, which
+// is to say so.
+unsafe impl Sync for Unprotected {}
+
+impl Unprotected {
+    fn increase(&self) {
+        // SAFETY: It is not true either, for the same reason.
+        unsafe { *self.0.get() += 1 };
+    }
+}
+
+/// Two jobs of one scope change the same number, and nothing orders them: if it did, the scheduler would hide the races of its
+/// jobs from the sanitizer.
+#[test]
+#[ignore = "a data race, which the thread sanitizer is to find"]
+fn a_race_between_two_jobs_is_there_to_be_found() {
+    let scheduler = Scheduler::new(2).expect("a thread can be started");
+    let (number, begun) = (Unprotected(UnsafeCell::new(0)), AtomicUsize::new(0));
+    let outcome = scheduler.parallel_for(2, 1, |_range, _worker| {
+        // Relaxed, so that it brings the two together and orders nothing.
+        begun.fetch_add(1, Ordering::Relaxed);
+        while begun.load(Ordering::Relaxed) < 2 {
+            std::hint::spin_loop();
+        }
+        (0..1_000).for_each(|_| number.increase());
+    });
+    assert_eq!(outcome, Ok(()));
+}
