@@ -84,6 +84,9 @@ pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
 
 /// Lets every sink wait for every source, but for the pairs in which the sink has been put before the source.
 fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
+    if sources.is_empty() || sinks.is_empty() {
+        return;
+    }
     let told = |_: NodeIndex, relation| relation == Relation::Order || relation == Relation::Data(resource);
     walk.from(edges, sources, Direction::Incoming, told);
     let (some_before, all_after): (Vec<NodeIndex>, Vec<NodeIndex>) =

@@ -58,7 +58,7 @@ impl<P> Schedule<P> {
             None => self.go(way, worker, context, Nobody),
         });
         let Ran { took, is_shared, failure, outcome } = ran.unwrap_or_else(Ran::panicked);
-        // What a run took that did not come to its end says nothing.
+        // The time of a failed run says nothing about its cost.
         if failure.is_some() || outcome.is_err() {
             self.costs.forget_work();
         } else {

@@ -10,8 +10,9 @@ use petgraph::{
 
 use super::edges::{Edges, Relation};
 
-/// The nodes, each after all before it. Where several could be next, a junction is, and then the lowest of so many processes:
-/// as if each junction were the edges that it stands for. Nodes on a circle, and those behind one, are left out.
+/// The nodes in an order in which each comes after all before it. Where several could be next, junctions come first, and then
+/// the lowest of the `processes`: as if each junction were the edges that it stands for. Nodes on a circle, and those behind
+/// one, are left out.
 pub(super) fn in_order<E>(graph: &DiGraph<(), E>, processes: usize) -> Vec<NodeIndex> {
     let rank = |node: NodeIndex| Reverse((node.index() < processes, node));
     let mut waits_for: Vec<usize> =

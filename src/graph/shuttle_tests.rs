@@ -247,13 +247,13 @@ fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
     }
 }
 
-/// A subscriber that panics when it is told for the how-manieth time that a span is entered, and never where that is 0. All
-/// threads of a model are one of the system's, so all of them tell it.
-struct Objects {
+/// A subscriber that panics at the `left`-th entry of a span from now on; 0 means never. All threads of a model are one of the
+/// system's, so it hears of all of them.
+struct PanickingSubscriber {
     left: std::sync::atomic::AtomicUsize,
 }
 
-impl Subscriber for Objects {
+impl Subscriber for PanickingSubscriber {
     fn enabled(&self, _metadata: &Metadata<'_>) -> bool {
         true
     }
@@ -281,7 +281,7 @@ impl Subscriber for Objects {
 #[test]
 fn shuttle_a_panic_between_processes_fails_the_run_and_the_next_frame_is_whole() {
     use Kind::{Pinned, Plain};
-    let objects = Arc::new(Objects { left: std::sync::atomic::AtomicUsize::new(0) });
+    let objects = Arc::new(PanickingSubscriber { left: std::sync::atomic::AtomicUsize::new(0) });
     let dispatch = Dispatch::from(Arc::clone(&objects));
     for (workers, always_share) in [(2, true), (3, true), (2, false)] {
         let (objects, dispatch) = (Arc::clone(&objects), dispatch.clone());

@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     sync::{Condvar, Mutex},
-    unwind::{JobPanic, catch, discard, report},
+    unwind::{JobPanic, catch, discard, emit},
 };
 
 use super::background_queue::BackgroundQueue;
@@ -124,6 +124,6 @@ impl<T: Send> Queued for Ticket<T> {
 fn abandon<T>(result: Result<T, JobPanic>) {
     match result {
         Ok(value) => discard(value),
-        Err(panic) => report(|| tracing::error!(message = %panic, "a background job that nobody waits for")),
+        Err(panic) => emit(|| tracing::error!(message = %panic, "a background job that nobody waits for")),
     }
 }

@@ -67,6 +67,7 @@ impl BackgroundQueue {
 /// Jobs that nobody has begun are dropped by whoever drops the queue, and what they have captured may panic at that.
 impl Drop for BackgroundQueue {
     fn drop(&mut self) {
-        mem::take(&mut self.jobs.lock().jobs).into_values().for_each(discard);
+        let jobs = mem::take(&mut self.jobs.lock().jobs);
+        jobs.into_values().for_each(discard);
     }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::{
     sync::{Arc, thread},
     timeline::{Setup, Timeline},
-    unwind::{AbortOnUnwind, JobPanic, catch, report},
+    unwind::{AbortOnUnwind, JobPanic, catch, emit},
 };
 
 use super::{
@@ -119,6 +119,9 @@ impl SchedulerBuilder {
     ///
     /// If it panics it is not called again: time stands still at its latest reading, which is reported to [`tracing`] as an
     /// error, and every [log](crate::timeline::Log::clock_panic) from then on says so. Jobs are not affected.
+    ///
+    /// A worker may call it between taking a job and running it. So it must not wait for anything that a job may hold while
+    /// that waits, such as a lock.
     pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
         self.timeline.clock = Some(Box::new(clock));
         self
@@ -226,14 +229,14 @@ impl Life {
             return;
         }
         let worker = Worker::new(index, queues, shared);
-        // A worker that were lost would keep whoever waits for its jobs waiting for ever.
+        // A lost worker would keep whoever waits for its jobs waiting for ever.
         let guard = AbortOnUnwind::new("a worker's thread");
         seat::occupy(&worker, || worker.work(Until::Shutdown));
         guard.disarm();
         if let Some(on_stop) = on_stop
             && let Err(panic) = catch(|| on_stop(index))
         {
-            report(|| tracing::error!(worker = index, message = %panic, "the hook at the end of a worker's thread"));
+            emit(|| tracing::error!(worker = index, message = %panic, "the hook at the end of a worker's thread"));
         }
     }
 
@@ -318,7 +321,7 @@ pub enum SchedulerError {
         source: io::Error,
     },
     /// What a thread was to do first panicked.
-    #[error("the hook at the start of worker {worker}'s thread failed: {panic}")]
+    #[error("the hook at the start of worker {worker}'s thread failed: {}", panic.message)]
     StartHook {
         /// The [index](Worker::index) of the worker.
         worker: usize,

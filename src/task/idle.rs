@@ -12,7 +12,6 @@ use crate::{
 };
 
 use super::{
-    queue::Band,
     sleep::WakeFor,
     worker::{Until, Worker},
 };
@@ -30,8 +29,8 @@ const MOST_PAUSES: u32 = 8;
 /// by then.
 const SILENT_LOOKS: u32 = 16;
 
-/// Where workers are model-checked they sleep at once, as every look would be one more branch of the model. Interpreted ones
-/// do, as a look takes them as long as a job.
+/// Under a model checker workers sleep at once: each look would be one more branch. Under Miri too: a look takes as long as
+/// a job.
 const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_loom, drawloom_shuttle, miri));
 
 /// A worker's time without work.
@@ -76,7 +75,7 @@ impl Idle {
     fn end_looking(&mut self, worker: &Worker) {
         worker.timeline().end_idle(worker.index());
         if self.is_searcher {
-            worker.shared().sleep().end_search(|| worker.sees_loot(&Band::FRAME));
+            worker.shared().sleep().end_search(|bands| worker.sees_loot(bands));
         }
         *self = Self::default();
     }

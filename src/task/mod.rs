@@ -118,8 +118,8 @@
 //!
 //! Everything else that an engine supplies may panic too. Hooks that name, place or start threads fail the
 //! [build](SchedulerBuilder::build); the hook that stops a thread is reported to [`tracing`]; a
-//! [clock](SchedulerBuilder::timeline_clock) stands still; a subscriber of `tracing` loses the event, or fails the run in whose
-//! spans it panicked.
+//! [clock](SchedulerBuilder::timeline_clock) stands still; a subscriber of `tracing` loses the event, or fails the run that it
+//! was told of. What panics while another panic unwinds, such as a destructor, ends the process, as in any Rust program.
 //!
 //! # What waiting means
 //!
@@ -133,7 +133,7 @@
 //! ways to bring that about:
 //!
 //! - A job waits for a background job that waits for what the first job is part of.
-//! - A job holds a lock, and waits for a scope one of whose jobs wants the lock.
+//! - A job holds a lock, and waits for a scope, or a background job, in which the lock is wanted.
 //! - A job waits for a thread that calls the same scheduler from outside, or two threads call two schedulers crosswise
 //!   ([`Scheduler`] says when).
 //! - Jobs that are ready wait for each other to run at the same time: one thread may have both.
@@ -150,19 +150,22 @@
 //! | [`BackgroundJob::wait`] | the job has run | runs that job if nobody has begun it, and otherwise sleeps |
 //! | [`Scheduler::run_background`] | the last job that was begun in time has run | runs background jobs |
 //! | dropping a [`Scheduler`] | its threads have ended: until the jobs that they are at have run | sleeps |
-//! | [`Timeline::start`](crate::timeline::Timeline::start) for the first time | the scheduler is 10 ms old | sleeps |
+//! | building a [`Scheduler`] | its threads have begun, and what waking one costs is measured | sleeps, or looks at the time |
+//! | [`Timeline::start`](crate::timeline::Timeline::start), [`now`](crate::timeline::Timeline::now) or [`take`](crate::timeline::Timeline::take) for the first time | the scheduler is 10 ms old | sleeps |
 //!
-//! [`Scope::spawn`], [`Scope::spawn_pinned`], [`Scheduler::background`] and all else return at once.
+//! [`Scope::spawn`], [`Scope::spawn_pinned`] and [`Scheduler::background`] return at once.
 //!
 //! # What costs more than linear
 //!
-//! Jobs of all kinds cost the same however many there are, and so do levels of nesting, but for this:
+//! Jobs of all kinds cost the same however many there are, but for this:
 //!
 //! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all that lie in a queue: time grows with their square.
 //! - A worker that finds nothing in its own queues looks into those of all others, so an idle moment costs time that grows
 //!   with the number of workers.
-//! - A [graph](crate::graph::FrameGraph::compile) compiles in time that grows with its nodes and the accesses of resources. But
-//!   readers of a resource that are put before some of its makers have an edge for each of the makers before them.
+//! - Where scopes nest deeply, a worker that takes a job for somebody else looks through the levels of who waits for it.
+//! - A [graph](crate::graph::FrameGraph::compile) has an edge or two for each access of a resource. But readers that are put
+//!   before some of a resource's makers have an edge for each maker before them; and for each resource with makers and readers,
+//!   and each modifier of one with several, the orders that lead there are walked back.
 //! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out what follows from other edges, in time that grows with the
 //!   product of nodes and edges.
 //!

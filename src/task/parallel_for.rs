@@ -44,8 +44,13 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
         Self { body, chunks: Chunks::new(length, chunk), tickets: CachePadded::new(Tickets::new()) }
     }
 
-    /// Runs the whole pass, beginning on this worker. Does not unwind.
+    /// Runs the whole pass, beginning on this worker, and drops it. Does not unwind.
     pub(super) fn run(mut self, worker: &Worker) -> Result<(), JobPanic> {
+        let outcome = self.run_all(worker);
+        outcome.and(catch(|| drop(self)))
+    }
+
+    fn run_all(&mut self, worker: &Worker) -> Result<(), JobPanic> {
         self.chunks = self.chunks.shuffled(worker);
         let count = self.chunks.count();
         let done = if count == 1 || worker.workers() == 1 {
@@ -59,7 +64,7 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
             return Ok(());
         }
         self.tickets.reset(done);
-        run_tokens(worker, &self, |crew| self.join(crew))
+        run_tokens(worker, &*self, |crew| self.join(crew))
     }
 
     /// Runs chunks as long as all of them seem to be less work than to wake somebody, and says how many.

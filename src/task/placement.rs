@@ -21,7 +21,7 @@ mod linux {
 
     use crate::{
         sync::{AtomicBool, AtomicUsize, Ordering},
-        unwind::report,
+        unwind::emit,
     };
 
     /// Where the threads of a scheduler may run.
@@ -83,7 +83,7 @@ mod linux {
                 // The machine has changed. It costs time, and nothing else.
                 self.is_needed.store(false, Ordering::Relaxed);
                 self.let_run_anywhere();
-                report(|| tracing::debug!(%error, "workers cannot be kept off the processor of their caller"));
+                emit(|| tracing::debug!(%error, "workers cannot be kept off the processor of their caller"));
             }
         }
 
@@ -102,7 +102,7 @@ mod linux {
         fn let_run_anywhere(&self) {
             for (thread, allowed) in self.threads.lock().iter() {
                 if let Err(error) = sched_setaffinity(Some(*thread), allowed) {
-                    report(|| tracing::debug!(%error, "a worker cannot be let go from its processors"));
+                    emit(|| tracing::debug!(%error, "a worker cannot be let go from its processors"));
                 }
             }
         }

@@ -271,7 +271,7 @@ impl Overflow {
     }
 
     /// Takes the oldest jobs, to spare others the lock: gives back the first, and calls `keep` with the others. Those are of
-    /// an outermost region, as a worker [keeps](super::worker::Worker::push) no others but its own.
+    /// an outermost region: no thief may [keep](super::worker::Worker::push) others.
     fn take_oldest(&self, keep: impl FnMut(Job)) -> Option<Job> {
         let (first, others) = self.jobs.change(|jobs| {
             let count = (jobs.len() / 2).min(MOST_AT_ONCE);

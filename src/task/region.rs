@@ -92,11 +92,9 @@ pub(super) fn open<R>(
     tokens: &dyn Tokens,
     body: impl FnOnce(&'static Region) -> R,
 ) -> Result<R, JobPanic> {
-    // Whatever is called below, this function is left by returning from it, or the process ends.
-    let guard = AbortOnUnwind::new("an open region of jobs");
     // SAFETY: The types differ in lifetimes only, and the referent outlives this call. Only jobs of the region use the
     // reference. Each is counted from before it is queued until it has run, and `wait_inside` returns only when the count
-    // is zero. `guard` excludes that this function unwinds before.
+    // is zero. `guard`, which is made before the reference is used, excludes that this function unwinds before.
     let tokens = unsafe { mem::transmute::<&dyn Tokens, &'static dyn Tokens>(tokens) };
     let storage = Region {
         latch: CachePadded::new(Latch::new(1)),
@@ -113,6 +111,8 @@ pub(super) fn open<R>(
     // takes the last count off does not use it afterwards. `wait_inside` returns only when the count is zero, and `guard`
     // excludes that this function unwinds before.
     let region: &'static Region = unsafe { &*ptr::from_ref(&storage) };
+    // The last of the locals, so that an unwind comes to it before it drops any other.
+    let guard = AbortOnUnwind::new("an open region of jobs");
     let result = worker.wait_inside(region, || catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone())));
     guard.disarm();
     result

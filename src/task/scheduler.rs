@@ -12,7 +12,7 @@ use crossbeam_utils::CachePadded;
 use crate::{
     sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread},
     timeline::Timeline,
-    unwind::JobPanic,
+    unwind::{JobPanic, catch, discard},
 };
 
 use super::{
@@ -141,7 +141,7 @@ impl Scheduler {
         body: impl Fn(Range<usize>, &Worker) + Sync,
     ) -> Result<(), JobPanic> {
         if length == 0 {
-            return Ok(());
+            return catch(|| drop(body));
         }
         let pass = Pass::new(length, chunk, body);
         self.seated(|worker| pass.run(worker))
@@ -198,7 +198,7 @@ impl Scheduler {
     /// Calls `body` as worker 0, whose queues these are, and gives them back.
     fn work_seated<R>(&self, queues: Box<Queues>, body: impl FnOnce(&Worker) -> R) -> R {
         let worker = Worker::new(0, queues, Arc::clone(&self.shared));
-        // What is a user's is caught where it is called, but a subscriber of spans is a user's as well.
+        // `body` catches what is the engine's, and the caller slot must be free again whatever was forgotten.
         let result = panic::catch_unwind(AssertUnwindSafe(|| seat::occupy(&worker, || body(&worker))));
         self.shared.seat.give_back(worker.into_queues());
         result.unwrap_or_else(|payload| panic::resume_unwind(payload))
@@ -215,14 +215,17 @@ impl Drop for Scheduler {
             if thread.thread().id() == thread::current().id() {
                 continue;
             }
-            // A worker's thread has nothing to report: the panic of a job was caught with the job.
-            let _ = thread.join();
+            // A worker's thread has nothing to report: the panic of a job was caught with the job. What is left is that of a
+            // destructor of the engine's, such as a thread-local's.
+            if let Err(payload) = thread.join() {
+                discard(payload);
+            }
         }
     }
 }
 
-/// What each worker has in its queues and its mailbox, and who sleeps until when: what one wants to see of a program that hangs.
-/// It may be printed at any time, from any thread, and waits for no job.
+/// Each worker's queued jobs, its mailbox, and what it sleeps for: for looking into a hang. It may be printed at any time, from
+/// any thread, and waits for no job.
 impl fmt::Debug for Scheduler {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shared = &self.shared;

@@ -42,9 +42,10 @@ impl<'scope> Scope<'scope> {
 
     /// Adds a job that any worker may run, in no particular order.
     ///
-    /// It is queued with the worker this is called on, who runs the newest of its jobs first, while others take its
-    /// oldest. Called on a thread that is no worker of the scheduler just now, one that was lent the scope by the body
-    /// or a job, it falls to the thread that opened the scope.
+    /// It is queued with the worker this is called on if that waits for the scope, or if the scope was opened from outside of
+    /// all jobs. That worker runs the newest of its jobs first, while others take its oldest. Otherwise it goes to the thread
+    /// that opened the scope, where workers that look for something to do find it too. Called on a thread that is no worker
+    /// of the scheduler just now, one that was lent the scope by the body or a job, it falls to the thread that opened it.
     pub fn spawn(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let work = Self::work(job);
         seat::with_current(self.region.shared(), |current| match current {
@@ -73,7 +74,7 @@ impl<'scope> Scope<'scope> {
         //    latch is released, and an abort guard in it excludes that it unwinds. The job is counted when it is queued,
         //    and taken off after the closure is gone; and whoever spawns is counted itself: the body until it has
         //    returned, a job until it has run, and nobody can keep the scope for longer, as both are lent it for a
-        //    lifetime of their own. A job that were lost would keep `region::open` waiting, not let it return.
+        //    lifetime of their own. A lost job would keep `region::open` waiting, not let it return.
         // 2. It is called with the region that its job was queued for, which is the one of this scope.
         Work::Closure(unsafe { Closure::new(closure) })
     }

@@ -5,7 +5,7 @@
 //! # Protocol
 //!
 //! *Work* is whatever a worker may wait for: a job in somebody's queue or mailbox, a released latch, the shutdown flag. A
-//! *sleeper* takes any work, or none but that of one region: so does one that waits in the midst of a job. A *searcher* is
+//! *sleeper* takes any work or, if it waits in the midst of a job, only that of the region it waits for. A *searcher* is
 //! awake, has nothing to do, and is going to look at everybody's queues and mailboxes once more before it ceases to be one.
 //!
 //! ```text
@@ -21,6 +21,8 @@
 //!  searcher that has found something to do
 //!  F1  count itself out                           F3  it was the last searcher: look for more work,
 //!  F2  fence                                          and wake one sleeper if there is some
+//!                                                 F4  look for background jobs, and wake one sleeper
+//!                                                     that takes them if there are some
 //! ```
 //!
 //! # Proof
@@ -39,13 +41,17 @@
 //! have to read what X wrote or something later. So W2 comes first, and the look that follows X's fence, S3 or F3, sees
 //! the work. At S3 it becomes a searcher once more, and finds that work or some other, and comes to F3 in the end. At F3 it
 //! wakes a sleeper, unless there is none, or a searcher again, for whom the same holds. A searcher called at W4 is one like
-//! any other, whatever it was called for. X skips F2 and F3 only where another searcher is still counted in. That one is
+//! any other, whatever it was called for. X skips F3 only where another searcher is still counted in. That one is
 //! counted out later than X, so the fence that it passes next comes after W2 as well, and the same holds for it; the last of
 //! them skips nothing.
 //!
+//! *Where work is for the background*, W3 passes over searchers: one of them may be worker 0, who does not look for it. The
+//! sleeper that is called looks for work of a frame first, and may find some. So it looks for background jobs at F4, as every
+//! searcher does that has found something, and passes the call on.
+//!
 //! *Where work has an owner*, it lies in the owner's mailbox, and W3 and W4 come twice: for the owner, then for others. An
-//! owner that sleeps until this region has work is met as any sleeper is, and called. One that does not sleep so is going to
-//! pass S2 after W2 before it does, and S3 sees the work. So an owner never sleeps while its mailbox has work for it, even if
+//! owner that sleeps until this region has work is met as any sleeper is, and called. Any other owner passes S2, after W2,
+//! before it next sleeps for this region, and S3 sees the work. So an owner never sleeps while its mailbox has work for it, even if
 //! nobody else is free to take that. If the owner is called, others are not: it runs the work.
 //!
 //! *Where work moves.* A thief that takes several jobs at once, or puts one back that it had taken out, hides them for a
@@ -112,16 +118,19 @@ impl Sleep {
         self.counts.fetch_add(SEARCHER, Ordering::Relaxed);
     }
 
-    /// Counts a searcher out that has found something to do. If it was the last one it wakes another if
-    /// `sees_more_work`.
-    pub(super) fn end_search(&self, sees_more_work: impl FnOnce() -> bool) {
+    /// Counts a searcher out that has found something to do. If `sees_more_work` of some bands it wakes another: for a frame
+    /// if it was the last searcher, and for background jobs in any case, since other searchers may be no workers for those.
+    pub(super) fn end_search(&self, sees_more_work: impl Fn(&[Band]) -> bool) {
         let before = self.counts.fetch_sub(SEARCHER, Ordering::Relaxed);
-        if searchers(before) > 1 {
+        fence(Ordering::SeqCst);
+        if any_sleepers(self.counts.load(Ordering::Relaxed)) == 0 {
             return;
         }
-        fence(Ordering::SeqCst);
-        if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 && sees_more_work() {
+        if searchers(before) == 1 && sees_more_work(&Band::FRAME) {
             self.wake_any();
+        }
+        if sees_more_work(&[Band::Background]) {
+            self.call(|&sleeper| takes(sleeper, Band::Background));
         }
     }
 

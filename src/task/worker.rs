@@ -161,8 +161,9 @@ impl Worker {
 
     /// Queues a job, and wakes somebody for it. Only from within a counted job of the region, or its body.
     ///
-    /// The job stays in this worker's queues only if no owner can wait for it in vain there: if this worker waits for the
-    /// region, and then for nothing further in; or if the region is an outermost one, whose owner steals.
+    /// The job stays in this worker's queues only if no owner can wait for it in vain there. A worker keeps jobs of the
+    /// innermost region that it waits for in the midst of a job. If it waits for none, it keeps those of an outermost region,
+    /// whose owner steals.
     pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
         self.spend(region);
         let job = Job { work, region, is_stolen: false };
@@ -258,9 +259,7 @@ impl Worker {
     pub(super) fn sees_work(&self, until: Until) -> bool {
         until.has_come(&self.shared)
             || match until {
-                Until::Shutdown => {
-                    self.sees_loot(&Band::ALL) || (self.index > 0 && !self.shared.background().is_empty())
-                }
+                Until::Shutdown => self.sees_loot(&Band::ALL),
                 Until::Finished { region } => {
                     let mailbox = self.shared.mailbox(self.index);
                     mailbox.has_pinned(region)
@@ -272,8 +271,10 @@ impl Worker {
     /// Whether there is something in these bands that this worker could take up, and does not have itself.
     pub(super) fn sees_loot(&self, bands: &[Band]) -> bool {
         let shared = &self.shared;
+        let has_queued = self.index > 0 && bands.contains(&Band::Background) && !shared.background().is_empty();
         let mut others = shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
-        others.any(|(_, loot)| bands.iter().any(|&band| !loot.of(band).is_empty()))
+        has_queued
+            || others.any(|(_, loot)| bands.iter().any(|&band| !loot.of(band).is_empty()))
             || shared.mailboxes().any(|mailbox| bands.iter().any(|&band| mailbox.has_any_shared(band)))
     }
 
@@ -337,9 +338,8 @@ impl Worker {
         match until {
             Until::Shutdown => self
                 .frame_job()
-                .or_else(|| self.own_job(&[Band::Background]))
-                .or_else(|| self.steal(&[Band::Background]))
-                .or_else(|| self.shared_job(Band::Background)),
+                .or_else(|| self.shared_job(Band::Background))
+                .or_else(|| self.steal(&[Band::Background])),
             Until::Finished { region } => {
                 let mailbox = self.shared.mailbox(self.index);
                 let pinned = mailbox.take_pinned(region);
@@ -354,20 +354,17 @@ impl Worker {
         }
     }
 
-    /// A job of whatever belongs to the frame.
+    /// A job of whatever belongs to the frame. What lies in mailboxes comes before what can be stolen: somebody waits for it
+    /// in the midst of a job.
     fn frame_job(&self) -> Option<Job> {
-        let own = self.own_job(&Band::FRAME);
-        own.or_else(|| self.steal(&Band::FRAME)).or_else(|| self.shared_job(Band::Normal))
+        let own = Band::FRAME.into_iter().find_map(|band| self.queues.pop(band));
+        own.or_else(|| self.shared_job(Band::Normal)).or_else(|| self.steal(&Band::FRAME))
     }
 
     /// A job out of somebody's mailbox, for whoever looks for work of this band.
     fn shared_job(&self, band: Band) -> Option<Job> {
         let job = self.shared.mailboxes().find_map(|mailbox| mailbox.take_any_shared(band))?;
         Some(Job { is_stolen: true, ..job })
-    }
-
-    fn own_job(&self, bands: &[Band]) -> Option<Job> {
-        bands.iter().find_map(|&band| self.queues.pop(band))
     }
 
     /// The newest job here, if it is one of this region, which the worker waits for in the midst of another job.

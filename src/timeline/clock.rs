@@ -7,7 +7,7 @@ use std::{sync::OnceLock, thread, time::Duration};
 
 use crate::{
     sync::{AtomicU64, Instant, Ordering},
-    unwind::{JobPanic, catch, report},
+    unwind::{JobPanic, catch, emit},
 };
 
 use super::ticks;
@@ -131,7 +131,7 @@ impl EngineClock {
         let message = panic.message.clone();
         // Of several threads whose readings panic at once, the first is reported.
         if self.panic.set(panic).is_ok() {
-            report(|| tracing::error!(message = %message, "the timeline's clock panicked, and time stands still"));
+            emit(|| tracing::error!(message = %message, "the timeline's clock panicked, and time stands still"));
         }
     }
 }

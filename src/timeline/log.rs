@@ -70,7 +70,7 @@ pub struct Run {
     pub in_background: bool,
     /// Whether a process failed, so that the rest was cancelled. What panicked is not among the chunks.
     pub failed: bool,
-    /// Whether every chunk that ran is here: there was room for all of them, and no log was taken meanwhile.
+    /// Whether every chunk that ran is here: there was room for all of them, and none was taken out before the run had ended.
     pub complete: bool,
     /// All chunks, by process, and those of one process by their items.
     pub chunks: Vec<Chunk>,

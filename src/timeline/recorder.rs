@@ -151,8 +151,8 @@ impl Timeline {
 
     /// Takes out all that was recorded since the last time.
     ///
-    /// It may be called at any time, and keeps nobody waiting; but what a run writes that is going on meanwhile is lost, and
-    /// counted, and that run is not [complete](Run::complete). So the best moment is between two frames.
+    /// It may be called at any time, and keeps nobody waiting. But chunks of a run that goes on meanwhile are lost, and counted,
+    /// and that run is not [complete](Run::complete). So the best moment is between two frames.
     pub fn take(&self) -> Log {
         let mut told = self.taker.lock();
         let Kept { frames, runs, spans, counters, threads, dropped } = self.book.lock().take();

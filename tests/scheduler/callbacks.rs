@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use drawloom::task::{Scheduler, SchedulerError};
+use drawloom::task::{AffinityMask, Scheduler, SchedulerError};
 
 use crate::{assert_intact, waits::ends};
 
@@ -73,9 +73,11 @@ fn a_hook_that_panics_while_the_scheduler_is_built_is_an_error_that_names_it() {
     assert_eq!(error.to_string(), "the hook that names the thread of worker 1 failed: no name for 1");
     assert_eq!(ended.load(Ordering::Relaxed), 0, "no thread was started");
 
-    let error = builder().affinity(|worker| panic!("no place for {worker}")).build().unwrap_err();
-    assert!(matches!(&error, SchedulerError::AffinityHook { worker: 1, .. }));
-    assert_eq!(error.to_string(), "the hook that places the thread of worker 1 failed: no place for 1");
+    let affinity = |worker| if worker == 2 { panic!("no place for {worker}") } else { AffinityMask::new(0..1024) };
+    let error = builder().affinity(affinity).build().unwrap_err();
+    assert!(matches!(&error, SchedulerError::AffinityHook { worker: 2, .. }));
+    assert_eq!(error.to_string(), "the hook that places the thread of worker 2 failed: no place for 2");
+    assert_eq!(ended.load(Ordering::Relaxed), 1, "the thread that was started has ended");
 }
 
 /// Panics when it is dropped, once it has been counted.
@@ -102,6 +104,11 @@ fn what_jobs_capture_may_panic_when_it_is_dropped() {
                 }
             });
             assert_eq!(outcome.unwrap_err().message, "it is dropped");
+            for length in [0, 1, 1_000] {
+                let captured = captured();
+                let outcome = scheduler.parallel_for(length, 1, move |_range, _worker| _ = &captured);
+                assert_eq!(outcome.unwrap_err().message, "it is dropped");
+            }
             // The job's result is dropped by whoever is the last to have it.
             drop(scheduler.background({
                 let captured = captured();
@@ -111,7 +118,7 @@ fn what_jobs_capture_may_panic_when_it_is_dropped() {
             assert_eq!(scheduler.background(move || _ = &captured).wait().unwrap_err().message, "it is dropped");
             assert_intact(&scheduler);
             drop(scheduler);
-            assert_eq!(dropped.load(Ordering::Relaxed), 6, "with a job that nobody has begun");
+            assert_eq!(dropped.load(Ordering::Relaxed), 9, "with a job that nobody has begun");
         }
     });
 }

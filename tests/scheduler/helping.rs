@@ -128,13 +128,13 @@ fn what_is_spawned_into_an_outer_scope_does_not_run_in_an_inner_wait() {
 }
 
 #[test]
-fn an_owner_that_starves_is_handed_the_jobs_of_its_scope() {
+fn an_owner_with_nothing_to_do_gets_jobs_that_a_thief_spawns_into_its_scope() {
     let scheduler = scheduler(2);
     for _round in 0..50 {
         let (together, is_there) = (Barrier::new(2), AtomicBool::new(false));
         let ran_on = Mutex::new(Vec::new());
         let midst = |_: &Scope<'_>, _: &Worker| {
-            // In a job of its own the owner steals nothing, so it must be given what the other one spawns.
+            // In a job of its own the owner steals nothing, so it finds what the other one spawns in its mailbox.
             let inner = scheduler.scope(|scope| {
                 scope.spawn(|scope, thief| {
                     together.wait();

@@ -190,7 +190,7 @@ pub fn run_items(world: &Arc<World>, seed: u64, range: Range<usize>, height: usi
 pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
     let total = AtomicU64::new(0);
     let outcome = during(Activity::Scope, seed, || {
-        world.scheduler.scope(|scope| plant(world, scope, &total, None, seed, height))
+        world.scheduler.scope(|scope| spawn_part(world, scope, &total, None, seed, height))
     });
     assert_eq!(outcome, Ok(()), "{}: part {seed:x}", world.name);
     check(world, seed, total.into_inner(), value(seed, height))
@@ -226,7 +226,7 @@ fn add(total: &AtomicU64, value: u64) {
 }
 
 /// Runs a part in this scope: its jobs have run when the scope ends.
-fn plant<'outer, 'scope>(
+fn spawn_part<'outer, 'scope>(
     world: &'scope Arc<World>,
     scope: &Scope<'scope>,
     total: &'scope AtomicU64,
@@ -243,10 +243,10 @@ fn plant<'outer, 'scope>(
         match piece {
             Piece::Leaf(seed) => add(total, leaf(seed)),
             Piece::Spawn(seed) => scope.spawn(move |scope, _worker| {
-                during(Activity::Job, seed, || plant(world, scope, total, outside, seed, lower));
+                during(Activity::Job, seed, || spawn_part(world, scope, total, outside, seed, lower));
             }),
             Piece::SpawnPinned(seed) => scope.spawn_pinned(move |scope, _worker| {
-                during(Activity::Job, seed, || plant(world, scope, total, outside, seed, lower));
+                during(Activity::Job, seed, || spawn_part(world, scope, total, outside, seed, lower));
             }),
             Piece::SpawnOutside(seed) => match outside {
                 Some(Outside { scope, total }) => scope.spawn(move |_scope, _worker| add(total, leaf(seed))),
@@ -297,7 +297,7 @@ fn run_inner_scope(world: &Arc<World>, seed: u64, panics: bool, height: usize) -
                 if panics {
                     inner.spawn(|_scope, _worker| panic_as_planned());
                 }
-                plant(world, inner, &inner_total, Some(outside), seed, height);
+                spawn_part(world, inner, &inner_total, Some(outside), seed, height);
             });
             assert_planned(outcome, panics);
         })

@@ -21,11 +21,11 @@ impl Unprotected {
     }
 }
 
-/// Two jobs of one scope change the same number, and nothing orders them: if it did, the scheduler would hide the races of its
+/// Two chunks of one loop change the same number, and nothing orders them: if it did, the scheduler would hide the races of its
 /// jobs from the sanitizer.
 #[test]
 #[ignore = "a data race, which the thread sanitizer is to find"]
-fn a_race_between_two_jobs_is_there_to_be_found() {
+fn a_race_between_two_chunks_is_there_to_be_found() {
     let scheduler = Scheduler::new(2).expect("a thread can be started");
     let (number, begun) = (Unprotected(UnsafeCell::new(0)), AtomicUsize::new(0));
     let outcome = scheduler.parallel_for(2, 1, |_range, _worker| {

@@ -30,6 +30,8 @@ pub struct Totals {
     /// Jobs and other parts that were checked.
     parts: u64,
     recorded_runs: u64,
+    /// Of those, the ones that a log calls complete and not failed.
+    pub complete_runs: u64,
 }
 
 impl AddAssign for Totals {
@@ -38,13 +40,15 @@ impl AddAssign for Totals {
         self.programs += other.programs;
         self.parts += other.parts;
         self.recorded_runs += other.recorded_runs;
+        self.complete_runs += other.complete_runs;
     }
 }
 
 impl fmt::Display for Totals {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { schedulers, programs, parts, recorded_runs } = self;
-        write!(formatter, "{schedulers} schedulers, {programs} programs, {parts} parts, {recorded_runs} recorded runs")
+        let Self { schedulers, programs, parts, recorded_runs, complete_runs } = self;
+        write!(formatter, "{schedulers} schedulers, {programs} programs, {parts} parts, ")?;
+        write!(formatter, "{recorded_runs} recorded runs, {complete_runs} of them complete")
     }
 }
 
@@ -94,10 +98,23 @@ pub fn run(seed: u64) -> Totals {
             },
         )
     });
+    finish(world);
     Totals { parts: watchdog::done() - done_before, ..totals }
 }
 
-/// An engine's clock that panics from its so many-th reading on.
+/// Waits until the background jobs that nobody has waited for have run, and drops the scheduler. They share the world, so it is
+/// not dropped before.
+fn finish(mut world: Arc<World>) {
+    during(Activity::Finish, 0, || {
+        while let Err(shared) = Arc::try_unwrap(world) {
+            shared.scheduler.run_background(Duration::MAX);
+            thread::yield_now();
+            world = shared;
+        }
+    });
+}
+
+/// An engine's clock that panics after so many readings.
 fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
     let (start, left) = (Instant::now(), AtomicU64::new(readings));
     move || {
@@ -115,7 +132,7 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
         match random.below(5) {
             0 => timeline.start(),
             1 => timeline.stop(),
-            2 => totals.recorded_runs += check_log(&timeline.take()),
+            2 => check_log(&timeline.take(), &mut totals),
             3 => timeline.mark_frame(),
             _ => {}
         }
@@ -130,8 +147,9 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
     totals
 }
 
-/// Checks that each run in the log which is said to be complete is, and says how many runs there are.
-fn check_log(log: &Log) -> u64 {
+/// Checks that each run in the log which is said to be complete is, and counts the runs.
+fn check_log(log: &Log, totals: &mut Totals) {
+    totals.recorded_runs += log.runs.len() as u64;
     for run in log.runs.iter().filter(|run| run.complete && !run.failed) {
         for (index, process) in run.graph.processes.iter().enumerate() {
             let width = process.name.rsplit(' ').next().and_then(|width| width.parse().ok());
@@ -142,6 +160,6 @@ fn check_log(log: &Log) -> u64 {
                 ends = chunk.items.end;
             }
         }
+        totals.complete_runs += 1;
     }
-    log.runs.len() as u64
 }

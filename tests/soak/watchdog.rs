@@ -42,10 +42,11 @@ pub enum Activity {
     LentThread,
     RunBackground,
     Job,
+    Finish,
 }
 
 impl Activity {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Scope,
         Self::Loop,
         Self::Graph,
@@ -56,6 +57,7 @@ impl Activity {
         Self::LentThread,
         Self::RunBackground,
         Self::Job,
+        Self::Finish,
     ];
 }
 
@@ -113,7 +115,7 @@ fn register() -> Arc<Activities> {
     activities
 }
 
-/// Has this world's scheduler be shown if it hangs.
+/// Shows this world's scheduler after a hang.
 pub fn watch(world: &Arc<World>) {
     *WORLD.lock().unwrap() = Arc::downgrade(world);
 }

@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicIsize, Ordering};
 use std::sync::{Arc, Barrier};
 use std::thread;
+use std::time::Duration;
 
 use drawloom::task::Scheduler;
 use proptest::prelude::*;
@@ -112,11 +113,11 @@ where
 }
 
 /// Panics at every event.
-struct Objects {
+struct PanickingSubscriber {
     told: Arc<AtomicIsize>,
 }
 
-impl<S: Subscriber> Layer<S> for Objects {
+impl<S: Subscriber> Layer<S> for PanickingSubscriber {
     fn on_event(&self, _event: &Event<'_>, _context: Context<'_, S>) {
         self.told.fetch_add(1, Ordering::Relaxed);
         panic!("as planned");
@@ -128,15 +129,19 @@ fn a_subscriber_that_panics_at_a_report_kills_no_worker() {
     const JOBS: isize = 8;
     const WORKERS: usize = 4;
     let told = Arc::new(AtomicIsize::new(0));
-    let dispatch = subscriber(Objects { told: Arc::clone(&told) }, LevelFilter::TRACE);
+    let dispatch = subscriber(PanickingSubscriber { told: Arc::clone(&told) }, LevelFilter::TRACE);
     dispatcher::with_default(&dispatch, || {
         let builder = Scheduler::builder().workers(WORKERS);
         let scheduler = scheduler(builder.on_stop(|_worker| panic!("as planned")), &dispatch);
         // Nobody waits for these: whoever is the last to have one, its worker or this thread, reports it.
         (0..JOBS).for_each(|_job| drop(scheduler.background(|| panic!("as planned"))));
-        while told.load(Ordering::Relaxed) < JOBS {
-            thread::yield_now();
+        for _look in 0..10_000 {
+            if told.load(Ordering::Relaxed) == JOBS {
+                break;
+            }
+            thread::sleep(Duration::from_millis(1));
         }
+        assert_eq!(told.load(Ordering::Relaxed), JOBS, "a worker is lost, or what it was to report");
         // Only that many workers together can pass this.
         let together = Barrier::new(WORKERS);
         let outcome = scheduler.parallel_for(WORKERS, 1, |_range, _worker| _ = together.wait());

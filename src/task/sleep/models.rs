@@ -14,6 +14,7 @@ use crate::{
 struct Room {
     sleep: Sleep,
     jobs: AtomicUsize,
+    background: AtomicUsize,
     latch: Latch,
     /// Whether the owner of the region has run a job.
     ran: AtomicBool,
@@ -25,6 +26,7 @@ impl Room {
         Arc::new(Self {
             sleep: Sleep::new(3),
             jobs: AtomicUsize::new(0),
+            background: AtomicUsize::new(0),
             latch: Latch::new(outstanding),
             ran: AtomicBool::new(false),
             shut_down: AtomicBool::new(false),
@@ -38,6 +40,12 @@ impl Room {
 
     fn has_jobs(&self) -> bool {
         self.jobs.load(Ordering::Relaxed) > 0
+    }
+
+    /// What a worker sees that ends its search: `jobs` are a frame's.
+    fn sees(&self, bands: &[Band]) -> bool {
+        let background = || self.background.load(Ordering::Relaxed) > 0;
+        (bands.contains(&Band::Normal) && self.has_jobs()) || (bands.contains(&Band::Background) && background())
     }
 
     fn try_consume(&self) -> bool {
@@ -62,7 +70,7 @@ impl Room {
             is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, || self.has_jobs());
         }
         if is_searcher {
-            self.sleep.end_search(|| self.has_jobs());
+            self.sleep.end_search(|bands| self.sees(bands));
         }
     }
 
@@ -70,6 +78,20 @@ impl Room {
     fn wait(&self, worker: usize) {
         while !self.latch.is_released() {
             self.sleep.sleep(worker, WakeFor::Region { level: 0 }, false, || self.latch.is_released());
+        }
+    }
+
+    /// What a worker does that takes one job: of a frame if there is one, and otherwise of the background.
+    fn consume_either(&self, worker: usize) {
+        let take = |jobs: &AtomicUsize| {
+            jobs.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |jobs| jobs.checked_sub(1)).is_ok()
+        };
+        let mut is_searcher = false;
+        while !(take(&self.jobs) || take(&self.background)) {
+            is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, || self.sees(&Band::ALL));
+        }
+        if is_searcher {
+            self.sleep.end_search(|bands| self.sees(bands));
         }
     }
 
@@ -94,7 +116,7 @@ impl Room {
         loop {
             if self.try_consume() {
                 if mem::take(&mut is_searcher) {
-                    self.sleep.end_search(|| self.has_jobs());
+                    self.sleep.end_search(|bands| self.sees(bands));
                 }
                 self.ran.store(true, Ordering::Relaxed);
                 self.sleep.wake_worker(1);
@@ -106,7 +128,7 @@ impl Room {
             }
         }
         if is_searcher {
-            self.sleep.end_search(|| self.has_jobs());
+            self.sleep.end_search(|bands| self.sees(bands));
         }
     }
 
@@ -252,7 +274,7 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
         room.jobs.fetch_add(1, Ordering::Relaxed);
         room.sleep.wake_beside(Band::Background);
         // Worker 0 has no eyes for it.
-        room.sleep.end_search(|| false);
+        room.sleep.end_search(|_| false);
         worker.join().unwrap();
     });
 }
@@ -296,6 +318,20 @@ fn a_job_of_an_outer_region_wakes_a_helper_while_the_owner_sleeps_for_an_inner_o
         });
         room.produce_for_owner(1);
         join([owner, helper]);
+    });
+}
+
+#[test]
+fn a_worker_called_for_a_background_job_that_finds_a_frames_passes_the_call_on() {
+    bounded(3, || {
+        let room = Room::new(1);
+        let workers = [1, 2].map(|worker| start(&room, move |room| room.consume_either(worker)));
+        room.background.fetch_add(1, Ordering::Relaxed);
+        room.sleep.wake_beside(Band::Background);
+        room.jobs.fetch_add(1, Ordering::Relaxed);
+        room.sleep.wake_any();
+        join(workers);
+        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
     });
 }
 
