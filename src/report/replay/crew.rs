@@ -1,7 +1,8 @@
 //! The workers of a replay: their queues, who of them looks for work, who sleeps, and who wakes whom. It follows
 //! `task/worker.rs`, `task/idle.rs` and `task/sleep.rs`.
 //!
-//! A worker that looks does so all the time, so it is there at the moment that a token is pushed.
+//! A worker that looks does so all the time, so it is there at the moment that a token is pushed. Every token lies in a queue, as
+//! in a run that a thread from outside calls for; mailboxes, through which workers hand on tokens of a run in a job, are left out.
 
 use std::{
     cmp::Reverse,
