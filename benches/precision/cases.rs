@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use drawloom::glam::{DQuat, DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Light, Material, Projection, RenderObject, Scene, Topology, Vertex};
 use drawloom::scene::{Mesh, SceneError};
-use drawloom::view::{ObjectRecord, ObjectTable, ShadowMaps};
+use drawloom::view::{GpuObject, ObjectTable, ShadowMaps};
 
 use crate::random::Random;
 use crate::vertex::Case;
@@ -148,7 +148,7 @@ impl Records {
     ///
     /// # Errors
     /// If an object cannot be.
-    pub fn visit(&mut self, cases: &[Case], mut visit: impl FnMut(&Case, &ObjectRecord)) -> Result<(), SceneError> {
+    pub fn visit(&mut self, cases: &[Case], mut visit: impl FnMut(&Case, &GpuObject)) -> Result<(), SceneError> {
         let handles: Vec<_> = self.scene.objects().collect();
         for (index, case) in cases.iter().enumerate() {
             let Case { position, orientation, scale, .. } = *case;

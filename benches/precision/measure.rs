@@ -81,7 +81,7 @@ pub const UNIT_ROUNDOFF: f64 = 1.0 / (1_u32 << 24) as f64;
 pub const BOUND: f64 = 1e-3;
 
 /// The most that some thirty roundings, each at its worst and all of one sign, are as an angle: in units of 2⁻²⁴ radians. See
-/// [`ViewRecord`](drawloom::view::ViewRecord).
+/// [`GpuView`](drawloom::view::GpuView).
 pub const WORST_ANGLE: f64 = 30.0;
 
 /// The views that keep within [`BOUND`].

@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
 use drawloom::scene::{Camera, Projection, Scene, ViewKind};
-use drawloom::view::{ObjectRecord, RenderView, ViewRecord};
+use drawloom::view::{GpuObject, GpuView, RenderView};
 
 /// A vertex of an object in a view.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ impl Case {
     }
 
     /// Where the shaders put it: `vertex` of `surface.wgsl`, in f32 and in the same order.
-    pub fn shaded(&self, object: &ObjectRecord, view: &ViewRecord) -> DVec2 {
+    pub fn shaded(&self, object: &GpuObject, view: &GpuView) -> DVec2 {
         let origin = fixed_difference(object, view);
         let turned = rotate(Quat::from_array(object.orientation), Vec3::from(object.scale) * self.vertex);
         self.placed(times(&view.clip_from_relative, origin + turned))
@@ -109,8 +109,8 @@ pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
 ///
 /// # Panics
 /// If the camera is out of reach.
-pub fn record_of(view: &RenderView) -> ViewRecord {
-    ViewRecord::new(view, &Scene::new().as_scene_ref(), 0).expect("the camera is within reach")
+pub fn record_of(view: &RenderView) -> GpuView {
+    GpuView::new(view, &Scene::new().as_scene_ref(), 0).expect("the camera is within reach")
 }
 
 fn unit(orientation: Quat) -> DQuat {
@@ -127,7 +127,7 @@ fn times(matrix: &Mat4, place: Vec3) -> Vec4 {
     matrix.x_axis * place.x + matrix.y_axis * place.y + matrix.z_axis * place.z + matrix.w_axis
 }
 
-fn fixed_difference(object: &ObjectRecord, view: &ViewRecord) -> Vec3 {
+fn fixed_difference(object: &GpuObject, view: &GpuView) -> Vec3 {
     let (low, from_low) = (UVec3::from(object.position_low), UVec3::from(view.position_low));
     let mut difference = Vec3::ZERO;
     for axis in 0..3 {

@@ -10,7 +10,7 @@ use crate::process::{Draws, Pass};
 use crate::queue::DrawList;
 use crate::scene::Mesh;
 use crate::task::Worker;
-use crate::view::{ObjectTable, ViewRecord};
+use crate::view::{GpuView, ObjectTable};
 
 /// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
 /// that draw what is no mesh, that lie beyond a bundle or of which all remains though they are partial, passes recorded twice or submitted out of order.
@@ -77,7 +77,7 @@ impl Backend for NullBackend {
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
         for view in request.views {
-            if ViewRecord::new(view, request.scene, 0).is_none() {
+            if GpuView::new(view, request.scene, 0).is_none() {
                 return Err(BackendError::ViewOutOfReach { view: view.name().to_owned() });
             }
         }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::{LightValues, MaterialValues, Materials, PassValues, Sampled, ViewValues};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, Camera, Light, Projection, ViewKind};
-use crate::view::{LightRecord, RenderView};
+use crate::view::{GpuLight, RenderView};
 
 /// How far f32 rounds, as a share of the value: 2⁻²⁴.
 pub(super) const UNIT: f64 = 1.0 / 16_777_216.0;
@@ -61,7 +61,7 @@ pub(super) fn view_values<R: Real>(view: &RenderView) -> ViewValues<R> {
 
 /// A light as a camera at the world's origin has it.
 pub(super) fn light_values<R: Real>(light: &Light, map: Option<&RenderView>) -> LightValues<R> {
-    let record = LightRecord::new(light, DVec3::ZERO, map);
+    let record = GpuLight::new(light, DVec3::ZERO, map);
     let number = |value: f32| R::of(f64::from(value));
     let orientation: Quat = record.shadow_orientation;
     LightValues {

@@ -284,7 +284,7 @@ pub enum ToneCurve {
 pub enum TransformPrecision {
     /// The camera's place is taken from the object's in 64-bit fixed point: off by less than 1e-3 pixels wherever in the world the
     /// camera is, for what is farther from it than it is large, at 1080p and fields of view from 27° to 90°; see
-    /// [`ViewRecord`](crate::view::ViewRecord) for others.
+    /// [`GpuView`](crate::view::GpuView) for others.
     #[default]
     CameraRelative,
     /// Places in the world in f32, as most engines have them: off by 0.05 pixels in the mean and 2 at most at 1 km from the world's

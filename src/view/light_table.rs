@@ -2,15 +2,13 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Quat, Vec3};
-
-use super::RenderView;
-use crate::scene::{Light, LightKind, Projection, ViewKind};
+use super::{GpuLight, RenderView};
+use crate::scene::{Light, LightKind, ViewKind};
 
 /// The lights that reach one view, those of one class beside each other: so that all of a class are one instanced draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTable {
-    records: Vec<LightRecord>,
+    records: Vec<GpuLight>,
     /// The class and the index of each light that reaches the view, on the way to its record.
     reaching: Vec<(usize, usize)>,
     /// For each light, its shadow map's view.
@@ -81,7 +79,7 @@ impl LightTable {
             let of_class = self.reaching.iter().filter(|(other, _)| *other == class);
             let record = |&(_, light): &(usize, usize)| {
                 let map = self.maps.get(light).copied().flatten();
-                LightRecord::new(&lights[light], origin, map.map(|index| &views[index]))
+                GpuLight::new(&lights[light], origin, map.map(|index| &views[index]))
             };
             self.records.extend(of_class.map(record));
             self.ranges[class] = start..self.records.len() as u32;
@@ -89,7 +87,7 @@ impl LightTable {
     }
 
     /// All of them.
-    pub fn records(&self) -> &[LightRecord] {
+    pub fn records(&self) -> &[GpuLight] {
         &self.records
     }
 
@@ -106,79 +104,10 @@ impl LightTable {
     }
 }
 
-/// A light as shaders read it, relative to one view's camera: `Light` in `drawloom.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct LightRecord {
-    /// Where it is, relative to the camera, in metres; for a directional light, where its shadow map is seen from.
-    pub position: Vec3,
-    /// 0 directional, 1 point, 2 spot, 3 hemispherical.
-    pub kind: u32,
-    /// The way it travels.
-    pub direction: Vec3,
-    /// Where it ends, in metres; for a directional light, where its shadow map does.
-    pub range: f32,
-    /// At 1 m, or on a surface that faces a directional light.
-    pub intensity: Vec3,
-    /// The cosine at which a spot light begins to fade.
-    pub cone_begin: f32,
-    /// The cosine at which a spot light is gone; 0 for a hemispherical one.
-    pub cone_end: f32,
-    /// The layer of its shadow map; [`LightRecord::NO_SHADOW_MAP`] without one.
-    pub shadow_layer: u32,
-    /// Half as wide as the shadow map: at 1 m for a spot light, in metres for a directional one.
-    pub shadow_half: f32,
-    /// Where the shadow map begins, in metres.
-    pub shadow_near: f32,
-    /// From the axes of the shadow map's camera to the world's.
-    pub shadow_orientation: Quat,
-}
-
-impl LightRecord {
-    /// The [`LightRecord::shadow_layer`] of a light without a shadow map.
-    pub const NO_SHADOW_MAP: u32 = u32::MAX;
-
-    /// The record of `light` for a camera at `origin`, with the view that draws its shadow map if there is one.
-    pub fn new(light: &Light, origin: DVec3, shadow_map: Option<&RenderView>) -> Self {
-        let relative = |position: DVec3| (position - origin).as_vec3();
-        let mut record = Self {
-            kind: light.kind() as u32,
-            shadow_layer: Self::NO_SHADOW_MAP,
-            shadow_orientation: Quat::IDENTITY,
-            ..bytemuck::Zeroable::zeroed()
-        };
-        match *light {
-            Light::Directional { direction, illuminance, .. } => {
-                (record.direction, record.intensity) = (direction.normalize(), illuminance);
-            }
-            Light::Point { position, intensity, range } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
-            }
-            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
-                record.direction = direction.normalize();
-                (record.cone_begin, record.cone_end) = (inner_angle.cos(), outer_angle.cos());
-            }
-            Light::Hemispherical { position, direction, intensity, range, .. } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
-                record.direction = direction.normalize();
-            }
-        }
-        if let Some(map) = shadow_map {
-            record.shadow_layer = map.layer;
-            record.shadow_near = map.camera.near;
-            record.shadow_orientation = map.camera.orientation;
-            record.shadow_half = map.picture_axes()[1].length();
-            if let Projection::Orthographic { .. } = map.camera.projection {
-                (record.position, record.range) = (relative(map.camera.position), map.camera.far);
-            }
-        }
-        record
-    }
-}
-
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
+    use glam::{DVec3, Vec3};
+
     use super::*;
     use crate::scene::Camera;
 

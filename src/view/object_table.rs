@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::frustum::Judged;
-use super::{Boxes, FixedPosition, Frustum, ObjectBox, RejectionReason, Rejections, Spheres, WorldBounds};
+use super::{Boxes, FixedPosition, Frustum, GpuObject, ObjectBox, RejectionReason, Rejections, Spheres, WorldBounds};
 use crate::blocks::parts;
 use crate::command::{Cull, DrawState};
 use crate::quality::CullingVolume;
@@ -31,7 +31,7 @@ pub struct ObjectTable {
 #[derive(Clone, Debug)]
 pub struct ObjectBlock {
     /// What is uploaded.
-    pub records: [ObjectRecord; ObjectTable::BLOCK],
+    pub records: [GpuObject; ObjectTable::BLOCK],
     /// Where they are.
     pub spheres: Spheres,
     /// The boxes around them, where the table is told to hold some.
@@ -169,7 +169,7 @@ impl ObjectTable {
     ///
     /// # Panics
     /// If there is no such block.
-    pub fn records_of(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [ObjectRecord]>) {
+    pub fn records_of(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [GpuObject]>) {
         let first = block * Self::BLOCK;
         let count = (self.length - first).min(Self::BLOCK);
         (first, RwLockReadGuard::map(self.block(block), |block| &block.records[..count]))
@@ -189,27 +189,6 @@ impl ObjectTable {
     }
 }
 
-/// An object as shaders read it. Its position is in fixed point, so that it can be taken relative to any view's camera
-/// exactly: one table serves all views, wherever they are.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct ObjectRecord {
-    /// The lower halves of the position's three coordinates.
-    pub position_low: [u32; 3],
-    /// Its material's slot.
-    pub material: u32,
-    /// The upper halves of the position's three coordinates.
-    pub position_high: [i32; 3],
-    /// Keeps what follows at a multiple of 16 bytes, as WGSL wants it.
-    pub padding: u32,
-    /// From object space to the world's axes: x, y, z, w.
-    pub orientation: [f32; 4],
-    /// Along the object's own axes.
-    pub scale: [f32; 3],
-    /// Its index.
-    pub object: u32,
-}
-
 /// How an object is drawn, as slots and state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectDraw {
@@ -227,7 +206,7 @@ impl Default for ObjectDraw {
     }
 }
 
-fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldBounds, ObjectDraw), RejectionReason> {
+fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, WorldBounds, ObjectDraw), RejectionReason> {
     let (position, scale, turn) = (scene.positions[object], scene.scales[object], scene.orientations[object]);
     let Some(fixed) = FixedPosition::new(position) else {
         let is_valid = scene.transform_is_valid(object);
@@ -251,7 +230,7 @@ fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(ObjectRecord, WorldB
 
     let slots = (scene.meshes[object].index(), scene.materials[object].index());
     let (position_low, position_high) = fixed.halves();
-    let record = ObjectRecord {
+    let record = GpuObject {
         position_low,
         material: slots.1,
         position_high,

@@ -10,7 +10,7 @@ use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
-use drawloom::view::ObjectRecord;
+use drawloom::view::GpuObject;
 
 use crate::scenes::field;
 
@@ -35,7 +35,7 @@ fn a_frame_says_how_many_bytes_it_uploaded_and_so_does_its_timeline() {
     for (place, statistics) in uploaded.iter().enumerate() {
         // What all objects are, and four bytes for each that is drawn.
         let commands: usize = statistics.views.iter().map(|view| view.commands).sum();
-        let every_frame = (600 * size_of::<ObjectRecord>() + commands * 4) as u64;
+        let every_frame = (600 * size_of::<GpuObject>() + commands * 4) as u64;
         assert!(statistics.uploaded >= every_frame, "{} of {every_frame}", statistics.uploaded);
         let assets = statistics.uploaded - every_frame;
         assert_eq!(place == 0, assets > meshes as u64, "frame {place} uploaded {assets} bytes beside what it must");

@@ -18,7 +18,7 @@ use crate::process::{Access, ClearColor, Draws, Pass, Twin, TwinShader};
 use crate::quality::VertexFormat;
 use crate::scene::{Mesh, ViewKind};
 use crate::task::catch;
-use crate::view::{FixedPosition, ViewRecord};
+use crate::view::{FixedPosition, GpuView};
 
 /// What draws in one kind of number, with what it keeps from frame to frame.
 pub(super) struct Engine<R: Number> {
@@ -96,7 +96,7 @@ pub(super) fn twins_of(request: &FrameRequest<'_>) -> Result<Vec<Twin>, BackendE
 fn view_state<R: Number>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
     let (view, lights, scene) = (&request.views[index], &request.lights[index], request.scene);
     let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
-    let record = ViewRecord::new(view, scene, lights.records().len()).ok_or_else(out_of_reach)?;
+    let record = GpuView::new(view, scene, lights.records().len()).ok_or_else(out_of_reach)?;
     let exact = view.camera.position;
     let camera = CameraPlace {
         exact,

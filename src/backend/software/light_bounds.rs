@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::backend::software::values::{exact_view, light_of_record};
     use crate::scene::{Assets, Camera, Light, SceneRef};
-    use crate::view::{LightRecord, RenderView};
+    use crate::view::{GpuLight, RenderView};
 
     const SIZE: [u32; 2] = [160, 90];
 
@@ -116,7 +116,7 @@ mod tests {
 
     fn reached(camera: &Camera, position: DVec3, range: f32) -> Reached {
         let light = Light::Point { position, intensity: Vec3::ONE, range };
-        reached_by(&view_of(camera), &light_of_record(&LightRecord::new(&light, camera.position, None)))
+        reached_by(&view_of(camera), &light_of_record(&GpuLight::new(&light, camera.position, None)))
     }
 
     fn bounds_of(camera: &Camera, position: DVec3, range: f32) -> PixelBounds {

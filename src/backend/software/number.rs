@@ -9,7 +9,7 @@ use crate::process::{LightValues, ObjectValues, Twin, TwinShader, ViewValues};
 use crate::quality::TransformPrecision;
 use crate::raster::Real;
 use crate::scene::{Light, SceneRef};
-use crate::view::{FixedPosition, LightRecord, ObjectTable, RenderView, ViewRecord};
+use crate::view::{FixedPosition, GpuLight, GpuView, ObjectTable, RenderView};
 
 /// A number that the backend draws in: f32, from the very numbers that a device gets, or f64, from what the scene says.
 pub(super) trait Number: Real {
@@ -32,10 +32,10 @@ pub(super) trait Number: Real {
     fn object(objects: &Self::Objects, index: usize, camera: &CameraPlace) -> Option<ObjectValues<Self>>;
 
     /// A view.
-    fn view(view: &RenderView, record: &ViewRecord, scene: &SceneRef<'_>) -> ViewValues<Self>;
+    fn view(view: &RenderView, record: &GpuView, scene: &SceneRef<'_>) -> ViewValues<Self>;
 
     /// A light as a view's camera has it, and the view that draws its shadow map.
-    fn light(record: &LightRecord, light: &Light, camera: &CameraPlace, map: Option<&RenderView>) -> LightValues<Self>;
+    fn light(record: &GpuLight, light: &Light, camera: &CameraPlace, map: Option<&RenderView>) -> LightValues<Self>;
 }
 
 /// Where a camera is in the world.
@@ -70,16 +70,11 @@ impl Number for f32 {
         objects.get(index, camera)
     }
 
-    fn view(view: &RenderView, record: &ViewRecord, _scene: &SceneRef<'_>) -> ViewValues<Self> {
+    fn view(view: &RenderView, record: &GpuView, _scene: &SceneRef<'_>) -> ViewValues<Self> {
         values::view_of_record(view, record)
     }
 
-    fn light(
-        record: &LightRecord,
-        _light: &Light,
-        _camera: &CameraPlace,
-        _map: Option<&RenderView>,
-    ) -> LightValues<Self> {
+    fn light(record: &GpuLight, _light: &Light, _camera: &CameraPlace, _map: Option<&RenderView>) -> LightValues<Self> {
         values::light_of_record(record)
     }
 }
@@ -103,11 +98,11 @@ impl Number for f64 {
         objects.get(index).map(|placed| placed.relative_to(camera))
     }
 
-    fn view(view: &RenderView, _record: &ViewRecord, scene: &SceneRef<'_>) -> ViewValues<Self> {
+    fn view(view: &RenderView, _record: &GpuView, scene: &SceneRef<'_>) -> ViewValues<Self> {
         values::exact_view(view, scene)
     }
 
-    fn light(record: &LightRecord, light: &Light, camera: &CameraPlace, map: Option<&RenderView>) -> LightValues<Self> {
+    fn light(record: &GpuLight, light: &Light, camera: &CameraPlace, map: Option<&RenderView>) -> LightValues<Self> {
         values::exact_light(record, light, camera, map)
     }
 }

@@ -10,12 +10,12 @@ use crate::process::{LightValues, ObjectValues, ViewValues};
 use crate::quality::TransformPrecision;
 use crate::raster::{Quaternion, Real, Vector, Vector3};
 use crate::scene::{Light, LightKind, Projection, SceneRef, ViewKind};
-use crate::view::{FixedPosition, LightRecord, ObjectRecord, ObjectTable, RenderView, ViewRecord};
+use crate::view::{FixedPosition, GpuLight, GpuObject, GpuView, ObjectTable, RenderView};
 
 /// A frame's objects as a device gets them.
 pub(super) struct Uploaded {
     /// A block of the table each.
-    blocks: Vec<OnceLock<Box<[ObjectRecord]>>>,
+    blocks: Vec<OnceLock<Box<[GpuObject]>>>,
 }
 
 impl Uploaded {
@@ -82,7 +82,7 @@ impl Placed {
 }
 
 /// A view as a device gets it.
-pub(super) fn view_of_record(view: &RenderView, record: &ViewRecord) -> ViewValues<f32> {
+pub(super) fn view_of_record(view: &RenderView, record: &GpuView) -> ViewValues<f32> {
     let axis = |axis: glam::Vec3| Vector(axis.to_array());
     ViewValues {
         clip_from_relative: record.clip_from_relative.to_cols_array_2d().map(Vector),
@@ -136,7 +136,7 @@ fn clamps_near(view: &RenderView) -> bool {
 }
 
 /// A light as a device gets it.
-pub(super) fn light_of_record<R: Real>(record: &LightRecord) -> LightValues<R> {
+pub(super) fn light_of_record<R: Real>(record: &GpuLight) -> LightValues<R> {
     let real = |value: f32| R::of(f64::from(value));
     let kind = LightKind::ALL.into_iter().find(|kind| *kind as u32 == record.kind);
     LightValues {
@@ -147,16 +147,16 @@ pub(super) fn light_of_record<R: Real>(record: &LightRecord) -> LightValues<R> {
         intensity: Vector3::of_single(record.intensity),
         cone_begin: real(record.cone_begin),
         cone_end: real(record.cone_end),
-        shadow_layer: (record.shadow_layer != LightRecord::NO_SHADOW_MAP).then_some(record.shadow_layer as usize),
+        shadow_layer: (record.shadow_layer != GpuLight::NO_SHADOW_MAP).then_some(record.shadow_layer as usize),
         shadow_half: real(record.shadow_half),
         shadow_near: real(record.shadow_near),
         shadow_orientation: Quaternion(record.shadow_orientation.to_array().map(real)),
     }
 }
 
-/// A light as the scene says: what [`LightRecord::new`] rounds is not rounded here.
+/// A light as the scene says: what [`GpuLight::new`] rounds is not rounded here.
 pub(super) fn exact_light(
-    record: &LightRecord,
+    record: &GpuLight,
     light: &Light,
     camera: &CameraPlace,
     map: Option<&RenderView>,

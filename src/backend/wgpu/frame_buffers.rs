@@ -16,7 +16,7 @@ use super::uploads::Uploads;
 use crate::backend::subdivisions::SubdividedMeshes;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Draws, Pass};
-use crate::view::{ObjectRecord, ObjectTable, ViewRecord};
+use crate::view::{GpuObject, GpuView, ObjectTable};
 
 /// Buffers that no frame uses at present.
 ///
@@ -100,7 +100,7 @@ impl FrameBuffers {
         buffers.set_passes(request);
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
-        let object_bytes = objects * size_of::<ObjectRecord>();
+        let object_bytes = objects * size_of::<GpuObject>();
         let longest = request.lights.iter().map(|lights| size_of_val(lights.records())).max().unwrap_or(0);
         for bytes in [object_bytes, objects * 4, longest] {
             check_storage(device, bytes)?;
@@ -167,7 +167,7 @@ impl FrameBuffers {
     pub(super) fn write_objects(&self, uploads: &Uploads, objects: &ObjectTable, blocks: Range<usize>) {
         let first = blocks.start * ObjectTable::BLOCK;
         let end = objects.len().min(blocks.end * ObjectTable::BLOCK);
-        let bytes = |objects: usize| objects * size_of::<ObjectRecord>();
+        let bytes = |objects: usize| objects * size_of::<GpuObject>();
         let size = NonZeroU64::new(bytes(end - first) as u64);
         let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
         let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
@@ -187,7 +187,7 @@ impl FrameBuffers {
 
 struct Buffers {
     objects: GrowingBuffer,
-    /// A [`ViewRecord`] a view.
+    /// A [`GpuView`] a view.
     views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
     lights: MirroredBuffer,
@@ -281,7 +281,7 @@ impl Buffers {
         let stride = self.key.drawn_stride;
         let drawn = drawn_place.map_or((0, ALIGNMENT), |place| (place * stride, stride));
         let bindings = [
-            self.views.on_device.binding(view * ALIGNMENT, size_of::<ViewRecord>()),
+            self.views.on_device.binding(view * ALIGNMENT, size_of::<GpuView>()),
             self.objects.binding(0, objects_bound),
             self.drawn.binding(drawn.0, drawn.1),
             self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
@@ -302,7 +302,7 @@ impl Buffers {
 /// If a camera is out of reach.
 fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
     for (view, lights) in request.views.iter().zip(request.lights) {
-        let record = ViewRecord::new(view, request.scene, lights.records().len())
+        let record = GpuView::new(view, request.scene, lights.records().len())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
         append_aligned(bytes, bytemuck::bytes_of(&record));
     }

@@ -3,7 +3,7 @@
 use wgpu::ShaderStages;
 
 use crate::process::Format;
-use crate::view::ViewRecord;
+use crate::view::GpuView;
 
 /// The bind group layouts that all processes share.
 pub(super) struct Layouts {
@@ -19,7 +19,7 @@ impl Layouts {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
         let frame = [
-            entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(size_of::<ViewRecord>() as u64)),
+            entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(size_of::<GpuView>() as u64)),
             entry(1, ShaderStages::VERTEX_FRAGMENT, storage()),
             entry(2, ShaderStages::VERTEX_FRAGMENT, storage()),
             entry(3, ShaderStages::VERTEX_FRAGMENT, storage()),

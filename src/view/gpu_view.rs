@@ -20,7 +20,7 @@ use crate::scene::{Projection, SceneRef, ViewKind};
 /// picture's height; beyond, as much more as it is farther. `benches/precision.rs` measures all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct ViewRecord {
+pub struct GpuView {
     /// From world axes relative to the place below to clip space: see [`RenderView::clip_from_relative`].
     pub clip_from_relative: Mat4,
     /// The lower halves of the place that everything is taken relative to: the camera's, but for a directional light's shadow map,
@@ -50,7 +50,7 @@ pub struct ViewRecord {
     pub far: f32,
 }
 
-impl ViewRecord {
+impl GpuView {
     /// The record of `view`; `None` where its camera is farther out than [`FixedPosition::REACH`].
     pub fn new(view: &RenderView, scene: &SceneRef<'_>, light_count: usize) -> Option<Self> {
         let (position, clip_from_relative) = placed(view);
@@ -111,7 +111,7 @@ mod tests {
     use crate::scene::{Camera, Scene};
 
     /// Where a place in the world comes to lie in clip space.
-    fn clip(record: &ViewRecord, place: DVec3) -> Vec3 {
+    fn clip(record: &GpuView, place: DVec3) -> Vec3 {
         let metres = |low: u32, high: i32| f64::from(high) * 4.0 + f64::from(low) / f64::from(1_u32 << 30);
         let origin =
             DVec3::from_array([0, 1, 2].map(|axis| metres(record.position_low[axis], record.position_high[axis])));
@@ -129,8 +129,8 @@ mod tests {
                 ..Camera::looking_at("plan", position, position + DVec3::new(-1.0, 2.0, 0.5))
             };
             let map = Camera { kind: ViewKind::Shadow, ..camera.clone() };
-            let [plain, moved] = [&camera, &map]
-                .map(|camera| ViewRecord::new(&RenderView::new(camera), &scene.as_scene_ref(), 0).unwrap());
+            let [plain, moved] =
+                [&camera, &map].map(|camera| GpuView::new(&RenderView::new(camera), &scene.as_scene_ref(), 0).unwrap());
             assert_ne!(plain.position_low, moved.position_low);
             for (x, y, depth) in [(0.0, 0.0, 5.0), (4.0, -3.0, 50.0), (-2.0, 1.0, 95.0)] {
                 let place = position + camera.orientation.as_dquat() * DVec3::new(x, y, -depth);
@@ -148,6 +148,6 @@ mod tests {
             far: 1e6,
             ..Camera::looking_at("map", DVec3::X * 4.2949e9, DVec3::X * 5e9)
         };
-        assert!(ViewRecord::new(&RenderView::new(&camera), &Scene::new().as_scene_ref(), 0).is_some());
+        assert!(GpuView::new(&RenderView::new(&camera), &Scene::new().as_scene_ref(), 0).is_some());
     }
 }
