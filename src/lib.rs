@@ -50,13 +50,13 @@
 //! | `drawloom` | span `record`, as long as [`Renderer::record`] takes | debug | `objects` |
 //! | `drawloom` | span `submit`, as long as [`Submitter::submit`] takes | debug | |
 //! | `drawloom` | an event for each reason why something is not drawn as asked | warn | `count`, `first`, `message` |
-//! | `drawloom::graph` | span `process`: a process of a [schedule](graph::Schedule) in one run | debug | `name`; where it has [labels](timeline::Labels), `process`, `phase`, `view` |
-//! | `drawloom::graph` | span `chunk`, inside that of its process: some of its items, run by one worker | trace | `start`, `end` |
-//! | `drawloom::graph` | event `taken`: a worker takes up a process, in a run on several workers | trace | `ready`: how many others wait for a worker; `queued`: the jobs in that worker's queues |
+//! | `drawloom::graph` | span `node`: one node of a [schedule](graph::Schedule) in one run | debug | `name`; if the node has [labels](timeline::Labels), `process`, `stage`, `view` |
+//! | `drawloom::graph` | span `chunk`, inside its node's span: a range of the node's items, run by one worker | trace | `start`, `end` |
+//! | `drawloom::graph` | event `taken`: a worker starts a ready node, in a parallel run | trace | `ready`: how many other nodes are ready; `queued`: the jobs in that worker's queues |
 //!
-//! A process has one span a run, whose parent is the span in which the run was called for: `record`, in a frame. Each worker
-//! enters it that runs chunks of it, leaves it before the process counts as done, and it is closed before anything begins
-//! that waits for the process. What panics, or fails, is left as well.
+//! A node has one span per run. Its parent is the span that was current when the run was started: `record`, in a frame. Each
+//! worker that runs chunks of the node enters the span and exits it before the node counts as done. The span closes before
+//! any dependent of the node begins. It is exited after an error or a panic, too.
 //!
 //! Workers are threads of their own. A subscriber that is to hear of all of them is the global default, or is set on each by
 //! [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the run fails.

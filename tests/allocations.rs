@@ -20,7 +20,7 @@ use std::{
 };
 
 use drawloom::{
-    graph::{Closure, FrameGraph, ProcessId, Schedule},
+    graph::{Closure, FrameGraph, NodeId, Schedule},
     task::{Scheduler, Worker, catch},
 };
 
@@ -110,9 +110,9 @@ fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
         (state >> 33) as usize % count
     };
     let mut graph = FrameGraph::new();
-    let mut before: Vec<ProcessId> = Vec::new();
+    let mut before: Vec<NodeId> = Vec::new();
     for (layer, &width) in layers.iter().enumerate() {
-        let processes: Vec<ProcessId> = (0..width)
+        let processes: Vec<NodeId> = (0..width)
             .map(|place| {
                 let (items, chunk) = (2 + below(100), 1 + below(4));
                 let payload = match below(8) {
@@ -145,7 +145,7 @@ fn comb() -> Schedule<Closure<'static, Duration>> {
     // Of processes that cost the same the first added comes first, so the spine does.
     let mut last = graph.add("root", root);
     graph.keep(last);
-    let bones: Vec<ProcessId> = (0..MOST_JOBS).map(|place| graph.add(format!("bone {place}"), nothing())).collect();
+    let bones: Vec<NodeId> = (0..MOST_JOBS).map(|place| graph.add(format!("bone {place}"), nothing())).collect();
     for (place, bone) in bones.into_iter().enumerate() {
         graph.order(last, bone);
         last = bone;
@@ -155,7 +155,7 @@ fn comb() -> Schedule<Closure<'static, Duration>> {
         graph.keep(tooth);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     schedule
 }
 
@@ -170,7 +170,7 @@ fn mail() -> Schedule<Process> {
         graph.keep(pinned);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     schedule
 }
 
@@ -212,8 +212,8 @@ fn with_others_kept(scheduler: &Scheduler, chosen: usize, call: impl FnMut() + S
 }
 
 /// The requests of frames of a graph, whose work changes: heavy frames are too long to be run alone.
-fn requests_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, always_share: bool) -> usize {
-    schedule.always_share(always_share);
+fn requests_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, always_parallel: bool) -> usize {
+    schedule.always_parallel(always_parallel);
     let world = World::default();
     let requests = requests_of(|frame| {
         world.work.store(if frame % 5 == 4 { 200 } else { 0 }, Ordering::Relaxed);
@@ -255,9 +255,9 @@ fn a_steady_frame_takes_no_memory() {
     let mut found = Vec::new();
     let mut note = |case: String, requests: usize| found.extend((requests > 0).then(|| format!("{case}: {requests}")));
     for (seed, layers) in [&[1, 12, 3, 30, 7, 1][..], &[5, 100, 2, 150, 40], &[200, 1, 200]].into_iter().enumerate() {
-        for always_share in [true, false] {
-            let requests = requests_of_graph(&scheduler, layered(seed as u64, layers), always_share);
-            note(format!("layers of {layers:?}, always shared: {always_share}"), requests);
+        for always_parallel in [true, false] {
+            let requests = requests_of_graph(&scheduler, layered(seed as u64, layers), always_parallel);
+            note(format!("layers of {layers:?}, always shared: {always_parallel}"), requests);
         }
     }
     let mut schedule = comb();

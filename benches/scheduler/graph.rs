@@ -152,7 +152,7 @@ fn drawloom(name: &'static str, workers: usize, graph: &Arc<Graph>) -> Contender
     let graph = Arc::clone(graph);
     let contender = Contender::new(name, move |work, watch| {
         let mut schedule = schedule(&graph)?;
-        schedule.always_share(name == ALWAYS_SHARED);
+        schedule.always_parallel(name == ALWAYS_SHARED);
         let scheduler = Scheduler::new(workers)?;
         watch.frames(|| Ok(schedule.run(&scheduler, work)?))
     });

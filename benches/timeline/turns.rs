@@ -48,7 +48,7 @@ impl Timed {
         nodes.iter().for_each(|&node| graph.keep(node));
         let mut schedule = graph.compile()?;
         // What is to be compared is one way of running, not two.
-        schedule.always_share(workers > 1);
+        schedule.always_parallel(workers > 1);
         let scheduler = Scheduler::new(workers)?;
         let mut timed =
             Self { name, chunks: passes * chunks, schedule, scheduler, work, off: Vec::new(), on: Vec::new() };

@@ -101,8 +101,8 @@ pub enum FrameError {
 impl From<RunError> for FrameError {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Failed { process, source } => Self::Failed { phase: process, source },
-            RunError::Panicked { process, message } => Self::Panicked { phase: process, message },
+            RunError::Failed { node, source } => Self::Failed { phase: node, source },
+            RunError::Panicked { node, message } => Self::Panicked { phase: node, message },
             RunError::Scheduler(panic) => Self::Job(panic),
         }
     }

@@ -7,7 +7,7 @@ use super::FrameError;
 use super::cost_model::CostModel;
 use super::occlusion::{Payoff, occluders};
 use super::phase::{FrameNode, PassTable, Phase};
-use crate::graph::{FrameGraph, ProcessId, Schedule};
+use crate::graph::{FrameGraph, NodeId, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::queue::Selection;
 use crate::scene::ViewKind;
@@ -174,8 +174,8 @@ impl Nodes {
         phase: Phase,
         process: Option<usize>,
         labels: Labels,
-        after: Option<ProcessId>,
-    ) -> ProcessId {
+        after: Option<NodeId>,
+    ) -> NodeId {
         let known_as = match phase {
             Phase::Sort { pass } => Phase::Split { pass },
             other => other,
@@ -188,7 +188,7 @@ impl Nodes {
         });
         let id = self.graph.add(name, FrameNode { phase, node: self.count, kind: place });
         self.count += 1;
-        self.graph.label(id, Labels { phase: Some(phase.name().to_owned()), ..labels });
+        self.graph.label(id, Labels { stage: Some(phase.name().to_owned()), ..labels });
         self.graph.keep(id);
         if let Some(after) = after {
             self.graph.order(after, id);

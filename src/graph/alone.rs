@@ -1,4 +1,4 @@
-//! A run on one thread: one process after another, as they stand. Nothing is counted, as each stands after all it depends
+//! A run on one thread: one node after another, as they stand. Nothing is counted, as each stands after all it depends
 //! on.
 
 use std::time::Duration;
@@ -15,11 +15,11 @@ use super::{
     watch::{Onlooker, Watching},
 };
 
-/// Where a run stood when it took too long for one thread: all before this process is done.
+/// Where a run stood when it took too long for one thread: all before this node is done.
 pub(super) struct Left<O> {
-    pub(super) process: u32,
+    pub(super) node: u32,
     pub(super) chunks: Chunks,
-    /// How many of the process' chunks are done.
+    /// How many of the node's chunks are done.
     pub(super) done: usize,
     /// Who looks on at it.
     pub(super) onlooker: O,
@@ -30,13 +30,13 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     pub(super) fn go_alone(&self, worker: &Worker, limit: Option<(Instant, Duration)>) -> Option<Left<W::Turn<'_>>> {
         let mut onlooker = self.watch.go_alone(worker);
         let mut patience = limit.map(|(start, at_most)| Patience { start, at_most, chunks: 0, next_look: 1 });
-        // One attempt for all: an attempt a process would cost more than the rest of what is done for it.
+        // One attempt for all: an attempt a node would cost more than the rest of what is done for it.
         let left = self.attempt(0, |position| {
-            for process in 0..self.schedule.flow.len() as u32 {
-                *position = Position { process, item: 0 };
-                onlooker.go_on(process);
+            for node in 0..self.schedule.flow.len() as u32 {
+                *position = Position { node, item: 0 };
+                onlooker.go_on(node);
                 if let Some((chunks, done)) = self.run_alone(position, worker, patience.as_mut(), &mut onlooker)? {
-                    return Ok(Some(Left { process, chunks, done, onlooker }));
+                    return Ok(Some(Left { node, chunks, done, onlooker }));
                 }
             }
             Ok(None)
@@ -44,7 +44,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         left.flatten()
     }
 
-    /// Runs one process, unless the time is over: then it says how many of which chunks are done. Whoever may run a pinned one
+    /// Runs one node, unless the time is over: then it says how many of which chunks are done. Whoever may run a pinned one
     /// has begun it, and ends it.
     #[inline]
     fn run_alone(
@@ -54,10 +54,10 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         mut patience: Option<&mut Patience>,
         onlooker: &mut impl Onlooker,
     ) -> Result<Option<(Chunks, usize)>, NodeError> {
-        let process = position.process;
+        let node = position.node;
         // Of no use here, unless the time is over; but what fails is to fail on one thread as on many.
-        let is_pinned = self.node(process).pinned();
-        let chunks = self.chunks(process, worker);
+        let is_pinned = self.node(node).pinned();
+        let chunks = self.chunks(node, worker);
         if chunks.count() == 0 {
             onlooker.end_empty();
         }

@@ -10,13 +10,13 @@ use crate::timeline::Labels;
 
 use super::error::GraphProblem;
 
-/// Processes, the resources they read and write, and the order that follows.
+/// Nodes, the resources they read and write, and the order that follows.
 ///
-/// `P` is what a process carries: anything for a graph that is only put in order, a [`Node`](super::Node) for one that runs.
+/// `P` is what a node carries: anything for a graph that is only put in order, a [`Node`](super::Node) for one that runs.
 ///
 /// # Who comes before whom
 ///
-/// A process can *write* a resource, *modify* it (read and write it) or *read* it. Of each resource, the writers come
+/// A node can *write* a resource, *modify* it (read and write it) or *read* it. Of each resource, the writers come
 /// first, then the modifiers, then the readers, and each of them waits for all it needs:
 ///
 /// - every modifier for every writer,
@@ -31,12 +31,12 @@ use super::error::GraphProblem;
 ///
 /// # What is kept
 ///
-/// The frame is for its outputs: a process is kept if an output, or a process that is [kept](Self::keep) whatever it
+/// The frame is for its outputs: a node is kept if an output, or a node that is [kept](Self::keep) whatever it
 /// writes, needs what it writes, directly or through others. All that must be waited for is needed, and so is, for a
-/// modifier, what the last modifiers before it left. Without an output and without a kept process all are dropped;
+/// modifier, what the last modifiers before it left. Without an output and without a kept node all are dropped;
 /// [`Schedule::dropped`](super::Schedule::dropped) names those that were.
 ///
-/// What [`order`](Self::order) says puts processes in order but keeps none. A dropped process still hands on the order: if
+/// What [`order`](Self::order) says puts nodes in order but keeps none. A dropped node still hands on the order: if
 /// `a` comes before it, and it before `b`, then `a` comes before `b`.
 ///
 /// ```
@@ -46,7 +46,7 @@ use super::error::GraphProblem;
 /// let [depth, image] = ["depth", "image"].map(|name| graph.resource(name));
 /// graph.output(image);
 ///
-/// let light = graph.add("light", "what a process carries");
+/// let light = graph.add("light", "what a node carries");
 /// graph.read(light, depth);
 /// graph.write(light, image);
 /// let geometry = graph.add("geometry", "can be anything");
@@ -54,7 +54,7 @@ use super::error::GraphProblem;
 /// graph.add("overlay", "and this one leads to no output");
 ///
 /// let schedule = graph.compile()?;
-/// let order: Vec<&str> = schedule.processes().map(|(name, _)| name).collect();
+/// let order: Vec<&str> = schedule.nodes().map(|(name, _)| name).collect();
 /// assert_eq!(order, ["geometry", "light"]);
 /// assert_eq!(schedule.dropped(), ["overlay"]);
 /// # Ok::<(), drawloom::graph::CompileError<&str>>(())
@@ -62,22 +62,22 @@ use super::error::GraphProblem;
 pub struct FrameGraph<P> {
     /// Tells this graph's ids from those of all others.
     identity: usize,
-    processes_added: usize,
-    pub(super) processes: Vec<Process<P>>,
+    nodes_added: usize,
+    pub(super) nodes: Vec<NodeEntry<P>>,
     pub(super) resources: Vec<Resource>,
     resource_by_name: HashMap<String, usize>,
     pub(super) accesses: Vec<Access>,
-    /// Pairs of positions in `processes`: the first comes before the second.
+    /// Pairs of positions in `nodes`: the first comes before the second.
     pub(super) orders: Vec<(usize, usize)>,
     /// Calls that were given an id that means nothing here, oldest first.
     pub(super) misuses: VecDeque<GraphProblem>,
 }
 
-/// A process of one [`FrameGraph`], and of the [`Schedule`](super::Schedule) it compiles to.
+/// A node of one [`FrameGraph`], and of the [`Schedule`](super::Schedule) it compiles to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ProcessId {
+pub struct NodeId {
     pub(super) graph: usize,
-    /// How many processes had been added to the graph before it.
+    /// How many nodes had been added to the graph before it.
     pub(super) serial: usize,
 }
 
@@ -88,10 +88,10 @@ pub struct ResourceId {
     index: usize,
 }
 
-pub(super) struct Process<P> {
+pub(super) struct NodeEntry<P> {
     pub(super) name: String,
     pub(super) labels: Labels,
-    pub(super) id: ProcessId,
+    pub(super) id: NodeId,
     pub(super) kept: bool,
     pub(super) payload: P,
 }
@@ -102,11 +102,11 @@ pub(super) struct Resource {
     pub(super) output: bool,
 }
 
-/// One call of `read` or `write`, by positions in `processes` and `resources`.
+/// One call of `read` or `write`, by positions in `nodes` and `resources`.
 #[derive(Clone, Copy)]
 pub(super) struct Access {
     pub(super) resource: usize,
-    pub(super) process: usize,
+    pub(super) node: usize,
     pub(super) writes: bool,
 }
 
@@ -118,8 +118,8 @@ impl<P> FrameGraph<P> {
         Self {
             // Relaxed: only that no two graphs get one number matters.
             identity: GRAPHS.fetch_add(1, Ordering::Relaxed),
-            processes_added: 0,
-            processes: Vec::new(),
+            nodes_added: 0,
+            nodes: Vec::new(),
             resources: Vec::new(),
             resource_by_name: HashMap::new(),
             accesses: Vec::new(),
@@ -154,95 +154,95 @@ impl<P> FrameGraph<P> {
         }
     }
 
-    /// Adds a process. No two processes of a graph that compiles have one name.
-    pub fn add(&mut self, name: impl Into<String>, process: P) -> ProcessId {
-        let id = ProcessId { graph: self.identity, serial: self.processes_added };
-        self.processes_added += 1;
+    /// Adds a node. No two nodes of a graph that compiles have one name.
+    pub fn add(&mut self, name: impl Into<String>, node: P) -> NodeId {
+        let id = NodeId { graph: self.identity, serial: self.nodes_added };
+        self.nodes_added += 1;
         let labels = Labels::default();
-        self.processes.push(Process { name: name.into(), labels, id, kept: false, payload: process });
+        self.nodes.push(NodeEntry { name: name.into(), labels, id, kept: false, payload: node });
         id
     }
 
-    /// Takes a process out, with all that was said about it, and gives it back: `None` if it is not there.
-    pub fn remove(&mut self, process: ProcessId) -> Option<P> {
-        let removed = self.process_position(process)?;
+    /// Takes a node out, with all that was said about it, and gives it back: `None` if it is not there.
+    pub fn remove(&mut self, node: NodeId) -> Option<P> {
+        let removed = self.node_position(node)?;
         let moved = |position: usize| position - usize::from(position > removed);
-        self.accesses.retain(|access| access.process != removed);
+        self.accesses.retain(|access| access.node != removed);
         for access in &mut self.accesses {
-            access.process = moved(access.process);
+            access.node = moved(access.node);
         }
         self.orders.retain(|(before, after)| *before != removed && *after != removed);
         for (before, after) in &mut self.orders {
             (*before, *after) = (moved(*before), moved(*after));
         }
-        Some(self.processes.remove(removed).payload)
+        Some(self.nodes.remove(removed).payload)
     }
 
-    /// Says that the process reads the resource.
-    pub fn read(&mut self, process: ProcessId, resource: ResourceId) {
-        self.access("read", process, resource, false);
+    /// Says that the node reads the resource.
+    pub fn read(&mut self, node: NodeId, resource: ResourceId) {
+        self.access("read", node, resource, false);
     }
 
-    /// Says that the process writes the resource. One that also reads it modifies it in place.
-    pub fn write(&mut self, process: ProcessId, resource: ResourceId) {
-        self.access("write", process, resource, true);
+    /// Says that the node writes the resource. One that also reads it modifies it in place.
+    pub fn write(&mut self, node: NodeId, resource: ResourceId) {
+        self.access("write", node, resource, true);
     }
 
-    /// Says that one process runs before another, whatever they read and write. It keeps neither.
-    pub fn order(&mut self, before: ProcessId, after: ProcessId) {
-        match (self.process_position(before), self.process_position(after)) {
+    /// Says that one node runs before another, whatever they read and write. It keeps neither.
+    pub fn order(&mut self, before: NodeId, after: NodeId) {
+        match (self.node_position(before), self.node_position(after)) {
             (Some(before), Some(after)) => self.orders.push((before, after)),
             (before, after) => {
-                let call = format!("order({}, {})", self.process_text(before), self.process_text(after));
-                self.misuses.push_back(GraphProblem::UnknownProcess { call });
+                let call = format!("order({}, {})", self.node_text(before), self.node_text(after));
+                self.misuses.push_back(GraphProblem::UnknownNode { call });
             }
         }
     }
 
-    /// Keeps the process whatever it writes, for what it does besides.
-    pub fn keep(&mut self, process: ProcessId) {
-        match self.process_position(process) {
-            Some(position) => self.processes[position].kept = true,
-            None => self.misuses.push_back(GraphProblem::UnknownProcess { call: "keep(?)".to_owned() }),
+    /// Keeps the node whatever it writes, for what it does besides.
+    pub fn keep(&mut self, node: NodeId) {
+        match self.node_position(node) {
+            Some(position) => self.nodes[position].kept = true,
+            None => self.misuses.push_back(GraphProblem::UnknownNode { call: "keep(?)".to_owned() }),
         }
     }
 
-    /// Says what the process is a part of, for [timelines](crate::timeline) and spans.
-    pub fn label(&mut self, process: ProcessId, labels: Labels) {
-        match self.process_position(process) {
-            Some(position) => self.processes[position].labels = labels,
-            None => self.misuses.push_back(GraphProblem::UnknownProcess { call: "label(?)".to_owned() }),
+    /// Says what the node is a part of, for [timelines](crate::timeline) and spans.
+    pub fn label(&mut self, node: NodeId, labels: Labels) {
+        match self.node_position(node) {
+            Some(position) => self.nodes[position].labels = labels,
+            None => self.misuses.push_back(GraphProblem::UnknownNode { call: "label(?)".to_owned() }),
         }
     }
 
-    fn access(&mut self, call: &str, process: ProcessId, resource: ResourceId, writes: bool) {
-        match (self.process_position(process), self.resource_position(resource)) {
-            (Some(process), Some(resource)) => self.accesses.push(Access { resource, process, writes }),
-            (process, resource) => {
+    fn access(&mut self, call: &str, node: NodeId, resource: ResourceId, writes: bool) {
+        match (self.node_position(node), self.resource_position(resource)) {
+            (Some(node), Some(resource)) => self.accesses.push(Access { resource, node, writes }),
+            (node, resource) => {
                 let resource_text =
                     resource.map_or_else(|| "?".to_owned(), |position| format!("{:?}", self.resources[position].name));
-                let text = format!("{call}({}, {resource_text})", self.process_text(process));
-                self.misuses.push_back(match process {
-                    None => GraphProblem::UnknownProcess { call: text },
+                let text = format!("{call}({}, {resource_text})", self.node_text(node));
+                self.misuses.push_back(match node {
+                    None => GraphProblem::UnknownNode { call: text },
                     Some(_) => GraphProblem::UnknownResource { call: text },
                 });
             }
         }
     }
 
-    fn process_position(&self, process: ProcessId) -> Option<usize> {
-        if process.graph != self.identity {
+    fn node_position(&self, node: NodeId) -> Option<usize> {
+        if node.graph != self.identity {
             return None;
         }
-        self.processes.binary_search_by_key(&process.serial, |process| process.id.serial).ok()
+        self.nodes.binary_search_by_key(&node.serial, |node| node.id.serial).ok()
     }
 
     fn resource_position(&self, resource: ResourceId) -> Option<usize> {
         (resource.graph == self.identity).then_some(resource.index)
     }
 
-    fn process_text(&self, position: Option<usize>) -> String {
-        position.map_or_else(|| "?".to_owned(), |position| format!("{:?}", self.processes[position].name))
+    fn node_text(&self, position: Option<usize>) -> String {
+        position.map_or_else(|| "?".to_owned(), |position| format!("{:?}", self.nodes[position].name))
     }
 }
 
@@ -254,11 +254,11 @@ impl<P> Default for FrameGraph<P> {
 
 impl<P> fmt::Debug for FrameGraph<P> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let processes: Vec<&str> = self.processes.iter().map(|process| process.name.as_str()).collect();
+        let nodes: Vec<&str> = self.nodes.iter().map(|node| node.name.as_str()).collect();
         let resources: Vec<&str> = self.resources.iter().map(|resource| resource.name.as_str()).collect();
         formatter
             .debug_struct("FrameGraph")
-            .field("processes", &processes)
+            .field("nodes", &nodes)
             .field("resources", &resources)
             .finish_non_exhaustive()
     }

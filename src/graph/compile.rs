@@ -21,13 +21,13 @@ use super::{
 };
 
 impl<P> FrameGraph<P> {
-    /// Orders the processes, drops those that lead to no output, and checks the rest.
+    /// Orders the nodes, drops those that lead to no output, and checks the rest.
     ///
     /// # Errors
     ///
     /// [`CompileError`], with the graph and the first [`GraphProblem`] in the order its variants are declared in. Names and
     /// cycles are looked at in the whole graph; a missing producer and writers without an order only matter where
-    /// the processes they belong to are kept.
+    /// the nodes they belong to are kept.
     pub fn compile(mut self) -> Result<Schedule<P>, CompileError<P>> {
         match plan(&mut self) {
             Ok(plan) => Ok(lay_out(self, &plan)),
@@ -39,9 +39,9 @@ impl<P> FrameGraph<P> {
 /// What a graph compiles to, before it is laid out: all by positions in the graph.
 struct Plan {
     needed: Vec<bool>,
-    /// The needed processes in the order they run in.
+    /// The needed nodes in the order they run in.
     order: Vec<usize>,
-    /// Per process, the needed processes it waits for.
+    /// Per node, the needed nodes it waits for.
     dependencies: Vec<Vec<usize>>,
 }
 
@@ -53,11 +53,11 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
     check_names(graph)?;
     let roles = Roles::of_all(graph);
     let mut edges = edges::derive(graph, &roles);
-    let order = in_order(&edges, graph.processes.len());
+    let order = in_order(&edges, graph.nodes.len());
     if order.len() < edges.node_count() {
-        let circle = circle(&edges, graph.processes.len(), &order);
-        let processes = circle.into_iter().map(|node| name(graph, node)).collect();
-        return Err(GraphProblem::Cycle { processes });
+        let circle = circle(&edges, graph.nodes.len(), &order);
+        let nodes = circle.into_iter().map(|node| name(graph, node)).collect();
+        return Err(GraphProblem::Cycle { nodes });
     }
     let place = places(order.len(), &order);
     edges::add_versions(&mut edges, &roles, &place);
@@ -72,27 +72,24 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
     for _ in &needed {
         remaining.add_node(());
     }
-    for (process, dependencies) in dependencies.iter().enumerate() {
+    for (node, dependencies) in dependencies.iter().enumerate() {
         for &dependency in dependencies {
-            remaining.add_edge(NodeIndex::new(dependency), NodeIndex::new(process), ());
+            remaining.add_edge(NodeIndex::new(dependency), NodeIndex::new(node), ());
         }
     }
-    let order = in_order(&remaining, needed.len())
-        .into_iter()
-        .map(NodeIndex::index)
-        .filter(|&process| needed[process])
-        .collect();
+    let order =
+        in_order(&remaining, needed.len()).into_iter().map(NodeIndex::index).filter(|&node| needed[node]).collect();
     Ok(Plan { needed, order, dependencies })
 }
 
 fn name<P>(graph: &FrameGraph<P>, node: NodeIndex) -> String {
-    graph.processes[node.index()].name.clone()
+    graph.nodes[node.index()].name.clone()
 }
 
 fn check_names<P>(graph: &FrameGraph<P>) -> Result<(), GraphProblem> {
     let mut names = HashSet::new();
-    match graph.processes.iter().find(|process| !names.insert(process.name.as_str())) {
-        Some(process) => Err(GraphProblem::DuplicateProcess { name: process.name.clone() }),
+    match graph.nodes.iter().find(|node| !names.insert(node.name.as_str())) {
+        Some(node) => Err(GraphProblem::DuplicateNode { name: node.name.clone() }),
         None => Ok(()),
     }
 }
@@ -108,7 +105,7 @@ struct Facts<'a, P> {
 }
 
 impl<P> Facts<'_, P> {
-    /// Whether it is a process that is needed. A junction is none.
+    /// Whether it is a node that is needed. A junction is none.
     fn is_needed(&self, node: NodeIndex) -> bool {
         self.needed.get(node.index()).is_some_and(|&needed| needed)
     }
@@ -142,7 +139,7 @@ impl<P> Facts<'_, P> {
         Ok(())
     }
 
-    /// All makers of a resource have an order if each, in the order of all processes, leads to the next.
+    /// All makers of a resource have an order if each, in the order of all nodes, leads to the next.
     fn check_writers(&self) -> Result<(), GraphProblem> {
         let mut walk = Walk::new();
         for (resource, roles) in self.graph.resources.iter().zip(self.roles) {
@@ -163,7 +160,7 @@ impl<P> Facts<'_, P> {
         Ok(())
     }
 
-    /// Per process, the needed ones it waits for, if it is needed itself.
+    /// Per node, the needed ones it waits for, if it is needed itself.
     fn dependencies(&self) -> Vec<Vec<usize>> {
         let last_maker = self.last_makers_of_junctions();
         let mut passed = vec![usize::MAX; self.edges.node_count()];
@@ -171,7 +168,7 @@ impl<P> Facts<'_, P> {
         for node in self.edges.node_indices().filter(|&node| self.is_needed(node)) {
             let dependencies = &mut dependencies[node.index()];
             self.add_last_makers(node, &last_maker, dependencies);
-            // An order that leads through dropped processes ends at the needed ones before them.
+            // An order that leads through dropped nodes ends at the needed ones before them.
             let mut open = vec![node];
             while let Some(after) = open.pop() {
                 for edge in self.edges.edges_directed(after, Direction::Incoming) {
@@ -203,7 +200,7 @@ impl<P> Facts<'_, P> {
         self.edges.node_indices().map(last_maker).collect()
     }
 
-    /// Of all makers of a resource that a process needs, it has to wait for the last one only, since they have an order.
+    /// Of all makers of a resource that a node needs, it has to wait for the last one only, since they have an order.
     fn add_last_makers(&self, node: NodeIndex, of_junction: &[Option<NodeIndex>], dependencies: &mut Vec<usize>) {
         let mut last: HashMap<usize, NodeIndex> = HashMap::new();
         for edge in self.edges.edges_directed(node, Direction::Incoming) {
@@ -221,13 +218,13 @@ impl<P> Facts<'_, P> {
 
 fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     let mut index_of = vec![0; plan.needed.len()];
-    for (index, &process) in plan.order.iter().enumerate() {
-        index_of[process] = index;
+    for (index, &node) in plan.order.iter().enumerate() {
+        index_of[node] = index;
     }
     let mut dependencies = vec![Vec::new(); plan.order.len()];
     let mut dependents = vec![Vec::new(); plan.order.len()];
-    for (index, &process) in plan.order.iter().enumerate() {
-        dependencies[index] = plan.dependencies[process].iter().map(|&dependency| index_of[dependency]).collect();
+    for (index, &node) in plan.order.iter().enumerate() {
+        dependencies[index] = plan.dependencies[node].iter().map(|&dependency| index_of[dependency]).collect();
         dependencies[index].sort_unstable();
         for &dependency in &dependencies[index] {
             dependents[dependency].push(index);
@@ -235,11 +232,11 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     }
     let mut dropped = Vec::new();
     let mut kept = Vec::with_capacity(plan.order.len());
-    for (position, process) in graph.processes.into_iter().enumerate() {
+    for (position, node) in graph.nodes.into_iter().enumerate() {
         if plan.needed[position] {
-            kept.push((index_of[position], process));
+            kept.push((index_of[position], node));
         } else {
-            dropped.push(process.name);
+            dropped.push(node.name);
         }
     }
     kept.sort_unstable_by_key(|(index, _)| *index);
@@ -247,23 +244,23 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     let mut schedule = Schedule {
         names: Vec::with_capacity(kept.len()),
         labels: Vec::with_capacity(kept.len()),
-        processes: Vec::with_capacity(kept.len()),
+        nodes: Vec::with_capacity(kept.len()),
         indices: HashMap::with_capacity(kept.len()),
         progress: Progress::new(&flow),
         costs: Costs::new(flow.len()),
         sharing: Sharing::default(),
         graph: None,
-        always_shares: false,
+        always_parallel: false,
         flow,
         dependencies: Adjacency::new(dependencies),
         dependents: Adjacency::new(dependents),
         dropped,
     };
-    for (index, process) in kept {
-        schedule.names.push(process.name);
-        schedule.labels.push(process.labels);
-        schedule.processes.push(process.payload);
-        schedule.indices.insert(process.id, index);
+    for (index, node) in kept {
+        schedule.names.push(node.name);
+        schedule.labels.push(node.labels);
+        schedule.nodes.push(node.payload);
+        schedule.indices.insert(node.id, index);
     }
     schedule
 }

@@ -1,4 +1,4 @@
-//! What the processes of a schedule cost, measured in some of the runs.
+//! What the nodes of a schedule cost, measured in some of the runs.
 
 use std::time::Duration;
 
@@ -6,10 +6,10 @@ use crate::sync::{AtomicU32, AtomicUsize, Instant, Ordering};
 
 /// What has been measured so far. Durations are in nanoseconds.
 pub(super) struct Costs {
-    /// Per process, from its start to its end: an average of the latest measured runs, the latest counting most.
+    /// Per node, from its start to its end: an average of the latest measured runs, the latest counting most.
     average: Box<[u64]>,
     has_learnt: bool,
-    /// Per process, in the current run.
+    /// Per node, in the current run.
     started: Box<[AtomicU32]>,
     took: Box<[AtomicU32]>,
     /// Of the current run, all workers' time together.
@@ -20,10 +20,10 @@ pub(super) struct Costs {
 const WEIGHT: u64 = 4;
 
 impl Costs {
-    pub(super) fn new(processes: usize) -> Self {
-        let zeros = || (0..processes).map(|_| AtomicU32::new(0)).collect();
+    pub(super) fn new(nodes: usize) -> Self {
+        let zeros = || (0..nodes).map(|_| AtomicU32::new(0)).collect();
         Self {
-            average: vec![0; processes].into(),
+            average: vec![0; nodes].into(),
             has_learnt: false,
             started: zeros(),
             took: zeros(),
@@ -31,14 +31,14 @@ impl Costs {
         }
     }
 
-    /// Nanoseconds per process; all are 0 before the first measured run.
+    /// Nanoseconds per node; all are 0 before the first measured run.
     pub(super) fn averages(&self) -> &[u64] {
         &self.average
     }
 
-    /// What the process costs, if that has been measured.
-    pub(super) fn of(&self, process: usize) -> Option<Duration> {
-        let average = self.average.get(process)?;
+    /// What the node costs, if that has been measured.
+    pub(super) fn of(&self, node: usize) -> Option<Duration> {
+        let average = self.average.get(node)?;
         self.has_learnt.then(|| Duration::from_nanos(*average))
     }
 
@@ -72,20 +72,20 @@ impl<'run> Clock<'run> {
         Self { start: costs.map(|costs| (Instant::now(), costs)) }
     }
 
-    /// A process starts.
-    pub(super) fn start(self, process: u32) {
+    /// A node starts.
+    pub(super) fn start(self, node: u32) {
         if let Some((start, costs)) = self.start {
-            // Relaxed, here and below: who reads it has come after, as those do who depend on the process.
-            costs.started[process as usize].store(nanoseconds(start), Ordering::Relaxed);
+            // Relaxed, here and below: who reads it has come after, as those do who depend on the node.
+            costs.started[node as usize].store(nanoseconds(start), Ordering::Relaxed);
         }
     }
 
-    /// A process ends.
-    pub(super) fn end(self, process: u32) {
+    /// A node ends.
+    pub(super) fn end(self, node: u32) {
         if let Some((start, costs)) = self.start {
-            let process = process as usize;
-            let took = nanoseconds(start).saturating_sub(costs.started[process].load(Ordering::Relaxed));
-            costs.took[process].store(took, Ordering::Relaxed);
+            let node = node as usize;
+            let took = nanoseconds(start).saturating_sub(costs.started[node].load(Ordering::Relaxed));
+            costs.took[node].store(took, Ordering::Relaxed);
         }
     }
 

@@ -14,7 +14,7 @@ use super::{
 };
 
 impl<P> FrameGraph<P> {
-    /// The graph as Graphviz draws it: processes as boxes, resources as ellipses, an arrow along each read and write, a
+    /// The graph as Graphviz draws it: nodes as boxes, resources as ellipses, an arrow along each read and write, a
     /// dotted one for each explicit order.
     ///
     /// Outputs have a double rim, imported resources are filled. What leads to no output is dashed. A graph that
@@ -22,17 +22,17 @@ impl<P> FrameGraph<P> {
     pub fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
-        let place = places(edges.node_count(), &in_order(&edges, self.processes.len()));
+        let place = places(edges.node_count(), &in_order(&edges, self.nodes.len()));
         edges::add_versions(&mut edges, &roles, &place);
         let needed = edges::needed(self, &roles, &edges);
 
         let mut dot = Dot::new();
-        for (position, process) in self.processes.iter().enumerate() {
+        for (position, node) in self.nodes.iter().enumerate() {
             let style = if needed[position] { "" } else { ", style=dashed" };
-            dot.line(format_args!("process{position} [shape=box, label={}{style}];", Quoted(&process.name)));
+            dot.line(format_args!("node{position} [shape=box, label={}{style}];", Quoted(&node.name)));
         }
         for (position, (resource, roles)) in self.resources.iter().zip(&roles).enumerate() {
-            let touched = roles.makers().chain(roles.readers.iter().copied()).any(|process| needed[process.index()]);
+            let touched = roles.makers().chain(roles.readers.iter().copied()).any(|node| needed[node.index()]);
             let style = match (resource.imported, resource.output || touched) {
                 (false, true) => "",
                 (false, false) => ", style=dashed",
@@ -44,31 +44,31 @@ impl<P> FrameGraph<P> {
         }
         for (position, roles) in roles.iter().enumerate() {
             for reader in roles.modifiers.iter().chain(&roles.readers) {
-                dot.line(format_args!("resource{position} -> process{};", reader.index()));
+                dot.line(format_args!("resource{position} -> node{};", reader.index()));
             }
             for maker in roles.makers() {
-                dot.line(format_args!("process{} -> resource{position};", maker.index()));
+                dot.line(format_args!("node{} -> resource{position};", maker.index()));
             }
         }
         for (before, after) in &self.orders {
-            dot.line(format_args!("process{before} -> process{after} [style=dotted];"));
+            dot.line(format_args!("node{before} -> node{after} [style=dotted];"));
         }
         dot.finish()
     }
 }
 
 impl<P> Schedule<P> {
-    /// The schedule as Graphviz draws it: a box for each process, an arrow from each to what waits for it and for nothing that
+    /// The schedule as Graphviz draws it: a box for each node, an arrow from each to what waits for it and for nothing that
     /// waits for it too, and what was dropped, dashed and apart.
     pub fn to_dot(&self) -> String {
         self.to_labelled_dot(|_, _| String::new())
     }
 
-    /// The same, with a label for each arrow that `label` finds one for: from the index of one process to that of another.
+    /// The same, with a label for each arrow that `label` finds one for: from the index of one node to that of another.
     pub(crate) fn to_labelled_dot(&self, label: impl Fn(usize, usize) -> String) -> String {
         let mut dot = Dot::new();
         for (index, name) in self.names.iter().enumerate() {
-            dot.line(format_args!("process{index} [shape=box, label={}];", Quoted(name)));
+            dot.line(format_args!("node{index} [shape=box, label={}];", Quoted(name)));
         }
         for (index, name) in self.dropped().iter().enumerate() {
             dot.line(format_args!("dropped{index} [shape=box, label={}, style=dashed];", Quoted(name)));
@@ -76,9 +76,9 @@ impl<P> Schedule<P> {
         for (index, dependent) in self.direct_dependencies() {
             let label = label(index, dependent);
             if label.is_empty() {
-                dot.line(format_args!("process{index} -> process{dependent};"));
+                dot.line(format_args!("node{index} -> node{dependent};"));
             } else {
-                dot.line(format_args!("process{index} -> process{dependent} [label={}];", Quoted(&label)));
+                dot.line(format_args!("node{index} -> node{dependent} [label={}];", Quoted(&label)));
             }
         }
         dot.finish()

@@ -2,7 +2,7 @@
 //!
 //! Where many read what many make, an edge from each maker to each reader would be their product. So all makers lead to one
 //! *junction*, and that to all readers, which means the same with an edge each. Junctions are nodes behind those of the
-//! processes: whoever follows edges passes through them, and they are in no result.
+//! nodes: whoever follows edges passes through them, and they are in no result.
 
 use petgraph::{
     Direction,
@@ -15,11 +15,11 @@ use super::{
     order::Walk,
 };
 
-/// An edge per reason to wait, from the process waited for. The node of a process is its position in the graph; those of
+/// An edge per reason to wait, from the node waited for. The node of a node is its position in the graph; those of
 /// junctions follow.
 pub(super) type Edges = DiGraph<(), Relation>;
 
-/// Why one process waits for another.
+/// Why one node waits for another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relation {
     /// It was told to.
@@ -28,7 +28,7 @@ pub(super) enum Relation {
     Data(usize),
 }
 
-/// The processes that touch one resource, by what they do with it, each in the order they were added.
+/// The nodes that touch one resource, by what they do with it, each in the order they were added.
 #[derive(Default)]
 pub(super) struct Roles {
     pub(super) writers: Vec<NodeIndex>,
@@ -40,19 +40,19 @@ impl Roles {
     /// Every resource's.
     pub(super) fn of_all<P>(graph: &FrameGraph<P>) -> Vec<Self> {
         let mut accesses = graph.accesses.clone();
-        accesses.sort_unstable_by_key(|access| (access.resource, access.process, access.writes));
+        accesses.sort_unstable_by_key(|access| (access.resource, access.node, access.writes));
         let mut roles: Vec<Self> = graph.resources.iter().map(|_| Self::default()).collect();
-        for of_one in accesses.chunk_by(|one, next| (one.resource, one.process) == (next.resource, next.process)) {
+        for of_one in accesses.chunk_by(|one, next| (one.resource, one.node) == (next.resource, next.node)) {
             let reads = of_one.iter().any(|access| !access.writes);
             let writes = of_one.iter().any(|access| access.writes);
-            let Access { resource, process, .. } = of_one[0];
+            let Access { resource, node, .. } = of_one[0];
             let roles = &mut roles[resource];
             let role = match (reads, writes) {
                 (_, false) => &mut roles.readers,
                 (false, true) => &mut roles.writers,
                 (true, true) => &mut roles.modifiers,
             };
-            role.push(NodeIndex::new(process));
+            role.push(NodeIndex::new(node));
         }
         roles
     }
@@ -63,10 +63,10 @@ impl Roles {
     }
 }
 
-/// The edges that were told, and those that follow from what each process does with each resource alone.
+/// The edges that were told, and those that follow from what each node does with each resource alone.
 pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
     let mut edges = Edges::default();
-    for _ in &graph.processes {
+    for _ in &graph.nodes {
         edges.add_node(());
     }
     for (before, after) in &graph.orders {
@@ -149,9 +149,9 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
     }
 }
 
-/// Which processes are needed: kept ones, those that make an output, and all that these need.
+/// Which nodes are needed: kept ones, those that make an output, and all that these need.
 pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -> Vec<bool> {
-    let mut needed: Vec<bool> = graph.processes.iter().map(|process| process.kept).collect();
+    let mut needed: Vec<bool> = graph.nodes.iter().map(|node| node.kept).collect();
     needed.resize(edges.node_count(), false);
     for (resource, roles) in graph.resources.iter().zip(roles) {
         if resource.output {
@@ -168,7 +168,7 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
             }
         }
     }
-    needed.truncate(graph.processes.len());
+    needed.truncate(graph.nodes.len());
     needed
 }
 
@@ -178,21 +178,21 @@ mod tests {
     use crate::graph::FrameGraph;
 
     #[test]
-    fn edges_grow_with_what_processes_do_and_not_with_pairs_of_them() {
+    fn edges_grow_with_what_nodes_do_and_not_with_pairs_of_them() {
         const EACH: usize = if cfg!(miri) { 10 } else { 200 };
         let mut graph = FrameGraph::new();
         let image = graph.resource("image");
         let mut before = None;
         for number in 0..3 * EACH {
-            let process = graph.add(number.to_string(), ());
-            graph.keep(process);
+            let node = graph.add(number.to_string(), ());
+            graph.keep(node);
             if number >= EACH {
-                graph.read(process, image);
+                graph.read(node, image);
             }
             if number < 2 * EACH {
-                graph.write(process, image);
-                if let Some(before) = before.replace(process) {
-                    graph.order(before, process);
+                graph.write(node, image);
+                if let Some(before) = before.replace(node) {
+                    graph.order(before, node);
                 }
             }
         }

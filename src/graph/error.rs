@@ -32,14 +32,14 @@ impl<P> fmt::Debug for CompileError<P> {
 ///
 /// The variants stand in the order in which they are looked for. Calls that meant nothing come first, since what follows may
 /// only follow from them; then names, which all other problems speak in; then cycles, since nothing has an order before
-/// they are gone; then what the kept processes lack.
+/// they are gone; then what the kept nodes lack.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum GraphProblem {
-    /// A call was given a process of another graph, or one that had been removed. The call did nothing and, once reported
+    /// A call was given a node of another graph, or one that had been removed. The call did nothing and, once reported
     /// here, is forgotten.
-    #[error("the process that stands as `?` in `{call}` does not belong to this graph")]
-    UnknownProcess {
+    #[error("the node that stands as `?` in `{call}` does not belong to this graph")]
+    UnknownNode {
         /// The call, with the names of what it was given, and `?` for what is unknown.
         call: String,
     },
@@ -49,18 +49,18 @@ pub enum GraphProblem {
         /// The call, with the names of what it was given, and `?` for what is unknown.
         call: String,
     },
-    /// Two processes have one name.
-    #[error("two processes are named {name:?}")]
-    DuplicateProcess {
+    /// Two nodes have one name.
+    #[error("two nodes are named {name:?}")]
+    DuplicateNode {
         /// The name.
         name: String,
     },
-    /// Processes wait for each other, dropped ones among them or not.
-    #[error("processes wait for each other in a circle: {}", circle(processes))]
+    /// Nodes wait for each other, dropped ones among them or not.
+    #[error("nodes wait for each other in a circle: {}", circle(nodes))]
     Cycle {
-        /// The processes of one circle: each must run before the next, and the last before the first. The one that was
+        /// The nodes of one circle: each must run before the next, and the last before the first. The one that was
         /// added first stands first.
-        processes: Vec<String>,
+        nodes: Vec<String>,
     },
     /// Nothing makes a resource before it is needed, and it is not imported.
     #[error("{}", missing(resource, *output, readers))]
@@ -69,10 +69,10 @@ pub enum GraphProblem {
         resource: String,
         /// Whether it is missed because it is an output of the graph.
         output: bool,
-        /// The processes that read it before anything has written it, in the order they were added.
+        /// The nodes that read it before anything has written it, in the order they were added.
         readers: Vec<String>,
     },
-    /// Two processes write a resource, or modify it, and it is open which is first.
+    /// Two nodes write a resource, or modify it, and it is open which is first.
     #[error("{first:?} and {second:?} both write {resource:?}, and nothing says which is first: put them in order")]
     UnorderedWriters {
         /// The resource.
@@ -84,8 +84,8 @@ pub enum GraphProblem {
     },
 }
 
-fn circle(processes: &[String]) -> String {
-    let names: Vec<String> = processes.iter().chain(processes.first()).map(|name| format!("{name:?}")).collect();
+fn circle(nodes: &[String]) -> String {
+    let names: Vec<String> = nodes.iter().chain(nodes.first()).map(|name| format!("{name:?}")).collect();
     names.join(" before ")
 }
 
@@ -102,28 +102,28 @@ fn missing(resource: &str, output: bool, readers: &[String]) -> String {
 
 /// A run that did not come to its end.
 ///
-/// Of several failures the one is reported whose process stands first in the schedule, and of one process' chunks the one
+/// Of several failures the one is reported whose node stands first in the schedule, and of one node's chunks the one
 /// that starts first. Which failures there are besides the first can depend on timing, since the first one stops the rest.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// A process reported an error.
-    #[error("the process {process:?} failed: {source}")]
+    /// A node reported an error.
+    #[error("the node {node:?} failed: {source}")]
     Failed {
-        /// The process' name.
-        process: String,
+        /// The node's name.
+        node: String,
         /// What it reported.
         source: NodeError,
     },
-    /// A process panicked.
-    #[error("the process {process:?} panicked: {message}")]
+    /// A node panicked.
+    #[error("the node {node:?} panicked: {message}")]
     Panicked {
-        /// The process' name.
-        process: String,
+        /// The node's name.
+        node: String,
         /// What the panic said.
         message: String,
     },
-    /// Something panicked outside of every process, such as a subscriber of the run's spans.
-    #[error("the run failed outside of its processes: {0}")]
+    /// Something panicked outside of every node, such as a subscriber of the run's spans.
+    #[error("the run failed outside of its nodes: {0}")]
     Scheduler(JobPanic),
 }

@@ -19,15 +19,15 @@ use super::{
 };
 
 impl<P> Schedule<P> {
-    /// Runs every process, each after all it depends on, and waits for the last.
+    /// Runs every node, each after all it depends on, and waits for the last.
     ///
-    /// The thread that calls it works too, and runs the [pinned](Node::pinned) processes. The other workers join in where
-    /// that pays: a schedule of little work, as far as its last runs tell, is run by the calling thread alone, one process
+    /// The thread that calls it works too, and runs the [pinned](Node::pinned) nodes. The other workers join in where
+    /// that pays: a schedule of little work, as far as its last runs tell, is run by the calling thread alone, one node
     /// after another. Once it has been run a few times a run takes no memory of its own.
     ///
     /// # Errors
     ///
-    /// [`RunError`] if a process failed or panicked. The rest was cancelled then: what had begun was finished, nothing else
+    /// [`RunError`] if a node failed or panicked. The rest was cancelled then: what had begun was finished, nothing else
     /// was started. The next run starts over. With `panic = "abort"` a panic ends the program instead.
     pub fn run<C>(&mut self, scheduler: &Scheduler, context: &C) -> Result<(), RunError>
     where
@@ -46,13 +46,13 @@ impl<P> Schedule<P> {
             Way::Shared { is_measured: false }
         } else if worker.workers() == 1 {
             Way::Alone { at_most: None }
-        } else if self.always_shares {
+        } else if self.always_parallel {
             self.sharing.share()
         } else {
             self.sharing.choose(worker.wake_price())
         };
         self.describe(worker);
-        // Subscribers of spans are the engine's, and may panic between two processes too.
+        // Subscribers of spans are the engine's, and may panic between two nodes too.
         let ran = catch(|| match Watch::new(worker, self.graph.as_ref()) {
             Some(watch) => self.go(way, worker, context, watch),
             None => self.go(way, worker, context, Nobody),
@@ -106,23 +106,23 @@ impl<P> Schedule<P> {
         let took = start.elapsed();
         let failure = run.failure.lock().take();
         let failed = failure.is_some() || outcome.is_err();
-        run.watch.end(Ended { always_shares: self.always_shares, failed });
+        run.watch.end(Ended { always_parallel: self.always_parallel, failed });
         Ran { took, is_shared, failure, outcome }
     }
 
-    /// Takes in what the processes cost in a measured run, and says how much work they were.
+    /// Takes in what the nodes cost in a measured run, and says how much work they were.
     fn learn(&mut self) -> Duration {
         let work = self.costs.learn();
         self.flow.rank(self.costs.averages());
         work
     }
 
-    /// Makes the schedule ready for the next run after one that failed outside of every process.
+    /// Makes the schedule ready for the next run after one that failed outside of every node.
     fn rearm(&mut self) {
-        for process in 0..self.flow.len() as u32 {
-            self.progress.arm(process, self.flow.dependency_count(process));
+        for node in 0..self.flow.len() as u32 {
+            self.progress.arm(node, self.flow.dependency_count(node));
             // Where a subscriber of spans panicked, one may have been left behind.
-            discard(self.progress.pass(process).opened.close());
+            discard(self.progress.pass(node).opened.close());
         }
     }
 }
@@ -137,7 +137,7 @@ struct Ran {
 }
 
 impl Ran {
-    /// A panic outside of every process and every job ended it.
+    /// A panic outside of every node and every job ended it.
     fn panicked(panic: JobPanic) -> Self {
         Self { took: Duration::ZERO, is_shared: false, failure: None, outcome: Err(panic) }
     }
@@ -159,23 +159,19 @@ struct Failure {
     error: RunError,
 }
 
-/// Where a run is that does what is a user's: at a process, and the item at which a chunk of it starts.
+/// Where a run is that does what is a user's: at a node, and the item at which a chunk of it starts.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Position {
-    pub(super) process: u32,
+    pub(super) node: u32,
     pub(super) item: usize,
 }
 
 impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
-    /// Calls what is a user's, beginning with this process, and stops the run if it fails: then there is no result. `call`
+    /// Calls what is a user's, beginning with this node, and stops the run if it fails: then there is no result. `call`
     /// keeps its position up to date.
     #[inline]
-    pub(super) fn attempt<R>(
-        &self,
-        process: u32,
-        call: impl FnOnce(&mut Position) -> Result<R, NodeError>,
-    ) -> Option<R> {
-        let mut position = Position { process, item: 0 };
+    pub(super) fn attempt<R>(&self, node: u32, call: impl FnOnce(&mut Position) -> Result<R, NodeError>) -> Option<R> {
+        let mut position = Position { node, item: 0 };
         match catch(|| call(&mut position)) {
             Ok(Ok(result)) => return Some(result),
             Ok(Err(error)) => self.fail_with_error(position, error),
@@ -184,17 +180,17 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         None
     }
 
-    /// How much there is to do of a process.
+    /// How much there is to do of a node.
     #[inline]
-    pub(super) fn chunks(&self, process: u32, worker: &Worker) -> Chunks {
-        let node = self.node(process);
+    pub(super) fn chunks(&self, node: u32, worker: &Worker) -> Chunks {
+        let node = self.node(node);
         let width = node.width(self.context);
         let chunk = if width == 0 { 1 } else { node.chunk(self.context) };
         let chunks = Chunks::new(width, chunk);
         if worker.is_shuffled() { chunks.shuffled(worker) } else { chunks }
     }
 
-    /// Runs these chunks of the process at the position, as long as nothing fails.
+    /// Runs these chunks of the node at the position, as long as nothing fails.
     #[inline]
     pub(super) fn run_chunks(
         &self,
@@ -210,15 +206,15 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
             }
             let range = chunks.range(place);
             position.item = range.start;
-            let run = |range| self.node(position.process).run(self.context, range, worker);
+            let run = |range| self.node(position.node).run(self.context, range, worker);
             onlooker.chunk(range, run)?;
         }
         Ok(())
     }
 
     #[inline]
-    pub(super) fn node(&self, process: u32) -> &P {
-        &self.schedule.processes[process as usize]
+    pub(super) fn node(&self, node: u32) -> &P {
+        &self.schedule.nodes[node as usize]
     }
 
     /// Whether something failed, so that nothing more is to begin.
@@ -229,16 +225,16 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
 
     #[cold]
     fn fail_with_error(&self, position: Position, source: NodeError) {
-        self.fail(position, RunError::Failed { process: self.name(position), source });
+        self.fail(position, RunError::Failed { node: self.name(position), source });
     }
 
     #[cold]
     fn fail_with_panic(&self, position: Position, panic: JobPanic) {
-        self.fail(position, RunError::Panicked { process: self.name(position), message: panic.message });
+        self.fail(position, RunError::Panicked { node: self.name(position), message: panic.message });
     }
 
     fn name(&self, position: Position) -> String {
-        self.schedule.names[position.process as usize].clone()
+        self.schedule.names[position.node as usize].clone()
     }
 
     /// Stops the run, and keeps the failure unless one is kept that stands before it.

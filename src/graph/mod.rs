@@ -1,6 +1,6 @@
-//! The frame graph: says which process waits for which, and runs them so.
+//! The frame graph: says which node waits for which, and runs them so.
 //!
-//! An engine adds processes, says of each which resources it reads and writes, and which resources the frame is for. The
+//! An engine adds nodes, says of each which resources it reads and writes, and which resources the frame is for. The
 //! graph is compiled once, which orders and checks it and drops what nobody needs; the [`Schedule`] that comes out is run
 //! every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
 //!
@@ -19,17 +19,17 @@
 //! A run on several workers takes up first what its end waits for, as measured in runs before; and a schedule of so little
 //! work that sharing it would cost more is run by the calling thread alone ([`Schedule::run`]).
 //!
-//! The graph knows nothing of what a process does. It may carry anything, and be ordered only; or carry [`Node`]s, and be
+//! The graph knows nothing of what a node does. It may carry anything, and be ordered only; or carry [`Node`]s, and be
 //! run. A node is a number of items that are worked off in chunks, and how many is asked only when all it depends on is
 //! done.
 //!
 //! That all work of a frame is *render processes*, which a manager hands to whatever thread is free, is from L 3.3 (Lorenzon &
 //! Clua). In M 10.4 (McAnlis) a fixed list of kinds says which view comes before which; here it follows from what
-//! each process reads and writes, so that a mirror in a mirror is no special case.
+//! each node reads and writes, so that a mirror in a mirror is no special case.
 //!
 //! # A graph of closures
 //!
-//! What the processes work on is borrowed for the length of a run, through the context:
+//! What the nodes work on is borrowed for the length of a run, through the context:
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -77,7 +77,7 @@
 //! ```
 //!
 //! A context that itself borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, differs in type from frame to
-//! frame. A schedule that is compiled once for all of them holds processes that are a node for each:
+//! frame. A schedule that is compiled once for all of them holds nodes that are a node for each:
 //!
 //! ```
 //! use std::ops::Range;
@@ -116,7 +116,7 @@
 //!
 //! let heights = vec![1.0, f32::NAN];
 //! let error = schedule.run(&scheduler, &World { heights: &heights }).unwrap_err();
-//! assert_eq!(error.to_string(), "the process \"check heights\" failed: a height is NaN");
+//! assert_eq!(error.to_string(), "the node \"check heights\" failed: a height is NaN");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -142,7 +142,7 @@ mod watch;
 mod shuttle_tests;
 
 pub use self::{
-    builder::{FrameGraph, ProcessId, ResourceId},
+    builder::{FrameGraph, NodeId, ResourceId},
     error::{CompileError, GraphProblem, NodeError, RunError},
     node::{Closure, Node},
     schedule::Schedule,

@@ -1,4 +1,4 @@
-//! What a process must be to be run.
+//! What a node must be to be run.
 
 use std::{fmt, ops::Range};
 
@@ -6,17 +6,17 @@ use crate::task::Worker;
 
 use super::error::NodeError;
 
-/// A process that can be run: a number of items, handed out in chunks to whoever is free.
+/// A node that can be run: a number of items, handed out in chunks to whoever is free.
 ///
-/// `C` is what the engine lends every process for the length of a run: its world, borrowed.
+/// `C` is what the engine lends every node for the length of a run: its world, borrowed.
 ///
-/// A panic in any of these methods fails the run with an error that names the process, as an error does. Where the program
+/// A panic in any of these methods fails the run with an error that names the node, as an error does. Where the program
 /// is built with `panic = "abort"` no panic can be caught, and it ends the program instead.
 pub trait Node<C: ?Sized>: Send + Sync {
     /// How many items there are.
     ///
-    /// It is asked once a run, when everything the process depends on is done, so it may depend on what that made. With 0
-    /// the process is done at once.
+    /// It is asked once a run, when everything the node depends on is done, so it may depend on what that made. With 0
+    /// the node is done at once.
     fn width(&self, context: &C) -> usize;
 
     /// How many items one call of [`run`](Self::run) is to take: 0 is treated as 1.
@@ -28,7 +28,7 @@ pub trait Node<C: ?Sized>: Send + Sync {
         1
     }
 
-    /// Whether the process must run on the thread that called [`Schedule::run`](super::Schedule::run), all of it: its
+    /// Whether the node must run on the thread that called [`Schedule::run`](super::Schedule::run), all of it: its
     /// width is asked there, and its chunks run there one after another, first to last.
     fn pinned(&self) -> bool {
         false
@@ -38,12 +38,12 @@ pub trait Node<C: ?Sized>: Send + Sync {
     ///
     /// Every item is in one range exactly. Ranges run in any order, at the same time or one after another, each on the thread
     /// that `worker` stands for. One that waits for another may wait for ever, as one thread may have both
-    /// ([`Schedule::always_share`](super::Schedule::always_share)).
+    /// ([`Schedule::always_parallel`](super::Schedule::always_parallel)).
     ///
     /// # Errors
     ///
-    /// Whatever the process cannot do. It stops the run: no further chunk starts, nothing that depends on the process runs,
-    /// and the run reports this error with the process' name.
+    /// Whatever the node cannot do. It stops the run: no further chunk starts, nothing that depends on the node runs,
+    /// and the run reports this error with the node's name.
     fn run(&self, context: &C, range: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
 }
 

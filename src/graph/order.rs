@@ -11,10 +11,10 @@ use petgraph::{
 use super::edges::{Edges, Relation};
 
 /// The nodes in an order in which each comes after all before it. Where several could be next, junctions come first, and then
-/// the lowest of the `processes`: as if each junction were the edges that it stands for. Nodes on a circle, and those behind
+/// the lowest of the `nodes`: as if each junction were the edges that it stands for. Nodes on a circle, and those behind
 /// one, are left out.
-pub(super) fn in_order<E>(graph: &DiGraph<(), E>, processes: usize) -> Vec<NodeIndex> {
-    let rank = |node: NodeIndex| Reverse((node.index() < processes, node));
+pub(super) fn in_order<E>(graph: &DiGraph<(), E>, nodes: usize) -> Vec<NodeIndex> {
+    let rank = |node: NodeIndex| Reverse((node.index() < nodes, node));
     let mut waits_for: Vec<usize> =
         graph.node_indices().map(|node| graph.edges_directed(node, Direction::Incoming).count()).collect();
     let mut ready: BinaryHeap<Reverse<(bool, NodeIndex)>> =
@@ -41,9 +41,9 @@ pub(super) fn places(nodes: usize, order: &[NodeIndex]) -> Vec<usize> {
     places
 }
 
-/// The nodes of one circle, the lowest first, of a graph of so many processes that has one; `ordered` is what [`in_order`] made
+/// The nodes of one circle, the lowest first, of a graph of so many nodes that has one; `ordered` is what [`in_order`] made
 /// of it.
-pub(super) fn circle(edges: &Edges, processes: usize, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
+pub(super) fn circle(edges: &Edges, nodes: usize, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
     let mut stuck = vec![true; edges.node_count()];
     for node in ordered {
         stuck[node.index()] = false;
@@ -60,7 +60,7 @@ pub(super) fn circle(edges: &Edges, processes: usize, ordered: &[NodeIndex]) -> 
         path.push(node);
         let before = |node| edges.neighbors_directed(node, Direction::Incoming).filter(|before| stuck[before.index()]);
         // A junction stands for what leads to it.
-        let (direct, junctions): (Vec<_>, Vec<_>) = before(node).partition(|node| node.index() < processes);
+        let (direct, junctions): (Vec<_>, Vec<_>) = before(node).partition(|node| node.index() < nodes);
         next = direct.into_iter().chain(junctions.into_iter().flat_map(before)).min();
     }
     path.reverse();

@@ -1,14 +1,14 @@
 //! A run on all workers.
 //!
-//! No job ever waits. A process with something left to wait for is nothing but a counter of dependencies; whoever brings
-//! that counter to zero has made the process *ready*. Who completes a process goes on with the first that became ready by
+//! No job ever waits. A node with something left to wait for is nothing but a counter of dependencies; whoever brings
+//! that counter to zero has made the node *ready*. Who completes a node goes on with the first that became ready by
 //! that, and pushes the others, all of them as one token; who takes such a token pushes one half of it, and half of the rest,
-//! until one process is left, so that the largest part lies where thieves take it.
+//! until one node is left, so that the largest part lies where thieves take it.
 //!
-//! A process asks its width when it starts. More than one chunk makes it a *pass*: chunks go by ticket, and a token is pushed
-//! through which another worker joins. Whoever finishes the last chunk completes the process.
+//! A node asks its width when it starts. More than one chunk makes it a *pass*: chunks go by ticket, and a token is pushed
+//! through which another worker joins. Whoever finishes the last chunk completes the node.
 //!
-//! After a failure the run is *drained*: processes are completed without being run, so that all counters come to rest where
+//! After a failure the run is *drained*: nodes are completed without being run, so that all counters come to rest where
 //! they began.
 
 use std::ops::Range;
@@ -33,7 +33,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     ///
     /// # Errors
     ///
-    /// A panic outside of every process.
+    /// A panic outside of every node.
     pub(super) fn share(&self, worker: &Worker) -> Result<(), JobPanic> {
         self.let_others_in(worker);
         run_tokens(worker, self, |crew| {
@@ -55,25 +55,25 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     /// As [`share`](Self::share).
     pub(super) fn share_rest(&self, left: Left<W::Turn<'_>>, worker: &Worker) -> Result<(), JobPanic> {
         let is_half_done = left.done < left.chunks.count();
-        let first_open = if is_half_done { left.process } else { left.process + 1 };
+        let first_open = if is_half_done { left.node } else { left.node + 1 };
         self.let_others_in(worker);
         run_tokens(worker, self, |crew| {
             // It is left before anything that waits for it begins.
             let half_done = is_half_done.then_some(left.onlooker);
             // All are armed before the first of them can be counted down.
-            let rest = left.process + 1..self.schedule.flow.len() as u32;
-            for process in rest.clone() {
-                self.schedule.progress.arm(process, self.open_dependencies(process, first_open));
+            let rest = left.node + 1..self.schedule.flow.len() as u32;
+            for node in rest.clone() {
+                self.schedule.progress.arm(node, self.open_dependencies(node, first_open));
             }
-            for process in rest.filter(|&process| self.open_dependencies(process, first_open) == 0) {
-                self.send(process, crew);
+            for node in rest.filter(|&node| self.open_dependencies(node, first_open) == 0) {
+                self.send(node, crew);
             }
             if let Some(onlooker) = half_done {
-                let pass = self.schedule.progress.pass(left.process);
+                let pass = self.schedule.progress.pass(left.node);
                 pass.open(left.chunks, left.done);
                 onlooker.leave(&pass.opened);
-                if self.join(left.process, crew) {
-                    self.go_on_after(left.process, crew);
+                if self.join(left.node, crew) {
+                    self.go_on_after(left.node, crew);
                 }
             }
         })
@@ -85,23 +85,23 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         self.watch.let_others_in();
     }
 
-    /// How many of the processes that one waits for stand at `first_open` or after it.
-    fn open_dependencies(&self, process: u32, first_open: u32) -> u32 {
-        let dependencies = self.schedule.dependencies(process as usize);
+    /// How many of the nodes that one waits for stand at `first_open` or after it.
+    fn open_dependencies(&self, node: u32, first_open: u32) -> u32 {
+        let dependencies = self.schedule.dependencies(node as usize);
         (dependencies.len() - dependencies.partition_point(|&dependency| dependency < first_open as usize)) as u32
     }
 
-    /// Pushes a process that is ready.
-    fn send(&self, process: u32, crew: &Crew<'_>) {
+    /// Pushes a node that is ready.
+    fn send(&self, node: u32, crew: &Crew<'_>) {
         self.watch.count_ready();
-        if self.is_pinned(process) {
-            crew.push_pinned(Token::StartPinned(process).encode());
+        if self.is_pinned(node) {
+            crew.push_pinned(Token::StartPinned(node).encode());
         } else {
-            crew.push(Token::Start(process).encode(), self.band(process));
+            crew.push(Token::Start(node).encode(), self.band(node));
         }
     }
 
-    /// Starts one of these processes, and leaves the others to whoever comes.
+    /// Starts one of these nodes, and leaves the others to whoever comes.
     fn start_one_of(&self, mut places: Range<u32>, crew: &Crew<'_>) {
         while places.len() > 1 {
             let middle = places.start + places.len() as u32 / 2;
@@ -116,50 +116,50 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         crew.push(Token::Ready(places).encode(), band);
     }
 
-    /// Starts a process that is ready, and goes on from one to the next as long as there is one to go on with.
+    /// Starts a node that is ready, and goes on from one to the next as long as there is one to go on with.
     ///
-    /// It is a loop and no recursion, so that a chain of processes may be as long as memory lasts.
-    fn start(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) {
+    /// It is a loop and no recursion, so that a chain of nodes may be as long as memory lasts.
+    fn start(&self, node: u32, is_pinned: bool, crew: &Crew<'_>) {
         let worker = crew.worker();
-        let mut next = Some((process, is_pinned));
-        while let Some((process, is_pinned)) = next {
-            self.schedule.progress.arm(process, self.schedule.flow.dependency_count(process));
-            self.clock.start(process);
+        let mut next = Some((node, is_pinned));
+        while let Some((node, is_pinned)) = next {
+            self.schedule.progress.arm(node, self.schedule.flow.dependency_count(node));
+            self.clock.start(node);
             self.watch.count_taken(worker);
-            let is_done = self.work_on(process, is_pinned, crew);
+            let is_done = self.work_on(node, is_pinned, crew);
             self.watch.forget_stolen(worker);
             if !is_done {
                 return;
             }
-            next = self.complete(process, crew).map(|next| (next, false));
+            next = self.complete(node, crew).map(|next| (next, false));
             // Nobody else can run what is pinned, and anybody can go on here.
-            if let Some((process, _)) = next
+            if let Some((node, _)) = next
                 && crew.has_pinned()
             {
-                crew.push(Token::Start(process).encode(), self.band(process));
+                crew.push(Token::Start(node).encode(), self.band(node));
                 return;
             }
         }
     }
 
-    /// Goes on with what a completed process has made ready.
-    fn go_on_after(&self, process: u32, crew: &Crew<'_>) {
-        if let Some(next) = self.complete(process, crew) {
+    /// Goes on with what a completed node has made ready.
+    fn go_on_after(&self, node: u32, crew: &Crew<'_>) {
+        if let Some(next) = self.complete(node, crew) {
             self.start(next, false, crew);
         }
     }
 
-    /// Runs a process that has just started. True if it is done, and false if whoever finishes its last chunk is to
+    /// Runs a node that has just started. True if it is done, and false if whoever finishes its last chunk is to
     /// complete it.
-    fn work_on(&self, process: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
+    fn work_on(&self, node: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
         if self.is_stopped() {
             return true;
         }
         let worker = crew.worker();
-        let mut onlooker = self.watch.open(worker, process);
+        let mut onlooker = self.watch.open(worker, node);
         let chunks = self.clock.work(|| {
-            self.attempt(process, |position| {
-                let chunks = self.chunks(process, worker);
+            self.attempt(node, |position| {
+                let chunks = self.chunks(node, worker);
                 if chunks.count() > 1 && !is_pinned {
                     return Ok(Some(chunks));
                 }
@@ -171,18 +171,18 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
             })
         });
         let Some(Some(chunks)) = chunks else { return true };
-        let pass = self.schedule.progress.pass(process);
+        let pass = self.schedule.progress.pass(node);
         pass.open(chunks, 0);
         onlooker.leave(&pass.opened);
-        self.join(process, crew)
+        self.join(node, crew)
     }
 
     /// Takes part in a pass. True for the one worker that finished its last chunk.
-    fn join(&self, process: u32, crew: &Crew<'_>) -> bool {
-        let pass = self.schedule.progress.pass(process);
+    fn join(&self, node: u32, crew: &Crew<'_>) -> bool {
+        let pass = self.schedule.progress.pass(node);
         let chunks = pass.chunks();
         let pace = pass.tickets.join();
-        let finished = self.clock.work(|| self.take_chunks(process, pass, &chunks, pace, crew));
+        let finished = self.clock.work(|| self.take_chunks(node, pass, &chunks, pace, crew));
         self.watch.forget_stolen(crew.worker());
         let is_last = pass.finish(finished, &chunks);
         if is_last {
@@ -192,15 +192,15 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     }
 
     /// Runs chunks until none is left, and says how many. After a failure they are only counted. Who looks on does so from the
-    /// first chunk on: who gets none has no part in the process, and may come when it is done.
-    fn take_chunks(&self, process: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
+    /// first chunk on: who gets none has no part in the node, and may come when it is done.
+    fn take_chunks(&self, node: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
         let (worker, mut onlooker) = (crew.worker(), None);
         let mut finished = 0;
         loop {
             if finished > 0 && crew.has_pinned() {
                 // Nobody else can run that, and anybody can join in this.
                 if pass.tickets.leave(chunks) {
-                    crew.push(Token::Join(process).encode(), self.band(process));
+                    crew.push(Token::Join(node).encode(), self.band(node));
                 }
                 return finished;
             }
@@ -214,20 +214,20 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
             }
             finished += places.len();
             if pass.tickets.invites(places.end, chunks, worker.workers()) {
-                crew.push(Token::Join(process).encode(), self.band(process));
+                crew.push(Token::Join(node).encode(), self.band(node));
             }
-            let onlooker = onlooker.get_or_insert_with(|| self.watch.join(worker, process, &pass.opened));
-            self.attempt(process, |position| self.run_chunks(position, chunks, places, worker, onlooker));
+            let onlooker = onlooker.get_or_insert_with(|| self.watch.join(worker, node, &pass.opened));
+            self.attempt(node, |position| self.run_chunks(position, chunks, places, worker, onlooker));
         }
     }
 
-    /// Counts down all that depend on the process. Those that became ready are pushed, but for one that can run anywhere:
+    /// Counts down all that depend on the node. Those that became ready are pushed, but for one that can run anywhere:
     /// it is given back, to be gone on with at once.
-    fn complete(&self, process: u32, crew: &Crew<'_>) -> Option<u32> {
-        self.clock.end(process);
+    fn complete(&self, node: u32, crew: &Crew<'_>) -> Option<u32> {
+        self.clock.end(node);
         let Schedule { flow, progress, .. } = self.schedule;
-        let mut ready = Ready::new(self, flow.first_place(process), crew);
-        for &dependent in flow.dependents(process) {
+        let mut ready = Ready::new(self, flow.first_place(node), crew);
+        for &dependent in flow.dependents(node) {
             if progress.release(dependent) {
                 ready.add(dependent);
             }
@@ -235,13 +235,13 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         ready.push_all_but_one()
     }
 
-    /// Whether the process is one for the calling thread. If that failed, nobody is to run it.
-    fn is_pinned(&self, process: u32) -> bool {
-        self.attempt(process, |_position| Ok(self.node(process).pinned())).unwrap_or(false)
+    /// Whether the node is one for the calling thread. If that failed, nobody is to run it.
+    fn is_pinned(&self, node: u32) -> bool {
+        self.attempt(node, |_position| Ok(self.node(node).pinned())).unwrap_or(false)
     }
 
-    fn band(&self, process: u32) -> Band {
-        if self.schedule.flow.is_urgent(process) { Band::Urgent } else { Band::Normal }
+    fn band(&self, node: u32) -> Band {
+        if self.schedule.flow.is_urgent(node) { Band::Urgent } else { Band::Normal }
     }
 }
 
@@ -249,18 +249,18 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Tokens for Run<'_, P, C, W> {
     fn run(&self, token: u64, crew: &Crew<'_>) {
         match Token::decode(token) {
             Token::Ready(places) => self.start_one_of(places, crew),
-            Token::Start(process) => self.start(process, false, crew),
-            Token::StartPinned(process) => self.start(process, true, crew),
-            Token::Join(process) => {
-                if self.join(process, crew) {
-                    self.go_on_after(process, crew);
+            Token::Start(node) => self.start(node, false, crew),
+            Token::StartPinned(node) => self.start(node, true, crew),
+            Token::Join(node) => {
+                if self.join(node, crew) {
+                    self.go_on_after(node, crew);
                 }
             }
         }
     }
 }
 
-/// Processes that became ready by one and the same.
+/// Nodes that became ready by one and the same.
 struct Ready<'run, P, C: ?Sized, W> {
     run: &'run Run<'run, P, C, W>,
     crew: &'run Crew<'run>,
@@ -277,23 +277,23 @@ impl<'run, P: Node<C>, C: Sync + ?Sized, W: Watching> Ready<'run, P, C, W> {
         Self { run, crew, places: place..place, kept: None, has_pinned: false }
     }
 
-    fn add(&mut self, process: u32) {
+    fn add(&mut self, node: u32) {
         let run = self.run;
         run.watch.count_ready();
-        if run.is_pinned(process) {
-            self.crew.push_pinned(Token::StartPinned(process).encode());
+        if run.is_pinned(node) {
+            self.crew.push_pinned(Token::StartPinned(node).encode());
             self.has_pinned = true;
         } else if self.crew.worker().is_shuffled() {
             // Each by itself, so that any of them can come next.
-            self.crew.push(Token::Start(process).encode(), run.band(process));
+            self.crew.push(Token::Start(node).encode(), run.band(node));
         } else if self.kept.is_none() {
-            self.kept = Some(process);
+            self.kept = Some(node);
         } else {
             let progress = &run.schedule.progress;
-            if !self.places.is_empty() && run.band(progress.ready(self.places.start)) != run.band(process) {
+            if !self.places.is_empty() && run.band(progress.ready(self.places.start)) != run.band(node) {
                 self.push();
             }
-            progress.set_ready(self.places.end, process);
+            progress.set_ready(self.places.end, node);
             self.places.end += 1;
         }
     }

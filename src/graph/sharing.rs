@@ -1,6 +1,6 @@
 //! Whether a run is worth sharing between workers.
 //!
-//! To share costs wake-ups, and cache lines that travel with every process that one worker makes ready and another runs. A
+//! To share costs wake-ups, and cache lines that travel with every node that one worker makes ready and another runs. A
 //! frame of little work is done sooner by the thread that has it. So each schedule remembers how long it took by itself and
 //! how long shared, and how much work it is, and goes the way that is shorter.
 

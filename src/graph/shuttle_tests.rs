@@ -1,6 +1,6 @@
 //! Whole runs of small schedules, in interleavings that shuttle draws.
 //!
-//! Each process counts how often each of its items has run, and looks whether all it depends on has run to the last item.
+//! Each node counts how often each of its items has run, and looks whether all it depends on has run to the last item.
 
 use std::{iter, ops::Range, panic::resume_unwind, sync::Arc, time::Duration};
 
@@ -20,15 +20,15 @@ const WAKE_PRICE: Duration = Duration::from_micros(2);
 /// What a run works on.
 struct Frame<'frame> {
     scheduler: &'frame Scheduler,
-    /// Per process, how often each of its items has run.
+    /// Per node, how often each of its items has run.
     ran: Vec<Vec<AtomicUsize>>,
-    /// How often a process was asked anything before all that it depends on had run.
+    /// How often a node was asked anything before all that it depends on had run.
     too_early: AtomicUsize,
-    /// Whether the processes that can fail do.
+    /// Whether the nodes that can fail do.
     fails: bool,
 }
 
-/// What is particular about a process.
+/// What is particular about a node.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Plain,
@@ -97,24 +97,24 @@ impl Node<Frame<'_>> for Process {
     }
 }
 
-/// Processes with their widths, and what they come after.
-fn processes(list: &[(usize, Kind, &[usize])]) -> Vec<Process> {
-    let process = |(index, &(width, kind, after)): (usize, &(usize, Kind, &[usize]))| Process {
+/// Nodes with their widths, and what they come after.
+fn nodes(list: &[(usize, Kind, &[usize])]) -> Vec<Process> {
+    let node = |(index, &(width, kind, after)): (usize, &(usize, Kind, &[usize]))| Process {
         index,
         width,
         kind,
         after: after.to_vec(),
     };
-    list.iter().enumerate().map(process).collect()
+    list.iter().enumerate().map(node).collect()
 }
 
-fn schedule(processes: &[Process]) -> Schedule<Process> {
+fn schedule(nodes: &[Process]) -> Schedule<Process> {
     let mut graph = FrameGraph::new();
     let mut ids = Vec::new();
-    for process in processes {
-        let id = graph.add(process.index.to_string(), process.clone());
+    for node in nodes {
+        let id = graph.add(node.index.to_string(), node.clone());
         graph.keep(id);
-        process.after.iter().for_each(|&before| graph.order(ids[before], id));
+        node.after.iter().for_each(|&before| graph.order(ids[before], id));
         ids.push(id);
     }
     graph.compile().expect("each comes after others")
@@ -126,8 +126,8 @@ fn run_frame(
     scheduler: &Scheduler,
     fails: bool,
 ) -> (Result<(), RunError>, Vec<Vec<usize>>) {
-    let counters = |process: &Process| iter::repeat_with(|| AtomicUsize::new(0)).take(process.width).collect();
-    let ran = schedule.processes().map(|(_, process)| counters(process)).collect();
+    let counters = |node: &Process| iter::repeat_with(|| AtomicUsize::new(0)).take(node.width).collect();
+    let ran = schedule.nodes().map(|(_, node)| counters(node)).collect();
     let frame = Frame { scheduler, ran, too_early: AtomicUsize::new(0), fails };
     let outcome = schedule.run(scheduler, &frame);
     assert_eq!(frame.too_early.load(Ordering::Relaxed), 0);
@@ -142,16 +142,16 @@ fn run_all(schedule: &mut Schedule<Process>, scheduler: &Scheduler) {
     assert!(ran.iter().flatten().all(|&times| times == 1), "an item is missing, or has run twice: {ran:?}");
 }
 
-/// Checks that many frames of these processes, on schedulers of a few workers and on one that shuffles.
-fn check_frames(frames: usize, always_share: bool, processes: Vec<Process>) {
-    let processes = Arc::new(processes);
+/// Checks that many frames of these nodes, on schedulers of a few workers and on one that shuffles.
+fn check_frames(frames: usize, always_parallel: bool, nodes: Vec<Process>) {
+    let nodes = Arc::new(nodes);
     for (workers, seed) in [(2, None), (3, None), (2, Some(1))] {
-        let processes = Arc::clone(&processes);
+        let nodes = Arc::clone(&nodes);
         check(move || {
             let builder = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE);
             let scheduler = seed.into_iter().fold(builder, SchedulerBuilder::shuffle).build().unwrap();
-            let mut schedule = schedule(&processes);
-            schedule.always_share(always_share);
+            let mut schedule = schedule(&nodes);
+            schedule.always_parallel(always_parallel);
             (0..frames).for_each(|_frame| run_all(&mut schedule, &scheduler));
         });
     }
@@ -160,7 +160,7 @@ fn check_frames(frames: usize, always_share: bool, processes: Vec<Process>) {
 #[test]
 fn shuttle_a_diamond_runs_in_order() {
     use Kind::Plain;
-    check_frames(1, true, processes(&[(1, Plain, &[]), (1, Plain, &[0]), (1, Plain, &[0]), (1, Plain, &[1, 2])]));
+    check_frames(1, true, nodes(&[(1, Plain, &[]), (1, Plain, &[0]), (1, Plain, &[0]), (1, Plain, &[1, 2])]));
 }
 
 #[test]
@@ -169,27 +169,27 @@ fn shuttle_many_that_become_ready_together_all_run() {
     let fan = [(1, Plain, &[0][..]); 9];
     let list: Vec<_> =
         iter::once((1, Plain, &[][..])).chain(fan).chain([(1, Plain, &[1, 2, 3, 4, 5, 6, 7, 8, 9][..])]).collect();
-    check_frames(1, true, processes(&list));
+    check_frames(1, true, nodes(&list));
 }
 
 #[test]
-fn shuttle_a_wide_process_is_done_when_its_last_item_is() {
+fn shuttle_a_wide_node_is_done_when_its_last_item_is() {
     use Kind::Plain;
-    check_frames(1, true, processes(&[(1, Plain, &[]), (5, Plain, &[0]), (0, Plain, &[0]), (2, Plain, &[1, 2])]));
+    check_frames(1, true, nodes(&[(1, Plain, &[]), (5, Plain, &[0]), (0, Plain, &[0]), (2, Plain, &[1, 2])]));
 }
 
 #[test]
-fn shuttle_pinned_processes_run_on_the_calling_thread() {
+fn shuttle_pinned_nodes_run_on_the_calling_thread() {
     use Kind::{Pinned, Plain};
     let list: [(usize, Kind, &[usize]); 5] =
         [(1, Plain, &[]), (2, Pinned, &[0]), (1, Plain, &[0]), (2, Plain, &[1, 2]), (1, Pinned, &[2])];
-    check_frames(1, true, processes(&list));
+    check_frames(1, true, nodes(&list));
 }
 
 #[test]
-fn shuttle_processes_may_open_scopes() {
+fn shuttle_nodes_may_open_scopes() {
     use Kind::{Nests, Plain};
-    check_frames(1, true, processes(&[(2, Nests, &[]), (1, Nests, &[]), (1, Plain, &[0, 1])]));
+    check_frames(1, true, nodes(&[(2, Nests, &[]), (1, Nests, &[]), (1, Plain, &[0, 1])]));
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn shuttle_one_frame_follows_another() {
     use Kind::{Pinned, Plain};
     let list: [(usize, Kind, &[usize]); 5] =
         [(3, Plain, &[]), (1, Plain, &[]), (1, Plain, &[0]), (1, Pinned, &[0, 1]), (2, Plain, &[2, 3])];
-    check_frames(3, true, processes(&list));
+    check_frames(3, true, nodes(&list));
 }
 
 #[test]
@@ -211,30 +211,30 @@ fn shuttle_a_run_that_is_too_long_for_one_thread_is_gone_on_with_by_all() {
         (1, Plain, &[0, 1]),
         (3, Plain, &[2, 3, 4]),
     ];
-    check_frames(4, false, processes(&list));
+    check_frames(4, false, nodes(&list));
 }
 
 #[test]
 fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
     use Kind::{Fails, Panics, Plain};
-    for (kind, other, always_share) in [(Fails, Plain, true), (Panics, Plain, false), (Fails, Panics, true)] {
+    for (kind, other, always_parallel) in [(Fails, Plain, true), (Panics, Plain, false), (Fails, Panics, true)] {
         for workers in [2, 3] {
             check(move || {
                 let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
                 let list: [(usize, Kind, &[usize]); 5] =
                     [(1, Plain, &[]), (3, kind, &[0]), (2, other, &[0]), (1, Plain, &[1]), (1, Plain, &[2, 3])];
-                let mut schedule = schedule(&processes(&list));
-                schedule.always_share(always_share);
-                if !always_share {
+                let mut schedule = schedule(&nodes(&list));
+                schedule.always_parallel(always_parallel);
+                if !always_parallel {
                     run_all(&mut schedule, &scheduler);
                 }
                 let (outcome, ran) = run_frame(&mut schedule, &scheduler, true);
                 match outcome {
-                    Err(RunError::Failed { process, source }) => {
-                        assert_eq!((process.as_str(), source.to_string().as_str()), ("1", "as planned"));
+                    Err(RunError::Failed { node, source }) => {
+                        assert_eq!((node.as_str(), source.to_string().as_str()), ("1", "as planned"));
                     }
-                    Err(RunError::Panicked { process, message }) => {
-                        assert!(process == "1" || process == "2");
+                    Err(RunError::Panicked { node, message }) => {
+                        assert!(node == "1" || node == "2");
                         assert_eq!(message, "as planned");
                     }
                     other => panic!("a run with a failure: {other:?}"),
@@ -279,19 +279,19 @@ impl Subscriber for PanickingSubscriber {
 }
 
 #[test]
-fn shuttle_a_panic_between_processes_fails_the_run_and_the_next_frame_is_whole() {
+fn shuttle_a_panic_between_nodes_fails_the_run_and_the_next_frame_is_whole() {
     use Kind::{Pinned, Plain};
     let objects = Arc::new(PanickingSubscriber { left: std::sync::atomic::AtomicUsize::new(0) });
     let dispatch = Dispatch::from(Arc::clone(&objects));
-    for (workers, always_share) in [(2, true), (3, true), (2, false)] {
+    for (workers, always_parallel) in [(2, true), (3, true), (2, false)] {
         let (objects, dispatch) = (Arc::clone(&objects), dispatch.clone());
         let at = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         check(move || {
             let list: [(usize, Kind, &[usize]); 5] =
                 [(2, Plain, &[]), (3, Plain, &[0]), (1, Pinned, &[0]), (0, Plain, &[1]), (1, Plain, &[2, 3])];
             let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
-            let mut schedule = schedule(&processes(&list));
-            schedule.always_share(always_share);
+            let mut schedule = schedule(&nodes(&list));
+            schedule.always_parallel(always_parallel);
             dispatcher::with_default(&dispatch, || {
                 objects.left.store(1 + at.fetch_add(1, Ordering::Relaxed) % 12, Ordering::Relaxed);
                 let (outcome, ran) = run_frame(&mut schedule, &scheduler, false);
@@ -324,8 +324,8 @@ fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
         });
         let list: [(usize, Kind, &[usize]); 3] =
             [(WIDTHS[0], Plain, &[]), (WIDTHS[1], Plain, &[0]), (WIDTHS[2], Plain, &[0])];
-        let mut schedule = schedule(&processes(&list));
-        schedule.always_share(true);
+        let mut schedule = schedule(&nodes(&list));
+        schedule.always_parallel(true);
         (0..3).for_each(|_frame| run_all(&mut schedule, &scheduler));
         let mut logs = Vec::from(looks.join().unwrap());
         logs.push(scheduler.timeline().take());
@@ -336,12 +336,12 @@ fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
                 runs += 1;
                 events += run.chunks.len() + run.empty.len();
                 if run.complete {
-                    assert_eq!([0, 1, 2].map(|process| run.width(process)), WIDTHS);
+                    assert_eq!([0, 1, 2].map(|node| run.width(node)), WIDTHS);
                     assert_eq!(run.empty.len(), 1);
                 }
             }
         }
-        // Four chunks a run, and one process without any. Idle times are dropped too.
+        // Four chunks a run, and one node without any. Idle times are dropped too.
         assert!(events + dropped as usize >= 5 * runs, "{events} events of {runs} runs, and {dropped} dropped");
     });
 }

@@ -5,17 +5,17 @@ use std::ops::Range;
 /// A piece of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Token {
-    /// Start the processes that stand ready at these places.
+    /// Start the nodes that stand ready at these places.
     Ready(Range<u32>),
-    /// Start this process.
+    /// Start this node.
     Start(u32),
-    /// Start this process, which is pinned.
+    /// Start this node, which is pinned.
     StartPinned(u32),
-    /// Take part in this process, which another worker has started.
+    /// Take part in this node, which another worker has started.
     Join(u32),
 }
 
-/// Places and processes take 31 bits each. Long before there are so many, memory is full.
+/// Places and nodes take 31 bits each. Long before there are so many, memory is full.
 const BITS: u32 = 31;
 const MASK: u64 = (1 << BITS) - 1;
 
@@ -23,9 +23,9 @@ impl Token {
     pub(super) fn encode(self) -> u64 {
         let (kind, high, low) = match self {
             Self::Ready(places) => (0, places.end, places.start),
-            Self::Start(process) => (1, 0, process),
-            Self::StartPinned(process) => (2, 0, process),
-            Self::Join(process) => (3, 0, process),
+            Self::Start(node) => (1, 0, node),
+            Self::StartPinned(node) => (2, 0, node),
+            Self::Join(node) => (3, 0, node),
         };
         (kind << (2 * BITS)) | (u64::from(high) << BITS) | u64::from(low)
     }

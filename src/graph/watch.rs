@@ -34,7 +34,7 @@ struct Traced<'run> {
     parent: Span,
     /// Whether they are told of chunks and counters, too.
     in_detail: bool,
-    /// How many processes are ready and have not been opened.
+    /// How many nodes are ready and have not been opened.
     ready: AtomicUsize,
 }
 
@@ -56,13 +56,13 @@ impl<P> Schedule<P> {
         C: ?Sized,
         P: Node<C>,
     {
-        let process = |index: usize| Process {
+        let node = |index: usize| Process {
             name: self.names[index].clone(),
             labels: self.labels[index].clone(),
             dependencies: self.dependencies(index).to_vec(),
-            pinned: catch(|| self.processes[index].pinned()).unwrap_or(false),
+            pinned: catch(|| self.nodes[index].pinned()).unwrap_or(false),
         };
-        Graph { processes: (0..self.len()).map(process).collect() }
+        Graph { processes: (0..self.len()).map(node).collect() }
     }
 }
 
@@ -92,38 +92,38 @@ impl<'run> Watch<'run> {
         self.traced.as_ref().filter(|traced| traced.in_detail)
     }
 
-    /// The span of a process.
-    fn span(&self, process: u32) -> Span {
+    /// The span of a node.
+    fn span(&self, node: u32) -> Span {
         let Some(traced) = &self.traced else { return Span::none() };
-        let Process { name, labels, .. } = &traced.graph.processes[process as usize];
-        let [of, phase, view] = [&labels.process, &labels.phase, &labels.view].map(Option::as_deref);
-        tracing::debug_span!(target: TARGET, parent: &traced.parent, "process", name, process = of, phase, view)
+        let Process { name, labels, .. } = &traced.graph.processes[node as usize];
+        let [of, stage, view] = [&labels.process, &labels.stage, &labels.view].map(Option::as_deref);
+        tracing::debug_span!(target: TARGET, parent: &traced.parent, "node", name, process = of, stage, view)
     }
 }
 
 /// Who looks on at a run: a [`Watch`], or [`Nobody`].
 pub(super) trait Watching: Sync {
-    /// What looks on while a worker is at a process.
+    /// What looks on while a worker is at a node.
     type Turn<'watch>: Onlooker
     where
         Self: 'watch;
 
-    /// A worker opens a process.
-    fn open(&self, worker: &Worker, process: u32) -> Self::Turn<'_>;
+    /// A worker opens a node.
+    fn open(&self, worker: &Worker, node: u32) -> Self::Turn<'_>;
 
-    /// A worker joins others at a process that was opened.
-    fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Self::Turn<'_>;
+    /// A worker joins others at a node that was opened.
+    fn join(&self, worker: &Worker, node: u32, opened: &Opened) -> Self::Turn<'_>;
 
-    /// A worker is to go through all processes by itself.
+    /// A worker is to go through all nodes by itself.
     fn go_alone(&self, worker: &Worker) -> Self::Turn<'_>;
 
-    /// A process that several have joined is done.
+    /// A node that several have joined is done.
     fn close(&self, opened: &Opened);
 
-    /// A process has become ready, in a run that is shared.
+    /// A node has become ready, in a run that is shared.
     fn count_ready(&self);
 
-    /// A worker has taken up a process that was ready, in a run that is shared.
+    /// A worker has taken up a node that was ready, in a run that is shared.
     fn count_taken(&self, worker: &Worker);
 
     /// What the worker's job was stolen for is done, and what it goes on with was not stolen.
@@ -142,14 +142,14 @@ impl Watching for Watch<'_> {
     where
         Self: 'watch;
 
-    fn open(&self, worker: &Worker, process: u32) -> Turn<'_> {
-        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), process, worker.has_stolen()));
-        Turn { watch: self, lap, span: self.span(process).entered() }
+    fn open(&self, worker: &Worker, node: u32) -> Turn<'_> {
+        let lap = self.recorded.as_ref().map(|run| run.open(worker.index(), node, worker.has_stolen()));
+        Turn { watch: self, lap, span: self.span(node).entered() }
     }
 
-    fn join(&self, worker: &Worker, process: u32, opened: &Opened) -> Turn<'_> {
+    fn join(&self, worker: &Worker, node: u32, opened: &Opened) -> Turn<'_> {
         let Opening { at, span } = opened.0.lock().clone();
-        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), process, worker.has_stolen(), at));
+        let lap = self.recorded.as_ref().map(|run| run.join(worker.index(), node, worker.has_stolen(), at));
         Turn { watch: self, lap, span: span.entered() }
     }
 
@@ -193,18 +193,18 @@ impl Watching for Watch<'_> {
     }
 }
 
-/// Who looks on while a worker is at a process: somebody, or [`Nobody`], and then it costs nothing.
+/// Who looks on while a worker is at a node: somebody, or [`Nobody`], and then it costs nothing.
 pub(super) trait Onlooker {
     /// Runs a chunk.
     fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R;
 
-    /// The process has no items.
+    /// The node has no items.
     fn end_empty(&mut self);
 
-    /// The worker goes on with another process without a break, and opens it.
-    fn go_on(&mut self, process: u32);
+    /// The worker goes on with another node without a break, and opens it.
+    fn go_on(&mut self, node: u32);
 
-    /// The worker leaves the process open for others.
+    /// The worker leaves the node open for others.
     fn leave(self, opened: &Opened);
 }
 
@@ -214,11 +214,11 @@ pub(super) struct Nobody;
 impl Watching for Nobody {
     type Turn<'watch> = Self;
 
-    fn open(&self, _worker: &Worker, _process: u32) -> Self {
+    fn open(&self, _worker: &Worker, _node: u32) -> Self {
         Self
     }
 
-    fn join(&self, _worker: &Worker, _process: u32, _opened: &Opened) -> Self {
+    fn join(&self, _worker: &Worker, _node: u32, _opened: &Opened) -> Self {
         Self
     }
 
@@ -246,12 +246,12 @@ impl Onlooker for Nobody {
 
     fn end_empty(&mut self) {}
 
-    fn go_on(&mut self, _process: u32) {}
+    fn go_on(&mut self, _node: u32) {}
 
     fn leave(self, _opened: &Opened) {}
 }
 
-/// A worker at a process while somebody looks on.
+/// A worker at a node while somebody looks on.
 pub(super) struct Turn<'run> {
     watch: &'run Watch<'run>,
     lap: Option<Lap<'run>>,
@@ -278,14 +278,14 @@ impl Onlooker for Turn<'_> {
         }
     }
 
-    fn go_on(&mut self, process: u32) {
+    fn go_on(&mut self, node: u32) {
         if self.watch.traced.is_some() {
             // Out of the old one first.
             self.span = Span::none().entered();
-            self.span = self.watch.span(process).entered();
+            self.span = self.watch.span(node).entered();
         }
         if let Some(lap) = &mut self.lap {
-            lap.go_on(process);
+            lap.go_on(node);
         }
     }
 
@@ -296,7 +296,7 @@ impl Onlooker for Turn<'_> {
     }
 }
 
-/// What those who join others at a process have to know of its beginning.
+/// What those who join others at a node have to know of its beginning.
 pub(super) struct Opened(Mutex<Opening>);
 
 #[derive(Clone)]
@@ -311,7 +311,7 @@ impl Opened {
         Self(Mutex::new(Opening { at: 0, span: Span::none() }))
     }
 
-    /// Gives the process' span away, which ends when it is dropped: all who took part are done.
+    /// Gives the node's span away, which ends when it is dropped: all who took part are done.
     pub(super) fn close(&self) -> Span {
         mem::replace(&mut self.0.lock().span, Span::none())
     }

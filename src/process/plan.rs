@@ -9,7 +9,7 @@ use super::planned_target::targets_of;
 use super::{
     Access, Declaration, Declare, Draws, Format, PlanError, PlannedTarget, ProcessError, RenderProcess, ShadowCasters,
 };
-use crate::graph::{FrameGraph, ProcessId};
+use crate::graph::{FrameGraph, NodeId};
 use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
 
@@ -87,10 +87,10 @@ impl FramePlan {
         }
 
         let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
-        let declarations: Vec<_> = schedule.processes().map(|(_, planned)| &planned.declaration).collect();
+        let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
         let dot = schedule.to_labelled_dot(|before, after| shared(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
-        let processes: Vec<_> = schedule.into_processes().map(|(_, process)| process).collect();
+        let processes: Vec<_> = schedule.into_nodes().map(|(_, process)| process).collect();
         if processes.is_empty() {
             return Err(PlanError::Empty);
         }
@@ -197,7 +197,7 @@ struct Added {
     /// In the chain.
     place: Option<usize>,
     name: String,
-    id: ProcessId,
+    id: NodeId,
     declaration: Declaration,
 }
 
@@ -223,7 +223,7 @@ fn stand_in(places: &[String], added: &[Added]) -> Option<PlannedTarget> {
 }
 
 /// Who goes before whom: by the chain, and by what processes say themselves.
-fn orders(places: &[String], added: &[Added]) -> Result<Vec<(ProcessId, ProcessId)>, PlanError> {
+fn orders(places: &[String], added: &[Added]) -> Result<Vec<(NodeId, NodeId)>, PlanError> {
     let mut orders = Vec::new();
     for earlier in added {
         let follows = |later: &&Added| later.place.is_some() && earlier.place.is_some() && later.place > earlier.place;
@@ -268,7 +268,7 @@ fn find(
     added: &[Added],
     name: &str,
     is_on_side: impl Fn(usize, usize) -> bool,
-) -> Result<Option<ProcessId>, NoSuchName> {
+) -> Result<Option<NodeId>, NoSuchName> {
     if let Some(found) = added.iter().find(|other| other.name == name) {
         return Ok(Some(found.id));
     }

@@ -65,7 +65,7 @@ pub struct Run {
     /// From when on others than the calling thread could take part. `None` if it ran all by itself.
     pub shared_from: Option<Duration>,
     /// Whether it was to be shared however little work it is.
-    pub always_shares: bool,
+    pub always_parallel: bool,
     /// Whether a background job called for it, which no frame waits for. Its frame is the one in which it began.
     pub in_background: bool,
     /// Whether a process failed, so that the rest was cancelled. What panicked is not among the chunks.
@@ -85,7 +85,7 @@ pub struct Graph {
     pub processes: Vec<Process>,
 }
 
-/// A process of a schedule: one phase of a render process in one view, say.
+/// A process of a schedule: one stage of a render process in one view, say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Process {
     /// What the graph calls it.
@@ -104,7 +104,7 @@ pub struct Labels {
     /// The render process: `geometry buffer`.
     pub process: Option<String>,
     /// Which part of the work: `visibility`, `record`.
-    pub phase: Option<String>,
+    pub stage: Option<String>,
     /// The view that it is for.
     pub view: Option<String>,
 }
@@ -242,10 +242,10 @@ impl Run {
 }
 
 impl Process {
-    /// What it counts as where all phases and views of a render process are taken together: the render process, or the phase
+    /// What it counts as where all stages and views of a render process are taken together: the render process, or the stage
     /// where it is none's, or its own name.
     pub fn group(&self) -> &str {
-        self.labels.process.as_ref().or(self.labels.phase.as_ref()).unwrap_or(&self.name)
+        self.labels.process.as_ref().or(self.labels.stage.as_ref()).unwrap_or(&self.name)
     }
 }
 

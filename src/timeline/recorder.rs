@@ -327,7 +327,7 @@ pub(crate) struct OpenRun<'timeline> {
 /// How a run has ended.
 #[derive(Default)]
 pub(crate) struct Ended {
-    pub(crate) always_shares: bool,
+    pub(crate) always_parallel: bool,
     pub(crate) failed: bool,
 }
 
@@ -362,7 +362,7 @@ impl OpenRun<'_> {
 
 impl Drop for OpenRun<'_> {
     fn drop(&mut self) {
-        let Ended { always_shares, failed } = self.how;
+        let Ended { always_parallel, failed } = self.how;
         let run = Run {
             frame: self.frame,
             graph: Arc::clone(&self.graph),
@@ -370,7 +370,7 @@ impl Drop for OpenRun<'_> {
             began: self.began,
             ended: self.timeline.now(),
             shared_from: self.shared_from.take(),
-            always_shares,
+            always_parallel,
             in_background: self.in_background,
             failed,
             // Relaxed: all who count are done.

@@ -47,7 +47,7 @@ fn a_log_accounts_for_whole_frames() {
 
             // Objects are counted by whoever looks at them, whatever the size of a job.
             let processes = run.graph.processes.iter().enumerate();
-            let seen = processes.filter(|(_, process)| process.labels.phase.as_deref() == Some("visibility"));
+            let seen = processes.filter(|(_, process)| process.labels.stage.as_deref() == Some("visibility"));
             let seen: Vec<_> = seen.map(|(index, _)| run.width(index)).collect();
             assert_eq!(seen, vec![2_000; scene.cameras.len()]);
 
@@ -72,7 +72,7 @@ fn every_job_says_which_process_phase_and_view_it_is_of() {
     assert_eq!(processes, plan.collect::<BTreeSet<_>>());
     let views: BTreeSet<_> = labels().filter_map(|labels| labels.view.as_deref()).collect();
     assert!(scene.cameras.iter().all(|camera| views.contains(camera.name.as_str())), "{views:?}");
-    let phases: BTreeSet<_> = labels().map(|labels| labels.phase.as_deref().unwrap()).collect();
+    let stages: BTreeSet<_> = labels().map(|labels| labels.stage.as_deref().unwrap()).collect();
     let expected = [
         "compact",
         "fill",
@@ -86,7 +86,7 @@ fn every_job_says_which_process_phase_and_view_it_is_of() {
         "upload",
         "visibility",
     ];
-    assert_eq!(phases, BTreeSet::from(expected));
+    assert_eq!(stages, BTreeSet::from(expected));
 }
 
 #[test]

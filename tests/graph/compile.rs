@@ -1,6 +1,6 @@
 //! What is kept, in which order, and what is found wrong: against the oracle, and case by case.
 
-use drawloom::graph::{FrameGraph, GraphProblem, ProcessId, Schedule};
+use drawloom::graph::{FrameGraph, GraphProblem, NodeId, Schedule};
 use proptest::prelude::*;
 
 use crate::oracle::{Oracle, Role, Sketch, any_sketch, closure, sound_sketch};
@@ -10,22 +10,22 @@ fn number(name: &str) -> usize {
 }
 
 fn names<P>(schedule: &Schedule<P>) -> Vec<&str> {
-    schedule.processes().map(|(name, _)| name).collect()
+    schedule.nodes().map(|(name, _)| name).collect()
 }
 
 fn check_schedule(sketch: &Sketch, schedule: &Schedule<usize>) -> Result<(), TestCaseError> {
     let oracle = Oracle::new(sketch);
-    let order: Vec<usize> = schedule.processes().map(|(_, process)| *process).collect();
+    let order: Vec<usize> = schedule.nodes().map(|(_, node)| *node).collect();
     prop_assert_eq!(&order, &oracle.order());
-    for (name, process) in schedule.processes() {
-        prop_assert_eq!(number(name), *process);
+    for (name, node) in schedule.nodes() {
+        prop_assert_eq!(number(name), *node);
     }
     let dropped: Vec<usize> = schedule.dropped().iter().map(|name| number(name)).collect();
-    let unneeded: Vec<usize> = (0..oracle.needed.len()).filter(|&process| !oracle.needed[process]).collect();
+    let unneeded: Vec<usize> = (0..oracle.needed.len()).filter(|&node| !oracle.needed[node]).collect();
     prop_assert_eq!(dropped, unneeded);
 
     let mut waits = vec![vec![false; order.len()]; order.len()];
-    for (index, _) in schedule.processes().enumerate() {
+    for (index, _) in schedule.nodes().enumerate() {
         for &dependency in schedule.dependencies(index) {
             waits[dependency][index] = true;
             prop_assert!(schedule.dependents(dependency).contains(&index));
@@ -42,8 +42,8 @@ fn check_schedule(sketch: &Sketch, schedule: &Schedule<usize>) -> Result<(), Tes
 
 fn check_problem(sketch: &Sketch, problem: &GraphProblem) -> Result<(), TestCaseError> {
     let oracle = Oracle::new(sketch);
-    if let GraphProblem::Cycle { processes } = problem {
-        let circle: Vec<usize> = processes.iter().map(|name| number(name)).collect();
+    if let GraphProblem::Cycle { nodes } = problem {
+        let circle: Vec<usize> = nodes.iter().map(|name| number(name)).collect();
         prop_assert_eq!(circle.first(), circle.iter().min());
         for (at, &before) in circle.iter().enumerate() {
             let after = circle[(at + 1) % circle.len()];
@@ -79,9 +79,9 @@ fn check_problem(sketch: &Sketch, problem: &GraphProblem) -> Result<(), TestCase
         return Err(TestCaseError::fail(format!("nothing is wrong, but {problem:?}")));
     };
     prop_assert!(unordered(number(resource), number(first), number(second)));
-    let processes = 0..sketch.roles.len();
-    let any_earlier = (0..number(resource))
-        .any(|resource| processes.clone().any(|a| processes.clone().any(|b| unordered(resource, a, b))));
+    let nodes = 0..sketch.roles.len();
+    let any_earlier =
+        (0..number(resource)).any(|resource| nodes.clone().any(|a| nodes.clone().any(|b| unordered(resource, a, b))));
     prop_assert!(!any_earlier, "an earlier resource has writers without an order");
     Ok(())
 }
@@ -107,7 +107,7 @@ proptest! {
 
     #[test]
     fn any_graph_compiles_or_fails_as_the_rules_say(sketch in any_sketch()) {
-        match sketch.graph(|process| process).compile() {
+        match sketch.graph(|node| node).compile() {
             Ok(schedule) => {
                 prop_assert!(!is_wrong(&sketch));
                 check_schedule(&sketch, &schedule)?;
@@ -122,18 +122,18 @@ proptest! {
 
     #[test]
     fn sound_graphs_compile_as_the_rules_say(sketch in sound_sketch()) {
-        let schedule = sketch.graph(|process| process).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let schedule = sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         check_schedule(&sketch, &schedule)?;
     }
 
     #[test]
     fn the_same_graph_gives_the_same_schedule(sketch in sound_sketch()) {
-        let compile = || sketch.graph(|process| process).compile().map_err(|error| TestCaseError::fail(error.to_string()));
+        let compile = || sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()));
         prop_assert_eq!(compile()?.to_dot(), compile()?.to_dot());
     }
 }
 
-/// A graph in which all processes are kept and all resources imported, so that only the order matters.
+/// A graph in which all nodes are kept and all resources imported, so that only the order matters.
 struct Ordering {
     graph: FrameGraph<()>,
 }
@@ -143,22 +143,22 @@ impl Ordering {
         Self { graph: FrameGraph::new() }
     }
 
-    fn add(&mut self, name: &str, reads: &[&str], writes: &[&str]) -> ProcessId {
-        let process = self.graph.add(name, ());
-        self.graph.keep(process);
+    fn add(&mut self, name: &str, reads: &[&str], writes: &[&str]) -> NodeId {
+        let node = self.graph.add(name, ());
+        self.graph.keep(node);
         for resource in reads.iter().chain(writes) {
             let resource = self.graph.resource(*resource);
             self.graph.import(resource);
         }
         for resource in reads {
             let resource = self.graph.resource(*resource);
-            self.graph.read(process, resource);
+            self.graph.read(node, resource);
         }
         for resource in writes {
             let resource = self.graph.resource(*resource);
-            self.graph.write(process, resource);
+            self.graph.write(node, resource);
         }
-        process
+        node
     }
 
     fn compile(self) -> Schedule<()> {
@@ -203,9 +203,9 @@ fn what_a_kept_modifier_builds_on_is_kept() {
     graph.import(canvas);
     graph.output(image);
     let [first, second, unrelated] = ["first", "second", "unrelated"].map(|name| graph.add(name, ()));
-    for process in [first, second] {
-        graph.read(process, canvas);
-        graph.write(process, canvas);
+    for node in [first, second] {
+        graph.read(node, canvas);
+        graph.write(node, canvas);
     }
     graph.write(second, image);
     graph.order(first, second);
@@ -221,11 +221,11 @@ fn what_was_overwritten_is_not_kept_for_a_modifier() {
     let [canvas, image] = ["canvas", "image"].map(|name| graph.resource(name));
     graph.output(image);
     let [before, write, modify] = ["before", "write", "modify"].map(|name| graph.add(name, ()));
-    for process in [before, modify] {
-        graph.read(process, canvas);
+    for node in [before, modify] {
+        graph.read(node, canvas);
     }
-    for process in [before, write, modify] {
-        graph.write(process, canvas);
+    for node in [before, write, modify] {
+        graph.write(node, canvas);
     }
     graph.write(modify, image);
     graph.order(before, write);
@@ -235,7 +235,7 @@ fn what_was_overwritten_is_not_kept_for_a_modifier() {
 }
 
 #[test]
-fn a_dropped_process_hands_on_the_order() {
+fn a_dropped_node_hands_on_the_order() {
     let mut ordering = Ordering::new();
     let last = ordering.add("last", &[], &["image"]);
     let first = ordering.add("first", &[], &["image"]);
@@ -248,7 +248,7 @@ fn a_dropped_process_hands_on_the_order() {
 }
 
 #[test]
-fn a_dropped_process_has_no_say_in_ties() {
+fn a_dropped_node_has_no_say_in_ties() {
     let mut ordering = Ordering::new();
     let first = ordering.add("first", &[], &[]);
     ordering.add("second", &[], &[]);
@@ -270,18 +270,18 @@ fn only_the_last_maker_is_waited_for() {
 }
 
 #[test]
-fn processes_are_found_by_id() {
+fn nodes_are_found_by_id() {
     let mut graph = FrameGraph::new();
     let [dropped, late, early] = ["dropped", "late", "early"].map(|name| graph.add(name, name.len()));
     graph.keep(late);
     graph.keep(early);
     graph.order(early, late);
     let mut schedule = graph.compile().expect("the graph is sound");
-    assert_eq!([dropped, late, early].map(|process| schedule.index(process)), [None, Some(1), Some(0)]);
-    assert_eq!(schedule.process(late), Some(&4));
-    *schedule.process_mut(early).expect("it is kept") = 7;
-    schedule.processes_mut().for_each(|(_, payload)| *payload += 1);
-    assert_eq!(schedule.processes().collect::<Vec<_>>(), [("early", &8), ("late", &5)]);
+    assert_eq!([dropped, late, early].map(|node| schedule.index(node)), [None, Some(1), Some(0)]);
+    assert_eq!(schedule.node(late), Some(&4));
+    *schedule.node_mut(early).expect("it is kept") = 7;
+    schedule.nodes_mut().for_each(|(_, payload)| *payload += 1);
+    assert_eq!(schedule.nodes().collect::<Vec<_>>(), [("early", &8), ("late", &5)]);
     assert_eq!((schedule.dependencies(2), schedule.dependents(usize::MAX)), (&[][..], &[][..]));
     let foreign = FrameGraph::new().add("early", ());
     assert_eq!(schedule.index(foreign), None);

@@ -65,7 +65,7 @@ fn string(text: &str) -> Option<(String, &str)> {
 }
 
 /// The attributes of the node that is drawn with that label.
-fn node<'a>(statements: &'a [Statement<'a>], label: &str) -> (String, Vec<(&'a str, &'a str)>) {
+fn statement_of<'a>(statements: &'a [Statement<'a>], label: &str) -> (String, Vec<(&'a str, &'a str)>) {
     let is_it =
         |(_, attributes): &&Statement<'_>| attributes.iter().any(|(key, value)| *key == "label" && value == label);
     let (identifiers, attributes) = statements.iter().find(is_it).unwrap_or_else(|| panic!("no {label:?}"));
@@ -90,21 +90,21 @@ fn small_graph() -> FrameGraph<()> {
 }
 
 #[test]
-fn a_graph_shows_processes_resources_and_what_is_not_needed() {
+fn a_graph_shows_nodes_resources_and_what_is_not_needed() {
     let dot = small_graph().to_dot();
     let statements = parse(&dot).expect("the drawing can be read");
-    let (shadow, attributes) = node(&statements, "shadow");
+    let (shadow, attributes) = statement_of(&statements, "shadow");
     assert_eq!(attributes, [("shape", "box")]);
-    let (light, _) = node(&statements, "light");
-    let (lines, attributes) = node(&statements, "lines");
+    let (light, _) = statement_of(&statements, "light");
+    let (lines, attributes) = statement_of(&statements, "lines");
     assert_eq!(attributes, [("shape", "box"), ("style", "dashed")]);
-    let (map, attributes) = node(&statements, "map");
+    let (map, attributes) = statement_of(&statements, "map");
     assert_eq!(attributes, [("shape", "ellipse")]);
-    let (image, attributes) = node(&statements, "image");
+    let (image, attributes) = statement_of(&statements, "image");
     assert_eq!(attributes, [("shape", "ellipse"), ("style", "filled"), ("peripheries", "2")]);
-    let (overlay, attributes) = node(&statements, "overlay");
+    let (overlay, attributes) = statement_of(&statements, "overlay");
     assert_eq!(attributes, [("shape", "ellipse"), ("style", "dashed")]);
-    let (_, attributes) = node(&statements, "noise");
+    let (_, attributes) = statement_of(&statements, "noise");
     assert_eq!(attributes, [("shape", "ellipse"), ("style", "filled,dashed")]);
 
     let mut edges: Vec<_> = statements.iter().filter(|(ends, _)| ends.len() == 2).cloned().collect();
@@ -126,10 +126,10 @@ fn a_graph_shows_processes_resources_and_what_is_not_needed() {
 fn a_schedule_shows_the_order_and_what_was_dropped() {
     let dot = small_graph().compile().expect("nothing is wrong").to_dot();
     let statements = parse(&dot).expect("the drawing can be read");
-    let (shadow, attributes) = node(&statements, "shadow");
+    let (shadow, attributes) = statement_of(&statements, "shadow");
     assert_eq!(attributes, [("shape", "box")]);
-    let (light, _) = node(&statements, "light");
-    let (_, attributes) = node(&statements, "lines");
+    let (light, _) = statement_of(&statements, "light");
+    let (_, attributes) = statement_of(&statements, "lines");
     assert_eq!(attributes, [("shape", "box"), ("style", "dashed")]);
     let edges: Vec<_> = statements.iter().map(|(ends, _)| ends.clone()).filter(|ends| ends.len() == 2).collect();
     assert_eq!(edges, [[shadow.as_str(), &light]]);
@@ -150,27 +150,27 @@ proptest! {
     #[test]
     fn any_name_is_drawn_as_it_is(name in "\\PC*|[\"\\\\&;a>\\[\\]{}=, -]{0,12}") {
         let mut graph = FrameGraph::new();
-        let process = graph.add(name.clone(), ());
-        graph.keep(process);
+        let node = graph.add(name.clone(), ());
+        graph.keep(node);
         let other = format!("other {name}");
         graph.resource(other.clone());
         graph.add("dropped".to_owned() + &name, ());
         let dot = graph.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
         prop_assert_eq!(statements.len(), 3);
-        prop_assert_eq!(node(&statements, &name).1, [("shape", "box")]);
-        prop_assert_eq!(node(&statements, &other).1[0], ("shape", "ellipse"));
+        prop_assert_eq!(statement_of(&statements, &name).1, [("shape", "box")]);
+        prop_assert_eq!(statement_of(&statements, &other).1[0], ("shape", "ellipse"));
         let dot = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?.to_dot();
         prop_assert_eq!(parse(&dot).map_err(TestCaseError::fail)?.len(), 2);
     }
 
     #[test]
     fn any_graph_can_be_drawn_also_one_that_does_not_compile(sketch in any_sketch()) {
-        let graph = sketch.graph(|process| process);
+        let graph = sketch.graph(|node| node);
         let dot = graph.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
         let dashed = |attributes: &[(&str, String)]| attributes.contains(&("style", "dashed".to_owned()));
-        let dropped = statements.iter().filter(|(ends, attributes)| ends[0].starts_with("process") && dashed(attributes));
+        let dropped = statements.iter().filter(|(ends, attributes)| ends[0].starts_with("node") && dashed(attributes));
         let drawn = dropped.count();
         if let Ok(schedule) = graph.compile() {
             prop_assert_eq!(drawn, schedule.dropped().len());
@@ -179,10 +179,10 @@ proptest! {
 
     #[test]
     fn a_schedule_draws_who_waits_for_whom_and_nothing_that_follows_from_it(sketch in sound_sketch()) {
-        let schedule = sketch.graph(|process| process).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let schedule = sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         let dot = schedule.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
-        let index = |end: &str| end.trim_start_matches("process").parse::<usize>().expect("processes are numbered");
+        let index = |end: &str| end.trim_start_matches("node").parse::<usize>().expect("nodes are numbered");
         let arrows = statements.iter().filter(|(ends, _)| ends.len() == 2);
         let drawn: Vec<_> = arrows.map(|(ends, _)| (index(ends[0]), index(ends[1]))).collect();
         let all = (0..schedule.len()).flat_map(|index| schedule.dependents(index).iter().map(move |&other| (index, other)));

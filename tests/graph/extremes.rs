@@ -46,7 +46,7 @@ fn a_million_items_are_counted() {
 }
 
 #[test]
-fn the_widest_process_is_cut_without_overflow() {
+fn the_widest_node_is_cut_without_overflow() {
     let third = usize::MAX / 3 + 1;
     let whole = std::iter::once(0..usize::MAX).collect();
     for (chunk, expected) in [(usize::MAX, whole), (third, vec![0..third, third..2 * third, 2 * third..usize::MAX])] {
@@ -66,14 +66,14 @@ fn the_widest_process_is_cut_without_overflow() {
 }
 
 #[test]
-fn chains_of_a_hundred_thousand_processes_run() {
+fn chains_of_a_hundred_thousand_nodes_run() {
     const LENGTH: usize = 100_000;
     for width in [0, 1] {
         let mut graph = FrameGraph::new();
         let mut before = graph.resource("start");
         graph.import(before);
         for index in 0..LENGTH {
-            let process = graph.add(
+            let node = graph.add(
                 format!("link {index}"),
                 Closure::new(|count: &AtomicUsize, _, _| {
                     count.fetch_add(1, Ordering::Relaxed);
@@ -81,9 +81,9 @@ fn chains_of_a_hundred_thousand_processes_run() {
                 })
                 .with_width(move |_| width),
             );
-            graph.read(process, before);
+            graph.read(node, before);
             before = graph.resource(format!("after {index}"));
-            graph.write(process, before);
+            graph.write(node, before);
         }
         graph.output(before);
         let mut schedule = graph.compile().expect("nothing is wrong");

@@ -1,6 +1,6 @@
 //! What the rules say of a graph, worked out the slow way: matrices of who comes before whom.
 
-use drawloom::graph::{FrameGraph, ProcessId};
+use drawloom::graph::{FrameGraph, NodeId};
 use proptest::{collection::vec, prelude::*};
 
 /// Who comes before whom: `[before][after]`.
@@ -13,10 +13,10 @@ pub enum Role {
     Reads,
 }
 
-/// A graph as plain data. Processes are named `p0`, `p1`, and so on, resources `r0`, `r1`.
+/// A graph as plain data. Nodes are named `p0`, `p1`, and so on, resources `r0`, `r1`.
 #[derive(Clone, Debug)]
 pub struct Sketch {
-    /// Per process and resource.
+    /// Per node and resource.
     pub roles: Vec<Vec<Option<Role>>>,
     pub orders: Vec<(usize, usize)>,
     pub kept: Vec<bool>,
@@ -32,11 +32,11 @@ pub fn any_sketch() -> impl Strategy<Value = Sketch> {
         1 => Just(Some(Role::Modifies)),
         2 => Just(Some(Role::Reads)),
     ];
-    (1..7usize, 1..4usize).prop_flat_map(move |(processes, resources)| {
+    (1..7usize, 1..4usize).prop_flat_map(move |(nodes, resources)| {
         (
-            vec(vec(role.clone(), resources), processes),
-            vec((0..processes, 0..processes), 0..=processes),
-            vec(prop::bool::weighted(0.2), processes),
+            vec(vec(role.clone(), resources), nodes),
+            vec((0..nodes, 0..nodes), 0..=nodes),
+            vec(prop::bool::weighted(0.2), nodes),
             vec(prop::bool::weighted(0.7), resources),
             vec(prop::bool::weighted(0.5), resources),
         )
@@ -57,29 +57,29 @@ pub fn any_sketch() -> impl Strategy<Value = Sketch> {
 
 /// Nothing is wrong with these: edges go from low to high, all makers of a resource are ordered, all is imported.
 pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
-    (1..24usize, 1..8usize).prop_flat_map(|(processes, resources)| {
+    (1..24usize, 1..8usize).prop_flat_map(|(nodes, resources)| {
         (
-            vec(vec(prop::bool::weighted(0.25), resources), processes),
-            vec((0..=processes, 0..=processes), resources),
-            vec((0..processes, 0..processes), 0..processes),
-            vec(prop::bool::weighted(0.1), processes),
+            vec(vec(prop::bool::weighted(0.25), resources), nodes),
+            vec((0..=nodes, 0..=nodes), resources),
+            vec((0..nodes, 0..nodes), 0..nodes),
+            vec(prop::bool::weighted(0.1), nodes),
             vec(prop::bool::weighted(0.3), resources),
         )
             .prop_map(|(touches, splits, orders, kept, output)| {
-                let role = |process: usize, resource: usize| {
+                let role = |node: usize, resource: usize| {
                     let (a, b) = splits[resource];
-                    if process < a.min(b) {
+                    if node < a.min(b) {
                         Role::Writes
-                    } else if process < a.max(b) {
+                    } else if node < a.max(b) {
                         Role::Modifies
                     } else {
                         Role::Reads
                     }
                 };
                 let roles: Vec<Vec<_>> = (0..touches.len())
-                    .map(|process| {
+                    .map(|node| {
                         (0..output.len())
-                            .map(|resource| touches[process][resource].then(|| role(process, resource)))
+                            .map(|resource| touches[node][resource].then(|| role(node, resource)))
                             .collect()
                     })
                     .collect();
@@ -87,7 +87,7 @@ pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
                     orders.into_iter().filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect();
                 for resource in 0..output.len() {
                     let makers: Vec<usize> = (0..roles.len())
-                        .filter(|&process| matches!(roles[process][resource], Some(Role::Writes | Role::Modifies)))
+                        .filter(|&node| matches!(roles[node][resource], Some(Role::Writes | Role::Modifies)))
                         .collect();
                     orders.extend(makers.windows(2).map(|pair| (pair[0], pair[1])));
                 }
@@ -97,11 +97,11 @@ pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
 }
 
 impl Sketch {
-    /// The graph of it, with a payload for each process.
+    /// The graph of it, with a payload for each node.
     pub fn graph<P>(&self, mut payload: impl FnMut(usize) -> P) -> FrameGraph<P> {
         let mut graph = FrameGraph::new();
         let resources: Vec<_> = (0..self.output.len()).map(|index| graph.resource(format!("r{index}"))).collect();
-        let processes: Vec<ProcessId> =
+        let nodes: Vec<NodeId> =
             (0..self.roles.len()).map(|index| graph.add(format!("p{index}"), payload(index))).collect();
         for (index, &resource) in resources.iter().enumerate() {
             if self.imported[index] {
@@ -110,27 +110,27 @@ impl Sketch {
             if self.output[index] {
                 graph.output(resource);
             }
-            for (&process, roles) in processes.iter().zip(&self.roles) {
+            for (&node, roles) in nodes.iter().zip(&self.roles) {
                 if matches!(roles[index], Some(Role::Reads | Role::Modifies)) {
-                    graph.read(process, resource);
+                    graph.read(node, resource);
                 }
                 if matches!(roles[index], Some(Role::Writes | Role::Modifies)) {
-                    graph.write(process, resource);
+                    graph.write(node, resource);
                 }
             }
         }
         for &(before, after) in &self.orders {
-            graph.order(processes[before], processes[after]);
+            graph.order(nodes[before], nodes[after]);
         }
-        for (&process, _) in processes.iter().zip(&self.kept).filter(|(_, kept)| **kept) {
-            graph.keep(process);
+        for (&node, _) in nodes.iter().zip(&self.kept).filter(|(_, kept)| **kept) {
+            graph.keep(node);
         }
         graph
     }
 
     pub fn with_role(&self, resource: usize, wanted: &[Role]) -> Vec<usize> {
         (0..self.roles.len())
-            .filter(|&process| self.roles[process][resource].is_some_and(|role| wanted.contains(&role)))
+            .filter(|&node| self.roles[node][resource].is_some_and(|role| wanted.contains(&role)))
             .collect()
     }
 
@@ -194,24 +194,24 @@ impl Oracle {
             sketch.makers(resource).into_iter().for_each(|maker| needed[maker] = true);
         }
         for _ in 0..count {
-            for process in 0..count {
-                let is_source = |edges: &Relation| (0..count).any(|after| needed[after] && edges[process][after]);
-                needed[process] |= data.iter().any(is_source);
+            for node in 0..count {
+                let is_source = |edges: &Relation| (0..count).any(|after| needed[after] && edges[node][after]);
+                needed[node] |= data.iter().any(is_source);
             }
         }
         Self { data, before, needed }
     }
 
     pub fn has_cycle(&self) -> bool {
-        (0..self.needed.len()).any(|process| self.before[process][process])
+        (0..self.needed.len()).any(|node| self.before[node][node])
     }
 
-    /// The needed processes: always the first of those that nothing left out comes before.
+    /// The needed nodes: always the first of those that nothing left out comes before.
     pub fn order(&self) -> Vec<usize> {
-        let mut left: Vec<usize> = (0..self.needed.len()).filter(|&process| self.needed[process]).collect();
+        let mut left: Vec<usize> = (0..self.needed.len()).filter(|&node| self.needed[node]).collect();
         let mut order = Vec::new();
         while !left.is_empty() {
-            let is_next = |&process: &usize| left.iter().all(|&other| !self.before[other][process]);
+            let is_next = |&node: &usize| left.iter().all(|&other| !self.before[other][node]);
             let at = left.iter().position(is_next).expect("there is no cycle");
             order.push(left.remove(at));
         }

@@ -1,15 +1,15 @@
 //! Every problem names what is wrong, and gives the graph back so that it can be put right.
 
-use drawloom::graph::{FrameGraph, GraphProblem, ProcessId, ResourceId, Schedule};
+use drawloom::graph::{FrameGraph, GraphProblem, NodeId, ResourceId, Schedule};
 
-/// A graph of kept processes.
-fn graph<const N: usize>(names: [&str; N]) -> (FrameGraph<usize>, [ProcessId; N]) {
+/// A graph of kept nodes.
+fn graph<const N: usize>(names: [&str; N]) -> (FrameGraph<usize>, [NodeId; N]) {
     let mut graph = FrameGraph::new();
-    let processes = names.map(|name| graph.add(name, name.len()));
-    for process in processes {
-        graph.keep(process);
+    let nodes = names.map(|name| graph.add(name, name.len()));
+    for node in nodes {
+        graph.keep(node);
     }
-    (graph, processes)
+    (graph, nodes)
 }
 
 /// Compiles a graph that is wrong: gives back the graph and what is wrong with it.
@@ -20,7 +20,7 @@ fn problem(graph: FrameGraph<usize>) -> (FrameGraph<usize>, GraphProblem, String
 }
 
 fn names(schedule: &Schedule<usize>) -> Vec<&str> {
-    schedule.processes().map(|(name, _)| name).collect()
+    schedule.nodes().map(|(name, _)| name).collect()
 }
 
 fn strings(names: &[&str]) -> Vec<String> {
@@ -28,35 +28,35 @@ fn strings(names: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_cycle_is_named_from_its_first_process_on() {
+fn a_cycle_is_named_from_its_first_node_on() {
     let (mut graph, [behind, a, b, c]) = graph(["behind", "a", "b", "c"]);
     graph.order(c, a);
     graph.order(a, b);
     graph.order(b, c);
     graph.order(c, behind);
     let (mut graph, problem, text) = problem(graph);
-    assert_eq!(problem, GraphProblem::Cycle { processes: strings(&["a", "b", "c"]) });
-    assert_eq!(text, r#"processes wait for each other in a circle: "a" before "b" before "c" before "a""#);
+    assert_eq!(problem, GraphProblem::Cycle { nodes: strings(&["a", "b", "c"]) });
+    assert_eq!(text, r#"nodes wait for each other in a circle: "a" before "b" before "c" before "a""#);
     assert_eq!(graph.remove(b), Some(1));
     assert_eq!(names(&graph.compile().expect("the circle is broken")), ["c", "behind", "a"]);
 }
 
 #[test]
-fn a_process_before_itself_is_a_cycle() {
+fn a_node_before_itself_is_a_cycle() {
     let (mut graph, [alone]) = graph(["alone"]);
     graph.order(alone, alone);
     let (_, problem, text) = problem(graph);
-    assert_eq!(problem, GraphProblem::Cycle { processes: strings(&["alone"]) });
+    assert_eq!(problem, GraphProblem::Cycle { nodes: strings(&["alone"]) });
     assert!(text.ends_with(r#""alone" before "alone""#), "{text}");
 }
 
 #[test]
-fn a_cycle_of_dropped_processes_is_one_too() {
+fn a_cycle_of_dropped_nodes_is_one_too() {
     let mut graph = FrameGraph::new();
     let [a, b] = ["a", "b"].map(|name| graph.add(name, 0));
     graph.order(a, b);
     graph.order(b, a);
-    assert_eq!(problem(graph).1, GraphProblem::Cycle { processes: strings(&["a", "b"]) });
+    assert_eq!(problem(graph).1, GraphProblem::Cycle { nodes: strings(&["a", "b"]) });
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn a_cycle_through_resources_is_put_right_by_an_order() {
     graph.read(image, old);
     graph.write(image, new);
     let (mut graph, problem, _) = problem(graph);
-    assert_eq!(problem, GraphProblem::Cycle { processes: strings(&["history", "image"]) });
+    assert_eq!(problem, GraphProblem::Cycle { nodes: strings(&["history", "image"]) });
     graph.order(history, image);
     assert_eq!(names(&graph.compile().expect("it reads the earlier version")), ["history", "image"]);
 }
@@ -132,13 +132,13 @@ fn an_output_that_nobody_writes_is_named_as_one() {
 }
 
 #[test]
-fn what_a_dropped_process_lacks_is_no_error() {
+fn what_a_dropped_node_lacks_is_no_error() {
     let (mut graph, [kept]) = graph(["kept"]);
     let resource = graph.resource("nowhere");
     let [first, second] = ["first", "second"].map(|name| graph.add(name, 0));
-    for process in [first, second] {
-        graph.read(process, resource);
-        graph.write(process, resource);
+    for node in [first, second] {
+        graph.read(node, resource);
+        graph.write(node, resource);
     }
     let schedule = graph.compile().expect("the dropped ones do not matter");
     assert_eq!(schedule.index(kept), Some(0));
@@ -151,10 +151,10 @@ fn writers_and_modifiers_without_an_order_are_named() {
         let (mut graph, [one, other]) = graph(["one", "other"]);
         let image = graph.resource("image");
         graph.import(image);
-        for process in [one, other] {
-            graph.write(process, image);
+        for node in [one, other] {
+            graph.write(node, image);
             if modify {
-                graph.read(process, image);
+                graph.read(node, image);
             }
         }
         let (mut graph, problem, text) = problem(graph);
@@ -167,11 +167,11 @@ fn writers_and_modifiers_without_an_order_are_named() {
 }
 
 #[test]
-fn two_processes_of_one_name_are_refused() {
+fn two_nodes_of_one_name_are_refused() {
     let (graph, [_, _, twin]) = graph(["shadow", "light", "shadow"]);
     let (mut graph, problem, text) = problem(graph);
-    assert_eq!(problem, GraphProblem::DuplicateProcess { name: "shadow".to_owned() });
-    assert_eq!(text, r#"two processes are named "shadow""#);
+    assert_eq!(problem, GraphProblem::DuplicateNode { name: "shadow".to_owned() });
+    assert_eq!(text, r#"two nodes are named "shadow""#);
     assert_eq!(graph.remove(twin), Some(6));
     assert_eq!(graph.remove(twin), None);
     assert_eq!(names(&graph.compile().expect("only one is left")), ["shadow", "light"]);
@@ -191,14 +191,14 @@ fn ids_of_another_graph_are_named_by_the_call() {
     graph.keep(foreign);
     graph.import(foreign_resource);
     graph.output(foreign_resource);
-    let process = |call: &str| GraphProblem::UnknownProcess { call: call.to_owned() };
+    let node = |call: &str| GraphProblem::UnknownNode { call: call.to_owned() };
     let resource = |call: &str| GraphProblem::UnknownResource { call: call.to_owned() };
     let expected = [
-        process(r#"read(?, "depth")"#),
+        node(r#"read(?, "depth")"#),
         resource(r#"write("own", ?)"#),
-        process(r#"order("own", ?)"#),
-        process(r#"order(?, "own")"#),
-        process("keep(?)"),
+        node(r#"order("own", ?)"#),
+        node(r#"order(?, "own")"#),
+        node("keep(?)"),
         resource("import(?)"),
         resource("output(?)"),
     ];
@@ -213,7 +213,7 @@ fn ids_of_another_graph_are_named_by_the_call() {
 }
 
 #[test]
-fn removing_a_process_leaves_what_was_said_of_the_others() {
+fn removing_a_node_leaves_what_was_said_of_the_others() {
     let (mut graph, [a, b, c, d]) = graph(["a", "b", "c", "d"]);
     let [image, other] = ["image", "other"].map(|name| graph.resource(name));
     graph.write(d, image);
@@ -225,11 +225,11 @@ fn removing_a_process_leaves_what_was_said_of_the_others() {
     let schedule = graph.compile().expect("nothing is wrong");
     assert_eq!(names(&schedule), ["d", "b", "c"]);
     assert_eq!((schedule.dependencies(1), schedule.dependencies(2)), (&[0][..], &[1][..]));
-    assert_eq!([a, b, c, d].map(|process| schedule.index(process)), [None, Some(1), Some(2), Some(0)]);
+    assert_eq!([a, b, c, d].map(|node| schedule.index(node)), [None, Some(1), Some(2), Some(0)]);
 }
 
 #[test]
-fn errors_can_be_passed_on_and_printed_whatever_the_processes_carry() {
+fn errors_can_be_passed_on_and_printed_whatever_the_nodes_carry() {
     struct Opaque;
     let compile = || -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let mut graph = FrameGraph::new();
@@ -239,6 +239,6 @@ fn errors_can_be_passed_on_and_printed_whatever_the_processes_carry() {
         Ok(())
     };
     let error = compile().expect_err("two have one name");
-    assert_eq!(error.to_string(), r#"two processes are named "twin""#);
-    assert!(format!("{error:?}").contains("DuplicateProcess"), "{error:?}");
+    assert_eq!(error.to_string(), r#"two nodes are named "twin""#);
+    assert!(format!("{error:?}").contains("DuplicateNode"), "{error:?}");
 }

@@ -20,16 +20,16 @@ use crate::{
     oracle::{Oracle, sound_sketch},
 };
 
-/// How often each item of each process was done.
+/// How often each item of each node was done.
 type Tally = Vec<Vec<AtomicUsize>>;
 
 fn tally(widths: &[usize]) -> Tally {
     widths.iter().map(|width| (0..*width).map(|_| AtomicUsize::new(0)).collect()).collect()
 }
 
-/// A process that counts its items, and fails if something that comes before it is not done.
+/// A node that counts its items, and fails if something that comes before it is not done.
 struct Counting {
-    process: usize,
+    node: usize,
     chunk: usize,
     pinned: bool,
     before: Vec<usize>,
@@ -38,9 +38,9 @@ struct Counting {
 impl Counting {
     fn check(&self, tally: &Tally) -> Result<(), NodeError> {
         // Relaxed: that the counts are seen at all is what the schedule is to see to.
-        let is_done = |process: &usize| tally[*process].iter().all(|count| count.load(Ordering::Relaxed) == 1);
-        match self.before.iter().find(|process| !is_done(process)) {
-            Some(process) => Err(format!("p{process} is not done").into()),
+        let is_done = |node: &usize| tally[*node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
+        match self.before.iter().find(|node| !is_done(node)) {
+            Some(node) => Err(format!("p{node} is not done").into()),
             None => Ok(()),
         }
     }
@@ -51,7 +51,7 @@ impl Node<Tally> for Counting {
         if let Err(error) = self.check(tally) {
             panic!("{error}");
         }
-        tally[self.process].len()
+        tally[self.node].len()
     }
 
     fn chunk(&self, _tally: &Tally) -> usize {
@@ -66,11 +66,11 @@ impl Node<Tally> for Counting {
         let chunk = self.chunk.max(1);
         if range.is_empty()
             || !range.start.is_multiple_of(chunk)
-            || range.end != (range.start + chunk).min(tally[self.process].len())
+            || range.end != (range.start + chunk).min(tally[self.node].len())
         {
             return Err(format!("{range:?} is no chunk").into());
         }
-        for count in &tally[self.process][range] {
+        for count in &tally[self.node][range] {
             count.fetch_add(1, Ordering::Relaxed);
         }
         self.check(tally)
@@ -86,22 +86,22 @@ proptest! {
         shapes in vec((prop_oneof![0..4usize, 0..100usize], 0..12usize, prop::bool::weighted(0.1)), 24),
     ) {
         let oracle = Oracle::new(&sketch);
-        let graph = sketch.graph(|process| Counting {
-            process,
-            chunk: shapes[process].1,
-            pinned: shapes[process].2,
-            before: (0..oracle.needed.len()).filter(|&before| oracle.needed[before] && oracle.before[before][process]).collect(),
+        let graph = sketch.graph(|node| Counting {
+            node,
+            chunk: shapes[node].1,
+            pinned: shapes[node].2,
+            before: (0..oracle.needed.len()).filter(|&before| oracle.needed[before] && oracle.before[before][node]).collect(),
         });
         let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         for scheduler in SCHEDULERS.iter() {
-            for always_shared in [true, true, false, false] {
-                schedule.always_share(always_shared);
-                let widths: Vec<usize> = (0..oracle.needed.len()).map(|process| shapes[process].0).collect();
+            for always_parallel in [true, true, false, false] {
+                schedule.always_parallel(always_parallel);
+                let widths: Vec<usize> = (0..oracle.needed.len()).map(|node| shapes[node].0).collect();
                 let tally = tally(&widths);
                 schedule.run(scheduler, &tally).map_err(|error| TestCaseError::fail(error.to_string()))?;
-                for (process, counts) in tally.into_iter().enumerate() {
+                for (node, counts) in tally.into_iter().enumerate() {
                     for count in counts {
-                        prop_assert_eq!(count.into_inner(), usize::from(oracle.needed[process]));
+                        prop_assert_eq!(count.into_inner(), usize::from(oracle.needed[node]));
                     }
                 }
             }
@@ -109,22 +109,22 @@ proptest! {
     }
 }
 
-/// A schedule of one kept process.
-pub fn alone<'a, C>(process: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
+/// A schedule of one kept node.
+pub fn alone<'a, C>(node: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
     let mut graph = FrameGraph::new();
-    let process = graph.add("alone", process);
-    graph.keep(process);
+    let node = graph.add("alone", node);
+    graph.keep(node);
     graph.compile().expect("nothing is wrong")
 }
 
 /// Runs the schedule on all workers of the scheduler, however little work it is.
 pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Scheduler, context: &C) {
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     schedule.run(scheduler, context).expect("nothing fails");
 }
 
 #[test]
-fn all_workers_join_a_wide_process() {
+fn all_workers_join_a_wide_node() {
     // Each item waits for the others, so the run only ends if as many workers work on it at once.
     let mut schedule = alone(Closure::new(|barrier: &Barrier, _, _| {
         barrier.wait();
@@ -132,8 +132,8 @@ fn all_workers_join_a_wide_process() {
     }));
     let [_, two, four] = &*SCHEDULERS;
     for (scheduler, width) in [(two, 2), (four, 4)] {
-        let (_, process) = schedule.processes_mut().next().expect("there is one");
-        *process = Closure::new(|barrier: &Barrier, _, _| {
+        let (_, node) = schedule.nodes_mut().next().expect("there is one");
+        *node = Closure::new(|barrier: &Barrier, _, _| {
             barrier.wait();
             Ok(())
         })
@@ -145,19 +145,19 @@ fn all_workers_join_a_wide_process() {
 }
 
 #[test]
-fn independent_processes_run_at_once() {
+fn independent_nodes_run_at_once() {
     let mut graph = FrameGraph::new();
     let source = graph.add("source", Closure::new(|_: &Barrier, _, _| Ok(())));
     for name in ["a", "b", "c", "d"] {
-        let process = graph.add(
+        let node = graph.add(
             name,
             Closure::new(|barrier: &Barrier, _, _| {
                 barrier.wait();
                 Ok(())
             }),
         );
-        graph.order(source, process);
-        graph.keep(process);
+        graph.order(source, node);
+        graph.keep(node);
     }
     graph.keep(source);
     let mut schedule = graph.compile().expect("nothing is wrong");
@@ -199,7 +199,7 @@ fn the_width_may_depend_on_what_came_before() {
 }
 
 #[test]
-fn pinned_processes_run_in_order_on_the_thread_that_called() {
+fn pinned_nodes_run_in_order_on_the_thread_that_called() {
     let log = |log: &Mutex<Vec<(thread::ThreadId, usize)>>, range: Range<usize>, _: &Worker| {
         log.lock().map_err(|_| "poisoned")?.push((thread::current().id(), range.start));
         Ok(())
@@ -210,7 +210,7 @@ fn pinned_processes_run_in_order_on_the_thread_that_called() {
     let last = graph.add("last", Closure::new(log).with_width(|_| 50).with_chunk(10).on_calling_thread());
     graph.order(first, between);
     graph.order(between, last);
-    [first, between, last].into_iter().for_each(|process| graph.keep(process));
+    [first, between, last].into_iter().for_each(|node| graph.keep(node));
     let mut schedule = graph.compile().expect("nothing is wrong");
     let here = thread::current().id();
     let expected: Vec<_> = (0..50).chain((0..50).step_by(10)).map(|start| (here, start)).collect();
@@ -226,12 +226,12 @@ fn pinned_processes_run_in_order_on_the_thread_that_called() {
 #[test]
 fn the_context_may_be_of_unknown_size() {
     let mut graph = FrameGraph::<Box<dyn Node<[AtomicUsize]>>>::new();
-    let process = Closure::new(|items: &[AtomicUsize], range: Range<usize>, _| {
+    let node = Closure::new(|items: &[AtomicUsize], range: Range<usize>, _| {
         items[range].iter().for_each(|item| item.store(1, Ordering::Relaxed));
         Ok(())
     });
-    let process = graph.add("fill", Box::new(process.with_width(<[AtomicUsize]>::len).with_chunk(4)));
-    graph.keep(process);
+    let node = graph.add("fill", Box::new(node.with_width(<[AtomicUsize]>::len).with_chunk(4)));
+    graph.keep(node);
     let mut schedule = graph.compile().expect("nothing is wrong");
     let items: Vec<AtomicUsize> = (0..10).map(|_| AtomicUsize::new(0)).collect();
     schedule.run(&SCHEDULERS[1], items.as_slice()).expect("nothing fails");
@@ -249,13 +249,13 @@ fn pinned_roots_run_on_the_thread_that_called() {
         if thread::current().id() == *caller { Ok(()) } else { Err("this is not the caller".into()) }
     };
     let mut graph = FrameGraph::new();
-    for (name, process) in [
+    for (name, node) in [
         ("meeting pinned", Closure::new(meeting).on_calling_thread()),
         ("meeting free", Closure::new(meeting)),
         ("checked", Closure::new(checked).on_calling_thread()),
     ] {
-        let process = graph.add(name, process);
-        graph.keep(process);
+        let node = graph.add(name, node);
+        graph.keep(node);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
     for scheduler in &SCHEDULERS[1..] {

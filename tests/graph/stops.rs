@@ -74,22 +74,22 @@ fn chain(trouble: Trouble, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '
         })
     };
     let mut graph = FrameGraph::<Box<dyn Node<Log> + '_>>::new();
-    let processes = [
+    let nodes = [
         graph.add("first", Box::new(noting("first"))),
         graph.add("troubled", Box::new(Troubled { trouble, is_on })),
         graph.add("last", Box::new(noting("last"))),
     ];
-    for pair in processes.windows(2) {
+    for pair in nodes.windows(2) {
         graph.order(pair[0], pair[1]);
     }
-    for process in processes {
-        graph.keep(process);
+    for node in nodes {
+        graph.keep(node);
     }
     graph.compile().expect("nothing is wrong")
 }
 
 #[test]
-fn a_failure_stops_the_run_and_names_the_process() {
+fn a_failure_stops_the_run_and_names_the_node() {
     let all =
         [Trouble::Error, Trouble::PanicInRun, Trouble::PanicInWidth, Trouble::PanicInChunk, Trouble::PanicInPinned];
     for trouble in all {
@@ -103,14 +103,14 @@ fn a_failure_stops_the_run_and_names_the_process() {
                 let log = log.into_inner().expect("nobody panics holding the log");
                 match result {
                     Ok(()) => assert!(!fails && log == ["first", "last"], "{log:?}"),
-                    Err(RunError::Failed { process, source }) => {
+                    Err(RunError::Failed { node, source }) => {
                         assert!(fails && trouble == Trouble::Error);
-                        assert_eq!((process.as_str(), source.to_string().as_str()), ("troubled", "as planned"));
+                        assert_eq!((node.as_str(), source.to_string().as_str()), ("troubled", "as planned"));
                         assert_eq!(log, ["first"]);
                     }
-                    Err(RunError::Panicked { process, message }) => {
+                    Err(RunError::Panicked { node, message }) => {
                         assert!(fails && trouble != Trouble::Error);
-                        assert_eq!((process.as_str(), message.as_str()), ("troubled", "as planned"));
+                        assert_eq!((node.as_str(), message.as_str()), ("troubled", "as planned"));
                         assert_eq!(log, ["first"]);
                     }
                     Err(other) => panic!("{other}"),
@@ -128,7 +128,7 @@ fn a_root_whose_first_question_panics_is_named() {
     graph.keep(root);
     let mut schedule = graph.compile().expect("nothing is wrong");
     let error = schedule.run(&SCHEDULERS[1], &Log::default()).expect_err("it panics");
-    assert_eq!(error.to_string(), r#"the process "root" panicked: as planned"#);
+    assert_eq!(error.to_string(), r#"the node "root" panicked: as planned"#);
     is_on.store(false, Ordering::Relaxed);
     schedule.run(&SCHEDULERS[1], &Log::default()).expect("it does not panic");
 }
@@ -137,7 +137,7 @@ fn a_root_whose_first_question_panics_is_named() {
 fn no_further_chunk_starts_after_a_failure() {
     for pinned in [false, true] {
         let started = AtomicUsize::new(0);
-        let process = Closure::new(|(): &(), range: Range<usize>, _| {
+        let node = Closure::new(|(): &(), range: Range<usize>, _| {
             started.fetch_add(1, Ordering::Relaxed);
             if range.len() < 2 {
                 return Err("so many chunks cannot be counted".into());
@@ -145,18 +145,18 @@ fn no_further_chunk_starts_after_a_failure() {
             if range.contains(&5) { Err("enough".into()) } else { Ok(()) }
         });
         // So wide that the run would not end if the failure did not stop it.
-        let process = process.with_width(|()| usize::MAX);
+        let node = node.with_width(|()| usize::MAX);
         let mut graph = FrameGraph::new();
-        let process = graph.add("endless", if pinned { process.on_calling_thread() } else { process });
+        let node = graph.add("endless", if pinned { node.on_calling_thread() } else { node });
         let after = graph.add("after", Closure::new(|(): &(), _, _| panic!("it must not run")));
-        graph.order(process, after);
-        graph.keep(process);
+        graph.order(node, after);
+        graph.keep(node);
         graph.keep(after);
         let mut schedule = graph.compile().expect("nothing is wrong");
         for scheduler in SCHEDULERS.iter() {
             started.store(0, Ordering::Relaxed);
             let error = schedule.run(scheduler, &()).expect_err("it fails");
-            assert_eq!(error.to_string(), r#"the process "endless" failed: enough"#);
+            assert_eq!(error.to_string(), r#"the node "endless" failed: enough"#);
             if pinned || scheduler.workers() == 1 {
                 // One chunk after another, up to the one that fails.
                 assert!(started.load(Ordering::Relaxed) <= 6);
@@ -176,14 +176,14 @@ fn of_two_failures_the_one_that_stands_first_is_reported() {
     };
     let mut graph = FrameGraph::new();
     for name in ["one", "two"] {
-        let process = graph.add(name, failing(name));
-        graph.keep(process);
+        let node = graph.add(name, failing(name));
+        graph.keep(node);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
-        assert_eq!(error.to_string(), r#"the process "one" failed: one"#);
+        assert_eq!(error.to_string(), r#"the node "one" failed: one"#);
     }
 }
 
@@ -194,13 +194,13 @@ fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
         Err(format!("chunk {}", range.start).into())
     });
     let mut graph = FrameGraph::new();
-    let process = graph.add("wide", failing.with_width(|_| 2));
-    graph.keep(process);
+    let node = graph.add("wide", failing.with_width(|_| 2));
+    graph.keep(node);
     let mut schedule = graph.compile().expect("nothing is wrong");
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
-        assert_eq!(error.to_string(), r#"the process "wide" failed: chunk 0"#);
+        assert_eq!(error.to_string(), r#"the node "wide" failed: chunk 0"#);
     }
 }
 
@@ -220,16 +220,16 @@ fn an_error_that_panics_when_dropped_does_not_reach_the_caller() {
     };
     let mut graph = FrameGraph::new();
     for name in ["one", "two"] {
-        let process = graph.add(name, Closure::new(failing));
-        graph.keep(process);
+        let node = graph.add(name, Closure::new(failing));
+        graph.keep(node);
     }
     let mut schedule = graph.compile().expect("nothing is wrong");
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     for _ in 0..50 {
         match schedule.run(&SCHEDULERS[1], &Barrier::new(2)) {
-            Err(RunError::Failed { process, source }) => {
+            Err(RunError::Failed { node, source }) => {
                 std::mem::forget(source);
-                assert_eq!(process, "one");
+                assert_eq!(node, "one");
             }
             other => panic!("{other:?}"),
         }

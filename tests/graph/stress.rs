@@ -1,4 +1,4 @@
-//! Random graphs on few and many workers, against a plain loop over their processes.
+//! Random graphs on few and many workers, against a plain loop over their nodes.
 //!
 //! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release --test graph stress` goes on with further
 //! seeds for that many seconds.
@@ -14,7 +14,7 @@ use std::{
 };
 
 use drawloom::{
-    graph::{FrameGraph, Node, NodeError, ProcessId, RunError, Schedule},
+    graph::{FrameGraph, Node, NodeError, NodeId, RunError, Schedule},
     task::{Scheduler, Worker},
 };
 
@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-/// A process of a random graph. It waits for processes before it in the list.
+/// A node of a random graph. It waits for nodes before it in the list.
 #[derive(Clone)]
 struct Plan {
     waits_for: Vec<usize>,
@@ -54,7 +54,7 @@ fn plans(seed: u64) -> Vec<Plan> {
         .collect()
 }
 
-/// What a run is lent: how often each item was done, who called, and which process is to fail, if any.
+/// What a run is lent: how often each item was done, who called, and which node is to fail, if any.
 struct World {
     done: Vec<Vec<AtomicUsize>>,
     /// Whether something was done too early or in the wrong place.
@@ -69,19 +69,19 @@ impl World {
         Self { done, is_wrong: AtomicBool::new(false), caller: thread::current().id(), failing }
     }
 
-    /// Per process, how often each of its items was done.
+    /// Per node, how often each of its items was done.
     fn counts(self) -> Vec<Vec<usize>> {
         assert!(!self.is_wrong.into_inner(), "something was done too early, or in the wrong place");
         self.done.into_iter().map(|items| items.into_iter().map(AtomicUsize::into_inner).collect()).collect()
     }
 }
 
-struct Process {
+struct BusyNode {
     place: usize,
     plan: Plan,
 }
 
-impl Node<World> for Process {
+impl Node<World> for BusyNode {
     fn width(&self, world: &World) -> usize {
         world.done[self.place].len()
     }
@@ -96,7 +96,7 @@ impl Node<World> for Process {
 
     fn run(&self, world: &World, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         // Relaxed: that the counts are seen at all is what the schedule is to see to.
-        let is_done = |&process: &usize| world.done[process].iter().all(|count| count.load(Ordering::Relaxed) == 1);
+        let is_done = |&node: &usize| world.done[node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
         let is_astray = self.plan.is_pinned && thread::current().id() != world.caller;
         if is_astray || !self.plan.waits_for.iter().all(is_done) {
             world.is_wrong.store(true, Ordering::Relaxed);
@@ -111,16 +111,16 @@ impl Node<World> for Process {
     }
 }
 
-fn compiled(plans: &[Plan]) -> Schedule<Process> {
+fn compiled(plans: &[Plan]) -> Schedule<BusyNode> {
     let mut graph = FrameGraph::new();
-    let processes: Vec<ProcessId> = plans
+    let nodes: Vec<NodeId> = plans
         .iter()
         .enumerate()
-        .map(|(place, plan)| graph.add(format!("p{place}"), Process { place, plan: plan.clone() }))
+        .map(|(place, plan)| graph.add(format!("p{place}"), BusyNode { place, plan: plan.clone() }))
         .collect();
     for (place, plan) in plans.iter().enumerate() {
-        plan.waits_for.iter().for_each(|&before| graph.order(processes[before], processes[place]));
-        graph.keep(processes[place]);
+        plan.waits_for.iter().for_each(|&before| graph.order(nodes[before], nodes[place]));
+        graph.keep(nodes[place]);
     }
     graph.compile().expect("nothing is wrong")
 }
@@ -130,7 +130,7 @@ fn serially(plans: &[Plan]) -> Vec<Vec<usize>> {
     plans.iter().map(|plan| vec![1; plan.width]).collect()
 }
 
-/// Whether the process waits for the failing one, through any number of others.
+/// Whether the node waits for the failing one, through any number of others.
 fn cancelled(plans: &[Plan], failing: usize) -> Vec<bool> {
     let mut cancelled = vec![false; plans.len()];
     for (place, plan) in plans.iter().enumerate() {
@@ -146,8 +146,8 @@ fn check(seed: u64, schedulers: &[Scheduler]) {
     for scheduler in schedulers {
         let at = format!("seed {seed}, {scheduler:?}");
         let mut schedule = compiled(&plans);
-        for always_share in [true, false, false, true] {
-            schedule.always_share(always_share);
+        for always_parallel in [true, false, false, true] {
+            schedule.always_parallel(always_parallel);
             let chosen = random.below(plans.len());
             let failing = (random.below(3) == 0 && plans[chosen].width > 0).then_some(chosen);
             let world = World::new(&plans, failing);
@@ -158,8 +158,8 @@ fn check(seed: u64, schedulers: &[Scheduler]) {
                 assert!(counts == whole, "{at}: an item was not done once");
                 continue;
             };
-            let Err(RunError::Failed { process, .. }) = outcome else { panic!("{at}: no failure") };
-            assert_eq!(process, format!("p{failing}"), "{at}");
+            let Err(RunError::Failed { node, .. }) = outcome else { panic!("{at}: no failure") };
+            assert_eq!(node, format!("p{failing}"), "{at}");
             assert!(counts.iter().flatten().all(|&count| count <= 1), "{at}: an item was done twice");
             let cancelled = cancelled(&plans, failing);
             let ran = |place: usize| counts[place].contains(&1);
@@ -205,8 +205,8 @@ fn shuffled_order(seed: u64) -> Vec<(usize, usize)> {
     let scheduler = Scheduler::builder().workers(1).shuffle(seed).build().expect("no thread is needed");
     let mut graph = FrameGraph::new();
     for place in 0..6 {
-        let process = graph.add(format!("p{place}"), Noting(place));
-        graph.keep(process);
+        let node = graph.add(format!("p{place}"), Noting(place));
+        graph.keep(node);
     }
     let log = Mutex::new(Vec::new());
     let mut schedule = graph.compile().expect("nothing is wrong");
@@ -224,7 +224,7 @@ fn a_seed_decides_the_order_of_one_worker() {
         assert_eq!(order.len(), 3 * 36 + 20);
     }
     assert!(orders[1..].iter().any(|order| *order != orders[0]), "no seed changes anything");
-    // A result that depends on which of two comes first shows both faces, for processes, chunks and loops alike.
+    // A result that depends on which of two comes first shows both faces, for nodes, chunks and loops alike.
     let first = |order: &[(usize, usize)], two: [(usize, usize); 2]| order.iter().find(|&at| two.contains(at)).copied();
     for two in [[(0, 0), (5, 0)], [(0, 0), (0, 5)], [(usize::MAX, 0), (usize::MAX, 19)]] {
         assert!(two.map(|one| orders.iter().any(|order| first(order, two) == Some(one))).iter().all(|&seen| seen));

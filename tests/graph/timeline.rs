@@ -62,7 +62,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     assert_eq!(run.graph.processes.len(), schedule.len());
     assert!(workers > 1 || run.shared_from.is_none());
     assert!(run.shared_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
-    for (index, (process, (name, busy))) in run.graph.processes.iter().zip(schedule.processes()).enumerate() {
+    for (index, (process, (name, busy))) in run.graph.processes.iter().zip(schedule.nodes()).enumerate() {
         assert_eq!(process.name, name);
         assert_eq!(process.dependencies, schedule.dependencies(index));
         assert_eq!(process.pinned, busy.pinned);
@@ -116,11 +116,11 @@ proptest! {
         sketch in sound_sketch(),
         processes in vec((0..90_usize, prop::bool::weighted(0.2)), 24),
         chunks in vec(1..40_usize, 3),
-        always_shares in any::<bool>(),
+        always_parallel in any::<bool>(),
     ) {
         let graph = sketch.graph(|process| Busy { width: processes[process].0, pinned: processes[process].1 });
         let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
-        schedule.always_share(always_shares);
+        schedule.always_parallel(always_parallel);
         for scheduler in &*RECORDED {
             for &chunk in &chunks {
                 let log = recorded(&mut schedule, scheduler, &Call { chunk, fails: false });
@@ -139,7 +139,7 @@ fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
     check(&log, &schedule, 16, 2);
     assert!(log.runs[0].shared_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].shared_from);
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
     assert!(log.runs[0].shared_from <= log.runs[0].chunks.iter().map(|chunk| chunk.opened).min());
 }
@@ -160,7 +160,7 @@ fn who_joins_in_a_process_of_another_worker_has_stolen_all_its_chunks() {
     graph.keep(after);
     graph.keep(wide);
     let mut schedule = graph.compile().unwrap();
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     scheduler.timeline().start();
     for _run in 0..20 {
         schedule.run(&scheduler, &()).unwrap();
@@ -367,7 +367,7 @@ fn who_slept_before_it_was_started_is_seen_asleep() {
 fn what_a_stolen_job_runs_itself_was_not_stolen() {
     let scheduler = Scheduler::new(2).unwrap();
     let mut schedule = one_process(Busy { width: 1, pinned: false });
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     let (done, is_done) = mpsc::channel();
     scheduler.timeline().start();
     scheduler

@@ -31,8 +31,8 @@ pub fn of_a_real_run() -> Result<Log, Failed> {
             Ok(())
         });
         let process = graph.add(format!("process {index}"), body.with_width(move |_| width).with_chunk(16));
-        let phase = Some(["cull", "fill", "sort"][index % 3].to_owned());
-        graph.label(process, Labels { phase, ..Labels::default() });
+        let stage = Some(["cull", "fill", "sort"][index % 3].to_owned());
+        graph.label(process, Labels { stage, ..Labels::default() });
         for _ in 0..dice.roll(3).min(processes.len()) {
             graph.order(processes[dice.roll(processes.len())], process);
         }
@@ -40,7 +40,7 @@ pub fn of_a_real_run() -> Result<Log, Failed> {
         processes.push(process);
     }
     let mut schedule = graph.compile().map_err(|error| error.to_string())?;
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     let scheduler = Scheduler::new(2)?;
     scheduler.timeline().start();
     for _ in 0..5 {
@@ -57,7 +57,7 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
     let passes = count / frames / CHUNKS;
     let process = |index: usize| Process {
         name: format!("pass {index}"),
-        labels: Labels { phase: Some(format!("phase {}", index % 9)), ..Labels::default() },
+        labels: Labels { stage: Some(format!("stage {}", index % 9)), ..Labels::default() },
         dependencies: index.checked_sub(1).into_iter().collect(),
         ..Process::default()
     };

@@ -64,7 +64,7 @@ fn wait_inside(scheduler: &Scheduler, family: usize, strangers: &AtomicUsize) {
             graph.order(first, pinned);
             [wide, pinned].into_iter().for_each(|process| graph.keep(process));
             let mut schedule = graph.compile().expect("nothing is wrong");
-            schedule.always_share(true);
+            schedule.always_parallel(true);
             schedule.run(scheduler, &()).unwrap();
         }
     }

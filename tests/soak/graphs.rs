@@ -123,7 +123,7 @@ pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
     let mut schedule = graph.compile().expect("each waits for some before it");
     let mut random = Random(seed);
     for _run in 0..random.below(4) {
-        schedule.always_share(random.one_in(2));
+        schedule.always_parallel(random.one_in(2));
         let node = random.below(widths.len());
         let failure = [Failure::Error, Failure::Panic][random.below(2)];
         let failing = (widths[node] > 0 && random.one_in(2)).then_some((node, failure));
@@ -160,9 +160,9 @@ fn run_once(
     };
     let name = format!("{node} of width {}", widths[node]);
     match (failure, outcome) {
-        (Failure::Error, Err(RunError::Failed { process, .. })) => assert_eq!(process, name, "{at}"),
-        (Failure::Panic, Err(RunError::Panicked { process, message })) => {
-            assert_eq!((process, message.as_str()), (name, "as planned"), "{at}");
+        (Failure::Error, Err(RunError::Failed { node: failed, .. })) => assert_eq!(failed, name, "{at}"),
+        (Failure::Panic, Err(RunError::Panicked { node: failed, message })) => {
+            assert_eq!((failed, message.as_str()), (name, "as planned"), "{at}");
         }
         (_, outcome) => panic!("{at}: node {node} was to fail, and the outcome is {outcome:?}"),
     }

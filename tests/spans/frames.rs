@@ -54,9 +54,9 @@ fn a_frame_is_recorded_and_submitted_in_spans_with_its_jobs_inside() {
             assert_eq!(told.len(), names.len());
             assert_eq!(told.into_iter().collect::<BTreeSet<_>>(), names);
         }
-        let phases: BTreeSet<_> = record.spans.iter().filter_map(|span| span.fields.get("phase")).collect();
-        for phase in ["visibility", "fill", "sort", "record"] {
-            assert!(phases.iter().any(|told| told.contains(phase)), "{phase} is not among {phases:?}");
+        let stages: BTreeSet<_> = record.spans.iter().filter_map(|span| span.fields.get("stage")).collect();
+        for stage in ["visibility", "fill", "sort", "record"] {
+            assert!(stages.iter().any(|told| told.contains(stage)), "{stage} is not among {stages:?}");
         }
         assert!(record.spans.iter().any(|span| span.fields.get("view").is_some_and(|view| view == "main")));
         assert!(record.spans.iter().any(|span| span.fields.contains_key("process")));
@@ -86,7 +86,7 @@ fn tracing_chrome_writes_them_into_a_trace() {
     let trace: Vec<Value> = serde_json::from_slice(&file.0.lock().unwrap()).unwrap();
     let begun = |name: &str| trace.iter().filter(|event| event["ph"] == "B" && event["name"] == name).count();
     let ended = |name: &str| trace.iter().filter(|event| event["ph"] == "E" && event["name"] == name).count();
-    for name in ["record", "submit", "process", "chunk"] {
+    for name in ["record", "submit", "node", "chunk"] {
         assert!(begun(name) >= 2 && begun(name) == ended(name), "{name}: {} and {}", begun(name), ended(name));
     }
     // It writes strings with the quotes of Rust.

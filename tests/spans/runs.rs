@@ -10,7 +10,7 @@ use tracing::{Level, dispatcher, info_span};
 use crate::recorder::{Fields, MoveKind, Origin, Record, Recorder, scheduler, subscriber};
 use crate::work::{Call, Entry, Way, Work, labels, schedules};
 
-const PROCESS: Origin = Origin { target: "drawloom::graph", name: "process", level: Level::DEBUG };
+const NODE: Origin = Origin { target: "drawloom::graph", name: "node", level: Level::DEBUG };
 const CHUNK: Origin = Origin { target: "drawloom::graph", name: "chunk", level: Level::TRACE };
 const TAKEN: Origin = Origin { target: "drawloom::graph", name: "taken", level: Level::TRACE };
 
@@ -74,7 +74,7 @@ fn a_process_that_was_done_alone_is_closed_before_the_rest_is_shared() {
 fn copy(schedule: &mut Schedule<Work>) -> Schedule<Work> {
     let mut graph = FrameGraph::new();
     let mut added = Vec::new();
-    for (index, (name, work)) in schedule.processes().enumerate() {
+    for (index, (name, work)) in schedule.nodes().enumerate() {
         let process = graph.add(name, *work);
         if let Some(labels) = labels(work.number) {
             graph.label(process, labels);
@@ -95,12 +95,12 @@ fn check(record: &Record, schedule: &Schedule<Work>, book: &[Entry], has_parent:
     let chunks = if is_detailed { book.len() } else { 0 };
     assert_eq!(record.spans.len(), usize::from(has_parent) + schedule.len() + chunks);
     let mut spans = Vec::new();
-    for (_, work) in schedule.processes() {
+    for (_, work) in schedule.nodes() {
         let own = |&span: &usize| record.spans[span].fields["name"] == format!("process {}", work.number);
-        let found: Vec<_> = record.named("process").filter(own).collect();
+        let found: Vec<_> = record.named("node").filter(own).collect();
         let [span] = found[..] else { panic!("{} spans of {work:?}", found.len()) };
         spans.push(span);
-        assert_eq!((record.spans[span].origin, record.spans[span].parent), (PROCESS, outer));
+        assert_eq!((record.spans[span].origin, record.spans[span].parent), (NODE, outer));
         assert_eq!(record.spans[span].fields, fields(work.number));
 
         // Who took part, but for whoever opened the process, who may have come too late for a chunk.
@@ -137,7 +137,7 @@ fn check(record: &Record, schedule: &Schedule<Work>, book: &[Entry], has_parent:
 
 fn fields(number: usize) -> Fields {
     let labels = labels(number).unwrap_or_default();
-    let labels = [("process", labels.process), ("phase", labels.phase), ("view", labels.view)];
+    let labels = [("process", labels.process), ("stage", labels.stage), ("view", labels.view)];
     let labels = labels.into_iter().filter_map(|(name, value)| Some((name, value?)));
     labels.chain([("name", format!("process {number}"))]).collect()
 }

@@ -24,7 +24,7 @@ proptest! {
     fn what_fails_is_left_and_closed(mut schedule in schedules(), number in 0..12_usize, panics in any::<bool>()) {
         let number = number % schedule.len();
         let trouble = if panics { Trouble::Panic(number) } else { Trouble::Error(number) };
-        let is_empty = schedule.processes().any(|(_, work)| work.number == number && work.width == 0);
+        let is_empty = schedule.nodes().any(|(_, work)| work.number == number && work.width == 0);
         for workers in [1, 2, 4] {
             for way in Way::ALL {
                 way.set(&mut schedule);
@@ -68,7 +68,7 @@ proptest! {
                             let outcome = outcome.expect("no panic reaches the caller");
                             assert_eq!(outcome.is_ok(), !panicked, "{kind:?}: {outcome:?}");
                             let done: usize = call.book.into_inner().unwrap().iter().map(|entry| entry.items.len()).sum();
-                            let all: usize = schedule.processes().map(|(_, work)| work.width).sum();
+                            let all: usize = schedule.nodes().map(|(_, work)| work.width).sum();
                             assert!(panicked || done == all, "{done} items of {all}");
                         }
                     });

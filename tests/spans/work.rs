@@ -86,8 +86,8 @@ pub fn schedules() -> impl Strategy<Value = Schedule<Work>> {
 
 /// Every other process has some.
 pub fn labels(number: usize) -> Option<Labels> {
-    let [process, phase] = [format!("part {number}"), "fill".to_owned()].map(Some);
-    number.is_multiple_of(2).then_some(Labels { process, phase, view: (number != 0).then(|| "main".to_owned()) })
+    let [process, stage] = [format!("part {number}"), "fill".to_owned()].map(Some);
+    number.is_multiple_of(2).then_some(Labels { process, stage, view: (number != 0).then(|| "main".to_owned()) })
 }
 
 /// How a schedule that was never run before is to go.
@@ -108,6 +108,6 @@ impl Way {
     }
 
     pub fn set(self, schedule: &mut Schedule<Work>) {
-        schedule.always_share(self == Self::Shared);
+        schedule.always_parallel(self == Self::Shared);
     }
 }

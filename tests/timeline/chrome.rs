@@ -157,7 +157,7 @@ fn check_jobs(log: &Log, trace: &Trace) {
                     arguments["queued_us"] = nanos(chunk.started - ready).into();
                 }
                 let labels = &process.labels;
-                for (key, label) in [("process", &labels.process), ("phase", &labels.phase), ("view", &labels.view)] {
+                for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
                     label.iter().for_each(|label| arguments[key] = label.as_str().into());
                 }
                 let times = (nanos(chunk.started), nanos(chunk.ended), chunk.worker as u64 + 1);
@@ -271,10 +271,10 @@ proptest! {
     fn what_ran_is_in_the_trace_with_its_dependencies(
         sketch in any_sketch(0),
         chunks in vec(1..30_usize, 1..4),
-        always_shares in any::<bool>(),
+        always_parallel in any::<bool>(),
     ) {
         let mut schedule = compile(&sketch);
-        schedule.always_share(always_shares);
+        schedule.always_parallel(always_parallel);
         for scheduler in &*RECORDED {
             let scheduler = scheduler.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             let log = recorded(&mut schedule, &scheduler, &chunks);

@@ -58,7 +58,7 @@ fn an_empty_log_makes_a_trace() {
 #[test]
 fn a_chunk_says_what_it_is_a_part_of_how_long_it_was_queued_and_that_it_was_stolen() {
     let labels =
-        Labels { process: Some("g-buffer".into()), phase: Some("record".into()), view: Some("main \"1\"".into()) };
+        Labels { process: Some("g-buffer".into()), stage: Some("record".into()), view: Some("main \"1\"".into()) };
     let record = Process { labels, ..process("record main", &[0]) };
     let stolen = Chunk { items: 512..1024, stolen: true, ..chunk(1, 1, 2_500, 70_001, 70_001) };
     let log = log(vec![Run {
@@ -67,7 +67,7 @@ fn a_chunk_says_what_it_is_a_part_of_how_long_it_was_queued_and_that_it_was_stol
     }]);
     check(&log);
     let trace = Trace::of(&log);
-    let arguments = r#""args":{"process":"g-buffer","phase":"record","view":"main \"1\"","items":"512..1024","queued_us":68.767,"opened_us":2.500,"stolen":true,"frame":7,"run":0}"#;
+    let arguments = r#""args":{"process":"g-buffer","stage":"record","view":"main \"1\"","items":"512..1024","queued_us":68.767,"opened_us":2.500,"stolen":true,"frame":7,"run":0}"#;
     assert!(trace.text.contains(arguments), "{}", trace.text);
     assert_eq!(trace.readings("ready processes"), [(0, 1.0), (5, 0.0), (1_234, 1.0), (2_500, 0.0)]);
 }
@@ -273,10 +273,10 @@ proptest! {
 
     #[test]
     fn any_names_come_out_as_they_went_in(names in vec(any_name(), 12)) {
-        let [name, process_label, phase, view, worker, thread, span_name, counter, device, pass_name, pass_view, idle_worker] = &names[..] else {
+        let [name, process_label, stage, view, worker, thread, span_name, counter, device, pass_name, pass_view, idle_worker] = &names[..] else {
             unreachable!("there are twelve")
         };
-        let labels = Labels { process: Some(process_label.clone()), phase: Some(phase.clone()), view: Some(view.clone()) };
+        let labels = Labels { process: Some(process_label.clone()), stage: Some(stage.clone()), view: Some(view.clone()) };
         let mut log = log(vec![run(vec![Process { labels, ..process(name, &[]) }], 9, vec![chunk(0, 1, 1, 2, 3)])]);
         log.workers[0].name.clone_from(idle_worker);
         log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: at(0), ended: at(9) });
@@ -291,7 +291,7 @@ proptest! {
         let trace = Trace::of(&log);
         let only = |category: &str| trace.slices(category).next().unwrap();
         prop_assert_eq!(&only("job").name, name);
-        for (key, label) in [("process", process_label), ("phase", phase), ("view", view)] {
+        for (key, label) in [("process", process_label), ("stage", stage), ("view", view)] {
             prop_assert_eq!(only("job").arguments[key].as_str(), Some(label.as_str()));
         }
         prop_assert_eq!((&only("span").name, &only("device").name), (span_name, pass_name));

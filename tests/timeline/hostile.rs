@@ -19,7 +19,7 @@ pub fn hostile_names() -> Vec<String> {
 pub fn log_of(names: &[String]) -> Log {
     let labels = |name: &String| {
         let name = Some(name.clone());
-        Labels { process: name.clone(), phase: name.clone(), view: name }
+        Labels { process: name.clone(), stage: name.clone(), view: name }
     };
     let process = |name: &String| Process { name: name.clone(), labels: labels(name), ..Process::default() };
     let graph = Arc::new(Graph { processes: names.iter().map(process).collect() });

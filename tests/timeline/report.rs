@@ -48,7 +48,7 @@ fn log() -> Log {
         began: micros(1_100),
         ended: micros(1_820),
         shared_from: Some(micros(1_100)),
-        always_shares: true,
+        always_parallel: true,
         complete: true,
         chunks: vec![
             chunk(0, 0, 0, 1_100..1_200),

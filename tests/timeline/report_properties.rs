@@ -245,9 +245,9 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
 
     #[test]
-    fn a_report_agrees_with_naive_oracles(sketch in any_graph(), always_shares in any::<bool>(), wake in 0..20_u64) {
+    fn a_report_agrees_with_naive_oracles(sketch in any_graph(), always_parallel in any::<bool>(), wake in 0..20_u64) {
         let mut schedule = schedule_of(&sketch);
-        schedule.always_share(always_shares);
+        schedule.always_parallel(always_parallel);
         let prices = Prices { wake: Duration::from_micros(wake), ..Prices::FREE };
         for scheduler in &*SCHEDULERS {
             let scheduler = scheduler.lock().unwrap();

@@ -132,7 +132,7 @@ mod tests {
             graph.keep(process);
         }
         let mut schedule = graph.compile().unwrap();
-        schedule.always_share(true);
+        schedule.always_parallel(true);
         schedule.run(&Scheduler::new(2).unwrap(), &()).unwrap();
         tracing::trace!(target: "drawloom::graph", ready = 77_u64, "another event");
         tracing::trace!(name: "taken", ready = 77_u64);

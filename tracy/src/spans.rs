@@ -25,7 +25,7 @@ use crate::RUNS;
 
 /// Whether it is the span of a process in a run.
 pub fn is_process(metadata: &Metadata<'_>) -> bool {
-    metadata.is_span() && metadata.target() == RUNS && metadata.name() == "process"
+    metadata.is_span() && metadata.target() == RUNS && metadata.name() == "node"
 }
 
 /// Whether it is the span of a chunk.
@@ -203,7 +203,7 @@ mod tests {
             for item in 0..100_000 {
                 let name = ["fill", "sort", "record"][item % 3];
                 let text = format!("part {item}");
-                debug_span!(target: "drawloom::graph", "process", item, name, process = text, phase = text, view = text);
+                debug_span!(target: "drawloom::graph", "node", item, name, process = text, stage = text, view = text);
                 trace_span!(target: "drawloom::graph", "chunk", start = item, end = item + 1);
                 info_span!("engine", item, name = text);
             }
@@ -216,9 +216,9 @@ mod tests {
         let long = "a".to_owned() + &"ä".repeat(5_000);
         let names = collected(|| {
             for name in ["", "\"{name}\" <b>\0\u{7}", &long] {
-                debug_span!(target: "drawloom::graph", "process", name);
+                debug_span!(target: "drawloom::graph", "node", name);
             }
-            debug_span!(target: "drawloom::graph", "process", name = ?Some(1));
+            debug_span!(target: "drawloom::graph", "node", name = ?Some(1));
         });
         let cut = "a".to_owned() + &"ä".repeat(MOST_BYTES / 2 - 1);
         assert_eq!(names, ["", "\"{name}\" <b>\0\u{7}", "Some(1)", &cut]);
@@ -231,9 +231,9 @@ mod tests {
             (is_process(metadata), is_chunk(metadata))
         };
         tracing::subscriber::with_default(Registry::default(), || {
-            assert_eq!(told(&debug_span!(target: "drawloom::graph", "process")), (true, false));
+            assert_eq!(told(&debug_span!(target: "drawloom::graph", "node")), (true, false));
             assert_eq!(told(&trace_span!(target: "drawloom::graph", "chunk")), (false, true));
-            assert_eq!(told(&debug_span!("process")), (false, false));
+            assert_eq!(told(&debug_span!("node")), (false, false));
             assert_eq!(told(&debug_span!(target: "drawloom", "record")), (false, false));
         });
     }

@@ -108,11 +108,11 @@ fn the_program_that_is_looked_at() {
     let scheduler = Scheduler::builder().workers(2).on_start(drawloom_tracy::name_worker).build().unwrap();
     let mut graph = FrameGraph::new();
     let process = graph.add(PROCESS, Closure::new(|(): &(), _, _| Ok(())).with_width(|()| 100));
-    let [of, phase, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.to_owned()));
-    graph.label(process, Labels { process: of, phase, view });
+    let [of, stage, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.to_owned()));
+    graph.label(process, Labels { process: of, stage, view });
     graph.keep(process);
     let mut schedule = graph.compile().unwrap();
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     let start = Instant::now();
     // Whoever looks ends it sooner.
     while start.elapsed() < Duration::from_secs(120) {

@@ -156,7 +156,7 @@ impl<W: io::Write> Trace<'_, W> {
         let Process { name, labels, .. } = &run.graph.processes[chunk.process];
         let slice = self.events.slice(category, name, lane_of(chunk.worker), chunk.started, chunk.ended)?;
         let slice = slice.object("args", |mut arguments| {
-            for (key, label) in [("process", &labels.process), ("phase", &labels.phase), ("view", &labels.view)] {
+            for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
                 if let Some(label) = label {
                     arguments = arguments.value(key, label)?;
                 }

@@ -170,7 +170,7 @@ fn nodes(graph: &Graph, texts: &mut Texts) -> Vec<Node> {
     let node = |process: &Process| Node {
         name: texts.add(&process.name),
         group: texts.add(process.group()),
-        color: texts.add(process.labels.phase.as_deref().unwrap_or(process.group())),
+        color: texts.add(process.labels.stage.as_deref().unwrap_or(process.group())),
         view: process.labels.view.as_ref().map(|view| texts.add(view)),
         pinned: process.pinned,
         dependencies: process.dependencies.clone(),

@@ -15,7 +15,7 @@ pub(super) struct Costs {
     pub(super) dependencies: Vec<Vec<usize>>,
     pub(super) processes: Vec<ProcessCosts>,
     /// Whether it is to be shared however little work it is.
-    pub(super) always_shares: bool,
+    pub(super) always_parallel: bool,
 }
 
 /// A process, and what its chunks cost, in nanoseconds.
@@ -47,7 +47,11 @@ impl Costs {
             }
         });
         let dependencies = run.graph.processes.iter().map(|process| process.dependencies.clone());
-        Self { dependencies: dependencies.collect(), processes: processes.collect(), always_shares: run.always_shares }
+        Self {
+            dependencies: dependencies.collect(),
+            processes: processes.collect(),
+            always_parallel: run.always_parallel,
+        }
     }
 
     /// Takes all items off the processes of a group.

@@ -138,7 +138,7 @@ impl Replay {
         let alone = costs.alone(&self.prices);
         if workers > 1 {
             let shared = self.share(costs, workers);
-            if costs.always_shares || !goes_alone(alone, shared.time, &self.prices) {
+            if costs.always_parallel || !goes_alone(alone, shared.time, &self.prices) {
                 return replayed(false, shared.time, shared.busy);
             }
         }
@@ -258,7 +258,7 @@ mod tests {
             assert_eq!(replay(&small, dear_wakes()).run(workers), Replayed { time: micros(20), alone: true, busy });
         }
         let mut shared = small.run(&Prices::FREE);
-        shared.always_shares = true;
+        shared.always_parallel = true;
         assert!(!Replay::new(&shared, dear_wakes()).unwrap().run(2).alone);
         assert!(!replay(&small, Prices::FREE).run(2).alone);
     }
@@ -402,7 +402,7 @@ mod tests {
             prop_assert!(replayed.time * workers as u32 >= work);
             // Who has the choice does not take a way that is much longer.
             prop_assert!(replayed.time <= replay.frame_time(1).mul_f64(1.25) + micros(1));
-            run.always_shares = true;
+            run.always_parallel = true;
             let steps = (run.graph.processes.len() + run.chunks.len() + workers) as u32;
             let most = work + (wake + waker * 2 + steal + ticket + process) * steps;
             prop_assert!(Replay::new(&run, prices).unwrap().frame_time(workers) <= most);

@@ -137,7 +137,7 @@ fn chain() -> Option<Schedule<Closure<'static, ()>>> {
     processes.windows(2).for_each(|pair| graph.order(pair[0], pair[1]));
     processes.iter().for_each(|&process| graph.keep(process));
     let mut schedule = graph.compile().ok()?;
-    schedule.always_share(true);
+    schedule.always_parallel(true);
     Some(schedule)
 }
 
