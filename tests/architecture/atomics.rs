@@ -1,0 +1,143 @@
+//! The tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use proc_macro2::TokenTree;
+
+use crate::sources::{Module, Source, modules_without_tests, read_crate};
+use crate::tokens::{is, is_for_tests, item, trees_of};
+
+#[test]
+fn the_tables_of_memory_orderings_list_every_atomic() {
+    let architecture = fs::read_to_string("ARCHITECTURE.md").expect("ARCHITECTURE.md can be read");
+    let problems = wrong_atomics(&architecture, &read_crate());
+    assert!(problems.is_empty(), "{} atomics:\n{}", problems.len(), problems.join("\n"));
+}
+
+/// The atomics that are only in the sources, or only in the tables of memory orderings.
+fn wrong_atomics(architecture: &str, sources: &[Source]) -> Vec<String> {
+    let (listed, mut declared) = (listed_atomics(architecture), BTreeSet::new());
+    for Module { source, trees, .. } in modules_without_tests(sources) {
+        let file: Vec<_> = source.path.iter().skip(1).filter_map(|part| part.to_str()).collect();
+        let names = declared_atomics(&trees).into_iter();
+        declared.extend(names.map(|name| format!("{}::{name}", file.join("/"))));
+    }
+    let missing = declared.difference(&listed).map(|name| format!("{name} is in no table of memory orderings"));
+    let gone = listed.difference(&declared).map(|name| format!("{name} is in a table, but not in src"));
+    missing.chain(gone).collect()
+}
+
+/// The names `file::field` in the first columns of the section. `::field` is in the file named before it.
+fn listed_atomics(architecture: &str) -> BTreeSet<String> {
+    let mut sections = architecture.split("\n## ");
+    let section = sections.find(|section| section.starts_with("Memory orderings\n")).unwrap_or_default();
+    let cells = section.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
+    // Code stands between every other pair of backticks.
+    let names = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter_map(|name| name.split_once("::"));
+    let mut file = "";
+    let whole = names.map(|(in_file, field)| {
+        file = if in_file.is_empty() { file } else { in_file };
+        format!("{file}::{field}")
+    });
+    whole.collect()
+}
+
+/// The names of fields and statics whose type mentions an atomic, and of tuple structs, enums and type aliases that do. Locals
+/// and parameters do not count, nor does anything that only tests are built with.
+fn declared_atomics(trees: &[TokenTree]) -> Vec<String> {
+    let (mut names, mut at) = (Vec::new(), 0);
+    while let Some(tree) = trees.get(at) {
+        at += 1;
+        let rest = &trees[at..];
+        match tree {
+            TokenTree::Group(group) => names.extend(declared_atomics(&trees_of(group.stream()))),
+            // A lifetime is a quotation mark and a word, which may be `static`.
+            TokenTree::Punct(mark) if mark.as_char() == '\'' => at += 1,
+            TokenTree::Punct(mark) if mark.as_char() == '#' && rest.first().is_some_and(is_for_tests) => {
+                at += item(rest).len();
+            }
+            TokenTree::Ident(word) if ["struct", "enum", "type", "static"].iter().any(|kind| word == kind) => {
+                match item(rest) {
+                    [.., TokenTree::Group(fields)] if word == "struct" => {
+                        names.extend(atomic_fields(&trees_of(fields.stream())));
+                    }
+                    whole => {
+                        // A static's value may name types that the static itself does not have.
+                        let mut parts = whole.split(|tree| word == "static" && is(Some(tree), "="));
+                        let is_atomic = parts.next().is_some_and(|part| part.iter().any(mentions_atomic));
+                        names.extend(whole.first().filter(|_| is_atomic).map(TokenTree::to_string));
+                    }
+                }
+                at += item(rest).len();
+            }
+            _ => {}
+        }
+    }
+    names
+}
+
+/// The fields of a struct whose type mentions an atomic.
+fn atomic_fields(trees: &[TokenTree]) -> Vec<String> {
+    let (mut names, mut field) = (Vec::new(), None);
+    for (at, tree) in trees.iter().enumerate() {
+        // Two colons are part of a path.
+        let is_field = is(trees.get(at + 1), ":") && !is(trees.get(at + 2), ":");
+        if let (true, TokenTree::Ident(name)) = (is_field, tree) {
+            field = Some(name);
+        }
+        if mentions_atomic(tree) {
+            names.extend(field.map(ToString::to_string));
+        }
+    }
+    names
+}
+
+fn mentions_atomic(tree: &TokenTree) -> bool {
+    match tree {
+        TokenTree::Group(group) => trees_of(group.stream()).iter().any(mentions_atomic),
+        tree => tree.to_string().starts_with("Atomic"),
+    }
+}
+
+/// The problems of a crate of one file, with these rows in the section on memory orderings.
+fn atomics_with(path: &str, text: &str, rows: &str) -> Vec<String> {
+    let architecture = format!("# A\n\n## Memory orderings\n\n{rows}\n\n## B\n\n| `low.rs::other` |\n");
+    wrong_atomics(&architecture, &[Source::new(path, text)])
+}
+
+#[test]
+fn an_atomic_that_is_not_listed_is_found() {
+    for (text, name) in [
+        ("struct A { a: u8, pub(super) b: AtomicBool, c: u8 }", "b"),
+        ("struct A<'a, T: 'static> where T: Fn(u8) { b: &'a [std::sync::atomic::AtomicPtr<T>], c: T }", "b"),
+        ("mod linux { #[cfg(not(test))] struct A { /** AtomicU8 */ b: HashMap<u8, Box<AtomicU64>> } }", "b"),
+        ("#[derive(Debug)] pub struct A(Arc<AtomicU32>);", "A"),
+        ("enum A { B, C { count: AtomicI64 } }", "A"),
+        ("type A = Box<[AtomicU32]>;", "A"),
+        ("fn f() { static A: AtomicUsize = AtomicUsize::new(0); }", "A"),
+        ("#[cfg(test)] mod tests { struct A { a: AtomicU8 } } struct B { b: AtomicU8 }", "b"),
+    ] {
+        let missing = format!("low/part.rs::{name} is in no table of memory orderings");
+        assert_eq!(atomics_with("low/part.rs", text, ""), [missing], "{text}");
+        let row = format!("| `low/part.rs::{name}` | `relaxed` |");
+        assert_eq!(atomics_with("low/part.rs", text, &row), [""; 0], "{text}");
+    }
+    let two = "struct A { a: AtomicU8 } struct B { b: AtomicU8 }";
+    assert_eq!(atomics_with("low.rs", two, "| `low.rs::a`, `::b` | hints |"), [""; 0]);
+}
+
+#[test]
+fn a_row_without_an_atomic_is_found() {
+    let gone = "low.rs::a is in a table, but not in src";
+    for text in [
+        "struct A { a: u8 }",
+        "fn f(a: &AtomicU8) { let a: AtomicU8 = AtomicU8::new(0); A { a: AtomicU8::new(0) }; }",
+        "use crate::sync::AtomicU8; static B: B = B { a: AtomicU8::new(0) };",
+        "#[cfg(all(test, drawloom_loom))] mod loom_tests { struct A { a: AtomicU8 } }",
+        "#[test] fn f() { static a: AtomicU8 = AtomicU8::new(0); }",
+    ] {
+        let problems = atomics_with("low.rs", text, "| `low.rs::a` |");
+        assert!(problems.contains(&gone.to_owned()), "{text}\n{problems:?}");
+    }
+}

@@ -1,0 +1,342 @@
+//! The files of one module do not import each other in circles, so that each can be understood with only those that it
+//! imports.
+//!
+//! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
+//! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a
+//! re-export of an item that the file does not use itself. So a `mod.rs` that only declares modules and re-exports their
+//! items is no part of a circle.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use proc_macro2::TokenTree;
+
+use crate::paths::{Leaf, expand, from_root};
+use crate::sources::{Module, Source, modules_without_tests, read_crate};
+use crate::tokens::{is, is_for_tests, item, trees_of};
+
+/// The modules in which circles remain. Take a module off the list when its last circle is gone.
+#[rustfmt::skip] // One a line, so that two changes do not conflict.
+const KNOWN_CIRCLES: &[&str] = &[
+    "backend",
+    "frame",
+    "graph",
+    "process",
+    "raster",
+    "report",
+    "scene",
+    "task",
+];
+
+/// How many re-exports are followed to the definition of one item.
+const MAX_REEXPORTS: usize = 8;
+
+#[test]
+fn files_do_not_import_each_other_in_circles() {
+    let problems = wrong_circles(&read_crate(), KNOWN_CIRCLES);
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+/// The circles in modules that are not known to have any, and the known modules that have none.
+fn wrong_circles(sources: &[Source], known: &[&str]) -> Vec<String> {
+    let circles = circles(sources);
+    let new = circles.iter().filter(|(module, _)| !known.contains(&module.as_str()));
+    let new = new.flat_map(|(_, circles)| circles.iter().cloned());
+    let gone = known.iter().filter(|module| !circles.contains_key(**module));
+    let gone = gone.map(|module| format!("{module} has no circle any more: take it off the list KNOWN_CIRCLES"));
+    new.chain(gone).collect()
+}
+
+/// The circles of each top-level module, in words. Where circles share files, only a shortest one is described.
+fn circles(sources: &[Source]) -> BTreeMap<String, Vec<String>> {
+    let imports = Imports::new(modules_without_tests(sources));
+    let mut circles = BTreeMap::<_, Vec<_>>::new();
+    let mut described = BTreeSet::new();
+    let mut shortest: Vec<_> = (0..imports.modules.len()).filter_map(|file| imports.circle_through(file)).collect();
+    shortest.sort_by_key(Vec::len);
+    for circle in shortest {
+        let connected = imports.mutual(circle[0]);
+        if described.insert(connected.clone()) {
+            let module = imports.modules[circle[0]].path[0].clone();
+            circles.entry(module).or_default().push(imports.describe(&circle, connected.len()));
+        }
+    }
+    circles
+}
+
+struct Imports<'a> {
+    modules: Vec<Module<'a>>,
+    /// For each file the files of its top-level module that it imports, each with the line of the first import.
+    of_file: Vec<BTreeMap<usize, usize>>,
+}
+
+impl<'a> Imports<'a> {
+    fn new(modules: Vec<Module<'a>>) -> Self {
+        let found: Vec<_> = modules.iter().map(|module| paths_in(&module.trees, &module.path)).collect();
+        let resolver = Resolver::new(&modules, &found);
+        let mut of_file = Vec::new();
+        for (user, paths) in found.iter().enumerate() {
+            let (mut imported, mut words) = (BTreeMap::new(), BTreeSet::new());
+            words_outside_imports(&modules[user].trees, &mut words);
+            let is_import = |found: &&FoundPath| match &found.name {
+                Some(name) => !found.is_reexport || words.contains(name),
+                None => true,
+            };
+            for found in paths.iter().filter(is_import) {
+                let file = resolver.file_of(&found.path, MAX_REEXPORTS);
+                let in_module = |file: &usize| modules[*file].path.first() == modules[user].path.first();
+                if let Some(file) = file.filter(in_module).filter(|&file| file != user) {
+                    imported.entry(file).or_insert(found.line);
+                }
+            }
+            of_file.push(imported);
+        }
+        Self { modules, of_file }
+    }
+
+    /// A shortest way through imports that leads from the file back to it.
+    fn circle_through(&self, file: usize) -> Option<Vec<usize>> {
+        let mut importer = BTreeMap::new();
+        let mut queue = VecDeque::from([file]);
+        while let Some(user) = queue.pop_front() {
+            for &used in self.of_file[user].keys() {
+                if used == file {
+                    let back = std::iter::successors(Some(user), |at| importer.get(at).copied());
+                    let mut circle: Vec<_> = back.collect();
+                    circle.reverse();
+                    return Some(circle);
+                }
+                if !importer.contains_key(&used) {
+                    importer.insert(used, user);
+                    queue.push_back(used);
+                }
+            }
+        }
+        None
+    }
+
+    /// The files that the file leads to through imports, and that lead back to it.
+    fn mutual(&self, file: usize) -> BTreeSet<usize> {
+        let reached = |start: usize| {
+            let (mut reached, mut stack) = (BTreeSet::new(), vec![start]);
+            while let Some(user) = stack.pop() {
+                stack.extend(self.of_file[user].keys().filter(|used| reached.insert(**used)));
+            }
+            reached
+        };
+        reached(file).into_iter().filter(|&other| reached(other).contains(&file)).collect()
+    }
+
+    fn describe(&self, circle: &[usize], connected: usize) -> String {
+        let shown = |file: usize| self.modules[file].source.path.display();
+        let next = circle.iter().skip(1).chain(circle.first());
+        let steps = circle
+            .iter()
+            .zip(next)
+            .map(|(user, used)| format!("{}:{} imports {}", shown(*user), self.of_file[*user][used], shown(*used)));
+        let steps = steps.collect::<Vec<_>>().join(", ");
+        match connected - circle.len() {
+            0 => format!("circle: {steps}"),
+            more => format!("circle: {steps} (and {more} more files import each other in circles with these)"),
+        }
+    }
+}
+
+/// Finds the file that defines an item.
+struct Resolver {
+    files: BTreeMap<Vec<String>, usize>,
+    /// For each file the names that it imports, and the paths they stand for.
+    names: Vec<BTreeMap<String, Vec<String>>>,
+}
+
+impl Resolver {
+    fn new(modules: &[Module], found: &[Vec<FoundPath>]) -> Self {
+        let files = modules.iter().enumerate().map(|(index, module)| (module.path.clone(), index)).collect();
+        let named = |paths: &Vec<FoundPath>| {
+            paths.iter().filter_map(|found| Some((found.name.clone()?, found.path.clone()))).collect()
+        };
+        Self { files, names: found.iter().map(named).collect() }
+    }
+
+    /// The file that defines the item at this path from the root; `None` if it is not the crate's.
+    fn file_of(&self, path: &[String], reexports: usize) -> Option<usize> {
+        let length = (0..=path.len()).rev().find(|&length| self.files.contains_key(&path[..length]))?;
+        let file = self.files[&path[..length]];
+        let rest = &path[length..];
+        let reexported = rest.first().and_then(|name| self.names[file].get(name)).filter(|_| reexports > 0);
+        let Some(target) = reexported else { return Some(file) };
+        self.file_of(&[target, &rest[1..]].concat(), reexports - 1)
+    }
+}
+
+/// A path in a file that leads into the crate.
+struct FoundPath {
+    /// From the crate's root.
+    path: Vec<String>,
+    line: usize,
+    /// The name that a `use` declaration of the file itself, not of a module or function in it, gives to the item.
+    name: Option<String>,
+    is_reexport: bool,
+}
+
+fn paths_in(trees: &[TokenTree], module: &[String]) -> Vec<FoundPath> {
+    let mut found = Vec::new();
+    find_paths(trees, module, &declared_modules(trees), true, &mut found);
+    found
+}
+
+/// Adds the paths that start with `crate`, `super`, `self` or one of `children`.
+fn find_paths(
+    trees: &[TokenTree],
+    module: &[String],
+    children: &BTreeSet<String>,
+    is_file: bool,
+    found: &mut Vec<FoundPath>,
+) {
+    let mut at = 0;
+    while let Some(tree) = trees.get(at) {
+        let rest = &trees[at + 1..];
+        match tree {
+            TokenTree::Punct(mark) if mark.as_char() == '#' && rest.first().is_some_and(is_for_tests) => {
+                at += item(rest).len();
+            }
+            TokenTree::Group(group) => {
+                let inner = trees_of(group.stream());
+                let is_visibility = at > 0 && is(trees.get(at - 1), "pub") && is(inner.first(), "in");
+                if at > 1 && is(trees.get(at - 2), "mod") {
+                    let module = [module, &[trees[at - 1].to_string()]].concat();
+                    find_paths(&inner, &module, &declared_modules(&inner), false, found);
+                } else if !is_visibility {
+                    find_paths(&inner, module, children, false, found);
+                }
+            }
+            TokenTree::Ident(start) => {
+                let word = start.to_string();
+                let is_use = at > 0 && is(trees.get(at - 1), "use");
+                let before_use = trees[..at.saturating_sub(1)].iter().rev();
+                let mut before_use = before_use.skip_while(|tree| matches!(tree, TokenTree::Group(_)));
+                let is_reexport = is_use && is(before_use.next(), "pub");
+                let starts = ["crate", "super", "self"].contains(&word.as_str()) || children.contains(&word);
+                // Behind two colons the word goes on with a path.
+                if starts && !(at > 0 && is(trees.get(at - 1), ":") && at > 1 && is(trees.get(at - 2), ":")) {
+                    let mut leaves = Vec::new();
+                    at = expand(trees, at, Vec::new(), &mut leaves);
+                    // A word alone is a visibility, a receiver, or a child's declaration.
+                    for Leaf { path, name } in leaves.into_iter().filter(|leaf| leaf.path.len() > 1 || is_use) {
+                        let path = from_root(&path, module);
+                        let name = Some(name).filter(|_| is_use && is_file);
+                        found.push(FoundPath { path, line: start.span().start().line, name, is_reexport });
+                    }
+                    continue;
+                }
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+}
+
+/// The names of modules that are declared here, in files of their own or in place.
+fn declared_modules(trees: &[TokenTree]) -> BTreeSet<String> {
+    let names = trees.windows(2).filter(|pair| is(Some(&pair[0]), "mod"));
+    names.map(|pair| pair[1].to_string()).collect()
+}
+
+/// Adds the words of the file's code, without `use` declarations and code for tests.
+fn words_outside_imports(trees: &[TokenTree], words: &mut BTreeSet<String>) {
+    let mut at = 0;
+    while let Some(tree) = trees.get(at) {
+        at += 1;
+        let rest = &trees[at..];
+        match tree {
+            TokenTree::Punct(mark) if mark.as_char() == '#' && rest.first().is_some_and(is_for_tests) => {
+                at += item(rest).len();
+            }
+            TokenTree::Group(group) => words_outside_imports(&trees_of(group.stream()), words),
+            TokenTree::Ident(word) if word == "use" => {
+                at += rest.iter().position(|tree| is(Some(tree), ";")).unwrap_or(rest.len());
+            }
+            TokenTree::Ident(word) if word == "mod" => at += 1,
+            TokenTree::Ident(word) => _ = words.insert(word.to_string()),
+            _ => {}
+        }
+    }
+}
+
+/// The circles of a crate with these files.
+fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
+    let sources: Vec<_> = files.iter().map(|(path, text)| Source::new(path, text)).collect();
+    wrong_circles(&sources, &[])
+}
+
+#[test]
+fn a_circle_is_found() {
+    let root = ("low/mod.rs", "//! Low.\nmod a;\npub(crate) mod b;\npub use a::A; pub(crate) use b::{B as Bee, g};");
+    for (a, b) in [
+        ("use super::b::B;", "use super::a::A;"),
+        ("use super::Bee;", "use super::{A, g};"),
+        ("use super::b;", "use crate::low::{a::A};"),
+        ("fn f() { super::b::g() }", "fn g() { check!(crate::low::A::new()) }"),
+        ("use crate::low::g as f;", "mod deep { use super::super::A; }"),
+        ("use super::Bee; #[cfg(not(test))] fn f() {}", "fn f() { use super::a; }"),
+    ] {
+        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b.rs", b)]);
+        let circle = "circle: src/low/a.rs:1 imports src/low/b.rs, src/low/b.rs:1 imports src/low/a.rs";
+        assert_eq!(problems, [circle], "{a}\n{b}");
+    }
+}
+
+#[test]
+fn a_circle_through_a_file_with_children_is_found() {
+    for (parent, child) in [
+        ("low.rs", "mod part; use part::P; pub struct L;"),
+        ("low/mod.rs", "pub mod part; pub struct L(part::P);"),
+        ("low/mod.rs", "mod part;\n#[cfg(unix)]\nuse self::part::P;\nstruct L;"),
+        ("low/mod.rs", "mod part; pub(crate) use part::P; struct L(P);"),
+    ]
+    .map(|parent| (parent, ("low/part.rs", "use super::L;")))
+    {
+        let problems = circles_of(&[parent, child]);
+        assert_eq!(problems.len(), 1, "{parent:?}\n{problems:?}");
+    }
+}
+
+#[test]
+fn connected_circles_are_described_by_the_shortest() {
+    let problems = circles_of(&[
+        ("low/mod.rs", "mod a; mod b; mod c; mod d;"),
+        ("low/a.rs", "use super::b;"),
+        ("low/b.rs", "\nuse super::c;"),
+        ("low/c.rs", "\n\nuse super::{a, b};"),
+        ("low/d.rs", "use super::a;"),
+    ]);
+    let circle = "circle: src/low/b.rs:2 imports src/low/c.rs, src/low/c.rs:3 imports src/low/b.rs";
+    assert_eq!(problems, [format!("{circle} (and 1 more files import each other in circles with these)")]);
+}
+
+#[test]
+fn imports_without_a_circle_are_allowed() {
+    let root = ("low/mod.rs", "mod a; mod b; #[cfg(test)] mod tests; pub use a::A; pub(super) use b::B;");
+    let items = ("low/mod.rs", "mod part; pub use part::{P as M, part}; #[cfg(test)] use part::Q; struct L;");
+    assert_eq!(circles_of(&[items, ("low/part.rs", "use super::L;")]), [""; 0]);
+    for (a, b) in [
+        ("use super::b::B;", "pub(in crate::low) struct B; fn f(self) {}"),
+        ("use super::B;", "//! [`super::A`]\n/* super::A */ fn f() { g(\"super::A\") }"),
+        ("use super::B;", "#[cfg(test)] use super::A; #[cfg(all(test, unix))] mod tests { use super::super::A; }"),
+        ("use super::B;", "use std::a::A; fn f() { x.a::<A>(); b::a::A }"),
+        ("use super::B;", "use crate::{low as other, high::a::A};"),
+    ] {
+        let tests = ("low/tests.rs", "use super::{a, b};");
+        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b.rs", b), tests]);
+        assert_eq!(problems, [""; 0], "{a}\n{b}");
+    }
+}
+
+#[test]
+fn a_known_circle_is_allowed_until_it_is_gone() {
+    let sources = [("a", "use super::b;"), ("b", "use super::a;")];
+    let sources = sources.map(|(name, text)| Source::new(&format!("low/{name}.rs"), text));
+    let sources: Vec<_> = sources.into_iter().chain([Source::new("low/mod.rs", "mod a; mod b;")]).collect();
+    assert_eq!(wrong_circles(&sources, &["low"]), [""; 0]);
+    let gone = "high has no circle any more: take it off the list KNOWN_CIRCLES";
+    assert_eq!(wrong_circles(&sources, &["high", "low"]), [gone]);
+}

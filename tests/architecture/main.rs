@@ -1,0 +1,14 @@
+//! The crate's structure, checked on its source:
+//!
+//! - `layers`: the modules that `src/lib.rs` lists are layers, and each uses only those above it.
+//! - `circles`: the files of one module do not import each other in circles.
+//! - `files`: files are short, and their names say what is inside.
+//! - `atomics`: the tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
+
+mod atomics;
+mod circles;
+mod files;
+mod layers;
+mod paths;
+mod sources;
+mod tokens;
