@@ -16,10 +16,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::WgpuBackend;
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RawPass, RenderProcess, Resolved, ToneMapping};
-use drawloom::queue::Selection;
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};

@@ -10,9 +10,9 @@
 //!    ▼
 //!  visibility        per view: which objects it sees          parallel over objects   view
 //!    ▼
-//!  fill              per view: a command for each of them     parallel over chunks    command, queue
+//!  fill              per view: a command for each of them     parallel over chunks    view
 //!    ▼
-//!  sort → instance   by key; equal runs become one draw       parallel over parts     queue
+//!  sort → instance   by key; equal runs become one draw       parallel over buckets   command
 //!    ▼
 //!  record            batches into passes, or bundles first    parallel over chunks    backend
 //!    ▼
@@ -35,7 +35,7 @@
 //!
 //! # Features
 //!
-//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the queue is there, with a
+//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, with a
 //!   backend that counts and checks, and one that draws on the processor.
 //! - `obj` (default): OBJ files and their textures.
 //! - `flip`: FLIP (Andersson et al. 2020) in the example `tradeoff`. It needs a C++ compiler.
@@ -74,7 +74,6 @@ pub mod scene;
 pub mod raster;
 pub mod command;
 pub mod view;
-pub mod queue;
 pub mod process;
 pub mod backend;
 mod frame;

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 
 use drawloom::RendererBuilder;
 use drawloom::backend::WgpuBackend;
+use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess, ToneMapping};
-use drawloom::queue::Selection;
 
 /// Draws everything once without lights, and then once more for each light: N × L (L 2). What it draws for lights are objects
 /// that are added to what is there, each in the place of an opaque one.

@@ -25,7 +25,7 @@ pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]
                 turn * (offset + orientation * (local * scale))
             };
             // No edge is longer than this after it was halved as often as it has to be.
-            let longest = mesh.longest_edge() / (1_u64 << command.state.halvings()) as f32;
+            let longest = mesh.longest_edge() / (1_u64 << command.state.subdivision_level()) as f32;
             for corners in mesh.triangles() {
                 for [one, other] in [[0, 1], [1, 2], [2, 0]].map(|edge| edge.map(|corner| corners[corner])) {
                     let [first, last] =

@@ -9,9 +9,9 @@ mod texels;
 mod wgpu;
 use std::ops::Range;
 
+use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
-use crate::queue::DrawList;
 use crate::scene::SceneRef;
 use crate::task::Worker;
 use crate::view::{LightTable, ObjectTable, Rejections, RenderView};

@@ -6,8 +6,8 @@ use std::ops::Range;
 use parking_lot::Mutex;
 
 use super::{Backend, BackendError, FrameRequest, PassRequest};
+use crate::command::DrawList;
 use crate::process::{Draws, Pass};
-use crate::queue::DrawList;
 use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::view::{GpuView, ObjectTable};

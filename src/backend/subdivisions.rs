@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use parking_lot::Mutex;
 
 use super::{BackendError, FrameRequest};
+use crate::command::{Batch, DrawList};
 use crate::quality::VertexFormat;
-use crate::queue::{Batch, DrawList};
 use crate::scene::{Assets, Mesh};
 use crate::view::RejectionReason;
 
@@ -78,14 +78,16 @@ impl<T> Subdivisions<T> {
         mut make: impl FnMut(Mesh) -> Result<T, BackendError>,
         mut put: impl FnMut((u32, u32), Arc<Subdivided<T>>),
     ) -> Result<(), BackendError> {
-        for &Batch { mesh, state, first, count } in list.batches.iter().filter(|batch| batch.state.halvings() > 0) {
-            let found = self.find(request.scene.assets, mesh, state.halvings(), vertices, &mut make)?;
+        for &Batch { mesh, state, first, count } in
+            list.batches.iter().filter(|batch| batch.state.subdivision_level() > 0)
+        {
+            let found = self.find(request.scene.assets, mesh, state.subdivision_level(), vertices, &mut make)?;
             if found.is_coarse {
                 for &object in &list.objects[first as usize..][..count as usize] {
                     request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
                 }
             }
-            put((mesh, state.halvings()), found);
+            put((mesh, state.subdivision_level()), found);
         }
         Ok(())
     }
@@ -94,18 +96,18 @@ impl<T> Subdivisions<T> {
         &self,
         assets: &Assets,
         slot: u32,
-        halvings: u32,
+        level: u32,
         vertices: VertexFormat,
         make: impl FnOnce(Mesh) -> Result<T, BackendError>,
     ) -> Result<Arc<Subdivided<T>>, BackendError> {
         let (revision, mesh) = assets.meshes.revised_at(slot).ok_or_else(no_such_mesh)?;
-        let key = (slot, revision, halvings, vertices);
+        let key = (slot, revision, level, vertices);
         let kept = self.kept.lock().get(&key).cloned();
         let found = match kept {
             Some(kept) => kept,
             None => {
                 // Two passes may do this at once, and then one of them was in vain: better than waiting for each other.
-                let (mesh, is_coarse) = subdivided(mesh, halvings);
+                let (mesh, is_coarse) = subdivided(mesh, level);
                 let made = Arc::new(Subdivided { drawn: make(mesh)?, is_coarse, used_in: AtomicU64::new(0) });
                 Arc::clone(self.kept.lock().entry(key).or_insert(made))
             }
@@ -116,9 +118,9 @@ impl<T> Subdivisions<T> {
 }
 
 /// The mesh with its edges halved so often; and whether it has longer edges than it should.
-fn subdivided(mesh: &Mesh, halvings: u32) -> (Mesh, bool) {
+fn subdivided(mesh: &Mesh, level: u32) -> (Mesh, bool) {
     // A little more, lest halves that were rounded up are halved again.
-    let longest = mesh.longest_edge() / (1_u64 << halvings) as f32 * 1.001;
+    let longest = mesh.longest_edge() / (1_u64 << level) as f32 * 1.001;
     let subdivided = mesh.subdivided(longest, MOST_TRIANGLES);
     let is_coarse = subdivided.longest_edge() > longest;
     (subdivided, is_coarse)

@@ -2,8 +2,8 @@
 
 use crate::scene::{Blend, Topology};
 
-/// Topology, culling, blending, and how often the mesh's edges are halved, quantised into a byte (M listing 10.1). Together
-/// with the process that draws, it says which pipeline a command needs, and together with the mesh which triangles.
+/// Topology, culling, blending and subdivision level in one byte (M listing 10.1). With the process that draws, it determines a
+/// command's pipeline; with the mesh, its triangles.
 ///
 /// ```text
 /// bit   7  6  5     | 4  3 | 2  1 | 0
@@ -16,41 +16,41 @@ impl DrawState {
     /// A single-sided opaque triangle list.
     pub const PLAIN: Self = Self(0);
 
-    /// How many states there can be: every state's [`DrawState::index`] is below it.
+    /// The number of states: [`DrawState::index`] is less.
     pub const COUNT: usize = 1 << 8;
 
-    /// How often a mesh's edges can be halved.
-    pub const FINEST: u32 = 7;
+    /// The highest subdivision level: a mesh's edges can be halved 7 times.
+    pub const MAX_SUBDIVISION_LEVEL: u32 = 7;
 
-    /// The state with these parts.
+    /// A state of subdivision level 0.
     pub fn new(topology: Topology, cull: Cull, blend: Blend) -> Self {
         Self(topology as u8 | (cull as u8) << 1 | (blend as u8) << 3)
     }
 
-    /// The same with the mesh's edges halved so often: at most [`DrawState::FINEST`] times.
-    pub fn subdivided(self, halvings: u32) -> Self {
-        Self(self.0 & 0b1_1111 | (halvings.min(Self::FINEST) as u8) << 5)
+    /// The same state with another subdivision level, at most [`DrawState::MAX_SUBDIVISION_LEVEL`].
+    pub fn with_subdivision_level(self, level: u32) -> Self {
+        Self(self.0 & 0b1_1111 | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u8) << 5)
     }
 
     /// How often the mesh's edges are halved.
-    pub fn halvings(self) -> u32 {
+    pub fn subdivision_level(self) -> u32 {
         u32::from(self.0 >> 5)
     }
 
-    /// What of the state the pipeline depends on. A subdivided mesh is a triangle list, whatever it was before.
-    pub fn of_pipeline(self) -> Self {
-        match self.halvings() {
+    /// The part of the state that selects the pipeline. A subdivided mesh is a triangle list, whatever its own topology is.
+    pub fn pipeline_state(self) -> Self {
+        match self.subdivision_level() {
             0 => self,
             _ => Self::new(Topology::TriangleList, self.cull(), self.blend()),
         }
     }
 
-    /// The byte, as a number to index by.
+    /// The byte as an index.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 
-    /// The state of this byte.
+    /// The state with this byte.
     pub(super) fn from_byte(byte: u8) -> Self {
         Self(byte)
     }
@@ -60,12 +60,12 @@ impl DrawState {
         self.0
     }
 
-    /// How indices make triangles.
+    /// How indices form triangles.
     pub fn topology(self) -> Topology {
         if self.0 & 1 == 0 { Topology::TriangleList } else { Topology::TriangleStrip }
     }
 
-    /// Which triangles are left out.
+    /// Which triangles are culled.
     pub fn cull(self) -> Cull {
         match (self.0 >> 1) & 3 {
             0 => Cull::Back,
@@ -74,7 +74,7 @@ impl DrawState {
         }
     }
 
-    /// How it mixes with what is behind it.
+    /// How it blends with the target.
     pub fn blend(self) -> Blend {
         match (self.0 >> 3) & 3 {
             0 => Blend::None,
@@ -85,14 +85,14 @@ impl DrawState {
     }
 }
 
-/// Which triangles are left out, by the way they are wound in the picture.
+/// Which triangles are culled, by their winding in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Cull {
-    /// Those that face away.
+    /// Triangles that face away.
     #[default]
     Back = 0,
-    /// Those that face the viewer: what faces away of a mirrored object.
+    /// Triangles that face the viewer: a mirrored object's back faces.
     Front = 1,
     /// None.
     Nothing = 2,
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_part_survives_the_byte() {
+    fn every_field_survives_the_byte() {
         let mut seen = std::collections::BTreeSet::new();
         for topology in [Topology::TriangleList, Topology::TriangleStrip] {
             for cull in [Cull::Back, Cull::Front, Cull::Nothing] {
@@ -111,11 +111,14 @@ mod tests {
                     let state = DrawState::new(topology, cull, blend);
                     assert_eq!((state.topology(), state.cull(), state.blend()), (topology, cull, blend));
                     assert!(state.index() < DrawState::COUNT);
-                    let subdivided = state.subdivided(9);
-                    assert_eq!((state.halvings(), subdivided.halvings()), (0, DrawState::FINEST));
-                    assert_eq!(subdivided.subdivided(0), state);
-                    assert_eq!(state.of_pipeline(), state);
-                    assert_eq!(subdivided.of_pipeline(), DrawState::new(Topology::TriangleList, cull, blend));
+                    let subdivided = state.with_subdivision_level(9);
+                    assert_eq!(
+                        (state.subdivision_level(), subdivided.subdivision_level()),
+                        (0, DrawState::MAX_SUBDIVISION_LEVEL)
+                    );
+                    assert_eq!(subdivided.with_subdivision_level(0), state);
+                    assert_eq!(state.pipeline_state(), state);
+                    assert_eq!(subdivided.pipeline_state(), DrawState::new(Topology::TriangleList, cull, blend));
                     assert!(seen.insert(state));
                 }
             }

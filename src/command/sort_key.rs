@@ -1,9 +1,9 @@
-//! The order of commands.
+//! The sort key of commands.
 
 use super::DrawState;
 
-/// The 64-bit order of a command within its view (M 10.5, "Sorting and Instancing"); smaller comes first. Commands with
-/// equal keys are ordered by their object's index.
+/// The 64-bit sort key of a command within its pass (M 10.5, "Sorting and Instancing"); smaller keys are drawn first. Commands
+/// with equal keys are ordered by object index.
 ///
 /// ```text
 /// bit    63 62 | 61 … 54 | 53 52 | 51 … 20 | 19 … 0
@@ -11,36 +11,35 @@ use super::DrawState;
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
-/// nothing 1 1  | 1 … 1               | 1 … 1
+/// empty   1 1  | 1 … 1               | 1 … 1
 /// ```
 ///
-/// Bits that the picture depends on: 63 and 62 (blended after opaque), and the depth of blended commands. All others only save
-/// state changes and overdraw. Depths are the numbers of a [`DepthKey`](crate::quality::DepthKey): of opaque commands the upper
-/// 20 of their bits, of blended ones all 32. Where fewer are asked for, the lower ones are the same in all keys, and are not
-/// sorted by.
+/// The picture depends on bits 63 and 62 (blended after opaque) and on the depth of blended commands. All other bits only save
+/// state changes and overdraw. Depths are codes of a [`DepthKey`](crate::quality::DepthKey): the upper 20 bits for opaque
+/// commands, all 32 for blended ones. A [`DepthKey`](crate::quality::DepthKey) with fewer bits leaves the lower ones equal in all
+/// keys, and the sort skips bits that are equal.
 ///
-/// Materials have no bits: shaders find them by object, so another material is no change of state, and were commands
-/// ordered by it, fewer of them would become one draw.
+/// Materials have no bits: shaders find them by object, so a change of material is no change of state, and sorting by material
+/// would split batches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SortKey(u64);
 
 impl SortKey {
-    /// Before every other, or the same.
+    /// The smallest key.
     pub const FIRST: Self = Self(0);
 
-    /// Behind every other.
+    /// The largest key, of empty commands.
     pub const LAST: Self = Self(u64::MAX);
 
-    /// The key of an opaque command: by state and mesh, then front to back.
-    ///
-    /// `depth` is its distance's [`DepthKey::code`](crate::quality::DepthKey::code).
+    /// The key of an opaque command: by state and mesh, then front to back. `depth` is a
+    /// [`DepthKey::code`](crate::quality::DepthKey::code).
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
         let state = (state.index() as u64 & 0xff) << 54;
         let mesh = u64::from(mesh) << 20;
         Self(state | mesh | u64::from(depth >> 12))
     }
 
-    /// The key of a blended command: back to front, to the last bit of `depth`, its distance's
+    /// The key of a blended command: back to front, exact to the last bit of `depth`, a
     /// [`DepthKey::code`](crate::quality::DepthKey::code).
     pub fn blended(depth: u32) -> Self {
         Self(1 << 62 | u64::from(!depth) << 30)
@@ -56,8 +55,8 @@ impl SortKey {
         Self(bits)
     }
 
-    /// The state and the mesh's slot that the key of an opaque command repeats; `None` of any other key.
-    pub(super) fn repeated(self) -> Option<(DrawState, u32)> {
+    /// The state and the mesh slot in the key of an opaque command; `None` for other keys.
+    pub(super) fn state_and_mesh(self) -> Option<(DrawState, u32)> {
         (self.0 >> 62 == 0).then(|| (DrawState::from_byte((self.0 >> 54) as u8), (self.0 >> 20) as u32))
     }
 }
@@ -108,16 +107,16 @@ mod tests {
         }
 
         #[test]
-        fn only_an_opaque_key_repeats_state_and_mesh(byte in any::<u8>(), mesh in any::<u32>(), depth in any::<u32>()) {
+        fn only_opaque_keys_contain_state_and_mesh(byte in any::<u8>(), mesh in any::<u32>(), depth in any::<u32>()) {
             let state = DrawState::from_byte(byte);
-            prop_assert_eq!(SortKey::opaque(state, mesh, depth).repeated(), Some((state, mesh)));
-            prop_assert_eq!(SortKey::blended(depth).repeated(), None);
-            prop_assert_eq!(SortKey::LAST.repeated(), None);
+            prop_assert_eq!(SortKey::opaque(state, mesh, depth).state_and_mesh(), Some((state, mesh)));
+            prop_assert_eq!(SortKey::blended(depth).state_and_mesh(), None);
+            prop_assert_eq!(SortKey::LAST.state_and_mesh(), None);
         }
     }
 
     #[test]
-    fn opaque_comes_before_blended_comes_before_nothing() {
+    fn opaque_keys_come_before_blended_ones_and_those_before_empty_ones() {
         let state = DrawState::new(Topology::TriangleStrip, Cull::Nothing, Blend::Subtractive);
         let last_opaque = SortKey::opaque(state, u32::MAX, u32::MAX);
         assert!(last_opaque < SortKey::blended(u32::MAX));

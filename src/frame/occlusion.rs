@@ -6,8 +6,8 @@ use std::time::Duration;
 use super::jobs::FrameJobs;
 use super::phase::{FrameContext, FrameTables};
 use crate::backend::Backend;
+use crate::command::{Blending, Selection};
 use crate::process::{Draws, FramePlan, Pass};
-use crate::queue::{Blending, Selection};
 use crate::scene::{Blend, SceneRef, ViewKind};
 use crate::view::{Occlusion, RenderView};
 
@@ -139,7 +139,7 @@ pub(super) fn choose_occluders<B: Backend>(frame: &FrameContext<'_, B>, view: us
     let FrameTables { objects, visible, occlusion, occluder_meshes, .. } = frame.tables;
     let occluders = frame.occluders[view].as_deref().unwrap_or_default();
     occlusion[view].occlusion.choose(frame.request.scene, objects, &visible[view], occluder_meshes, |draw| {
-        let is_drawn = |selection: &Selection| selection.takes(draw.state.blend(), draw.material);
+        let is_drawn = |selection: &Selection| selection.contains(draw.state.blend(), draw.material);
         draw.state.blend() == Blend::None && occluders.iter().any(is_drawn)
     });
 }

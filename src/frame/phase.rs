@@ -12,10 +12,10 @@ use super::triangles::{AskingMeshes, PassTriangles};
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
 use crate::blocks::Blocks;
 use crate::command::RenderCommand;
+use crate::command::{Bucket, DrawList, Selection, SortScratch, Splitters, instance, sort};
 use crate::graph::{Node, NodeError};
-use crate::queue::{DrawList, DrawPart, Fill, Selection, SortMemory, Split, instance, sort};
 use crate::task::Worker;
-use crate::view::{LightTable, ObjectTable, OccluderMeshes, VisibleSet};
+use crate::view::{Fill, LightTable, ObjectTable, OccluderMeshes, VisibleSet};
 
 /// What a node of the frame's job graph does: one phase, of the frame, of a view, or of a pass (by index).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ pub(super) struct FrameTables {
     /// One for each pass.
     pub(super) passes: Vec<PassTable>,
     /// One for each worker.
-    sort_memory: Vec<Mutex<SortMemory>>,
+    sort_memory: Vec<Mutex<SortScratch>>,
 }
 
 /// What one pass draws, on its way from slots to batches.
@@ -99,9 +99,9 @@ pub(super) struct PassTable {
     /// Which objects it draws; `None` for a pass without commands.
     pub(super) selection: Option<Selection>,
     commands: Blocks<RenderCommand>,
-    split: RwLock<Split>,
+    split: RwLock<Splitters>,
     /// As many as there may be at most.
-    parts: Vec<RwLock<DrawPart>>,
+    parts: Vec<RwLock<Bucket>>,
     pub(super) list: RwLock<DrawList>,
     pub(super) triangles: RwLock<PassTriangles>,
 }
@@ -118,8 +118,8 @@ impl PassTable {
             *self.triangles.get_mut() = PassTriangles::default();
         }
         if selection.is_some() {
-            self.commands.reserve(objects, RenderCommand::NOTHING);
-            self.parts.resize_with(Split::MOST_PARTS, RwLock::default);
+            self.commands.reserve(objects, RenderCommand::EMPTY);
+            self.parts.resize_with(Splitters::MAX_BUCKETS, RwLock::default);
         }
     }
 }
@@ -238,7 +238,7 @@ impl Phase {
             Self::Occlusion { view } if tables.occlusion[view].is_on() => tables.objects.len(),
             Self::CoarseDepth { .. } | Self::Occlusion { .. } => 0,
             Self::Fill { pass } => visible_count(frame, pass),
-            Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().part_count(),
+            Self::Sort { pass } | Self::Instance { pass } => tables.passes[pass].split.read().bucket_count(),
             Self::Triangles { pass } => tables.passes[pass].triangles.read().len(),
             Self::Record { pass } => part_count(frame, pass),
             Self::Compact { .. }
@@ -295,7 +295,7 @@ impl Phase {
     /// share of the visible objects counts, drawn or not, since as much is known when they are split.
     fn known_items<B: Backend>(self, frame: &FrameContext<'_, B>, range: Range<usize>) -> Option<usize> {
         if let Self::Sort { pass } = self {
-            let parts = frame.tables.passes[pass].split.read().part_count();
+            let parts = frame.tables.passes[pass].split.read().bucket_count();
             return Some(visible_count(frame, pass) * range.len() / parts);
         }
         self.can_be_cut().then(|| range.len())
@@ -345,7 +345,7 @@ impl FrameNode {
                 let count = visible_count(frame, pass);
                 // Each part reads every key of the view, so there are no more than there are workers.
                 let parts = count.div_ceil(self.job_size(frame, count)).min(frame.workers);
-                table.split.write().cut(&table.commands, count, parts);
+                table.split.write().choose(&table.commands, count, parts);
             }
             Phase::Sort { pass } => {
                 let table = &tables.passes[pass];
@@ -353,7 +353,7 @@ impl FrameNode {
                 let mut memory = tables.sort_memory[worker.index()].lock();
                 for part in range {
                     let sorted = &mut table.parts[part].write().commands;
-                    sort(&table.commands, count, split.part(part), &mut memory, sorted);
+                    sort(&table.commands, count, split.key_range(part), &mut memory, sorted);
                 }
             }
             Phase::Instance { pass } => {
@@ -418,7 +418,7 @@ fn join<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) {
     let table = &frame.tables.passes[pass];
     let mut list = table.list.write();
     list.clear();
-    for part in &table.parts[..table.split.read().part_count()] {
+    for part in &table.parts[..table.split.read().bucket_count()] {
         list.append(&mut part.write(), |mesh| merges(frame, pass, mesh));
     }
 }

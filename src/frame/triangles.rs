@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use parking_lot::Mutex;
 
-use crate::queue::DrawList;
+use crate::command::DrawList;
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, SceneRef};
 use crate::view::RenderView;

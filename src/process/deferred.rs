@@ -6,8 +6,8 @@ use super::{
     DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, PlanError, PostStep, RenderProcess,
     Requirements, ShadowCasters, ToneMapping, Transparency,
 };
+use crate::command::MaterialShare;
 use crate::quality::Quality;
-use crate::queue::MaterialShare;
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 

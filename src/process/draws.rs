@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 #[cfg(feature = "wgpu")]
 use super::RawPass;
-use crate::queue::Selection;
+use crate::command::Selection;
 use crate::scene::Blend;
 use crate::view::LightClass;
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::geometry_buffer_twin::GeometryBufferTwin;
 use super::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess, Twin};
-use crate::queue::{Blending, MaterialShare, Selection};
+use crate::command::{Blending, MaterialShare, Selection};
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for radiance:
 ///

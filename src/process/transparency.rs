@@ -4,7 +4,7 @@ use super::shadow::shadow_shader;
 use super::shadow_twin::ShadowReader;
 use super::transparency_twin::TransparencyTwin;
 use super::{CommandDraws, Declare, Draws, RenderProcess, ShadowCasters, Twin};
-use crate::queue::Selection;
+use crate::command::Selection;
 use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
 

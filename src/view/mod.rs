@@ -1,6 +1,7 @@
 //! Views: "everything is a camera" (M 10.4). What there is, worked out once a frame, and what of it each view sees.
 
 mod boxes;
+mod fill;
 mod fixed_position;
 mod frustum;
 mod gpu_light;
@@ -13,10 +14,12 @@ mod rejection;
 mod render_view;
 mod shadow_maps;
 mod spheres;
+mod subdivision_level;
 mod triangle_culling;
 mod visible_set;
 
 pub use boxes::{Boxes, ObjectBox};
+pub(crate) use fill::Fill;
 pub use fixed_position::FixedPosition;
 pub use frustum::Frustum;
 pub use gpu_light::GpuLight;

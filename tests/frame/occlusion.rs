@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
+use drawloom::command::{Blending, Selection};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::queue::{Blending, Selection};
 use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};

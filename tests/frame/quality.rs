@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use drawloom::Renderer;
 use drawloom::backend::NullBackend;
+use drawloom::command::DrawList;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{DepthCurve, DepthKey, Quality, ShadowQuality};
-use drawloom::queue::DrawList;
 use drawloom::scene::{Blend, Light, Scene};
 use drawloom::task::Scheduler;
 
@@ -88,19 +88,19 @@ fn half_the_angle_is_a_halving_more() {
         range: 100.0,
         casts_shadow: true,
     }];
-    let halvings = |widest_edge: f32| {
+    let level = |widest_edge: f32| {
         let shadows = ShadowQuality { widest_edge, ..ShadowQuality::default() };
         let list = drawn(&scene, Quality { shadows, ..Quality::balanced() }, "shadow casters", 2);
         let mut of_objects: Vec<_> =
-            list.commands().map(|command| (command.object, command.state.halvings())).collect();
+            list.commands().map(|command| (command.object, command.state.subdivision_level())).collect();
         of_objects.sort();
         of_objects
     };
     // No edge is seen under that.
-    assert!(halvings(90.0).iter().all(|(_, halvings)| *halvings == 0));
-    let fine = halvings(0.5);
-    assert!(fine.len() > 100 && fine.iter().any(|(_, halvings)| *halvings > 1));
-    for ((object, fine), (other, coarse)) in fine.into_iter().zip(halvings(1.0)) {
+    assert!(level(90.0).iter().all(|(_, level)| *level == 0));
+    let fine = level(0.5);
+    assert!(fine.len() > 100 && fine.iter().any(|(_, level)| *level > 1));
+    for ((object, fine), (other, coarse)) in fine.into_iter().zip(level(1.0)) {
         assert_eq!((object, fine.saturating_sub(1)), (other, coarse));
     }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest};
+use drawloom::command::{Bucket, DrawList};
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
 use drawloom::quality::Quality;
-use drawloom::queue::{DrawList, DrawPart};
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::view::{LightTable, ObjectTable, Rejections, RenderView};
@@ -86,7 +86,7 @@ fn a_frame_by_the_rules_breaks_none() {
 #[test]
 fn commands_out_of_order_are_refused() {
     let rule = broken_rule(|worker, frame, list, request| {
-        let mut part = DrawPart {
+        let mut part = Bucket {
             commands: list.commands().rev().copied().collect(),
             batches: list.batches.clone(),
             objects: list.objects.clone(),

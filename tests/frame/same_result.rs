@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drawloom::backend::{NullBackend, NullPass};
+use drawloom::command::{DrawList, Splitters};
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::queue::{DrawList, Split};
 use drawloom::scene::{Blend, Projection, Scene, sample};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
@@ -62,7 +62,7 @@ fn a_view_of_so_many_objects_that_it_is_sorted_in_parts() {
     scene.cameras.truncate(1);
     scene.duplicate_objects(40);
     let (lists, passes, _) = drawn(&scene, 1, Granularity::PerCamera);
-    assert!(lists[0].objects.len() > 8 * Split::FEWEST, "{}", lists[0].objects.len());
+    assert!(lists[0].objects.len() > 8 * Splitters::MIN_COMMANDS_PER_BUCKET, "{}", lists[0].objects.len());
     assert!(lists[0].commands().is_sorted_by(|one, next| (one.key, one.object) < (next.key, next.object)));
     let batches = lists[0].batches.windows(2);
     assert!(batches.into_iter().all(|pair| (pair[0].mesh, pair[0].state) != (pair[1].mesh, pair[1].state)));

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::Renderer;
 use drawloom::backend::{Encode, Record, WgpuBackend};
+use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
-use drawloom::queue::Selection;
 use drawloom::task::Scheduler;
 use libtest_mimic::Failed;
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::backend::BackendError;
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Deferred, Draws, Exposure, Format, FullScreen, GeometryBuffer, GeometryFormats,
     RawPass, RenderProcess, Resolved, ToneMapping,
 };
-use drawloom::queue::Selection;
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
 use drawloom::{FrameError, wgpu};
 use libtest_mimic::Failed;

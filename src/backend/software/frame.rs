@@ -17,9 +17,9 @@ use super::submission::SoftwareSubmission;
 use super::targets::FrameTargets;
 use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, PassRequest};
+use crate::command::{Batch, DrawList};
 use crate::process::{FullScreenTwin, LightTwin, LightValues, ObjectTwin, Pass, ViewValues};
 use crate::quality::VertexFormat;
-use crate::queue::{Batch, DrawList};
 use crate::scene::{Blend, Mesh};
 use crate::view::ObjectTable;
 
@@ -133,9 +133,9 @@ impl<R: Number> Frame<R> {
             PassDraws::Objects { twin, writes_depth } => {
                 let subdivided = self.subdivided.lock();
                 let mesh_of = |batch: &Batch| {
-                    let mesh = match batch.state.halvings() {
+                    let mesh = match batch.state.subdivision_level() {
                         0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
-                        halvings => subdivided.get(&(batch.mesh, halvings)).map(|mesh| &mesh.drawn),
+                        level => subdivided.get(&(batch.mesh, level)).map(|mesh| &mesh.drawn),
                     };
                     mesh.cloned().ok_or_else(no_such_mesh)
                 };

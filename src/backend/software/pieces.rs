@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::number::Number;
 use super::tiles::Tiling;
+use crate::command::Batch;
 use crate::command::Cull;
 use crate::process::{Corner, ObjectTwin, ObjectValues, VertexValues, ViewValues};
-use crate::queue::Batch;
 use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
 use crate::scene::{Blend, Mesh, Vertex};
 

@@ -8,7 +8,7 @@ use super::growing_buffer::MirroredBuffer;
 use super::record::mesh_of;
 use super::uploads::Uploads;
 use crate::backend::BackendError;
-use crate::queue::DrawList;
+use crate::command::DrawList;
 
 /// The arguments of a pass's indirect draws: those of each batch at its own place.
 #[derive(Default)]
@@ -44,7 +44,7 @@ impl Arguments {
         let buffer = buffer.get_or_insert_with(|| MirroredBuffer::new("indirect draws", wgpu::BufferUsages::INDIRECT));
         let bytes = buffer.rewrite();
         for (place, batch) in list.batches.iter().enumerate() {
-            let arguments = match (batch.state.halvings(), list.remaining(place)) {
+            let arguments = match (batch.state.subdivision_level(), list.remaining(place)) {
                 (0, None) => {
                     let mesh = mesh_of(assets, batch)?;
                     DrawIndexedIndirectArgs {

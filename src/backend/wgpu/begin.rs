@@ -8,8 +8,8 @@ use super::kept::{ProcessGroup, Surroundings};
 use super::subdivided_mesh::SubdividedMesh;
 use super::{Record, WgpuBackend, WgpuFrame};
 use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawList;
 use crate::process::{Access, Pass};
-use crate::queue::DrawList;
 use crate::scene::Mesh;
 
 impl WgpuBackend {

@@ -1,7 +1,7 @@
 //! Which way a pass is recorded, by what each way was measured to cost.
 
 use super::ways::{Encode, Way};
-use crate::queue::DrawList;
+use crate::command::DrawList;
 
 /// Chooses a way for one pass from frame to frame.
 ///

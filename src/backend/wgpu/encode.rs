@@ -10,8 +10,8 @@ use super::frame_pass::FramePass;
 use super::ways::Share;
 use super::{Record, WgpuBackend, WgpuCommands, WgpuFrame, WgpuPart, WgpuSubmission, record};
 use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawList;
 use crate::process::{Draws, Pass};
-use crate::queue::DrawList;
 
 impl WgpuBackend {
     /// Encodes a whole pass: its bundles, or what it draws without any.

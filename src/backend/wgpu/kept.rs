@@ -11,7 +11,7 @@ use super::assets::AssetSnapshot;
 use super::pipelines::ProcessPipelines;
 use super::subdivided_mesh::SubdividedMesh;
 use crate::backend::subdivisions::{Subdivided, SubdividedMeshes};
-use crate::queue::Batch;
+use crate::command::Batch;
 
 /// What all bundles of a pass are recorded with. Pipelines know the formats of their targets; the snapshot knows where meshes
 /// lie in the arenas.
@@ -111,8 +111,8 @@ fn drawn<'a>(
     batches: &'a [Batch],
     subdivided: &'a SubdividedMeshes<SubdividedMesh>,
 ) -> impl Iterator<Item = &'a Arc<Subdivided<SubdividedMesh>>> {
-    let halved = batches.iter().filter(|batch| batch.state.halvings() > 0);
-    halved.filter_map(|batch| subdivided.get(&(batch.mesh, batch.state.halvings())))
+    let halved = batches.iter().filter(|batch| batch.state.subdivision_level() > 0);
+    halved.filter_map(|batch| subdivided.get(&(batch.mesh, batch.state.subdivision_level())))
 }
 
 /// What a pass has at `@group(2)`: its parameters and the targets that it samples.

@@ -9,10 +9,10 @@ use super::chooser::Chooser;
 use super::layouts::{Layouts, Sampled, process_layout, texture_format};
 use super::vertices::{attributes, stride};
 use super::ways::Ways;
+use crate::command::Batch;
 use crate::command::{Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess, SHADER_PRELUDE};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
-use crate::queue::Batch;
 use crate::scene::{Blend, LightKind, Topology, ViewKind};
 
 /// The pipelines of one process: one for each state that a scene has needed so far.
@@ -185,7 +185,7 @@ impl ProcessPipelines {
         let mut made = HashMap::new();
         let prepared = self.prepared();
         for run in batches.chunk_by(|one, next| one.state == next.state) {
-            let state = run[0].state.of_pipeline();
+            let state = run[0].state.pipeline_state();
             if !prepared.contains_key(&state) && !made.contains_key(&state) {
                 made.extend(self.make(device, state));
             }

@@ -16,8 +16,8 @@ use super::ways::{Record, Share};
 use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawState;
+use crate::command::{Batch, DrawList};
 use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
-use crate::queue::{Batch, DrawList};
 
 /// An earlier frame's bundle at a place of a pass that has one encoder, if that way is taken and there is one.
 pub(super) fn kept(frame: &WgpuFrame, index: usize, list: &DrawList, place: usize) -> Option<WgpuPart> {
@@ -109,10 +109,10 @@ impl<'a> Prepared<'a> {
         let mut start = places.start;
         for run in self.list.batches[places].chunk_by(|one, next| one.state == next.state) {
             let state = run[0].state;
-            let pipeline = self.by_state.get(&state.of_pipeline());
+            let pipeline = self.by_state.get(&state.pipeline_state());
             encoder.set_pipeline(pipeline.ok_or_else(|| broken("a pipeline is made before it is used"))?);
             let end = start + run.len();
-            if state.halvings() > 0 {
+            if state.subdivision_level() > 0 {
                 self.draw_subdivided(encoder, run)?;
                 self.set_arenas(encoder);
             } else if self.list.is_whole() {
@@ -174,7 +174,7 @@ impl<'a> Prepared<'a> {
 
     fn draw_subdivided(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         for batch in run {
-            let mesh = self.subdivided.get(&(batch.mesh, batch.state.halvings()));
+            let mesh = self.subdivided.get(&(batch.mesh, batch.state.subdivision_level()));
             let mesh = mesh.ok_or_else(|| broken("a mesh is subdivided before it is drawn"))?;
             let mesh = &mesh.drawn;
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));

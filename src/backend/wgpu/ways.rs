@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::chooser::Chooser;
-use crate::queue::DrawList;
+use crate::command::DrawList;
 
 /// How a pass's batches become commands of the device. The picture is the same from all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -171,8 +171,8 @@ impl Ways {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
+    use crate::command::Batch;
     use crate::command::DrawState;
-    use crate::queue::Batch;
 
     fn list(batches: u32) -> DrawList {
         let batch = |first| Batch { mesh: 0, state: DrawState::PLAIN, first, count: 1 };

@@ -45,7 +45,7 @@ const STATE: u8 = 1 << 6;
 
 impl Default for Coder {
     fn default() -> Self {
-        let last = RenderCommand { key: SortKey::from_bits(0), ..RenderCommand::NOTHING };
+        let last = RenderCommand { key: SortKey::from_bits(0), ..RenderCommand::EMPTY };
         Self { last, step: 0 }
     }
 }
@@ -137,7 +137,7 @@ impl Coder {
     /// What a command with this key is likely to draw.
     fn expected(&self, key: SortKey) -> Expected {
         let RenderCommand { mesh, material, state, .. } = self.last;
-        let (state, mesh) = key.repeated().unwrap_or((state, mesh));
+        let (state, mesh) = key.state_and_mesh().unwrap_or((state, mesh));
         Expected { mesh, material, state }
     }
 }

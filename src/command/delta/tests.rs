@@ -154,7 +154,7 @@ proptest! {
 
 #[test]
 fn a_huge_count_takes_no_memory_and_no_time() {
-    let mut bytes = DeltaCommands::encode(&[RenderCommand::NOTHING; 3]).into_bytes();
+    let mut bytes = DeltaCommands::encode(&[RenderCommand::EMPTY; 3]).into_bytes();
     bytes[8..HEADER].fill(0xff);
     let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len());
     assert_eq!(error, Err(DeltaError::Truncated { index: 3, count: u64::MAX }));
@@ -188,7 +188,7 @@ fn copies_of_an_object_are_a_byte_each() {
 
 #[test]
 fn memory_is_kept_from_frame_to_frame() {
-    let commands = [RenderCommand::NOTHING, RenderCommand { object: 9, ..RenderCommand::NOTHING }].repeat(1_000);
+    let commands = [RenderCommand::EMPTY, RenderCommand { object: 9, ..RenderCommand::EMPTY }].repeat(1_000);
     let mut coded = DeltaCommands::encode(&commands);
     let before = (coded.bytes().as_ptr(), coded.bytes.capacity());
     coded.clear();

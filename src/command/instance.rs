@@ -1,25 +1,23 @@
 //! Instance: equal runs become one draw (M 10.5, "Sorting and Instancing").
 
-use super::{Batch, DrawPart};
-use crate::command::RenderCommand;
+use super::{Batch, Bucket, RenderCommand};
 
-/// Merges the part's sorted commands into batches: neighbours with the same mesh and state become one instanced draw,
-/// or, where the mesh in a slot is not one that `merges`, each of them a draw of its own.
+/// Merges the bucket's sorted commands into batches: neighbours with the same mesh and state become one instanced draw. Where
+/// `can_merge` does not hold for a mesh's slot, each command of that mesh is a batch of its own.
 ///
-/// Neighbours of different materials share a batch, because shaders find materials by object. Redundant state is
-/// filtered by the same stroke: what stays the same from one batch to the next is not set again when they are recorded.
-pub fn instance(part: &mut DrawPart, merges: impl Fn(u32) -> bool) {
-    part.batches.clear();
-    part.objects.clear();
-    part.objects.extend(part.commands.iter().map(|command| command.object));
+/// Neighbours with different materials share a batch, because shaders find materials by object.
+pub(crate) fn instance(bucket: &mut Bucket, can_merge: impl Fn(u32) -> bool) {
+    bucket.batches.clear();
+    bucket.objects.clear();
+    bucket.objects.extend(bucket.commands.iter().map(|command| command.object));
     let mut first = 0;
     let is_same = |one: &RenderCommand, next: &RenderCommand| {
-        (one.state, one.mesh) == (next.state, next.mesh) && merges(one.mesh)
+        (one.state, one.mesh) == (next.state, next.mesh) && can_merge(one.mesh)
     };
-    for run in part.commands.chunk_by(is_same) {
+    for run in bucket.commands.chunk_by(is_same) {
         let RenderCommand { mesh, state, .. } = run[0];
         let count = run.len() as u32;
-        part.batches.push(Batch { mesh, state, first, count });
+        bucket.batches.push(Batch { mesh, state, first, count });
         first += count;
     }
 }
@@ -30,8 +28,8 @@ mod tests {
 
     use super::*;
     use crate::blocks::Blocks;
-    use crate::command::{Cull, DrawState, SortKey};
-    use crate::queue::{DrawList, Part, SortMemory, sort};
+    use crate::command::splitters::KeyRange;
+    use crate::command::{Cull, DrawList, DrawState, SortKey, SortScratch, sort};
     use crate::scene::{Blend, Topology};
 
     fn any_command() -> impl Strategy<Value = Option<RenderCommand>> {
@@ -56,27 +54,27 @@ mod tests {
         ) {
             let commands: Vec<_> = (0..)
                 .zip(commands)
-                .map(|(object, command)| command.map_or(RenderCommand::NOTHING, |command| RenderCommand { object, ..command }))
+                .map(|(object, command)| command.map_or(RenderCommand::EMPTY, |command| RenderCommand { object, ..command }))
                 .collect();
             let mut slots = Blocks::new();
-            slots.reserve(commands.len(), RenderCommand::NOTHING);
+            slots.reserve(commands.len(), RenderCommand::EMPTY);
             for (index, &command) in commands.iter().enumerate() {
                 slots.write(index / 256)[index % 256] = command;
             }
             let mut starts: Vec<_> = cuts.iter().flatten().map(|command| command.key).collect();
             starts.sort();
             let edges: Vec<_> = [SortKey::FIRST].into_iter().chain(starts).chain([SortKey::LAST]).collect();
-            let mut memory = SortMemory::default();
+            let mut scratch = SortScratch::default();
             let sorted = |pair: &[SortKey]| {
-                let mut part = DrawPart::default();
-                sort(&slots, commands.len(), Part::between(pair[0], pair[1]), &mut memory, &mut part.commands);
-                instance(&mut part, |_| merges);
-                part
+                let mut bucket = Bucket::default();
+                sort(&slots, commands.len(), KeyRange::between(pair[0], pair[1]), &mut scratch, &mut bucket.commands);
+                instance(&mut bucket, |_| merges);
+                bucket
             };
-            let mut parts: Vec<_> = edges.windows(2).map(sorted).collect();
+            let mut buckets: Vec<_> = edges.windows(2).map(sorted).collect();
             let mut list = DrawList::default();
             list.clear();
-            parts.iter_mut().for_each(|part| list.append(part, |_| merges));
+            buckets.iter_mut().for_each(|bucket| list.append(bucket, |_| merges));
 
             let mut expected: Vec<_> = commands.into_iter().filter(|command| command.key != SortKey::LAST).collect();
             expected.sort_by_key(|command| (command.key, command.object));
@@ -89,8 +87,8 @@ mod tests {
             let wanted = expected.iter().map(|command| (command.mesh, command.state, command.object));
             prop_assert!(drawn.eq(wanted));
             let merged = list.batches.windows(2).all(|pair| (pair[0].mesh, pair[0].state) != (pair[1].mesh, pair[1].state));
-            prop_assert!(merged || !merges, "two neighbours that could have been one");
-            prop_assert!(merges || list.batches.len() == expected.len(), "two that were to stay two");
+            prop_assert!(merged || !merges, "two neighbours that should be one batch");
+            prop_assert!(merges || list.batches.len() == expected.len(), "a batch of two commands that may not merge");
             let bundled: usize = (0..list.bundle_count()).map(|bundle| list.bundle(bundle).len()).sum();
             prop_assert_eq!(bundled, list.batches.len());
         }

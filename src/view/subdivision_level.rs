@@ -1,24 +1,29 @@
-//! How finely meshes are subdivided for paraboloids, which bend straight edges.
+//! How finely meshes are subdivided for paraboloid views, which bend straight edges.
 
 use glam::{DVec3, Vec3};
 
 use crate::scene::SceneRef;
 use crate::view::RenderView;
 
-/// How often the edges of an object are to be halved in the view of a paraboloid: until they are seen under `widest_angle`
-/// radians at most; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that lies
-/// behind the camera as a whole, and keeps no light from anything.
+/// The subdivision level of an object in a paraboloid view: how often its edges are halved until none is seen under more than
+/// `widest_angle` radians; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that
+/// lies entirely behind the camera and so casts no shadow.
 ///
-/// The distance is that of the nearest place of the mesh's box, so the result is the same for every instance at one distance.
-/// A box that is very near, or around the camera, says little; then every triangle is looked at. The result may be more than
-/// [`DrawState::FINEST`](crate::command::DrawState::FINEST).
-pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize, widest_angle: f64) -> Option<u32> {
+/// The distance is that of the nearest point of the mesh's box, so instances at one distance have one level. Where the box is very
+/// near, or contains the camera, the distance of every triangle is computed instead. The level may exceed
+/// [`DrawState::MAX_SUBDIVISION_LEVEL`](crate::command::DrawState::MAX_SUBDIVISION_LEVEL).
+pub(super) fn subdivision_level(
+    view: &RenderView,
+    scene: &SceneRef<'_>,
+    object: usize,
+    widest_angle: f64,
+) -> Option<u32> {
     let mesh = scene.assets.get(scene.meshes[object]).ok()?;
     let scale = scene.scales[object];
     let to_object = scene.orientations[object].normalize().as_dquat().inverse();
     let eye = to_object * (view.camera.position - scene.positions[object]);
     let forward = to_object * (view.camera.orientation.normalize() * Vec3::NEG_Z).as_dvec3();
-    let nearest = f64::from(view.camera.far) * NEAREST;
+    let min_distance = f64::from(view.camera.far) * MIN_DISTANCE_SHARE;
 
     let [one, other] = mesh.corners().map(|corner| (corner * scale).as_dvec3());
     let (low, high) = (one.min(other), one.max(other));
@@ -28,26 +33,26 @@ pub(super) fn halvings(view: &RenderView, scene: &SceneRef<'_>, object: usize, w
     }
     let edge = f64::from(mesh.longest_edge()) * f64::from(scale.abs().max_element());
     let until = |shortest: f64| (edge / shortest).log2().ceil().clamp(0.0, 64.0) as u32;
-    let by_box = until(widest_angle * eye.distance(eye.clamp(low, high)).max(nearest));
-    if by_box < WORTH_A_LOOK {
+    let by_box = until(widest_angle * eye.distance(eye.clamp(low, high)).max(min_distance));
+    if by_box < TRIANGLE_TEST_THRESHOLD {
         return Some(by_box);
     }
     let places = |corner: u32| (Vec3::from(mesh.vertices()[corner as usize].position) * scale).as_dvec3() - eye;
     let shortest = mesh.triangles().map(|corners| corners.map(places)).filter_map(|[a, b, c]| {
-        let widest = widest_angle * distance_to_triangle(a, b, c).max(nearest);
+        let widest = widest_angle * distance_to_triangle(a, b, c).max(min_distance);
         let is_before = [a, b, c].iter().any(|corner| forward.dot(*corner) > 0.0);
         (is_before && a.distance(b).max(b.distance(c)).max(c.distance(a)) > widest).then_some(widest)
     });
     Some(shortest.reduce(f64::min).map_or(0, until))
 }
 
-/// What is nearer to a light than this share of its range counts as if it were there.
-const NEAREST: f64 = 1e-3;
+/// Nearer geometry is treated as at this share of the light's range.
+const MIN_DISTANCE_SHARE: f64 = 1e-3;
 
-/// How many halvings by the box make a look at every triangle worth its time.
-const WORTH_A_LOOK: u32 = 4;
+/// From this level by the box on, testing every triangle is worth its time.
+const TRIANGLE_TEST_THRESHOLD: u32 = 4;
 
-/// From the origin to the nearest place of a triangle.
+/// The distance from the origin to the nearest point of a triangle.
 fn distance_to_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let normal = (b - a).cross(c - a);
     // Inside, where the origin is on the inner side of all three edges.
@@ -92,7 +97,7 @@ mod tests {
             kind: ViewKind::Shadow,
             ..Camera::looking_at("lamp", DVec3::Y * height, DVec3::Y * (height - 1.0))
         };
-        halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, widest_angle)
+        subdivision_level(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, widest_angle)
     }
 
     #[test]
@@ -109,10 +114,10 @@ mod tests {
     }
 
     #[test]
-    fn twice_the_angle_is_a_halving_less() {
+    fn twice_the_angle_is_one_level_less() {
         for height in [0.5, 2.0, 10.0, 30.0] {
-            let halvings = |times: f64| floor_under(WIDEST_ANGLE * times, height, Vec3::ONE).unwrap();
-            assert_eq!([halvings(0.5), halvings(2.0)], [halvings(1.0) + 1, halvings(1.0) - 1], "{height}");
+            let level = |times: f64| floor_under(WIDEST_ANGLE * times, height, Vec3::ONE).unwrap();
+            assert_eq!([level(0.5), level(2.0)], [level(1.0) + 1, level(1.0) - 1], "{height}");
         }
         assert_eq!(floor_under(1e-300, 2.0, Vec3::ONE), Some(64));
     }
@@ -149,7 +154,7 @@ mod tests {
                 kind: ViewKind::Shadow,
                 ..Camera::looking_at("lamp", DVec3::Y * height, DVec3::Y * (height - 1.0))
             };
-            halvings(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, WIDEST_ANGLE)
+            subdivision_level(&RenderView::new(&lamp), &scene.as_scene_ref(), 0, WIDEST_ANGLE)
         };
         // 14 cm at 2 m are 4°, and at 10 cm 81°.
         assert_eq!(from(0.0), Some(0));
@@ -158,7 +163,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_distance_to_a_triangle_is_that_to_its_nearest_place(
+        fn the_distance_to_a_triangle_is_that_to_its_nearest_point(
             corners in prop::array::uniform3(prop::array::uniform3(-3.0..3.0_f64)),
         ) {
             let [a, b, c] = corners.map(DVec3::from);

@@ -1,25 +1,25 @@
-//! A radix sort of numbers.
+//! A radix sort of integers.
 
-/// Sorts `entries` by their bits from `low` on, `width` of them, above which there is none; those that are equal in these keep
-/// their order. `swapped` and `counts` are memory to work in.
+/// Sorts `entries` by the `width` bits that begin at bit `low`; no higher bit is set. The sort is stable. `swapped` and `counts`
+/// are scratch memory.
 ///
-/// From the lowest digit to the highest, each pass a counting sort (Knuth, *The Art of Computer Programming* 3, 5.2.5).
-pub(super) fn sort_by_bits(
+/// It runs a counting sort per digit, from the lowest to the highest (Knuth, *The Art of Computer Programming* 3, 5.2.5).
+pub(super) fn radix_sort(
     entries: &mut Vec<u64>,
     swapped: &mut Vec<u64>,
-    counts: &mut Vec<[u32; DIGITS]>,
+    counts: &mut Vec<[u32; DIGIT_VALUES]>,
     low: u32,
     width: u32,
 ) {
-    let passes = width.div_ceil(DIGIT_BITS);
+    let passes = width.div_ceil(MAX_DIGIT_BITS);
     if passes == 0 {
         return;
     }
-    // All digits are about as wide as each other, so that no pass has more places to write to than it must.
+    // Digits of equal width: no pass scatters to more positions than it must.
     let digit_bits = width.div_ceil(passes);
     let digits = 1 << digit_bits;
     let digit = |entry: u64, pass: u32| (entry >> (low + pass * digit_bits)) as usize & (digits - 1);
-    counts.resize(counts.len().max(passes as usize), [0; DIGITS]);
+    counts.resize(counts.len().max(passes as usize), [0; DIGIT_VALUES]);
     let counts = &mut counts[..passes as usize];
     for counts in &mut *counts {
         counts[..digits].fill(0);
@@ -37,19 +37,19 @@ pub(super) fn sort_by_bits(
             next += std::mem::replace(count, next);
         }
         for &entry in &*entries {
-            let place = &mut counts[digit(entry, pass)];
-            swapped[*place as usize] = entry;
-            *place += 1;
+            let position = &mut counts[digit(entry, pass)];
+            swapped[*position as usize] = entry;
+            *position += 1;
         }
         std::mem::swap(entries, swapped);
     }
 }
 
-/// Bits looked at in one pass at most: as many counters as fit into the nearest memory beside what is moved.
-const DIGIT_BITS: u32 = 11;
+/// The widest digit: its counters fit into the L1 cache beside the entries that move.
+const MAX_DIGIT_BITS: u32 = 11;
 
-/// The values of a digit.
-pub(super) const DIGITS: usize = 1 << DIGIT_BITS;
+/// The number of values of the widest digit.
+pub(super) const DIGIT_VALUES: usize = 1 << MAX_DIGIT_BITS;
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
@@ -59,7 +59,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn entries_are_sorted_as_a_stable_sort_would(
+        fn entries_are_sorted_as_by_a_stable_sort(
             mut entries in prop::collection::vec(any::<u64>(), 0..600),
             low in 0_u32..30,
             width in 0_u32..=34,
@@ -67,7 +67,7 @@ mod tests {
             entries.iter_mut().for_each(|entry| *entry &= (1 << (low + width)) - 1);
             let mut expected = entries.clone();
             expected.sort_by_key(|entry| entry >> low);
-            sort_by_bits(&mut entries, &mut vec![7; 3], &mut vec![[9; DIGITS]; 2], low, width);
+            radix_sort(&mut entries, &mut vec![7; 3], &mut vec![[9; DIGIT_VALUES]; 2], low, width);
             prop_assert_eq!(entries, expected);
         }
     }

@@ -1,0 +1,65 @@
+//! Which objects a process draws.
+
+use crate::scene::Blend;
+
+/// Which objects a process draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Selection {
+    /// By blending.
+    pub blending: Blending,
+    /// By material.
+    pub materials: MaterialShare,
+}
+
+impl Selection {
+    /// Every opaque object.
+    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL };
+    /// Every blended object.
+    pub const BLENDED: Self = Self { blending: Blending::Blended, materials: MaterialShare::ALL };
+    /// Every object: opaque ones first, then blended ones.
+    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL };
+
+    /// Whether it contains objects that blend like this and have the material in this slot.
+    pub fn contains(self, blend: Blend, material: u32) -> bool {
+        let blends = match self.blending {
+            Blending::Opaque => blend == Blend::None,
+            Blending::Blended => blend != Blend::None,
+            Blending::Both => true,
+        };
+        // The comparison comes first: the division costs as much as the rest of a command.
+        blends && (self.materials == MaterialShare::ALL || material % self.materials.of.max(1) == self.materials.index)
+    }
+}
+
+/// Objects by how they mix with the target's colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Blending {
+    /// Objects without blending.
+    #[default]
+    Opaque,
+    /// Objects with any blending.
+    Blended,
+    /// Both.
+    Both,
+}
+
+/// A share of the materials: those whose slot modulo `of` is `index`. The shares 0 to `of` − 1 are disjoint and contain every
+/// material, so a process that is added once per share splits its work by material (L 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MaterialShare {
+    /// Which share, counted from 0.
+    pub index: u32,
+    /// The number of shares; 0 counts as 1.
+    pub of: u32,
+}
+
+impl MaterialShare {
+    /// Every material.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+}
+
+impl Default for MaterialShare {
+    fn default() -> Self {
+        Self::ALL
+    }
+}

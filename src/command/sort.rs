@@ -1,0 +1,75 @@
+//! Sort: commands by key, equal keys by object.
+
+use super::key_packer::KeyPacker;
+use super::radix_sort::{DIGIT_VALUES, radix_sort};
+use super::splitters::KeyRange;
+use super::{RenderCommand, SortKey};
+use crate::blocks::Blocks;
+
+/// Scratch memory for sorting. Each worker keeps one.
+#[derive(Debug, Default)]
+pub(crate) struct SortScratch {
+    commands: Vec<RenderCommand>,
+    /// For each command its packed key, and in the bits below that its index in `commands`.
+    entries: Vec<u64>,
+    swapped_entries: Vec<u64>,
+    digit_counts: Vec<[u32; DIGIT_VALUES]>,
+}
+
+/// Sorts the first `count` commands whose keys lie in `range` into `sorted`, and leaves out empty commands. Equal keys are
+/// ordered by object, so the order is total: it depends neither on the algorithm nor on which worker filled which command, and
+/// the buckets in sequence are the same whatever their number.
+///
+/// The commands lie in the order of their objects, as [`Fill`](crate::view::Fill) writes them.
+pub(crate) fn sort(
+    commands: &Blocks<RenderCommand>,
+    count: usize,
+    range: KeyRange,
+    scratch: &mut SortScratch,
+    sorted: &mut Vec<RenderCommand>,
+) {
+    collect(commands, count, range, &mut scratch.commands);
+    sorted.clear();
+    let Some(first) = scratch.commands.first() else { return };
+    let differing = scratch.commands.iter().fold(0, |bits, command| bits | (command.key.bits() ^ first.key.bits()));
+    let packer = KeyPacker::new(differing);
+    let index_width = usize::BITS - (scratch.commands.len() - 1).leading_zeros();
+    if packer.width() + index_width > u64::BITS {
+        sorted.extend_from_slice(&scratch.commands);
+        sorted.sort_unstable_by_key(|command| (command.key, command.object));
+        return;
+    }
+    let entry = |(index, command): (u64, &RenderCommand)| packer.pack(command.key).unbounded_shl(index_width) | index;
+    scratch.entries.clear();
+    scratch.entries.extend((0..).zip(&scratch.commands).map(entry));
+    if scratch.entries.len() < RADIX_SORT_THRESHOLD {
+        scratch.entries.sort_unstable();
+    } else {
+        let SortScratch { entries, swapped_entries, digit_counts, .. } = scratch;
+        radix_sort(entries, swapped_entries, digit_counts, index_width, packer.width());
+    }
+    let index_mask = u64::MAX.unbounded_shr(u64::BITS - index_width);
+    sorted.extend(scratch.entries.iter().map(|entry| scratch.commands[(entry & index_mask) as usize]));
+}
+
+/// Below this number of commands a comparison sort is faster than counting digits.
+const RADIX_SORT_THRESHOLD: usize = 512;
+
+fn collect(commands: &Blocks<RenderCommand>, count: usize, range: KeyRange, collected: &mut Vec<RenderCommand>) {
+    collected.clear();
+    let mut held = [RenderCommand::EMPTY; Blocks::<RenderCommand>::SIZE];
+    for (block, entries) in Blocks::<RenderCommand>::parts(0..count) {
+        let filled = &commands.read(block)[..entries.len()];
+        if range.is_all() && filled.iter().all(|command| command.key != SortKey::LAST) {
+            collected.extend_from_slice(filled);
+            continue;
+        }
+        // Branchless: a mispredicted branch costs more than a wasted store.
+        let mut held_count = 0;
+        for command in filled {
+            held[held_count] = *command;
+            held_count += usize::from(range.contains(command.key));
+        }
+        collected.extend_from_slice(&held[..held_count]);
+    }
+}

@@ -1,0 +1,95 @@
+//! Fill: a command for each object that a view sees (M 10.3, "Filling a RenderCommand Structure").
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::subdivision_level::subdivision_level;
+use crate::blocks::Blocks;
+use crate::command::{DrawState, RenderCommand, Selection, SortKey};
+use crate::quality::{DepthCodes, Quality};
+use crate::scene::{Blend, Projection, SceneRef};
+use crate::view::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, places};
+
+/// Fills the commands of one pass. It computes no state: it copies what the object table holds, so workers contend for nothing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fill<'a> {
+    /// The frame's objects.
+    pub(crate) table: &'a ObjectTable,
+    /// The view.
+    pub(crate) view: &'a RenderView,
+    /// The objects that it sees.
+    pub(crate) visible: &'a VisibleSet,
+    /// Which of them the process draws.
+    pub(crate) selection: Selection,
+    /// The scene, for what few views need to know about an object.
+    pub(crate) scene: &'a SceneRef<'a>,
+    /// The precision of the depth order, and of the subdivision for paraboloids.
+    pub(crate) quality: &'a Quality,
+}
+
+/// How a view orders commands by depth.
+struct DepthOrder {
+    forward: DVec3,
+    opaque: DepthCodes,
+    blended: DepthCodes,
+}
+
+impl Fill<'_> {
+    /// Writes one command for each visible object whose rank is in `ranks`, at the index that is its rank: its index among the
+    /// visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
+    pub(crate) fn run(&self, ranks: Range<usize>, commands: &Blocks<RenderCommand>) {
+        let camera = &self.view.camera;
+        let order = DepthOrder {
+            forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
+            opaque: self.quality.opaque_order.codes(camera.near, camera.far),
+            blended: self.quality.blended_order.codes(camera.near, camera.far),
+        };
+        for (block, part) in Blocks::<RenderCommand>::parts(ranks) {
+            let mut slots = commands.write(block);
+            // Visible objects come in order, so a block stays open for many of them.
+            let mut open = None;
+            self.visible.visit(part, |rank, word, bits| {
+                let first = word * VisibleSet::WORD;
+                let index = first / ObjectTable::BLOCK;
+                let (_, objects) = match open.take() {
+                    Some((current, guard)) if current == index => open.insert((current, guard)),
+                    _ => open.insert((index, self.table.block(index))),
+                };
+                let start = rank % Blocks::<RenderCommand>::SIZE;
+                for (slot, bit) in slots[start..].iter_mut().zip(places(bits)) {
+                    *slot = self.command(first + bit, objects, &order);
+                }
+            });
+        }
+    }
+
+    #[inline]
+    fn command(&self, object: usize, objects: &ObjectBlock, order: &DepthOrder) -> RenderCommand {
+        let entry = object % ObjectTable::BLOCK;
+        let draw = objects.draws[entry];
+        let blend = draw.state.blend();
+        if !self.selection.contains(blend, draw.material) {
+            return RenderCommand::EMPTY;
+        }
+        let mut state = draw.state;
+        if self.view.camera.projection == Projection::Paraboloid {
+            let widest_angle = f64::from(self.quality.shadows.widest_edge).to_radians();
+            let Some(level) = subdivision_level(self.view, self.scene, object, widest_angle) else {
+                return RenderCommand::EMPTY;
+            };
+            state = state.with_subdivision_level(level);
+            if level > DrawState::MAX_SUBDIVISION_LEVEL {
+                self.table.rejections().count_once(RejectionReason::CoarseEdges, object);
+            }
+        }
+        let center = objects.spheres.get(entry).center;
+        // In f64, rounded once: two depths that differ in f32 are in the right order, however far the objects are to the side.
+        let depth = order.forward.dot(center - self.view.camera.position) as f32;
+        let key = match blend {
+            Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.of(depth)),
+            _ => SortKey::blended(order.blended.of(depth)),
+        };
+        RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
+    }
+}
