@@ -6,10 +6,6 @@
 //! thread, the device thread, while the next update runs on another. Without a window: the picture goes into a texture
 //! that stands for the surface's, and at the end to `engine_loop.png`.
 
-#[path = "frame/adapter.rs"]
-#[expect(dead_code, reason = "the other half is for the frame example")]
-mod adapter;
-
 use std::error::Error;
 use std::sync::Arc;
 use std::thread;
@@ -30,7 +26,7 @@ const STEP: Duration = Duration::from_millis(16);
 
 fn main() -> Result<(), Box<dyn Error>> {
     // The engine's own device. What Drawloom needs of it is in WgpuBackend's constants.
-    let (device, queue) = adapter::device()?;
+    let (device, queue) = open_device()?;
     let surface = Arc::new(Surface::new(&device, [960, 540]));
 
     // One scheduler for the engine's own jobs and for Drawloom's.
@@ -266,6 +262,23 @@ fn surface_texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu::Te
 
 fn adapter_name(device: &wgpu::Device) -> String {
     device.adapter_info().name
+}
+
+/// A device on the machine's best adapter, with what Drawloom requires and what it can use beyond that.
+fn open_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..wgpu::RequestAdapterOptions::default()
+    };
+    let adapter = pollster::block_on(instance.request_adapter(&options))?;
+    let optional = adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES);
+    let descriptor = wgpu::DeviceDescriptor {
+        required_features: WgpuBackend::REQUIRED_FEATURES | optional,
+        required_limits: adapter.limits(),
+        ..wgpu::DeviceDescriptor::default()
+    };
+    Ok(pollster::block_on(adapter.request_device(&descriptor))?)
 }
 
 /// A cube of 2 m, each side with normals of its own.

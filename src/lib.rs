@@ -38,7 +38,6 @@
 //! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, with a
 //!   backend that counts and checks, and one that draws on the processor.
 //! - `obj` (default): OBJ files and their textures.
-//! - `flip`: FLIP (Andersson et al. 2020) in the example `tradeoff`. It needs a C++ compiler.
 //!
 //! # Spans
 //!

@@ -1,22 +1,4 @@
-//! Nothing that a camera sees is left out, whatever stands for it: the cases of `benches/culling.rs`, and frames.
-
-#[path = "../benches/culling/boxes.rs"]
-#[expect(dead_code, reason = "nothing is added up here")]
-mod boxes;
-#[path = "../benches/culling/cameras.rs"]
-mod cameras;
-#[path = "../benches/culling/naive.rs"]
-mod naive;
-#[path = "../benches/culling/oracle.rs"]
-mod oracle;
-#[path = "../benches/shared/random.rs"]
-#[expect(dead_code, reason = "there is more to draw by chance elsewhere")]
-mod random;
-#[path = "../benches/culling/spheres.rs"]
-#[expect(dead_code, reason = "nothing is added up here")]
-mod spheres;
-#[path = "../benches/culling/tally.rs"]
-mod tally;
+//! Nothing that a camera sees is left out, whatever stands for it: the cases of `benches/benches/culling/main.rs`, and frames.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -29,9 +11,9 @@ use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::view::{Frustum, ObjectTable};
-
-use boxes::{BoxTallies, Shapes, VOLUMES};
-use tally::Tallies;
+use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
+use drawloom_testing::culling::tally::Tallies;
+use drawloom_testing::culling::{boxes, spheres};
 
 /// Of what is outside and anywhere, the share that may be kept.
 const MOST_FALSE_VISIBLES: f64 = 1e-3;

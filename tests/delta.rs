@@ -2,17 +2,13 @@
 //!
 //! The case that needs a shared scene is ignored, and never passes, where that is missing.
 
-#[path = "../benches/shared/draw_lists.rs"]
-mod draw_lists;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use drawloom::command::DeltaCommands;
 use drawloom::scene::{Scene, obj, sample};
+use drawloom_testing::draw_lists::draw_lists;
 use libtest_mimic::{Arguments, Failed, Trial, run};
-
-use draw_lists::draw_lists;
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();

@@ -1,17 +1,7 @@
 //! A vertex is where it belongs in every picture, wherever in the world the camera is.
 
-#[path = "../benches/precision/cases.rs"]
-mod cases;
-#[path = "../benches/precision/measure.rs"]
-mod measure;
-#[path = "../benches/shared/random.rs"]
-#[expect(dead_code, reason = "orders are for benches")]
-mod random;
-#[path = "../benches/precision/vertex.rs"]
-mod vertex;
-
-use measure::{BOUND, HELD, MAGNIFYING, Origin, WORST_ANGLE, measure};
-use random::Random;
+use drawloom_testing::precision::measure::{BOUND, HELD, MAGNIFYING, Origin, WORST_ANGLE, measure};
+use drawloom_testing::random::Random;
 
 const CASES: usize = 5000;
 

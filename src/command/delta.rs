@@ -26,7 +26,7 @@ use code::{Coder, Fault, LONGEST};
 /// They are for commands that leave the frame: stored, sent, or kept for many frames. Sorted commands take 1 to 6 bytes in
 /// place of 24. To code, to check and to decode one takes 3 to 8 ns each, so they win where bytes pass at less than 0.8 GB/s.
 /// Within a frame they lose, and it does not use them: commands are sorted and read there several times, and to copy the
-/// fixed form takes 0.5 ns, to compare it with the last frame's 1.3. (`cargo bench --bench delta`, on a virtual machine of two
+/// fixed form takes 0.5 ns, to compare it with the last frame's 1.3. (`cargo bench -p drawloom-benches --bench delta`, on a virtual machine of two
 /// cores.)
 ///
 /// ```

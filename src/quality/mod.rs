@@ -12,7 +12,7 @@ pub use shadows::ShadowQuality;
 /// How accurate frames are, and so what they cost: all that a renderer may give up accuracy for.
 ///
 /// Three presets are a start: [`Quality::fast`], [`Quality::balanced`], which is the default, and [`Quality::exact`].
-/// `examples/tradeoff.rs` measures what each knob gives and takes on a scene of one's own.
+/// `benches/examples/tradeoff` measures what each knob gives and takes on a scene of one's own.
 ///
 /// ```
 /// use drawloom::quality::{CullingVolume, Quality};

@@ -17,7 +17,7 @@ use crate::scene::{Projection, SceneRef, ViewKind};
 /// pixels for fields of view from 27° to 90°. Narrower ones magnify what f32 can say of a direction, and wider ones are
 /// stretched at the edge: 0.3 pixels at 0.1°, 0.06 in the corners at 179°. Spot lights' maps of 1024² hold 1e-3 of their pixels from
 /// 12° to 68° from the axis, and those of other lights always. A main camera without perspective holds it up to 2.5 times its
-/// picture's height; beyond, as much more as it is farther. `benches/precision.rs` measures all of it.
+/// picture's height; beyond, as much more as it is farther. `testing/src/precision` measures all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuView {

@@ -3,11 +3,11 @@
 use drawloom::FrameError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, RenderObject, Scene};
+use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::look::assert_alike;
-use crate::scenes::everything::everything;
 use crate::signs::{RED, Sign, Signs, camera};
 use crate::stage::Studio;
 

@@ -4,10 +4,10 @@ use drawloom::FrameError;
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Projection, SceneError};
+use drawloom_testing::scenes::cube;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::scenes::cube;
 use crate::signs::{BLUE, GREEN, RED, Sign, Signs, camera, told};
 use crate::stage::{Outcome, StageName, Studio};
 

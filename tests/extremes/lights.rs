@@ -4,11 +4,11 @@ use std::f32::consts::FRAC_PI_2;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
+use drawloom_testing::scenes::{cube, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::look::Look;
-use crate::scenes::{cube, sized, square};
 use crate::signs::told;
 use crate::stage::Studio;
 

@@ -8,9 +8,6 @@
 //! Shear is not among the cases: an object's transform is one scale along its own axes and one turn, and objects have no
 //! parents, so it cannot be said.
 
-#[path = "../../examples/frame/adapter.rs"]
-#[expect(dead_code, reason = "a device that draws nothing is for others")]
-mod adapter;
 mod amounts;
 mod cameras;
 mod deadline;
@@ -20,8 +17,6 @@ mod numbers;
 mod oracle;
 mod places;
 mod qualities;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 mod signs;
 mod special;
 mod stage;

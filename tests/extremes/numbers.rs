@@ -7,10 +7,10 @@ use drawloom::scene::{
     Bounds, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology, Vertex,
 };
 use drawloom::view::RejectionReason;
+use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::scenes::{sized, square};
 use crate::signs::told;
 use crate::special::{SPECIAL, SPECIAL_PLACES};
 use crate::stage::{Drawn, Outcome, Studio};

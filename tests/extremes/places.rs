@@ -5,12 +5,12 @@ use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Light, Mesh, Scene, Topology, Vertex};
 use drawloom::view::{FixedPosition, RejectionReason};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::square;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::look::assert_alike;
-use crate::scenes::everything::everything;
-use crate::scenes::square;
 use crate::signs::{BLUE, GREEN, RED, Sign, Signs, camera, told};
 use crate::stage::Studio;
 

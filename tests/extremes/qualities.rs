@@ -7,10 +7,10 @@ use drawloom::quality::{
     TransformPrecision, VertexFormat,
 };
 use drawloom::scene::{Camera, Light, Material, Scene};
+use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::scenes::everything::everything;
 use crate::signs::{RED, Sign, Signs, camera, told};
 use crate::stage::{OpenError, Studio};
 

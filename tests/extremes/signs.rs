@@ -3,10 +3,10 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology};
+use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::oracle::{Oracle, Seen};
-use crate::scenes::{sized, square};
 use crate::stage::{Drawn, Studio};
 
 /// A square of 2 m before scaling that faces its own +Z.

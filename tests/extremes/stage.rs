@@ -12,9 +12,9 @@ use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::Rejection;
 use drawloom::{BuildError, FrameError, Renderer, SubmitError, Submitter, wgpu};
+use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
-use crate::adapter;
 use crate::look::{Look, look};
 
 /// A backend that cases are run on.

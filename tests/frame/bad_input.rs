@@ -10,9 +10,9 @@ use drawloom::scene::{Bounds, Camera, Light, LightKind, Mesh, Projection, Scene,
 use drawloom::task::Scheduler;
 use drawloom::view::RejectionReason;
 use drawloom::{BuildError, FrameError, Granularity, Renderer, SubmitError};
+use drawloom_testing::scenes::{cube, field};
 
 use crate::renderer;
-use crate::scenes::{cube, field};
 
 fn error_of(scene: SceneRef<'_>) -> FrameError {
     let (mut renderer, submitter) = renderer(2, Granularity::default());

@@ -11,8 +11,7 @@ use drawloom::scene::{Light, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder, Submitter};
-
-use crate::scenes::field;
+use drawloom_testing::scenes::field;
 
 fn build(builder: RendererBuilder<NullBackend>) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap()

@@ -11,9 +11,8 @@ use drawloom::scene::{Blend, Camera, Light, Material, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
-
-use crate::scenes::everything::{dark, everything};
-use crate::scenes::sized;
+use drawloom_testing::scenes::everything::{dark, everything};
+use drawloom_testing::scenes::sized;
 
 /// A process of an engine's own, which draws over `radiance` where it is told.
 struct Own<F> {

@@ -7,8 +7,7 @@ use drawloom::backend::NullBackend;
 use drawloom::process::{Declare, Deferred, Draws, FullScreen, ProcessError, RenderProcess};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
-
-use crate::scenes::field;
+use drawloom_testing::scenes::field;
 
 /// Panics for as long as the switch is on.
 struct Fragile {

@@ -14,8 +14,6 @@ mod triangles;
 #[cfg(feature = "wgpu")]
 mod uploads;
 mod views;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 
 use std::sync::Arc;
 

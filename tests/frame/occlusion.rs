@@ -11,8 +11,7 @@ use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
-
-use crate::scenes::{cube, field, sized};
+use drawloom_testing::scenes::{cube, field, sized};
 
 /// Before the first camera and behind the second a wall; behind it, or before it, and beside it small cubes, one in four of which
 /// is glass.

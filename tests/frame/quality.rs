@@ -10,8 +10,7 @@ use drawloom::process::Deferred;
 use drawloom::quality::{DepthCurve, DepthKey, Quality, ShadowQuality};
 use drawloom::scene::{Blend, Light, Scene};
 use drawloom::task::Scheduler;
-
-use crate::scenes::field;
+use drawloom_testing::scenes::field;
 
 /// What a process draws in a view of a frame of this quality.
 fn drawn(scene: &Scene, quality: Quality, process: &str, view: usize) -> DrawList {

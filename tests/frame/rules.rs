@@ -11,9 +11,9 @@ use drawloom::quality::Quality;
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::view::{LightTable, ObjectTable, Rejections, RenderView};
+use drawloom_testing::scenes::field;
 
 use crate::renderer;
-use crate::scenes::field;
 
 const PASS: Pass = Pass { process: 0, view: 0 };
 

@@ -10,9 +10,9 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Blend, Projection, Scene, sample};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
+use drawloom_testing::scenes::field;
 
 use crate::renderer;
-use crate::scenes::field;
 
 const GRANULARITIES: [Granularity; 7] = [
     Granularity::Adaptive,

@@ -10,8 +10,7 @@ use drawloom::scene::{Light, Scene};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
-
-use crate::scenes::field;
+use drawloom_testing::scenes::field;
 
 /// A renderer whose shadow maps are drawn in every so many-th frame.
 struct Studio {

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use drawloom::report::{Prices, Replay, ReportError};
 use drawloom::{FrameError, Granularity};
+use drawloom_testing::scenes::field;
 
 use crate::renderer;
-use crate::scenes::field;
 
 #[test]
 fn a_recorded_frame_draws_the_same() {

@@ -10,10 +10,10 @@ use drawloom::scene::{Projection, Scene, Topology};
 use drawloom::task::Scheduler;
 use drawloom::view::RenderView;
 use drawloom::{FrameStatistics, Granularity, Renderer};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{as_list, culled, field, square, with_meshes};
 
 use crate::renderer;
-use crate::scenes::everything::everything;
-use crate::scenes::{as_list, culled, field, square, with_meshes};
 
 /// A frame's statistics, and the renderer that still has its lists.
 fn frame(scene: &Scene, workers: usize, granularity: Granularity) -> (FrameStatistics, Renderer<NullBackend>) {

@@ -1,9 +1,5 @@
 //! What a frame says it has uploaded, on wgpu's backend that does nothing else.
 
-#[path = "../../examples/frame/adapter.rs"]
-#[expect(dead_code, reason = "the other half is for the frame example")]
-mod adapter;
-
 use std::sync::Arc;
 
 use drawloom::Renderer;
@@ -11,8 +7,8 @@ use drawloom::backend::WgpuBackend;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::view::GpuObject;
-
-use crate::scenes::field;
+use drawloom_testing::adapter;
+use drawloom_testing::scenes::field;
 
 #[test]
 fn a_frame_says_how_many_bytes_it_uploaded_and_so_does_its_timeline() {

@@ -8,9 +8,9 @@ use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderPr
 use drawloom::scene::{Light, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer};
+use drawloom_testing::scenes::field;
 
 use crate::renderer;
-use crate::scenes::field;
 
 /// The depth that a light sees.
 struct ShadowDepth;

@@ -9,13 +9,8 @@
 
 #![cfg(unix)]
 
-#[path = "../../examples/frame/adapter.rs"]
-#[expect(dead_code, reason = "the other half is for the frame example")]
-mod adapter;
 mod report;
 mod requests;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 mod stack;
 
 use std::env;
@@ -28,6 +23,7 @@ use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Scene, sample};
 use drawloom::task::Scheduler;
+use drawloom_testing::{adapter, scenes};
 
 use report::Report;
 use stack::{Owner, Stage};

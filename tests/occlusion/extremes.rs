@@ -3,10 +3,10 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Material, Projection, RenderObject, Scene};
+use drawloom_testing::samples::Samples;
+use drawloom_testing::scenes::{cube, sized};
 
 use crate::occlusion;
-use crate::samples::Samples;
-use crate::scenes::{cube, sized};
 
 /// A large cube before small ones, all of it scaled by `size` and moved by `shift`.
 fn scene(size: f64, shift: DVec3, change: impl Fn(&mut Camera)) -> Scene {

@@ -2,10 +2,7 @@
 
 mod extremes;
 mod properties;
-mod samples;
 mod walls;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 
 use drawloom::scene::{Blend, SceneRef, ViewKind};
 use drawloom::view::{ObjectTable, OccluderMeshes, Occlusion, RenderView, VisibleSet};

@@ -3,11 +3,11 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex};
+use drawloom_testing::samples::Samples;
+use drawloom_testing::scenes::{cube, square};
 use proptest::prelude::*;
 
 use crate::occlusion;
-use crate::samples::Samples;
-use crate::scenes::{cube, square};
 
 /// Its mesh, its material, where it is, how large and how it is turned.
 type Thing = (usize, usize, [f64; 3], [f32; 3], [f32; 4]);

@@ -4,10 +4,10 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
     Blend, Bounds, Camera, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
 };
+use drawloom_testing::samples::Samples;
+use drawloom_testing::scenes::{cube, sized, square};
 
 use crate::occlusion;
-use crate::samples::Samples;
-use crate::scenes::{cube, sized, square};
 
 /// Which objects are hidden where none are.
 const NOTHING: [usize; 0] = [];

@@ -3,13 +3,12 @@
 //! All cases are ignored, and never pass, where there is no Chromium; with `DRAWLOOM_REQUIRE_BROWSER` set they fail there.
 
 mod browser;
-#[path = "../timeline/hostile.rs"]
-mod hostile;
 mod logs;
 
 use std::{env, process::ExitCode};
 
 use drawloom::timeline::Log;
+use drawloom_testing::hostile;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
 use browser::{Browser, Shown};

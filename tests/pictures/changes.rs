@@ -3,11 +3,11 @@
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Texture, Topology};
 use drawloom::view::RejectionReason;
+use drawloom_testing::scenes::{cube, field, square, textured};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::assert_different;
-use crate::scenes::{cube, field, square, textured};
 use crate::studio::{Studio, draw};
 
 pub const CASES: &[Case] = &[

@@ -10,11 +10,11 @@ use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::DeviceLog;
 use drawloom::{Recorded, Renderer, wgpu};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::scenes::everything::everything;
-use crate::scenes::field;
 use crate::studio::Studio;
 use crate::techniques::{device, drawn_anew, expect, many_batches, pictures, studio_of, techniques};
 

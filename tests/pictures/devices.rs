@@ -9,10 +9,11 @@ use drawloom::scene::Light;
 use drawloom::task::Scheduler;
 use drawloom::view::{Rejection, RejectionReason, ShadowMaps};
 use drawloom::{FrameError, Granularity, Renderer, wgpu};
+use drawloom_testing::adapter;
+use drawloom_testing::scenes::{field, textured};
 use libtest_mimic::Failed;
 
-use crate::scenes::{field, textured};
-use crate::{Case, adapter};
+use crate::Case;
 
 pub const CASES: &[Case] = &[
     ("noop_takes_every_frame", noop),

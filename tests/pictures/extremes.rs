@@ -3,11 +3,11 @@
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, Topology};
 use drawloom::view::RejectionReason;
+use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::assert_color;
-use crate::scenes::{sized, square};
 use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[

@@ -7,14 +7,14 @@ use drawloom::process::{
 };
 use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, ToneCurve, VertexFormat};
 use drawloom::scene::{Camera, Material, Mesh, Projection, RenderObject, Scene, Texture, Topology, Vertex};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{field, sized};
 use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{Distance, as_image, assert_color, tone_mapped};
 use crate::references::colonnade;
-use crate::scenes::everything::everything;
-use crate::scenes::{field, sized};
 use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[

@@ -3,13 +3,13 @@
 use drawloom::backend::Picture;
 use drawloom::process::{Deferred, Format, GeometryFormats};
 use drawloom::scene::{Projection, Scene};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{Distance, as_image};
 use crate::references::colonnade;
-use crate::scenes::everything::everything;
-use crate::scenes::field;
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[

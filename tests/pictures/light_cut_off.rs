@@ -4,11 +4,11 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::Quality;
 use drawloom::scene::{Light, Scene};
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::rays::{Panel, Stage};
-use crate::scenes::field;
 use crate::shadows::{MAPS, camera, hemisphere, spot};
 use crate::studio::{Studio, radiance};
 

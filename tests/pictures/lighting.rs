@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, Topology};
+use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{assert_color, tone_mapped};
-use crate::scenes::{sized, square};
 use crate::studio::{draw, pixel};
 
 pub const CASES: &[Case] = &[

@@ -4,8 +4,6 @@
 //! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` writes the references anew: look
 //! at each before it is kept.
 
-#[path = "../../examples/frame/adapter.rs"]
-mod adapter;
 mod changes;
 mod device_times;
 mod devices;
@@ -29,8 +27,6 @@ mod shadow_casters;
 mod shadow_interval;
 mod shadows;
 mod software;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 mod studio;
 mod techniques;
 mod transforms;

@@ -3,11 +3,11 @@
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
+use drawloom_testing::scenes::{cube, field, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{assert_alike, assert_different};
-use crate::scenes::{cube, field, sized, square};
 use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[

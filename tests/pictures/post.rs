@@ -7,12 +7,12 @@ use drawloom::process::{
     ToneMapping,
 };
 use drawloom::scene::{Camera, Scene};
+use drawloom_testing::scenes::sized;
 use image::{Rgb, RgbImage};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{Distance, as_image, assert_color, tone_mapped};
-use crate::scenes::sized;
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[

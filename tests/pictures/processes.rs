@@ -13,11 +13,11 @@ use drawloom::process::{
 };
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
 use drawloom::{FrameError, wgpu};
+use drawloom_testing::scenes::{field, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{assert_color, tone_mapped};
-use crate::scenes::{field, sized, square};
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use drawloom::glam::Vec3;
 use drawloom::scene::{Light, Mesh, Scene, Vertex, obj, sample};
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::judge::{Distance, as_image, assert_different};
-use crate::scenes::field;
 use crate::studio::draw;
 use crate::{Case, shared_scenes};
 

@@ -4,10 +4,10 @@ use drawloom::backend::{Picture, WgpuResources};
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
 use drawloom::scene::{Blend, Light, LightKind, Material, Scene, ViewKind};
 use drawloom::view::{LightClass, ShadowMaps};
+use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[

@@ -2,11 +2,11 @@
 
 use drawloom::Granularity;
 use drawloom::scene::{Blend, Material, Scene};
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::references::{colonnade, cornell, sponza};
-use crate::scenes::field;
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[

@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex};
 use drawloom::view::ShadowMaps;
+use drawloom_testing::scenes::{cube, sized};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::rays::{Panel, Stage};
-use crate::scenes::{cube, sized};
 use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told, without_shadow};
 use crate::studio::{Studio, radiance};
 

@@ -3,11 +3,11 @@
 use drawloom::glam::{DVec2, DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Blend, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, Topology};
+use drawloom_testing::scenes::{cube, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::rays::{Panel, Stage};
-use crate::scenes::{cube, square};
 use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told};
 
 pub const CASES: &[Case] = &[

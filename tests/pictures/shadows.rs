@@ -4,11 +4,11 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, Projection};
 use drawloom::view::ShadowMaps;
+use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::rays::{Counts, Panel, Stage};
-use crate::scenes::sized;
 use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] = &[

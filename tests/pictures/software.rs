@@ -7,10 +7,10 @@ use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::process::Deferred;
 use drawloom::scene::{Scene, obj, sample};
 use drawloom::task::Scheduler;
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
-use crate::scenes::everything::everything;
-use crate::scenes::field;
 use crate::studio::draw;
 use crate::{Case, shared_scenes};
 

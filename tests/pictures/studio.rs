@@ -7,10 +7,9 @@ use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Recorded, Renderer, RendererBuilder, Submitter, wgpu};
+use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
-
-use crate::adapter;
 
 /// The machine's adapter as a device that all cases share; `None` where there is none.
 pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {

@@ -10,12 +10,12 @@ use drawloom::scene::{Blend, Light, Material, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Granularity, Recorded, Renderer, SubmitError, wgpu};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{cube, field};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::references::colonnade;
-use crate::scenes::everything::everything;
-use crate::scenes::{cube, field};
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
@@ -360,7 +360,7 @@ fn subdivided_otherwise() -> Result<(), Failed> {
     let (recorded, _) = shadows(&studio);
     expect(recorded > 0, || "nothing was recorded nearer to the lamp".to_owned())?;
     let mesh = scene.as_scene_ref().meshes[3];
-    scene.replace(mesh, crate::scenes::cube_with_flipped_normals())?;
+    scene.replace(mesh, drawloom_testing::scenes::cube_with_flipped_normals())?;
     if draw(&mut studio, &scene)? == drawn_anew(&scene)? { Ok(()) } else { Err("with another mesh it differs".into()) }
 }
 

@@ -4,11 +4,11 @@ use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, TransformPrecision};
 use drawloom::scene::{Light, Scene, SceneError};
+use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{assert_alike, assert_different};
-use crate::scenes::field;
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[

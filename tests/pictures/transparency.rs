@@ -7,12 +7,12 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
 use drawloom::view::ShadowMaps;
+use drawloom_testing::scenes::{cube, sized, square};
 use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::judge::{assert_color, tone_mapped};
-use crate::scenes::{cube, sized, square};
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[

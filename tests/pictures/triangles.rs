@@ -7,12 +7,12 @@ use drawloom::backend::{Encode, Record, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::quality::{Quality, TransformPrecision};
 use drawloom::scene::{RenderObject, Scene};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{as_list, field, with_meshes};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::references::colonnade;
-use crate::scenes::everything::everything;
-use crate::scenes::{as_list, field, with_meshes};
 use crate::techniques::{
     device, drawn_anew, expect, many_batches, pictures, small_maps, studio_of, technique, techniques,
 };

@@ -7,9 +7,9 @@ use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{Deferred, Format};
 use drawloom::scene::{Camera, Light, Material, Projection, RenderObject, Scene, Topology};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{cube, field, sized, square};
 
-use crate::scenes::everything::everything;
-use crate::scenes::{cube, field, sized, square};
 use crate::{Studio, deferred, pixel};
 
 /// A square of 2 m, 5 m before the camera, that gives off this radiance and reflects nothing.

@@ -2,8 +2,6 @@
 
 mod drawn;
 mod refused;
-#[path = "../scenes/mod.rs"]
-mod scenes;
 mod same_bytes;
 
 use std::sync::Arc;

@@ -11,8 +11,8 @@ use drawloom::process::{
 };
 use drawloom::raster::{Real, Vector4};
 use drawloom::{FrameError, SubmitError};
+use drawloom_testing::scenes::field;
 
-use crate::scenes::field;
 use crate::{Studio, deferred};
 
 /// Where a twin panics.

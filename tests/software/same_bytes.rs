@@ -4,9 +4,9 @@ use drawloom::backend::SoftwareBackend;
 use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::Scene;
 use drawloom::{Granularity, RendererBuilder};
+use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::{as_list, culled, field, with_meshes};
 
-use crate::scenes::everything::everything;
-use crate::scenes::{as_list, culled, field, with_meshes};
 use crate::{Studio, deferred};
 
 /// A field in pictures of odd sizes, with edges inside of the squares that are drawn by one job.

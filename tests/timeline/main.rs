@@ -3,7 +3,6 @@
 mod chrome;
 mod chrome_by_hand;
 mod chrome_golden;
-mod hostile;
 mod page;
 mod report;
 mod report_properties;

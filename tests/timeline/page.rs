@@ -6,10 +6,9 @@ use drawloom::{
     report::{Prices, write_page},
     timeline::{Chunk, Idle, IdleKind, Log},
 };
+use drawloom_testing::hostile::{hostile_names, log_of};
 use proptest::{collection::vec, prelude::*};
 use serde_json::Value;
-
-use crate::hostile::{hostile_names, log_of};
 
 fn page_of(log: &Log) -> String {
     let mut page = Vec::new();

@@ -3,9 +3,6 @@
 //!     cargo run --release -p drawloom-tracy --example frame_tracy
 //!     cargo run --release -p drawloom-tracy --example frame_tracy -- --frames 60 --no-wait
 
-#[path = "../../examples/frame/adapter.rs"]
-mod adapter;
-
 use std::{error::Error, num::NonZeroUsize, sync::Arc, thread, time::Duration};
 
 use clap::Parser;
@@ -17,6 +14,7 @@ use drawloom::{
     task::Scheduler,
     wgpu,
 };
+use drawloom_testing::adapter;
 use drawloom_tracy::Zones;
 use indicatif::{ProgressBar, ProgressStyle};
 

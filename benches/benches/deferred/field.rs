@@ -1,0 +1,112 @@
+//! A field of boxes under many small lights.
+
+use std::f64::consts::TAU;
+
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, SceneError};
+use drawloom_benches::boxes::new_box;
+use drawloom_testing::random::Random;
+
+use crate::Extent;
+
+/// From the middle of the field to its edges, in metres.
+const HALF: f64 = 25.0;
+const MATERIALS: usize = 16;
+
+/// What is in a field beside its boxes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Field {
+    /// Half of them point lights, half spot lights, none of which reaches further than some 3 m. The lights of a smaller
+    /// number are the first of a larger one.
+    pub lights: usize,
+    /// Spot lights high above the field that cast shadows.
+    pub shadow_maps: usize,
+    /// Whether each object is there a second time, as one that is added to what is drawn: pipelines that draw it once for
+    /// each light find it so.
+    pub twice: bool,
+}
+
+impl Field {
+    /// The field, with a camera that sees all of it and every light. All objects are of one mesh, so that whoever draws them
+    /// can do so in one draw.
+    ///
+    /// # Errors
+    /// None that this causes.
+    pub fn scene(self, extent: &Extent) -> Result<Scene, SceneError> {
+        let mut random = Random::new();
+        let mut scene = Scene::new();
+        (scene.ambient, scene.background) = (Vec3::splat(0.02), Vec3::new(0.01, 0.01, 0.02));
+        let cube = scene.add(new_box(String::from("cube"), Vec3::ONE)?)?;
+        let mut paints = Vec::new();
+        for index in 0..MATERIALS {
+            let paint =
+                Material { name: format!("paint {index}"), diffuse: random.vector(0.3, 0.9), ..Material::default() };
+            paints.push([scene.add(paint.clone())?, scene.add(Material { blend: Blend::Additive, ..paint })?]);
+        }
+        let mut objects = vec![RenderObject {
+            scale: Vec3::new(HALF as f32, 0.1, HALF as f32),
+            ..RenderObject::new(cube, paints[0][0], DVec3::Y * -0.1)
+        }];
+        let mut materials = vec![0];
+        for _ in 0..extent.boxes {
+            let place = DVec3::new(random.between(-HALF, HALF), random.between(0.2, 0.8), random.between(-HALF, HALF));
+            let scale = random.vector(0.15, 0.5);
+            let orientation = Quat::from_axis_angle(random.direction().as_vec3(), random.between(0.0, TAU) as f32);
+            let material = random.below(MATERIALS);
+            materials.push(material);
+            objects.push(RenderObject { orientation, scale, ..RenderObject::new(cube, paints[material][0], place) });
+        }
+        for (object, &material) in objects.iter().zip(&materials) {
+            scene.add_object(*object)?;
+            if self.twice {
+                scene.add_object(RenderObject { material: paints[material][1], ..*object })?;
+            }
+        }
+        scene.lights = (0..self.lights).map(|index| small_light(index, &mut random)).collect();
+        scene.lights.extend((0..self.shadow_maps).map(|index| high_light(index, self.shadow_maps)));
+        scene.cameras.push(Camera {
+            size: extent.picture,
+            ..Camera::looking_at("main", DVec3::new(0.0, 36.0, 38.0), DVec3::ZERO)
+        });
+        Ok(scene)
+    }
+
+    /// How many objects there are.
+    pub fn objects(self, extent: &Extent) -> usize {
+        (extent.boxes + 1) * if self.twice { 2 } else { 1 }
+    }
+}
+
+fn small_light(index: usize, random: &mut Random) -> Light {
+    let inner = HALF * 0.95;
+    let (x, z) = (random.between(-inner, inner), random.between(-inner, inner));
+    let color = random.vector(0.2, 1.0);
+    let range = random.between(2.7, 3.3) as f32;
+    if index.is_multiple_of(2) {
+        Light::Point { position: DVec3::new(x, 1.2, z), intensity: color * 2.0, range }
+    } else {
+        Light::Spot {
+            position: DVec3::new(x, 2.4, z),
+            direction: Vec3::new(0.2, -1.0, 0.1).normalize(),
+            intensity: color * 5.0,
+            range,
+            inner_angle: 0.4,
+            outer_angle: 0.7,
+            casts_shadow: false,
+        }
+    }
+}
+
+/// One of several on a ring above the field, each of which lights the middle of it and more.
+fn high_light(index: usize, of: usize) -> Light {
+    let (sine, cosine) = (TAU * index as f64 / of as f64).sin_cos();
+    Light::Spot {
+        position: DVec3::new(15.0 * cosine, 20.0, 15.0 * sine),
+        direction: Vec3::new(-0.3 * cosine as f32, -1.0, -0.3 * sine as f32).normalize(),
+        intensity: Vec3::splat(800.0 / of as f32),
+        range: 40.0,
+        inner_angle: 0.5,
+        outer_angle: 0.75,
+        casts_shadow: true,
+    }
+}

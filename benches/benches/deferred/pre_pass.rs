@@ -1,0 +1,105 @@
+//! With a depth pre-pass, and without.
+
+use std::error::Error;
+use std::rc::Rc;
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError, sample};
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::boxes::new_box;
+use drawloom_benches::table::Table;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use crate::Extent;
+use crate::report::milliseconds;
+use crate::turns::{Setting, Turns};
+
+/// A line of the table.
+#[derive(Serialize)]
+pub struct Line {
+    backend: BackendName,
+    scene: &'static str,
+    depth_pre_pass: bool,
+    draws: usize,
+    processor_ms: f64,
+    device_ms: Option<f64>,
+}
+
+/// # Errors
+/// If a frame cannot be drawn.
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Line>, Box<dyn Error>> {
+    let mut colonnade = sample::colonnade()?;
+    for camera in &mut colonnade.cameras {
+        camera.size = extent.picture;
+    }
+    let scenes = [
+        ("30 walls, front to back", walls(extent, Order::FrontToBack)?),
+        ("30 walls, back to front", walls(extent, Order::BackToFront)?),
+        ("colonnade", colonnade),
+    ];
+    let mut turns = Turns::new(backend, progress);
+    let mut names = Vec::new();
+    for (name, scene) in scenes {
+        let scene = Rc::new(scene);
+        for depth_pre_pass in [false, true] {
+            let deferred = Deferred::to_picture().depth_pre_pass(depth_pre_pass);
+            turns.add(Rc::clone(&scene), WORKERS, |builder| builder.deferred(deferred))?;
+            names.push((name, depth_pre_pass));
+        }
+    }
+    let settings = turns.take(extent, "depth pre-pass")?;
+    let line = |(setting, (scene, depth_pre_pass)): (&Setting, (&'static str, bool))| Line {
+        backend,
+        scene,
+        depth_pre_pass,
+        draws: setting.draws(),
+        processor_ms: milliseconds(setting.processor()),
+        device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
+    };
+    Ok(settings.iter().zip(names).map(line).collect())
+}
+
+/// One worker, so that it is the sum of the work that is compared.
+const WORKERS: usize = 1;
+
+/// In which order walls are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    FrontToBack,
+    BackToFront,
+}
+
+/// Thirty walls one behind the other, each of which fills the picture. Objects are sorted by material before they are sorted
+/// by depth, so materials say the order.
+fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
+    const WALLS: usize = 30;
+    let mut scene = Scene::new();
+    let wall = scene.add(new_box(String::from("wall"), Vec3::new(60.0, 40.0, 0.05))?)?;
+    for place in 0..WALLS {
+        let behind = if order == Order::FrontToBack { place } else { WALLS - 1 - place };
+        let diffuse = Vec3::new(0.2, 0.5, 0.9).lerp(Vec3::new(0.9, 0.5, 0.2), behind as f32 / WALLS as f32);
+        let material = scene.add(Material { name: format!("wall {behind}"), diffuse, ..Material::default() })?;
+        scene.add_object(RenderObject::new(wall, material, DVec3::NEG_Z * (5.0 + behind as f64)))?;
+    }
+    scene.lights.push(Light::Point { position: DVec3::NEG_Z * 3.0, intensity: Vec3::splat(10.0), range: 8.0 });
+    scene.cameras.push(Camera { size: extent.picture, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) });
+    Ok(scene)
+}
+
+pub fn print(lines: &[Line]) {
+    println!("The depth pre-pass, 1 worker.\n");
+    let mut table = Table::new(&["backend", "scene", "pre-pass", "draws", "CPU ms", "device ms"]);
+    for line in lines {
+        table.line([
+            line.backend.name().to_owned(),
+            line.scene.to_owned(),
+            if line.depth_pre_pass { "on" } else { "off" }.to_owned(),
+            line.draws.to_string(),
+            format!("{:.3}", line.processor_ms),
+            line.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
+        ]);
+    }
+    table.print();
+}

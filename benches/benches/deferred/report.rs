@@ -1,0 +1,66 @@
+//! What was measured, as tables and as JSON.
+
+use std::io;
+use std::time::Duration;
+
+use drawloom_benches::results;
+use serde::Serialize;
+
+use crate::{Extent, lights, pre_pass, shadows};
+
+/// What was measured.
+#[derive(Serialize)]
+pub struct Report {
+    extent: &'static str,
+    /// On `noop`, and on the adapter.
+    rounds: [usize; 2],
+    picture: [u32; 2],
+    boxes: usize,
+    adapter: Option<String>,
+    pub lights: Vec<lights::Line>,
+    pub shadows: Vec<shadows::Line>,
+    pub depth_pre_pass: Vec<pre_pass::Line>,
+}
+
+impl Report {
+    pub fn new(extent: &Extent, adapter: Option<String>) -> Self {
+        Self {
+            extent: extent.name,
+            rounds: extent.rounds,
+            picture: extent.picture,
+            boxes: extent.boxes,
+            adapter,
+            lights: Vec::new(),
+            shadows: Vec::new(),
+            depth_pre_pass: Vec::new(),
+        }
+    }
+
+    pub fn print(&self) {
+        let Self { extent, rounds: [noop, adapter_rounds], picture: [width, height], boxes, adapter, .. } = self;
+        println!(
+            "{extent} run: medians of {noop} frames on noop and {adapter_rounds} on the adapter, {width} × {height} pixels"
+        );
+        println!(
+            "{boxes} boxes in the field{}",
+            if *extent == "trial" { "; a trial, whose figures mean nothing" } else { "" }
+        );
+        println!("adapter: {}", adapter.as_deref().unwrap_or("none"));
+        println!(
+            "CPU ms: from the scene's hand-over to the return of submit; device ms: from the call of submit until drawn\n"
+        );
+        lights::print(&self.lights);
+        shadows::print(&self.shadows);
+        pre_pass::print(&self.depth_pre_pass);
+    }
+
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("deferred.json", self)
+    }
+}
+
+pub fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}

@@ -1,0 +1,77 @@
+//! What was measured, as a table and as JSON.
+
+use std::io;
+
+use drawloom::command::RenderCommand;
+use drawloom_benches::results;
+use drawloom_benches::table::Table;
+use serde::Serialize;
+
+/// A scene's commands, in nanoseconds a command.
+#[derive(Serialize)]
+pub struct Row {
+    pub scene: &'static str,
+    /// How many, over all processes and views.
+    pub commands: usize,
+    /// Bytes a delta command takes on average.
+    pub bytes: f64,
+    /// Coding them.
+    pub encode: f64,
+    /// Checking bytes from elsewhere.
+    pub check: f64,
+    /// Turning them back into the fixed form.
+    pub decode: f64,
+    /// Copying the fixed form.
+    pub copy: f64,
+    /// Comparing the fixed form with an equal one.
+    pub compare: f64,
+}
+
+impl Row {
+    /// Bytes a nanosecond, which are gigabytes a second, at which what delta commands save takes as long as they cost: coded,
+    /// checked and decoded, against a copy at either end.
+    fn break_even(&self) -> f64 {
+        let saved = size_of::<RenderCommand>() as f64 - self.bytes;
+        saved / (self.encode + self.check + self.decode - 2.0 * self.copy)
+    }
+}
+
+pub struct Report {
+    rounds: usize,
+    quick: bool,
+    rows: Vec<Row>,
+}
+
+impl Report {
+    pub fn new(rounds: usize, quick: bool) -> Self {
+        Self { rounds, quick, rows: Vec::new() }
+    }
+
+    pub fn add(&mut self, row: Row) {
+        self.rows.push(row);
+    }
+
+    pub fn print(&self) {
+        let note = if self.quick { "; a quick run, whose figures mean little" } else { "" };
+        println!("ns a command, median of {} rounds{note}", self.rounds);
+        println!("fixed form: {} bytes a command; copy, compare: of the fixed form", size_of::<RenderCommand>());
+        println!(
+            "wins below: GB/s of what is written to or sent through, under which fewer bytes save more than they cost\n"
+        );
+        let headings = ["scene", "commands", "bytes", "encode", "check", "decode", "copy", "compare", "wins below"];
+        let mut table = Table::new(&headings);
+        for row in &self.rows {
+            let figures = [row.bytes, row.encode, row.check, row.decode, row.copy, row.compare, row.break_even()];
+            let [bytes, encode, check, decode, copy, compare, even] = figures.map(|figure| format!("{figure:.2}"));
+            let scene = row.scene.to_owned();
+            table.line([scene, row.commands.to_string(), bytes, encode, check, decode, copy, compare, even]);
+        }
+        table.print();
+    }
+
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("delta.json", &self.rows)
+    }
+}

@@ -1,0 +1,84 @@
+//! What bits of a sort key's depth give and take: how many objects they leave in the wrong order.
+//!
+//!     cargo bench -p drawloom-benches --bench depth_order
+//!
+//! 10,000 distances, drawn from two distributions between 0.1 m and 10 km, are sorted by their numbers and, where those are the
+//! same, by chance, as objects are by their index. Against them stands the same sorted by distance. Nothing is timed, so the
+//! figures are the same on every machine.
+//!
+//! - ties: of the pairs that are neighbours by distance, those that have one number;
+//! - inversions: of the pairs that are drawn one after the other, those that are in the wrong order;
+//! - worst: how far apart two are that are in the wrong order, at most, as a share of the step that is stated for them.
+
+use std::process::ExitCode;
+
+use drawloom::quality::{DepthCurve, DepthKey};
+use drawloom_benches::table::Table;
+use drawloom_testing::random::Random;
+
+const NEAR: f32 = 0.1;
+const FAR: f32 = 1e4;
+const COUNT: usize = 10_000;
+
+fn main() -> ExitCode {
+    let mut random = Random::new();
+    let (low, high) = (f64::from(NEAR), f64::from(FAR));
+    let even = (0..COUNT).map(|_| random.between(low, high) as f32).collect();
+    let log_even = (0..COUNT).map(|_| random.between(low.ln(), high.ln()).exp() as f32).collect();
+    let distributions: [(&str, Vec<f32>); 2] = [("log-uniform", log_even), ("uniform", even)];
+
+    let mut within = true;
+    let mut table = Table::new(&["distances", "curve", "bits", "ties, %", "inversions, %", "worst"]);
+    for (name, distances) in &distributions {
+        for (curve_name, curve) in
+            [("linear", DepthCurve::Linear { far: FAR }), ("logarithmic", DepthCurve::Logarithmic)]
+        {
+            for bits in [8, 12, 16, 18, 20, 24, 32] {
+                let Order { ties, inversions, worst } = Order::of(DepthKey { bits, curve }, distances);
+                within &= worst <= 1.0;
+                let percent = |share: f64| format!("{:.3}", share * 100.0);
+                let cells = [(*name).to_owned(), curve_name.to_owned(), bits.to_string(), percent(ties)];
+                let [distances, curve, bits, ties] = cells;
+                table.line([distances, curve, bits, ties, percent(inversions), format!("{worst:.3}")]);
+            }
+        }
+    }
+    table.print();
+    if within {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("error: two are in the wrong order that are farther apart than the step that is stated");
+    ExitCode::FAILURE
+}
+
+/// How good an order is.
+struct Order {
+    ties: f64,
+    inversions: f64,
+    worst: f64,
+}
+
+impl Order {
+    fn of(key: DepthKey, distances: &[f32]) -> Self {
+        let number = |distance: f32| key.code(distance, NEAR, FAR);
+        let share = |count: usize| count as f64 / (distances.len() - 1) as f64;
+
+        let mut exact = distances.to_vec();
+        exact.sort_by(f32::total_cmp);
+        let ties = exact.windows(2).filter(|pair| pair[0] < pair[1] && number(pair[0]) == number(pair[1])).count();
+
+        let mut drawn = distances.to_vec();
+        drawn.sort_by_key(|&distance| number(distance));
+        let inversions = drawn.windows(2).filter(|pair| pair[0] > pair[1]).count();
+
+        let (mut farthest, mut worst) = (0.0_f32, 0.0_f64);
+        for &distance in &drawn {
+            if farthest > distance {
+                let apart = f64::from(farthest) - f64::from(distance);
+                worst = worst.max(apart / key.step(farthest, NEAR, FAR));
+            }
+            farthest = farthest.max(distance);
+        }
+        Self { ties: share(ties), inversions: share(inversions), worst }
+    }
+}

@@ -1,0 +1,72 @@
+//! The picture: what each mode gains on each scene, and what more workers would.
+
+use std::error::Error;
+use std::path::Path;
+
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::chart::{self, Bars, Lines, Panel};
+
+use crate::mode::Mode;
+use crate::prediction::PREDICTED;
+use crate::report::Row;
+use crate::scenes;
+
+/// # Errors
+/// If the file cannot be written.
+pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
+    let mut panels = Vec::new();
+    for &backend in BackendName::ALL {
+        let rows: Vec<_> = rows.iter().filter(|row| row.backend == backend).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let most = rows.iter().filter(|row| !row.predicted).map(|row| row.workers).max().unwrap_or(1);
+        panels.push(Panel::Bars(measured(&rows, backend, most)));
+        panels.push(Panel::Lines(predicted(&rows, backend, most)));
+    }
+    chart::draw(path, &panels)
+}
+
+fn names(rows: &[&Row]) -> impl Iterator<Item = &'static str> {
+    scenes::NAMES.into_iter().filter(|&name| rows.iter().any(|row| row.scene == name))
+}
+
+fn measured(rows: &[&Row], backend: BackendName, workers: usize) -> Bars {
+    let modes = &Mode::ALL;
+    let speed_up = |scene: &str, mode: &Mode| {
+        let workers = if mode.is_serial { 1 } else { workers };
+        let is_it =
+            |row: &&&Row| (row.scene, row.mode, row.workers, row.predicted) == (scene, mode.name, workers, false);
+        rows.iter().find(is_it).map_or(f64::NAN, |row| row.speedup_vs_serial)
+    };
+    let group = |scene: &'static str| (scene.to_owned(), modes.iter().map(|mode| speed_up(scene, mode)).collect());
+    Bars {
+        title: format!("Speed-up on one thread, {workers} workers, {}", backend.name()),
+        series: modes.iter().map(|mode| mode.name.to_owned()).collect(),
+        groups: names(rows).map(group).collect(),
+        marks: Vec::new(),
+        mark_name: String::new(),
+        line: 1.0,
+    }
+}
+
+fn predicted(rows: &[&Row], backend: BackendName, workers: usize) -> Lines {
+    let line = |scene: &'static str| {
+        let adaptive = |workers: usize, predicted| {
+            let is_it = |row: &&&Row| {
+                (row.scene, row.mode, row.workers, row.predicted) == (scene, "adaptive", workers, predicted)
+            };
+            rows.iter().find(is_it).map(|row| (workers as f64, row.speedup_vs_serial))
+        };
+        let measured = (1..=workers.ilog2()).filter_map(|power| adaptive(1 << power, false));
+        let beyond = PREDICTED.into_iter().filter(|&count| count > workers).filter_map(|count| adaptive(count, true));
+        (scene.to_owned(), [(1.0, 1.0)].into_iter().chain(measured).chain(beyond).collect())
+    };
+    Lines {
+        title: format!("The same for adaptive by number of workers, {}; more than {workers} predicted", backend.name()),
+        across: "workers".to_owned(),
+        series: names(rows).map(line).collect(),
+        first_color: 1,
+        ticks: [1, 2].into_iter().chain(PREDICTED).map(|workers| workers as f64).collect(),
+    }
+}

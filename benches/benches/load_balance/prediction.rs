@@ -1,0 +1,69 @@
+//! What a frame would take with other numbers of workers.
+
+use std::error::Error;
+use std::sync::Arc;
+
+use drawloom::backend::{WgpuBackend, WgpuSubmission};
+use drawloom::report::{Prices, Replay};
+use drawloom::scene::SceneRef;
+use drawloom::{Renderer, Submitter};
+use drawloom_benches::stopwatch::{middle, timed_frame};
+
+/// More workers than most machines have.
+pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
+
+/// Seconds a frame, by number of workers: of each frame that was replayed. Beside it, what the frame before it took, with
+/// everything as near in memory: what the replay for as many workers as there are is to be compared with.
+#[derive(Clone)]
+pub struct Prediction {
+    prices: Prices,
+    times: Vec<(usize, Vec<f64>)>,
+    measured: Vec<f64>,
+}
+
+impl Prediction {
+    /// For so many workers, for one, and for more.
+    pub fn new(prices: Prices, workers: usize) -> Self {
+        let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
+        counts.sort_unstable();
+        counts.dedup();
+        Self { prices, times: counts.into_iter().map(|count| (count, Vec::new())).collect(), measured: Vec::new() }
+    }
+
+    /// Draws two frames, and replays the second.
+    ///
+    /// # Errors
+    /// If it cannot be drawn.
+    pub fn replay(
+        &mut self,
+        renderer: &mut Renderer<WgpuBackend>,
+        submitter: &Submitter<WgpuBackend>,
+        scene: SceneRef<'_>,
+    ) -> Result<(), Box<dyn Error>> {
+        let (_, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
+        self.measured.push(time.processor.as_secs_f64());
+        let timeline = Arc::clone(renderer.scheduler().timeline());
+        timeline.start();
+        let recorded = renderer.record(scene)?;
+        let submitted = submitter.submit(recorded)?;
+        timeline.stop();
+        submitted.submission.wait()?;
+        let log = timeline.take();
+        let replay = Replay::of_frame(&log, log.frames[0].number, self.prices)?;
+        for (workers, times) in &mut self.times {
+            times.push(replay.frame_time(*workers).as_secs_f64());
+        }
+        Ok(())
+    }
+
+    /// The median of the frames beside those that were replayed.
+    pub fn measured(&self) -> f64 {
+        middle(self.measured.iter().copied())
+    }
+
+    /// The median; `None` where it was not asked for.
+    pub fn of(&self, workers: usize) -> Option<f64> {
+        let found = self.times.iter().find(|(count, _)| *count == workers);
+        found.map(|(_, times)| middle(times.iter().copied()))
+    }
+}

@@ -1,0 +1,244 @@
+//! What was measured, as tables, as JSON and as a picture.
+
+use std::error::Error;
+
+use drawloom_benches::backends::{BackendName, adapter_name};
+use drawloom_benches::results;
+use drawloom_benches::stopwatch::middle;
+use drawloom_benches::table::Table;
+use serde::Serialize;
+
+use crate::mode::Mode;
+use crate::prediction::{PREDICTED, Prediction};
+use crate::turns::{Block, Measured, Times};
+use crate::{Extent, charts};
+
+/// A mode on a scene, measured or predicted.
+#[derive(Serialize)]
+pub struct Row {
+    pub scene: &'static str,
+    pub backend: BackendName,
+    pub workers: usize,
+    pub mode: &'static str,
+    pub ns_per_object_view: f64,
+    pub speedup_vs_serial: f64,
+    pub ratio_to_best_mode: f64,
+    pub predicted: bool,
+}
+
+/// What was measured.
+pub struct Report {
+    extent: &'static str,
+    rounds: [usize; 2],
+    pub rows: Vec<Row>,
+    errors: Vec<ReplayError>,
+    /// On `uneven`, adaptive against per-camera.
+    against_per_camera: Vec<(BackendName, usize, f64)>,
+}
+
+/// What was predicted, against what was measured.
+struct ReplayError {
+    scene: &'static str,
+    backend: BackendName,
+    workers: usize,
+    mode: &'static str,
+    /// In milliseconds a frame.
+    predicted: f64,
+    measured: f64,
+}
+
+impl Report {
+    pub fn new(extent: &Extent) -> Self {
+        Self {
+            extent: extent.name,
+            rounds: extent.rounds,
+            rows: Vec::new(),
+            errors: Vec::new(),
+            against_per_camera: Vec::new(),
+        }
+    }
+
+    pub fn add(&mut self, block: &Block<'_>, measured: Measured) {
+        let Measured { times, predictions } = measured;
+        let calibrated = |index: &usize| middle(times[*index].calibration.iter().copied());
+        let fixed = (0..Mode::ALL.len()).filter(|&index| Mode::is_fixed(index));
+        let best = fixed.min_by(|one, other| calibrated(one).total_cmp(&calibrated(other))).unwrap_or(Mode::SERIAL);
+        let against = |base: usize, mode: usize| middle(ratios(&times[base], &times[mode]));
+        let row = |mode: usize, workers| Row {
+            scene: block.case.name,
+            backend: block.backend,
+            workers,
+            mode: Mode::ALL[mode].name,
+            ns_per_object_view: middle(times[mode].measured.iter().copied()) * 1e9 / block.case.object_views() as f64,
+            speedup_vs_serial: against(Mode::SERIAL, mode),
+            ratio_to_best_mode: against(best, mode),
+            predicted: false,
+        };
+        for (index, mode) in Mode::ALL.iter().enumerate() {
+            let workers = if mode.is_serial { 1 } else { block.workers };
+            // One thread is measured again beside each number of workers; the first time is as good as the others.
+            let is_there = |row: &Row| {
+                !row.predicted
+                    && (row.scene, row.backend, row.workers, row.mode)
+                        == (block.case.name, block.backend, workers, mode.name)
+            };
+            if !self.rows.iter().any(is_there) {
+                self.rows.push(row(index, workers));
+            }
+        }
+        if block.case.name == "uneven" {
+            let ratio = against(Mode::PER_CAMERA, Mode::ADAPTIVE);
+            self.against_per_camera.push((block.backend, block.workers, ratio));
+        }
+        self.add_predictions(block, &predictions);
+    }
+
+    fn add_predictions(&mut self, block: &Block<'_>, predictions: &[Prediction]) {
+        let (scene, backend, object_views) = (block.case.name, block.backend, block.case.object_views() as f64);
+        for workers in PREDICTED {
+            if self
+                .rows
+                .iter()
+                .any(|row| row.predicted && (row.scene, row.backend, row.workers) == (scene, backend, workers))
+            {
+                continue;
+            }
+            let time = |index: usize| {
+                let workers = if Mode::ALL[index].is_serial { 1 } else { workers };
+                predictions[index].of(workers).unwrap_or(f64::NAN)
+            };
+            let fixed = (0..Mode::ALL.len()).filter(|&index| Mode::is_fixed(index));
+            let best = fixed.map(time).fold(f64::INFINITY, f64::min);
+            for (index, mode) in Mode::ALL.iter().enumerate().filter(|(_, mode)| !mode.is_serial) {
+                self.rows.push(Row {
+                    scene,
+                    backend,
+                    workers,
+                    mode: mode.name,
+                    ns_per_object_view: time(index) * 1e9 / object_views,
+                    speedup_vs_serial: time(Mode::SERIAL) / time(index),
+                    ratio_to_best_mode: best / time(index),
+                    predicted: true,
+                });
+            }
+        }
+        for (mode, prediction) in Mode::ALL.iter().zip(predictions) {
+            let workers = if mode.is_serial { 1 } else { block.workers };
+            self.errors.push(ReplayError {
+                scene,
+                backend,
+                workers,
+                mode: mode.name,
+                predicted: prediction.of(workers).unwrap_or(f64::NAN) * 1e3,
+                measured: prediction.measured() * 1e3,
+            });
+        }
+    }
+
+    pub fn print(&self) {
+        let [noop, adapter] = self.rounds;
+        let note = if self.extent == "full" { "" } else { ", whose figures mean nothing" };
+        println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
+        println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
+        println!("ns: record + submit, per object and view that sees it; best: of the fixed modes, in other rounds\n");
+        self.print_measured();
+        self.print_predicted();
+        self.print_errors();
+        self.print_marks();
+    }
+
+    fn print_measured(&self) {
+        let mut table =
+            Table::new(&["scene", "backend", "workers", "mode", "ns", "speed-up on serial", "of the best mode"]);
+        for row in self.rows.iter().filter(|row| !row.predicted) {
+            table.line([
+                row.scene.to_owned(),
+                row.backend.name().to_owned(),
+                row.workers.to_string(),
+                row.mode.to_owned(),
+                format!("{:.1}", row.ns_per_object_view),
+                format!("{:.2}", row.speedup_vs_serial),
+                format!("{:.3}", row.ratio_to_best_mode),
+            ]);
+        }
+        table.print();
+    }
+
+    fn print_predicted(&self) {
+        println!("Predicted speed-up on serial, adaptive and the best fixed mode\n");
+        let counts = PREDICTED.map(|workers| format!("{workers} workers"));
+        let headings: Vec<_> = ["scene", "backend"].into_iter().chain(counts.iter().map(String::as_str)).collect();
+        let mut table = Table::new(&headings);
+        for row in self.rows.iter().filter(|row| row.predicted && row.workers == PREDICTED[0] && row.mode == "adaptive")
+        {
+            let cell = |workers| {
+                let of = |other: &&Row| {
+                    other.predicted && (other.scene, other.backend, other.workers) == (row.scene, row.backend, workers)
+                };
+                let adaptive = self.rows.iter().filter(of).find(|row| row.mode == "adaptive");
+                let fixed = self.rows.iter().filter(of).filter(|row| row.mode != "adaptive");
+                let best = fixed.map(|row| row.speedup_vs_serial).fold(1.0, f64::max);
+                format!("{:.2} / {best:.2}", adaptive.map_or(f64::NAN, |row| row.speedup_vs_serial))
+            };
+            let [four, eight, sixteen, thirty_two, sixty_four] = PREDICTED.map(cell);
+            let (scene, backend) = (row.scene.to_owned(), row.backend.name().to_owned());
+            table.line([scene, backend, four, eight, sixteen, thirty_two, sixty_four]);
+        }
+        table.print();
+    }
+
+    fn print_errors(&self) {
+        println!("The replay, for the workers that there are\n");
+        let mut table = Table::new(&["scene", "backend", "workers", "mode", "predicted ms", "measured ms", "error %"]);
+        for error in &self.errors {
+            table.line([
+                error.scene.to_owned(),
+                error.backend.name().to_owned(),
+                error.workers.to_string(),
+                error.mode.to_owned(),
+                format!("{:.4}", error.predicted),
+                format!("{:.4}", error.measured),
+                format!("{:.1}", (error.predicted / error.measured - 1.0) * 100.0),
+            ]);
+        }
+        table.print();
+    }
+
+    /// What is to hold on `noop` with two workers, and what does.
+    fn print_marks(&self) {
+        println!("On noop, two workers: what is to be reached, and what was\n");
+        let mut table = Table::new(&["what", "scene", "at least", "reached"]);
+        let mut mark = |what: &str, scene: &str, least: f64, reached: f64| {
+            let verdict = if reached >= least { "" } else { ", short" };
+            table.line([what.to_owned(), scene.to_owned(), format!("{least:.2}"), format!("{reached:.3}{verdict}")]);
+        };
+        let judged = |row: &&Row| {
+            row.backend == BackendName::Noop && row.workers == 2 && row.mode == "adaptive" && !row.predicted
+        };
+        for row in self.rows.iter().filter(judged) {
+            let least = if ["small", "interrupted"].contains(&row.scene) { 0.90 } else { 0.97 };
+            mark("adaptive, of the best fixed mode", row.scene, least, row.ratio_to_best_mode);
+            mark("adaptive, of serial", row.scene, 0.97, row.speedup_vs_serial);
+        }
+        for &(_, _, ratio) in self.against_per_camera.iter().filter(|mark| (mark.0, mark.1) == (BackendName::Noop, 2)) {
+            mark("adaptive, of per-camera", "uneven", 1.5, ratio);
+        }
+        let judged = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
+        let worst = self.errors.iter().filter(judged).map(|error| (error.predicted / error.measured - 1.0).abs());
+        let worst = worst.fold(0.0, f64::max);
+        mark("the replay's worst, 1 − error", "all but interrupted", 0.95, 1.0 - worst);
+        table.print();
+    }
+
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self) -> Result<(), Box<dyn Error>> {
+        results::write_json("load_balance.json", &self.rows)?;
+        charts::draw(&results::file("load_balance.svg")?, &self.rows)
+    }
+}
+
+/// By round, how many times as long one takes as another.
+fn ratios<'a>(one: &'a Times, other: &'a Times) -> impl Iterator<Item = f64> + 'a {
+    one.measured.iter().zip(&other.measured).map(|(one, other)| one / other)
+}

@@ -1,0 +1,50 @@
+//! The scenes.
+
+use drawloom::scene::{Scene, SceneError};
+use drawloom_benches::clouds::{around_one, back_to_back};
+
+/// In the order they are shown.
+pub const NAMES: [&str; 6] = ["even", "uneven", "single", "many", "small", "interrupted"];
+
+/// A scene, and what is to be seen in it.
+pub struct Case {
+    pub name: &'static str,
+    pub scene: Scene,
+    /// How many objects each camera is to see.
+    pub seen: Vec<usize>,
+    /// Whether a foreign thread takes a core half of the time (the system's own events of M 10.5).
+    pub is_interrupted: bool,
+}
+
+impl Case {
+    /// Summed over views.
+    pub fn object_views(&self) -> usize {
+        self.seen.iter().sum()
+    }
+}
+
+/// All of them, with this share of their objects.
+///
+/// # Errors
+/// If a scene cannot be.
+pub fn all(share: usize) -> Result<Vec<Case>, SceneError> {
+    let of = |objects: usize| (objects / share).max(1);
+    let uneven = [20_000, 500, 1_000, 1_500].map(of);
+    let round = |name, cameras, objects| {
+        let scene = around_one(cameras, objects)?;
+        Ok::<_, SceneError>(Case { name, scene, seen: vec![objects; cameras], is_interrupted: false })
+    };
+    let turned = |name, is_interrupted| {
+        let scene = back_to_back(uneven)?;
+        Ok::<_, SceneError>(Case { name, scene, seen: uneven.to_vec(), is_interrupted })
+    };
+    let [even, uneven, single, many, small, interrupted] = NAMES;
+    Ok(vec![
+        round(even, 4, of(10_000))?,
+        turned(uneven, false)?,
+        round(single, 1, of(40_000))?,
+        round(many, 64, of(50))?,
+        round(small, 1, 7)?,
+        turned(interrupted, true)?,
+    ])
+}

@@ -1,0 +1,65 @@
+//! The picture: what two workers gain, and how many frames a second there are.
+
+use std::error::Error;
+use std::path::Path;
+
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::chart::{self, Bars, Lines, Panel};
+
+use crate::scenario::Row;
+
+/// # Errors
+/// If the file cannot be written.
+pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
+    let mut panels = Vec::new();
+    for &backend in BackendName::ALL {
+        let of = |instancing| rows.iter().filter(move |row| row.backend == backend && row.instancing == instancing);
+        let (off, on): (Vec<_>, Vec<_>) = (of(false).collect(), of(true).collect());
+        if !off.is_empty() {
+            panels.push(Panel::Bars(ratios(backend, &off)));
+            panels.push(Panel::Lines(frames(backend, &off, &on)));
+        }
+    }
+    chart::draw(path, &panels)
+}
+
+/// Those with instancing would leave no room for the others.
+fn ratios(backend: BackendName, off: &[&Row]) -> Bars {
+    Bars {
+        title: format!("Multi against single by objects, instancing off, {}", backend.name()),
+        series: vec!["L 6, on two cores of 2009".to_owned(), "2 workers".to_owned()],
+        groups: off
+            .iter()
+            .map(|row| (chart::grouped(row.objects as f64), vec![of_paper(row.objects), row.ratio]))
+            .collect(),
+        marks: off.iter().map(|row| row.ceiling).collect(),
+        mark_name: "ceiling".to_owned(),
+        line: 1.0,
+    }
+}
+
+/// What L measured; with fewer objects, it says, two cores were slightly worse than one.
+fn of_paper(objects: usize) -> f64 {
+    match objects {
+        1_006 => 119.0 / 71.0,
+        2_006 => 1.71,
+        _ => f64::NAN,
+    }
+}
+
+fn frames(backend: BackendName, off: &[&Row], on: &[&Row]) -> Lines {
+    let line = |name: &str, rows: &[&Row], frames: fn(&Row) -> f64| {
+        (name.to_owned(), rows.iter().map(|row| (row.objects as f64, frames(row))).collect())
+    };
+    Lines {
+        title: format!("Frames a second, {}, without what the device takes", backend.name()),
+        across: "objects".to_owned(),
+        series: vec![
+            line("single", off, |row| row.single_fps),
+            line("multi", off, |row| row.multi_fps),
+            line("multi, instanced", on, |row| row.multi_fps),
+        ],
+        first_color: 0,
+        ticks: off.iter().map(|row| row.objects as f64).collect(),
+    }
+}

@@ -1,0 +1,118 @@
+//! What was measured, as tables, as JSON and as a picture.
+
+use std::error::Error;
+
+use drawloom_benches::backends::{BackendName, adapter_name};
+use drawloom_benches::results;
+use drawloom_benches::table::Table;
+use serde::Serialize;
+
+use crate::{Extent, charts, growth, scenario};
+
+/// What was measured.
+pub struct Report {
+    extent: &'static str,
+    rounds: [usize; 2],
+    growth_rounds: [usize; 2],
+    pub scenarios: Vec<scenario::Row>,
+    pub growth: Vec<growth::Row>,
+}
+
+/// A row of the file: of one table or the other.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Row<'a> {
+    Scenario(&'a scenario::Row),
+    Growth(&'a growth::Row),
+}
+
+impl Report {
+    pub fn new(extent: &Extent) -> Self {
+        let Extent { name, rounds, growth_rounds, .. } = *extent;
+        Self { extent: name, rounds, growth_rounds, scenarios: Vec::new(), growth: Vec::new() }
+    }
+
+    pub fn print(&self) {
+        let ([noop, adapter], [many_noop, many_adapter]) = (self.rounds, self.growth_rounds);
+        let note = if self.extent == "full" { "" } else { ", whose figures mean nothing" };
+        println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
+        println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
+        println!("frames: record + submit, without what the device takes; held: until recording ended, of the frame\n");
+        let mut table = Table::new(&[
+            "objects",
+            "backend",
+            "instancing",
+            "single fps",
+            "multi fps",
+            "ratio",
+            "ceiling",
+            "single held ms",
+            "multi held ms",
+            "single held %",
+            "multi held %",
+        ]);
+        for row in &self.scenarios {
+            table.line([
+                row.objects.to_string(),
+                row.backend.name().to_owned(),
+                if row.instancing { "on" } else { "off" }.to_owned(),
+                format!("{:.1}", row.single_fps),
+                format!("{:.1}", row.multi_fps),
+                format!("{:.2}", row.ratio),
+                format!("{:.2}", row.ceiling),
+                format!("{:.4}", row.single_held_ms),
+                format!("{:.4}", row.multi_held_ms),
+                format!("{:.1}", row.single_held_share * 100.0),
+                format!("{:.1}", row.multi_held_share * 100.0),
+            ]);
+        }
+        table.print();
+        println!("Growth: two workers, no instancing; medians of {many_noop} and {many_adapter} rounds\n");
+        let mut table = Table::new(&["objects", "backend", "ns an object and view"]);
+        for row in &self.growth {
+            let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
+            table.line([objects, backend, format!("{:.1}", row.ns_per_object_view)]);
+        }
+        table.print();
+        self.print_marks();
+    }
+
+    /// What is to hold on `noop`, and what does.
+    fn print_marks(&self) {
+        println!("On noop, without instancing: what is to be reached, and what was\n");
+        let mut table = Table::new(&["what", "objects", "bound", "reached"]);
+        let mut mark = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
+            let verdict = if is_reached { "" } else { ", short" };
+            table.line([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{verdict}")]);
+        };
+        for row in self.scenarios.iter().filter(|row| row.backend == BackendName::Noop && !row.instancing) {
+            let least = match row.objects {
+                7 | 16 | 106 => 0.97,
+                1_006 => 1.70,
+                2_006 => 1.80,
+                10_000 => 1.90,
+                _ => continue,
+            };
+            mark("ratio", row.objects, least, row.ratio, row.ratio >= least);
+            if row.objects >= 1_000 {
+                let of_ceiling = row.ratio / row.ceiling;
+                mark("ratio, of its ceiling", row.objects, 0.90, of_ceiling, of_ceiling >= 0.9);
+            }
+        }
+        let growth: Vec<_> = self.growth.iter().filter(|row| row.backend == BackendName::Noop).collect();
+        if let [first, .., last] = growth[..] {
+            let grown = last.ns_per_object_view / first.ns_per_object_view;
+            mark("ns, of those of the fewest, at most", last.objects, 1.5, grown, grown <= 1.5);
+        }
+        table.print();
+    }
+
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self) -> Result<(), Box<dyn Error>> {
+        let scenarios = self.scenarios.iter().map(Row::Scenario);
+        let rows: Vec<_> = scenarios.chain(self.growth.iter().map(Row::Growth)).collect();
+        results::write_json("objects.json", &rows)?;
+        charts::draw(&results::file("objects.svg")?, &self.scenarios)
+    }
+}

@@ -1,0 +1,49 @@
+//! The scene of L 6: a few things under a lamp, and as many more of them as are wanted, each where one stands already.
+
+use std::f64::consts::TAU;
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
+use drawloom_benches::boxes::new_box;
+use drawloom_benches::moving::Moving;
+use drawloom_testing::random::Random;
+
+/// The main camera's, and the lamp's.
+pub const VIEWS: usize = 2;
+/// In pixels, to each side, of the picture and of the shadow map. What is measured is the processor's part; a device in
+/// software would share it.
+pub const PICTURE: u32 = 64;
+
+/// Things that stand beside each other.
+const ORIGINALS: usize = 7;
+/// In metres. From there a box needs no subdivision to be drawn into the lamp's map: its edges are seen under 5° at most.
+const LAMP_HEIGHT: f64 = 20.0;
+
+/// # Errors
+/// If the scene cannot be.
+pub fn new(objects: usize) -> Result<Moving, SceneError> {
+    let mut random = Random::new();
+    let mut scene = Scene::new();
+    let mut originals = Vec::new();
+    for index in 0..ORIGINALS {
+        let mesh = scene.add(new_box(format!("box {index}"), random.vector(0.3, 0.5))?)?;
+        let (name, diffuse) = (format!("paint {index}"), random.vector(0.2, 0.9));
+        let material = scene.add(Material { name, diffuse, ..Material::default() })?;
+        let (sine, cosine) = (TAU * index as f64 / ORIGINALS as f64).sin_cos();
+        originals.push(RenderObject::new(mesh, material, DVec3::new(cosine, 0.0, sine) * 3.0));
+    }
+    for &object in originals.iter().cycle().take(objects) {
+        scene.add_object(object)?;
+    }
+    scene
+        .cameras
+        .push(Camera { size: [PICTURE; 2], ..Camera::looking_at("main", DVec3::new(0.0, 6.0, 10.0), DVec3::ZERO) });
+    scene.lights.push(Light::Hemispherical {
+        position: DVec3::Y * LAMP_HEIGHT,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(300.0),
+        range: 40.0,
+        casts_shadow: true,
+    });
+    Ok(Moving::new(scene))
+}

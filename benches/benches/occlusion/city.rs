@@ -1,0 +1,66 @@
+//! A city of boxes.
+
+use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
+use drawloom_benches::boxes::new_box;
+use drawloom_testing::random::Random;
+
+/// In metres: a lot is as wide as this to either side, and after so many of them comes a street.
+const LOT: f64 = 14.0;
+const LOTS: [usize; 2] = [4, 6];
+const STREET: f64 = 16.0;
+
+/// Of all boxes, those that are houses: the others are as small as what stands in streets, half to five metres.
+const HOUSES: f64 = 0.7;
+
+/// So many boxes, and cameras in streets, above roofs and above all.
+///
+/// # Errors
+/// If the scene cannot be.
+pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
+    let mut random = Random::new();
+    let mut scene = Scene::new();
+    let mesh = scene.add(new_box("box".to_owned(), Vec3::ONE)?)?;
+    let material = scene.add(Material::default())?;
+    let houses = (boxes as f64 * HOUSES) as usize;
+    let side = (houses as f64).sqrt().ceil() as usize;
+    // Where lots are, to either side of streets, counted from the city's middle.
+    let along = |lot: usize, axis: usize| {
+        let streets = |lot: usize| (lot / LOTS[axis]) as f64 * STREET;
+        (lot as f64 + 0.5 - (side / 2 / LOTS[axis] * LOTS[axis]) as f64) * LOT + streets(lot)
+            - streets(side / 2 / LOTS[axis] * LOTS[axis])
+    };
+    let extent = side as f64 * LOT * 0.5;
+    for index in 0..boxes {
+        let is_house = index < houses;
+        let (x, z, half, height) = if is_house {
+            let half = [random.between(4.5, 6.9), random.between(4.5, 6.9)];
+            // Few are high.
+            let height = 6.0 + 22.0 * random.between(0.0, 1.0).powi(2) + 90.0 * random.between(0.0, 1.0).powi(40);
+            (along(index % side, 0), along(index / side, 1), half, height)
+        } else {
+            let half = [random.between(0.25, 2.5), random.between(0.25, 2.5)];
+            (random.between(-extent, extent), random.between(-extent, extent), half, random.between(0.5, 5.0))
+        };
+        let is_turned = random.below(7) == 0;
+        let turn = if is_turned { random.between(0.0, 1.57) } else { 0.0 };
+        // Turned, it has to keep to its lot.
+        let half = half.map(|half| if is_turned { half * 0.7 } else { half });
+        let object = RenderObject::new(mesh, material, DVec3::new(x, height * 0.5, z));
+        let scale = Vec3::new(half[0] as f32, height as f32 * 0.5, half[1] as f32);
+        scene.add_object(RenderObject { scale, orientation: Quat::from_rotation_y(turn as f32), ..object })?;
+    }
+    let street = -STREET * 0.5;
+    let eye = DVec3::new(street, 1.7, street);
+    let up = |height: f64| DVec3::Y * height;
+    scene.cameras = [
+        ("along a street", eye + DVec3::Z * 60.0, DVec3::NEG_Z),
+        ("across a street", eye + DVec3::Z * 55.0, DVec3::new(1.0, 0.05, -0.3)),
+        ("from a crossing", eye, DVec3::new(1.0, 0.1, 1.0)),
+        ("above the roofs", eye + up(32.0), DVec3::new(-0.6, -0.1, 1.0)),
+        ("from above", eye + up(250.0), DVec3::new(0.5, -0.8, 0.5)),
+    ]
+    .map(|(name, position, towards)| Camera { size: picture, ..Camera::looking_at(name, position, position + towards) })
+    .into();
+    Ok(scene)
+}

@@ -1,0 +1,175 @@
+//! What a camera sees, what is found to be hidden from it, and what that takes.
+
+use std::time::Instant;
+
+use drawloom::quality::Quality;
+use drawloom::scene::{Blend, Camera, SceneRef};
+use drawloom::view::{ObjectTable, OccluderMeshes, Occlusion, RenderView, VisibleSet};
+use drawloom_benches::table::Table;
+use drawloom_testing::samples::Samples;
+use serde::Serialize;
+
+use crate::naive;
+
+/// A camera's picture at one coarseness, or all of them.
+#[derive(Clone, Default, Serialize)]
+pub struct Row {
+    pub camera: String,
+    /// Pixels to a square's side.
+    pub side: u32,
+    /// Objects the frustum holds.
+    pub seen: usize,
+    /// Of those, the ones that would show if nothing were before them, and do not.
+    pub truly_hidden: usize,
+    /// Of those, the ones that were found.
+    pub found: usize,
+    /// Left out, and show.
+    pub false_hidden: usize,
+    pub naive_found: usize,
+    pub naive_false: usize,
+    /// Convex parts drawn.
+    pub parts: usize,
+    /// Choosing and projecting occluders, in microseconds.
+    pub choose_us: f64,
+    /// Drawing the coarse depth, on one core, in microseconds.
+    pub draw_us: f64,
+    /// Asking for one object, in nanoseconds.
+    pub object_ns: f64,
+}
+
+impl Row {
+    /// A row for each coarseness, over all cameras; times are means over cameras.
+    pub fn totals(rows: &[Self]) -> Vec<Self> {
+        let total = |side: u32| {
+            let rows = rows.iter().filter(|row| row.side == side);
+            let count = rows.clone().count() as f64;
+            let sum = |figure: fn(&Self) -> usize| rows.clone().map(figure).sum();
+            let mean = |figure: fn(&Self) -> f64| rows.clone().map(figure).sum::<f64>() / count;
+            Self {
+                camera: "all".to_owned(),
+                side,
+                seen: sum(|row| row.seen),
+                truly_hidden: sum(|row| row.truly_hidden),
+                found: sum(|row| row.found),
+                false_hidden: sum(|row| row.false_hidden),
+                naive_found: sum(|row| row.naive_found),
+                naive_false: sum(|row| row.naive_false),
+                parts: sum(|row| row.parts),
+                choose_us: mean(|row| row.choose_us),
+                draw_us: mean(|row| row.draw_us),
+                object_ns: mean(|row| row.object_ns),
+            }
+        };
+        Quality::OCCLUSION_SQUARES.into_iter().map(total).collect()
+    }
+}
+
+/// What a camera sees.
+pub struct Sight<'a> {
+    scene: &'a SceneRef<'a>,
+    view: RenderView,
+    table: ObjectTable,
+    meshes: OccluderMeshes,
+    seen: Vec<bool>,
+    truth: Samples,
+}
+
+impl<'a> Sight<'a> {
+    pub fn new(scene: &'a SceneRef<'a>, camera: &Camera) -> Self {
+        let count = scene.object_count();
+        let mut table = ObjectTable::default();
+        table.reset(count);
+        table.fill(scene, 0..count);
+        let mut meshes = OccluderMeshes::default();
+        meshes.follow(scene.assets);
+        let view = RenderView::new(camera);
+        let sees = |object: usize| {
+            let bounds = table.block(object / ObjectTable::BLOCK).spheres.get(object % ObjectTable::BLOCK);
+            view.frustum.may_see(bounds.center, bounds.radius)
+        };
+        let seen: Vec<_> = (0..count).map(sees).collect();
+        let truth = Samples::new(scene, camera, 0.25, |object| seen[object]);
+        Self { scene, view, table, meshes, seen, truth }
+    }
+
+    /// Lets occlusion look for what is hidden, in squares of so many pixels.
+    pub fn measure(&self, side: u32, rounds: usize) -> Row {
+        let Self { scene, view, table, meshes, seen, truth } = self;
+        let count = seen.len();
+        let mut occlusion = Occlusion::default();
+        let mut visible = VisibleSet::default();
+        let mut times: [Vec<f64>; 3] = Default::default();
+        for _ in 0..rounds {
+            visible.reset(count);
+            let bits = |(place, object): (usize, usize)| u64::from(seen[object]) << place;
+            visible.test(0..count, |objects| objects.enumerate().fold(0, |all, object| all | bits(object)));
+            occlusion.reset(view, side);
+            let start = Instant::now();
+            occlusion.choose(scene, table, &visible, meshes, |draw| draw.state.blend() == Blend::None);
+            let chosen = Instant::now();
+            (0..occlusion.strip_count()).for_each(|strip| occlusion.draw(strip));
+            let drawn = Instant::now();
+            visible.hide(0..count, |first, seen| occlusion.hidden(scene, table, first, seen));
+            let spans = [chosen - start, drawn - chosen, drawn.elapsed()];
+            times.iter_mut().zip(spans).for_each(|(times, span)| times.push(span.as_secs_f64()));
+        }
+        let is_left = |object: usize| visible.word(object / VisibleSet::WORD) >> (object % VisibleSet::WORD) & 1 == 1;
+        let hidden: Vec<_> = (0..count).map(|object| seen[object] && !is_left(object)).collect();
+        let naive = naive::hidden(scene, &view.camera, side, seen);
+        let number = |of: &dyn Fn(usize) -> bool| (0..count).filter(|&object| of(object)).count();
+        let is_truly_hidden = |object: usize| truth.alone[object] && !truth.shown[object];
+        let sights = number(&|object| seen[object]);
+        let [choose, draw, ask] = times.map(|mut times| {
+            times.sort_by(f64::total_cmp);
+            times[times.len() / 2]
+        });
+        Row {
+            camera: view.name().to_owned(),
+            side,
+            seen: sights,
+            truly_hidden: number(&is_truly_hidden),
+            found: number(&|object| is_truly_hidden(object) && hidden[object]),
+            false_hidden: number(&|object| truth.shown[object] && hidden[object]),
+            naive_found: number(&|object| is_truly_hidden(object) && naive[object]),
+            naive_false: number(&|object| truth.shown[object] && naive[object]),
+            parts: occlusion.part_count(),
+            choose_us: choose * 1e6,
+            draw_us: draw * 1e6,
+            object_ns: ask * 1e9 / sights.max(1) as f64,
+        }
+    }
+}
+
+pub fn print(rows: &[Row]) {
+    let headings = [
+        "camera",
+        "1/k",
+        "in frustum",
+        "hidden",
+        "found",
+        "false",
+        "naive found",
+        "naive false",
+        "choose µs",
+        "draw µs",
+        "ns an object",
+    ];
+    let mut table = Table::new(&headings);
+    let percent = |part: usize, whole: usize| format!("{:.1}", part as f64 / whole.max(1) as f64 * 100.0);
+    for row in rows {
+        table.line([
+            row.camera.clone(),
+            row.side.to_string(),
+            row.seen.to_string(),
+            row.truly_hidden.to_string(),
+            percent(row.found, row.truly_hidden),
+            row.false_hidden.to_string(),
+            percent(row.naive_found, row.truly_hidden),
+            row.naive_false.to_string(),
+            format!("{:.0}", row.choose_us),
+            format!("{:.0}", row.draw_us),
+            format!("{:.0}", row.object_ns),
+        ]);
+    }
+    table.print();
+}

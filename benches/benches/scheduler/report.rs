@@ -1,0 +1,122 @@
+//! What was measured, as a table and as JSON.
+
+use std::io;
+
+use drawloom_benches::results;
+use drawloom_benches::table::Table;
+use serde::Serialize;
+
+use crate::Extent;
+use crate::turns::Row;
+
+/// What was measured.
+pub struct Report {
+    extent: &'static str,
+    rounds: usize,
+    lines: Vec<Line>,
+}
+
+/// A contender in a row.
+#[derive(Serialize)]
+struct Line {
+    row: &'static str,
+    executor: &'static str,
+    workers: usize,
+    median: f64,
+    p95: f64,
+    unit: &'static str,
+    /// Whether it is somebody else's way to do the same.
+    #[serde(skip)]
+    is_peer: bool,
+}
+
+impl Line {
+    fn is_ours(&self) -> bool {
+        self.executor.starts_with("drawloom")
+    }
+}
+
+impl Report {
+    pub fn new(extent: &Extent) -> Self {
+        Self { extent: extent.name, rounds: extent.rounds, lines: Vec::new() }
+    }
+
+    pub fn add(&mut self, row: &Row) {
+        self.lines.extend(row.contenders.iter().map(|contender| {
+            let mut line = Line {
+                row: row.name,
+                executor: contender.name,
+                workers: contender.workers,
+                median: contender.median(),
+                p95: contender.percentile_95(),
+                unit: row.unit,
+                is_peer: false,
+            };
+            line.is_peer = !line.is_ours() && !contender.is_easier;
+            line
+        }));
+    }
+
+    pub fn print(&self) {
+        let note = if self.extent == "full" { "" } else { ", whose figures mean little" };
+        println!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
+        println!("workers: threads that run jobs, the caller's included; ratio: to the best of the peers");
+        println!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
+        let mut table = Table::new(&["row", "executor", "workers", "median", "p95", "unit", "ratio"]);
+        for line in &self.lines {
+            let Line { row, executor, workers, median, p95, unit, .. } = line;
+            let ratio = self.best_peer(row).map_or(String::new(), |best| format!("{:.2}", median / best));
+            let figures = [median, p95].map(|figure| format!("{figure:.decimals$}", decimals = decimals(*figure)));
+            let [median, p95] = figures;
+            table.line([
+                row.to_string(),
+                executor.to_string(),
+                workers.to_string(),
+                median,
+                p95,
+                unit.to_string(),
+                ratio,
+            ]);
+        }
+        table.print();
+        self.print_cold_target();
+    }
+
+    /// A frame that finds everybody asleep cannot do without waking them: what it may take is set beside it.
+    fn print_cold_target(&self) {
+        let (Some(wake), Some(ideal)) = (self.median("wake", "drawloom"), self.median("frame_cold", "ideal")) else {
+            return;
+        };
+        let target = ideal + 1.5 * wake;
+        println!("frame_cold: a wake takes {wake:.1} µs (row wake, drawloom); ideal + 1.5 wakes = {target:.1} µs");
+        let ours = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
+        for Line { executor, median, .. } in ours {
+            println!("frame_cold: {executor} takes {:+.1} µs against that", median - target);
+        }
+        println!();
+    }
+
+    fn median(&self, row: &str, executor: &str) -> Option<f64> {
+        self.lines.iter().find(|line| line.row == row && line.executor == executor).map(|line| line.median)
+    }
+
+    fn best_peer(&self, row: &str) -> Option<f64> {
+        let peers = self.lines.iter().filter(|line| line.row == row && line.is_peer);
+        peers.map(|line| line.median).min_by(f64::total_cmp)
+    }
+
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self) -> io::Result<()> {
+        results::write_json("scheduler.json", &self.lines)
+    }
+}
+
+/// So many that there are three figures, of small numbers.
+fn decimals(figure: f64) -> usize {
+    match figure {
+        ..10.0 => 2,
+        ..1000.0 => 1,
+        _ => 0,
+    }
+}

@@ -1,0 +1,26 @@
+//! What a process' span costs where nobody subscribes.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use drawloom_benches::stopwatch::middle;
+
+const SPANS: u32 = 1_000_000;
+
+/// Nanoseconds a span that is opened, entered and closed, with the fields that a process has. Of so many rounds.
+pub fn measure(rounds: usize) -> f64 {
+    let parent = tracing::Span::current();
+    let (name, view) = (black_box("geometry buffer, view 0, record"), black_box(Some("main")));
+    let with = || {
+        let span = tracing::debug_span!(target: "drawloom::graph", parent: &parent, "process", name, view);
+        drop(black_box(span.entered()));
+    };
+    let without = || _ = black_box((name, view));
+    middle((0..rounds).map(|_| time(with) - time(without)))
+}
+
+fn time(call: impl Fn()) -> f64 {
+    let start = Instant::now();
+    (0..SPANS).for_each(|_| call());
+    start.elapsed().as_nanos() as f64 / f64::from(SPANS)
+}

@@ -1,0 +1,102 @@
+//! What accuracy costs on a scene: every knob of `Quality` alone, and the presets, with what each saves and how far off it is.
+//!
+//!     cargo run --release -p drawloom-benches --example tradeoff
+//!     cargo run --release -p drawloom-benches --example tradeoff -- scene.obj --camera-path orbit --budget-ms 8
+
+mod arguments;
+mod budget;
+mod camera_path;
+mod charts;
+mod comparison;
+mod errors;
+mod front;
+mod measure;
+mod page;
+mod paraboloid;
+mod results;
+mod settings;
+mod stage;
+mod targets;
+mod vertices;
+
+use std::error::Error;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use drawloom::raster::CulledTriangles;
+use drawloom::scene::{Camera, Scene};
+use drawloom::view::RenderView;
+
+use arguments::Arguments;
+use measure::Measurements;
+use results::Results;
+
+/// What may go wrong here, to be printed.
+type Failure = Box<dyn Error>;
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
+    match run(&Arguments::checked()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// How many triangles nobody sees: what culling them on the CPU would save the device (S 9.6).
+fn tell_triangles(scene: &Scene, path: &[Camera]) {
+    let Some(view) = path.first().map(RenderView::new) else { return };
+    let (scene, mut kept) = (scene.as_scene_ref(), Vec::new());
+    let mut culled = CulledTriangles::default();
+    let start = Instant::now();
+    for object in 0..scene.object_count() {
+        kept.clear();
+        culled += view.cull_triangles(&scene, object, &mut kept);
+    }
+    let each = start.elapsed().as_nanos() as f64 / culled.triangles.max(1) as f64;
+    println!(
+        "triangles: {}, of which the CPU could leave out {:.1}%: {} face away, {} are outside of the picture, {} cover no pixel, {} \
+         are none; {each:.0} ns each\n",
+        culled.triangles,
+        culled.share() * 100.0,
+        culled.back_facing,
+        culled.off_screen,
+        culled.zero_size,
+        culled.degenerate,
+    );
+}
+
+/// Whether every error measured is within its bound.
+fn run(arguments: &Arguments) -> Result<bool, Failure> {
+    let scene = arguments.load_scene()?;
+    let path = camera_path::of(&scene, arguments)?;
+    let settings = settings::all();
+    let mut stage = stage::open(arguments)?;
+    println!("drawn by {}", stage.name());
+
+    let measurements = Measurements::take(&mut *stage, &scene, &path, &settings, arguments)?;
+    let results = Results::new(arguments.scene_name(), stage.name(), &scene, &path, &settings, &measurements)?;
+    results.print();
+    tell_triangles(&scene, &path);
+
+    let folder = drawloom_benches::results::folder()?;
+    let pictures = folder.join("tradeoff").join(format!("{}-{}", results.scene(), stage.kind()));
+    std::fs::create_dir_all(&pictures)?;
+    results.write(&folder.join("tradeoff.json"))?;
+    charts::draw(&pictures, &results)?;
+    front::draw(&pictures, &results)?;
+    page::write(&pictures, &results, &measurements)?;
+
+    if let Some(budget) = arguments.budget_ms {
+        budget::answer(budget, &mut *stage, &scene, &path, &settings, &results)?;
+    }
+    let exceeded: Vec<_> = results.exceeded().collect();
+    for entry in &exceeded {
+        let (error, bound) = (entry.error.unwrap_or_default(), entry.bound.unwrap_or_default());
+        eprintln!("{}, {}: off by {error} {}, and can be by {bound}", entry.knob, entry.setting, entry.metric);
+    }
+    Ok(exceeded.is_empty())
+}

@@ -1,0 +1,78 @@
+//! Scenes of boxes scattered in clouds, with cameras of which each sees a cloud as a whole.
+
+use std::f64::consts::TAU;
+
+use drawloom::glam::{DVec3, Quat};
+use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
+use drawloom_testing::random::Random;
+
+use crate::boxes::new_box;
+
+pub const MESHES: u32 = 64;
+/// So many that a view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
+pub const MATERIALS: u32 = 16;
+
+/// In metres. A cloud fills 20° to each side of where its camera looks. A camera sees 30° up and down, and with its square
+/// picture as far to the left and right; so it sees all of its cloud, and nothing of those a quarter turn away.
+const DISTANCE: f64 = 150.0;
+const CLOUD_RADIUS: f64 = 50.0;
+
+/// In pixels, to each side. What is measured is the processor's part; a device in software would share it.
+const PICTURE: u32 = 64;
+
+/// So many cameras around one cloud of objects: each sees all of it.
+///
+/// # Errors
+/// If the scene cannot be.
+pub fn around_one(cameras: usize, objects: usize) -> Result<Scene, SceneError> {
+    let mut scene = scene_of_clouds([(DVec3::ZERO, objects)])?;
+    let around = directions(cameras).enumerate();
+    scene.cameras = around.map(|(index, direction)| camera(index, direction * DISTANCE, DVec3::ZERO)).collect();
+    Ok(scene)
+}
+
+/// Four cameras back to back, each with a cloud of its own.
+///
+/// # Errors
+/// If the scene cannot be.
+pub fn back_to_back(objects: [usize; 4]) -> Result<Scene, SceneError> {
+    let centers: Vec<_> = directions(4).map(|direction| direction * DISTANCE).collect();
+    let mut scene = scene_of_clouds(centers.iter().copied().zip(objects))?;
+    scene.cameras = centers.iter().enumerate().map(|(index, &center)| camera(index, DVec3::ZERO, center)).collect();
+    Ok(scene)
+}
+
+fn directions(count: usize) -> impl Iterator<Item = DVec3> {
+    (0..count).map(move |index| {
+        let (sine, cosine) = (TAU * index as f64 / count as f64).sin_cos();
+        DVec3::new(cosine, 0.0, sine)
+    })
+}
+
+fn camera(index: usize, position: DVec3, target: DVec3) -> Camera {
+    Camera { size: [PICTURE; 2], ..Camera::looking_at(format!("camera {index}"), position, target) }
+}
+
+/// Boxes scattered in clouds, given by centre and number of boxes.
+fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<Scene, SceneError> {
+    let mut random = Random::new();
+    let mut scene = Scene::new();
+    let (mut meshes, mut materials) = (Vec::new(), Vec::new());
+    for index in 0..MESHES {
+        meshes.push(scene.add(new_box(format!("box {index}"), random.vector(0.1, 0.6))?)?);
+    }
+    for index in 0..MATERIALS {
+        let (name, diffuse) = (format!("paint {index}"), random.vector(0.2, 0.9));
+        materials.push(scene.add(Material { name, diffuse, ..Material::default() })?);
+    }
+    for (center, objects) in clouds {
+        for _ in 0..objects {
+            let position = center + random.direction() * (CLOUD_RADIUS * random.between(0.0, 1.0).cbrt());
+            let orientation = Quat::from_axis_angle(random.direction().as_vec3(), random.between(0.0, TAU) as f32);
+            let mesh = meshes[random.below(meshes.len())];
+            let material = materials[random.below(materials.len())];
+            scene.add_object(RenderObject { orientation, ..RenderObject::new(mesh, material, position) })?;
+        }
+    }
+    Ok(scene)
+}

@@ -1,0 +1,41 @@
+//! Where benchmarks write their results: in `target/drawloom/`.
+
+use std::env;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+/// Writes `value` as the file `name`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_json(name: &str, value: &impl Serialize) -> io::Result<()> {
+    let path = file(name)?;
+    fs::write(&path, serde_json::to_string_pretty(value)? + "\n")?;
+    println!("{} written", path.display());
+    Ok(())
+}
+
+/// The path of the file `name`, in a folder that is there.
+///
+/// # Errors
+/// If the folder cannot be made.
+pub fn file(name: &str) -> io::Result<PathBuf> {
+    let folder = folder()?;
+    Ok(folder.join(name))
+}
+
+/// The folder `drawloom` of the target folder, which Cargo's programs are in: `target/release/deps/bench`,
+/// `target/release/examples/example`.
+///
+/// # Errors
+/// If the folder cannot be made.
+pub fn folder() -> io::Result<PathBuf> {
+    let program = env::current_exe()?;
+    let target = program.ancestors().nth(3).unwrap_or(Path::new("target"));
+    let folder = target.join("drawloom");
+    fs::create_dir_all(&folder)?;
+    Ok(folder)
+}

@@ -1,0 +1,236 @@
+//! Renders a scene through the whole frame, and says what that took. Without a graphics adapter the processor draws it.
+//!
+//!     cargo run --release --example frame
+//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
+//!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
+
+mod arguments;
+mod device;
+mod report;
+mod timeline;
+
+use std::error::Error;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::{Backend, NullBackend, Picture, SoftwareBackend, WgpuBackend};
+use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::scene::{Mesh, Scene, obj, sample};
+use drawloom::task::Scheduler;
+use drawloom::timeline::Log;
+use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
+use drawloom_testing::adapter;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use arguments::{Arguments, BackendName};
+use device::{Device, NoDevice, WgpuDevice};
+use report::Report;
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
+    match run(&Arguments::checked()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", with_causes(error.as_ref()));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let scene = load_scene(arguments)?;
+    let (report, log) = match arguments.backend {
+        Some(BackendName::Null) => {
+            let drawn = draw(arguments, BackendName::Null, &scene, |_| NullBackend, NoDevice)?;
+            (drawn.report, drawn.log)
+        }
+        Some(BackendName::Noop) => {
+            let backend = wgpu_backend(arguments, adapter::noop_device()?)?;
+            let drawn = draw(arguments, BackendName::Noop, &scene, |_| backend, WgpuDevice::timed(false))?;
+            (drawn.report, drawn.log)
+        }
+        Some(BackendName::Wgpu) => draw_on_adapter(arguments, &scene, adapter_backend(arguments)?)?,
+        Some(software @ (BackendName::Software | BackendName::Reference)) => {
+            draw_in_software(arguments, software, &scene, None)?
+        }
+        None => match adapter_backend(arguments) {
+            Ok(backend) => draw_on_adapter(arguments, &scene, backend)?,
+            // Whoever says how wgpu is to record wants wgpu.
+            Err(error) if arguments.record.is_some() => return Err(error),
+            Err(error) => draw_in_software(arguments, BackendName::Software, &scene, Some(&*error))?,
+        },
+    };
+    report.print();
+    timeline::tell(arguments, &log)?;
+    match &arguments.report {
+        Some(path) => report.write(path),
+        None => Ok(()),
+    }
+}
+
+fn adapter_backend(arguments: &Arguments) -> Result<WgpuBackend, Box<dyn Error>> {
+    wgpu_backend(arguments, adapter::device()?)
+}
+
+fn draw_on_adapter(
+    arguments: &Arguments,
+    scene: &Scene,
+    backend: WgpuBackend,
+) -> Result<(Report, Log), Box<dyn Error>> {
+    let is_timed = arguments.html.is_some() || arguments.timeline.is_some();
+    let is_timed = is_timed && backend.device().features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    let backend = if is_timed { backend.time_passes()? } else { backend };
+    let drawn = draw(arguments, BackendName::Wgpu, scene, |_| backend, WgpuDevice::timed(is_timed))?;
+    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    Ok((drawn.report, drawn.log))
+}
+
+/// Draws without an adapter: for that reason, if it is not what was asked for.
+fn draw_in_software(
+    arguments: &Arguments,
+    name: BackendName,
+    scene: &Scene,
+    reason: Option<&dyn Error>,
+) -> Result<(Report, Log), Box<dyn Error>> {
+    let make = |scheduler: &Arc<Scheduler>| match name {
+        BackendName::Reference => SoftwareBackend::reference(),
+        _ => SoftwareBackend::new(Arc::clone(scheduler)),
+    };
+    let drawn = draw(arguments, name, scene, make, NoDevice)?;
+    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    Ok((drawn.report.because(reason.map(with_causes)), drawn.log))
+}
+
+fn wgpu_backend(
+    arguments: &Arguments,
+    (device, queue): (wgpu::Device, wgpu::Queue),
+) -> Result<WgpuBackend, Box<dyn Error>> {
+    let backend = WgpuBackend::new(device, queue)?;
+    Ok(match arguments.record {
+        None => backend,
+        Some(record) => backend.record(record.way())?,
+    })
+}
+
+fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
+    let mut scene = match &arguments.scene {
+        None => sample::colonnade()?,
+        Some(path) => {
+            let imported = obj::load(path)?;
+            for warning in &imported.warnings {
+                eprintln!("warning: {warning}");
+            }
+            println!(
+                "{}: {} triangles, and {} degenerate ones left out",
+                path.display(),
+                imported.triangles,
+                imported.degenerate_triangles
+            );
+            imported.scene
+        }
+    };
+    for camera in &mut scene.cameras {
+        if let Some(placed) = &arguments.camera {
+            placed.apply(camera);
+        }
+        camera.size = arguments.size.0;
+    }
+    scene.duplicate_objects(arguments.copies as usize);
+    if arguments.cull_triangles {
+        let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
+        for (handle, mesh) in meshes {
+            scene.replace(handle, mesh.with_triangles_culled(true))?;
+        }
+    }
+    Ok(scene)
+}
+
+/// What came of drawing all frames.
+struct Drawn<B: Backend> {
+    last: Submitted<B>,
+    report: Report,
+    /// Empty unless somebody asked for it.
+    log: Log,
+}
+
+/// Draws all frames.
+fn draw<B: Backend>(
+    arguments: &Arguments,
+    name: BackendName,
+    scene: &Scene,
+    make: impl FnOnce(&Arc<Scheduler>) -> B,
+    mut device: impl Device<B>,
+) -> Result<Drawn<B>, Box<dyn Error>> {
+    let builder = Scheduler::builder().timeline_capacity(timeline::CAPACITY);
+    let scheduler = Arc::new(match arguments.workers {
+        Some(workers) => builder.workers(workers.get()).build()?,
+        None => builder.build()?,
+    });
+    let workers = scheduler.workers();
+    let deferred =
+        Deferred::new().depth_pre_pass(arguments.depth_pre_pass).post(ToneMapping::default()).post(Fxaa::default());
+    let backend = make(&scheduler);
+    let (mut renderer, submitter) =
+        Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?;
+
+    let timeline = Arc::clone(renderer.scheduler().timeline());
+    let frames = arguments.frames;
+    let progress = ProgressBar::new(u64::from(frames));
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left")?);
+    let mut measured: Vec<(Duration, FrameStatistics)> = Vec::new();
+    let mut last = None;
+    for number in 0..frames {
+        let begins_at = timeline::begins_at(arguments);
+        // Who records for the first time describes the graph and touches memory: that is no frame to look at, if there are more.
+        if begins_at.is_some_and(|first| first.saturating_sub(1) == number) {
+            timeline.start();
+        }
+        if begins_at == Some(number) {
+            drop(timeline.take());
+            device.start(renderer.backend(), &timeline)?;
+        }
+        let start = Instant::now();
+        let recorded = renderer.record(scene.as_scene_ref())?;
+        let frame_number = recorded.frame_number();
+        let submitted = submitter.submit(recorded)?;
+        let cpu = start.elapsed();
+        // The next frame is not to be measured against a device that is still busy with this one.
+        device.wait(&submitted.submission, frame_number)?;
+        measured.push((cpu, submitted.statistics.clone()));
+        last = Some(submitted);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    if let Some(path) = &arguments.graph {
+        std::fs::write(path, renderer.plan().to_dot())
+            .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+    }
+
+    timeline.stop();
+    let log = Log { device: device.end(renderer.backend(), &timeline)?, ..timeline.take() };
+    let report = Report::new(renderer.backend().adapter(), name, arguments, workers, &measured);
+    Ok(Drawn { last: last.ok_or("no frame was drawn")?, report, log })
+}
+
+fn save(arguments: &Arguments, picture: &Picture) -> Result<(), Box<dyn Error>> {
+    let path = arguments.out.clone().unwrap_or_else(|| "frame.png".into());
+    image::save_buffer(&path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
+        .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+    println!("{} written", path.display());
+    Ok(())
+}
+
+fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let inner_text = inner.to_string();
+        // Some errors end with what caused them already.
+        if !text.ends_with(&inner_text) {
+            text = format!("{text}: {inner_text}");
+        }
+        cause = inner.source();
+    }
+    text
+}

@@ -1,0 +1,64 @@
+//! What was counted.
+
+use serde::Serialize;
+
+use super::oracle::Verdict;
+
+/// How often a test was wrong.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Tally {
+    pub cases: u64,
+    /// Culled, though the oracle says that it reaches inside.
+    pub false_culls: u64,
+    /// What the oracle says is outside.
+    pub outside: u64,
+    /// Of that, what was kept.
+    pub false_visibles: u64,
+}
+
+impl Tally {
+    pub fn count(&mut self, verdict: Verdict, seen: bool) {
+        self.cases += 1;
+        self.false_culls += u64::from(verdict == Verdict::Inside && !seen);
+        self.outside += u64::from(verdict == Verdict::Outside);
+        self.false_visibles += u64::from(verdict == Verdict::Outside && seen);
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.cases += other.cases;
+        self.false_culls += other.false_culls;
+        self.outside += other.outside;
+        self.false_visibles += other.false_visibles;
+    }
+
+    /// Of what is outside, the share that was kept.
+    pub fn false_share(&self) -> f64 {
+        self.false_visibles as f64 / self.outside.max(1) as f64
+    }
+}
+
+/// The same of what touches a plane by construction, and of what is anywhere.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Tallies {
+    pub tangent: Tally,
+    pub anywhere: Tally,
+}
+
+impl Tallies {
+    pub fn of(&mut self, is_tangent: bool) -> &mut Tally {
+        if is_tangent { &mut self.tangent } else { &mut self.anywhere }
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.tangent.add(&other.tangent);
+        self.anywhere.add(&other.anywhere);
+    }
+
+    pub fn cases(&self) -> u64 {
+        self.tangent.cases + self.anywhere.cases
+    }
+
+    pub fn false_culls(&self) -> u64 {
+        self.tangent.false_culls + self.anywhere.false_culls
+    }
+}

@@ -1,0 +1,11 @@
+//! What Drawloom's tests, examples and benchmarks share: scenes, devices, random numbers, and oracles in f64.
+
+#[cfg(feature = "wgpu")]
+pub mod adapter;
+pub mod culling;
+pub mod draw_lists;
+pub mod hostile;
+pub mod precision;
+pub mod random;
+pub mod samples;
+pub mod scenes;
