@@ -65,7 +65,8 @@ mod sync;
 mod unwind;
 pub mod timeline;
 pub mod task;
-pub mod blocks;
+#[doc(hidden)]
+pub mod chunked_array;
 pub mod graph;
 pub mod quality;
 pub mod handle;

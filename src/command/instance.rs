@@ -27,7 +27,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::blocks::Blocks;
+    use crate::chunked_array::ChunkedArray;
     use crate::command::splitters::KeyRange;
     use crate::command::{Cull, DrawList, DrawState, SortKey, SortScratch, sort};
     use crate::scene::{Blend, Topology};
@@ -56,8 +56,8 @@ mod tests {
                 .zip(commands)
                 .map(|(object, command)| command.map_or(RenderCommand::EMPTY, |command| RenderCommand { object, ..command }))
                 .collect();
-            let mut slots = Blocks::new();
-            slots.reserve(commands.len(), RenderCommand::EMPTY);
+            let mut slots = ChunkedArray::new();
+            slots.grow(commands.len(), RenderCommand::EMPTY);
             for (index, &command) in commands.iter().enumerate() {
                 slots.write(index / 256)[index % 256] = command;
             }

@@ -4,7 +4,7 @@ use super::key_packer::KeyPacker;
 use super::radix_sort::{DIGIT_VALUES, radix_sort};
 use super::splitters::KeyRange;
 use super::{RenderCommand, SortKey};
-use crate::blocks::Blocks;
+use crate::chunked_array::ChunkedArray;
 
 /// Scratch memory for sorting. Each worker keeps one.
 #[derive(Debug, Default)]
@@ -22,7 +22,7 @@ pub(crate) struct SortScratch {
 ///
 /// The commands lie in the order of their objects, as [`Fill`](crate::view::Fill) writes them.
 pub(crate) fn sort(
-    commands: &Blocks<RenderCommand>,
+    commands: &ChunkedArray<RenderCommand>,
     count: usize,
     range: KeyRange,
     scratch: &mut SortScratch,
@@ -55,10 +55,10 @@ pub(crate) fn sort(
 /// Below this number of commands a comparison sort is faster than counting digits.
 const RADIX_SORT_THRESHOLD: usize = 512;
 
-fn collect(commands: &Blocks<RenderCommand>, count: usize, range: KeyRange, collected: &mut Vec<RenderCommand>) {
+fn collect(commands: &ChunkedArray<RenderCommand>, count: usize, range: KeyRange, collected: &mut Vec<RenderCommand>) {
     collected.clear();
-    let mut held = [RenderCommand::EMPTY; Blocks::<RenderCommand>::SIZE];
-    for (block, entries) in Blocks::<RenderCommand>::parts(0..count) {
+    let mut held = [RenderCommand::EMPTY; ChunkedArray::<RenderCommand>::BLOCK_SIZE];
+    for (block, entries) in ChunkedArray::<RenderCommand>::block_ranges(0..count) {
         let filled = &commands.read(block)[..entries.len()];
         if range.is_all() && filled.iter().all(|command| command.key != SortKey::LAST) {
             collected.extend_from_slice(filled);

@@ -1,7 +1,7 @@
 //! Splitters: keys that divide a pass' commands into buckets, which are sorted and merged in parallel.
 
 use super::{RenderCommand, SortKey};
-use crate::blocks::Blocks;
+use crate::chunked_array::ChunkedArray;
 
 /// The splitters of a sample sort: keys that divide a pass' commands into buckets of about equal size, one job each (Blelloch
 /// et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).
@@ -31,7 +31,7 @@ impl Splitters {
 
     /// Chooses the splitters of `buckets` buckets for the first `count` commands, or of fewer where buckets would be smaller than
     /// [`Splitters::MIN_COMMANDS_PER_BUCKET`].
-    pub(crate) fn choose(&mut self, commands: &Blocks<RenderCommand>, count: usize, buckets: usize) {
+    pub(crate) fn choose(&mut self, commands: &ChunkedArray<RenderCommand>, count: usize, buckets: usize) {
         self.keys.clear();
         let buckets = buckets.min(count / Self::MIN_COMMANDS_PER_BUCKET).clamp(1, Self::MAX_BUCKETS);
         if buckets == 1 {
@@ -41,7 +41,8 @@ impl Splitters {
         self.samples.clear();
         self.samples.extend((0..samples).filter_map(|sample| {
             let index = sampled_index(sample, samples, count);
-            let command = commands.read(index / Blocks::<RenderCommand>::SIZE)[index % Blocks::<RenderCommand>::SIZE];
+            let command = commands.read(index / ChunkedArray::<RenderCommand>::BLOCK_SIZE)
+                [index % ChunkedArray::<RenderCommand>::BLOCK_SIZE];
             (command.key != SortKey::LAST).then_some(command.key)
         }));
         self.samples.sort_unstable();
@@ -110,19 +111,19 @@ mod tests {
     use super::*;
     use crate::command::{DrawState, SortScratch, sort};
 
-    fn commands_of(depths: &[f32]) -> Blocks<RenderCommand> {
-        let mut commands = Blocks::new();
-        commands.reserve(depths.len(), RenderCommand::EMPTY);
+    fn commands_of(depths: &[f32]) -> ChunkedArray<RenderCommand> {
+        let mut commands = ChunkedArray::new();
+        commands.grow(depths.len(), RenderCommand::EMPTY);
         for (index, &depth) in depths.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
             let key = SortKey::opaque(DrawState::PLAIN, index as u32 % 3, depth.to_bits() << 1);
-            commands.write(index / Blocks::<RenderCommand>::SIZE)[index % Blocks::<RenderCommand>::SIZE] =
-                RenderCommand {
-                    key,
-                    object: index as u32,
-                    mesh: index as u32 % 3,
-                    material: 0,
-                    state: DrawState::PLAIN,
-                };
+            commands.write(index / ChunkedArray::<RenderCommand>::BLOCK_SIZE)
+                [index % ChunkedArray::<RenderCommand>::BLOCK_SIZE] = RenderCommand {
+                key,
+                object: index as u32,
+                mesh: index as u32 % 3,
+                material: 0,
+                state: DrawState::PLAIN,
+            };
         }
         commands
     }

@@ -10,7 +10,7 @@ use super::occlusion::{ViewOcclusion, choose_occluders};
 use super::statistics::{Stage, StageClock};
 use super::triangles::{AskingMeshes, PassTriangles};
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
-use crate::blocks::Blocks;
+use crate::chunked_array::ChunkedArray;
 use crate::command::RenderCommand;
 use crate::command::{Bucket, DrawList, Selection, SortScratch, Splitters, instance, sort};
 use crate::graph::{Node, NodeError};
@@ -98,7 +98,7 @@ pub(super) struct FrameTables {
 pub(super) struct PassTable {
     /// Which objects it draws; `None` for a pass without commands.
     pub(super) selection: Option<Selection>,
-    commands: Blocks<RenderCommand>,
+    commands: ChunkedArray<RenderCommand>,
     split: RwLock<Splitters>,
     /// As many as there may be at most.
     parts: Vec<RwLock<Bucket>>,
@@ -118,7 +118,7 @@ impl PassTable {
             *self.triangles.get_mut() = PassTriangles::default();
         }
         if selection.is_some() {
-            self.commands.reserve(objects, RenderCommand::EMPTY);
+            self.commands.grow(objects, RenderCommand::EMPTY);
             self.parts.resize_with(Splitters::MAX_BUCKETS, RwLock::default);
         }
     }

@@ -34,7 +34,7 @@ impl<P> Schedule<P> {
         C: Sync + ?Sized,
         P: Node<C>,
     {
-        scheduler.seated(|worker| self.run_on(worker, context))
+        scheduler.with_worker(|worker| self.run_on(worker, context))
     }
 
     fn run_on<C>(&mut self, worker: &Worker, context: &C) -> Result<(), RunError>
@@ -49,7 +49,7 @@ impl<P> Schedule<P> {
         } else if self.always_parallel {
             self.sharing.share()
         } else {
-            self.sharing.choose(worker.wake_price())
+            self.sharing.choose(worker.wake_up_cost())
         };
         self.describe(worker);
         // Subscribers of spans are the engine's, and may panic between two nodes too.
@@ -187,7 +187,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         let width = node.width(self.context);
         let chunk = if width == 0 { 1 } else { node.chunk(self.context) };
         let chunks = Chunks::new(width, chunk);
-        if worker.is_shuffled() { chunks.shuffled(worker) } else { chunks }
+        if worker.is_shuffled() { chunks.shuffled(|count| worker.draw(count)) } else { chunks }
     }
 
     /// Runs these chunks of the node at the position, as long as nothing fails.

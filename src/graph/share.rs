@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use crate::{
     sync::Instant,
-    task::{Band, Chunks, Crew, JobPanic, Pace, Tokens, Worker, run_tokens},
+    task::{Chunks, JobPanic, Priority, TicketSize, TokenContext, Tokens, Worker, run_tokens},
 };
 
 use super::{
@@ -92,7 +92,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     }
 
     /// Pushes a node that is ready.
-    fn send(&self, node: u32, crew: &Crew<'_>) {
+    fn send(&self, node: u32, crew: &TokenContext<'_>) {
         self.watch.count_ready();
         if self.is_pinned(node) {
             crew.push_pinned(Token::StartPinned(node).encode());
@@ -102,7 +102,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     }
 
     /// Starts one of these nodes, and leaves the others to whoever comes.
-    fn start_one_of(&self, mut places: Range<u32>, crew: &Crew<'_>) {
+    fn start_one_of(&self, mut places: Range<u32>, crew: &TokenContext<'_>) {
         while places.len() > 1 {
             let middle = places.start + places.len() as u32 / 2;
             self.push_ready(middle..places.end, crew);
@@ -111,7 +111,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         self.start(self.schedule.progress.ready(places.start), false, crew);
     }
 
-    fn push_ready(&self, places: Range<u32>, crew: &Crew<'_>) {
+    fn push_ready(&self, places: Range<u32>, crew: &TokenContext<'_>) {
         let band = self.band(self.schedule.progress.ready(places.start));
         crew.push(Token::Ready(places).encode(), band);
     }
@@ -119,7 +119,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     /// Starts a node that is ready, and goes on from one to the next as long as there is one to go on with.
     ///
     /// It is a loop and no recursion, so that a chain of nodes may be as long as memory lasts.
-    fn start(&self, node: u32, is_pinned: bool, crew: &Crew<'_>) {
+    fn start(&self, node: u32, is_pinned: bool, crew: &TokenContext<'_>) {
         let worker = crew.worker();
         let mut next = Some((node, is_pinned));
         while let Some((node, is_pinned)) = next {
@@ -143,7 +143,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     }
 
     /// Goes on with what a completed node has made ready.
-    fn go_on_after(&self, node: u32, crew: &Crew<'_>) {
+    fn go_on_after(&self, node: u32, crew: &TokenContext<'_>) {
         if let Some(next) = self.complete(node, crew) {
             self.start(next, false, crew);
         }
@@ -151,7 +151,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
 
     /// Runs a node that has just started. True if it is done, and false if whoever finishes its last chunk is to
     /// complete it.
-    fn work_on(&self, node: u32, is_pinned: bool, crew: &Crew<'_>) -> bool {
+    fn work_on(&self, node: u32, is_pinned: bool, crew: &TokenContext<'_>) -> bool {
         if self.is_stopped() {
             return true;
         }
@@ -178,7 +178,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
     }
 
     /// Takes part in a pass. True for the one worker that finished its last chunk.
-    fn join(&self, node: u32, crew: &Crew<'_>) -> bool {
+    fn join(&self, node: u32, crew: &TokenContext<'_>) -> bool {
         let pass = self.schedule.progress.pass(node);
         let chunks = pass.chunks();
         let pace = pass.tickets.join();
@@ -193,7 +193,14 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
 
     /// Runs chunks until none is left, and says how many. After a failure they are only counted. Who looks on does so from the
     /// first chunk on: who gets none has no part in the node, and may come when it is done.
-    fn take_chunks(&self, node: u32, pass: &OpenPass, chunks: &Chunks, mut pace: Pace, crew: &Crew<'_>) -> usize {
+    fn take_chunks(
+        &self,
+        node: u32,
+        pass: &OpenPass,
+        chunks: &Chunks,
+        mut pace: TicketSize,
+        crew: &TokenContext<'_>,
+    ) -> usize {
         let (worker, mut onlooker) = (crew.worker(), None);
         let mut finished = 0;
         loop {
@@ -213,7 +220,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
                 return finished;
             }
             finished += places.len();
-            if pass.tickets.invites(places.end, chunks, worker.workers()) {
+            if pass.tickets.should_invite(places.end, chunks, worker.workers()) {
                 crew.push(Token::Join(node).encode(), self.band(node));
             }
             let onlooker = onlooker.get_or_insert_with(|| self.watch.join(worker, node, &pass.opened));
@@ -223,7 +230,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
 
     /// Counts down all that depend on the node. Those that became ready are pushed, but for one that can run anywhere:
     /// it is given back, to be gone on with at once.
-    fn complete(&self, node: u32, crew: &Crew<'_>) -> Option<u32> {
+    fn complete(&self, node: u32, crew: &TokenContext<'_>) -> Option<u32> {
         self.clock.end(node);
         let Schedule { flow, progress, .. } = self.schedule;
         let mut ready = Ready::new(self, flow.first_place(node), crew);
@@ -240,13 +247,13 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         self.attempt(node, |_position| Ok(self.node(node).pinned())).unwrap_or(false)
     }
 
-    fn band(&self, node: u32) -> Band {
-        if self.schedule.flow.is_urgent(node) { Band::Urgent } else { Band::Normal }
+    fn band(&self, node: u32) -> Priority {
+        if self.schedule.flow.is_urgent(node) { Priority::Urgent } else { Priority::Normal }
     }
 }
 
 impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Tokens for Run<'_, P, C, W> {
-    fn run(&self, token: u64, crew: &Crew<'_>) {
+    fn run(&self, token: u64, crew: &TokenContext<'_>) {
         match Token::decode(token) {
             Token::Ready(places) => self.start_one_of(places, crew),
             Token::Start(node) => self.start(node, false, crew),
@@ -263,7 +270,7 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Tokens for Run<'_, P, C, W> {
 /// Nodes that became ready by one and the same.
 struct Ready<'run, P, C: ?Sized, W> {
     run: &'run Run<'run, P, C, W>,
-    crew: &'run Crew<'run>,
+    crew: &'run TokenContext<'run>,
     /// Where those stand that have not been pushed: all of one band.
     places: Range<u32>,
     /// The one that is not pushed.
@@ -273,7 +280,7 @@ struct Ready<'run, P, C: ?Sized, W> {
 
 impl<'run, P: Node<C>, C: Sync + ?Sized, W: Watching> Ready<'run, P, C, W> {
     /// None. They are to stand at the places from this one on.
-    fn new(run: &'run Run<'run, P, C, W>, place: u32, crew: &'run Crew<'run>) -> Self {
+    fn new(run: &'run Run<'run, P, C, W>, place: u32, crew: &'run TokenContext<'run>) -> Self {
         Self { run, crew, places: place..place, kept: None, has_pinned: false }
     }
 

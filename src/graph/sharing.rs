@@ -53,20 +53,20 @@ const RELUCTANCE: f64 = 1.25;
 
 impl Sharing {
     /// The way of the next run, where a worker is woken at that price.
-    pub(crate) fn choose(&mut self, wake_price: Duration) -> Way {
+    pub(crate) fn choose(&mut self, wake_up_cost: Duration) -> Way {
         let knows_nothing = self.alone.is_none() && self.shared_runs == 0 && self.given_up == 0;
         if knows_nothing {
             // What is less work than a wake-up shows it at once, and nobody is woken. All else loses no more than that.
-            return Way::Alone { at_most: Some(wake_price) };
+            return Way::Alone { at_most: Some(wake_up_cost) };
         }
-        let wake_price = wake_price.as_nanos() as f64;
-        let limit = self.shared.unwrap_or(0.0).max(wake_price);
+        let wake_up_cost = wake_up_cost.as_nanos() as f64;
+        let limit = self.shared.unwrap_or(0.0).max(wake_up_cost);
         self.is_alone = match self.alone {
             None => false,
             Some(alone) if self.is_alone => alone <= limit * RELUCTANCE,
             Some(alone) => alone * RELUCTANCE <= limit,
         };
-        let is_doubtful = self.alone.is_some_and(|alone| alone > wake_price) && self.since_measured >= SHARED_EVERY;
+        let is_doubtful = self.alone.is_some_and(|alone| alone > wake_up_cost) && self.since_measured >= SHARED_EVERY;
         if self.is_alone && !is_doubtful {
             return Way::Alone { at_most: Some(Duration::from_nanos((limit * 2.0 * RELUCTANCE) as u64)) };
         }

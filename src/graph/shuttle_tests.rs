@@ -148,7 +148,7 @@ fn check_frames(frames: usize, always_parallel: bool, nodes: Vec<Process>) {
     for (workers, seed) in [(2, None), (3, None), (2, Some(1))] {
         let nodes = Arc::clone(&nodes);
         check(move || {
-            let builder = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE);
+            let builder = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE);
             let scheduler = seed.into_iter().fold(builder, SchedulerBuilder::shuffle).build().unwrap();
             let mut schedule = schedule(&nodes);
             schedule.always_parallel(always_parallel);
@@ -220,7 +220,7 @@ fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
     for (kind, other, always_parallel) in [(Fails, Plain, true), (Panics, Plain, false), (Fails, Panics, true)] {
         for workers in [2, 3] {
             check(move || {
-                let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
+                let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE).build().unwrap();
                 let list: [(usize, Kind, &[usize]); 5] =
                     [(1, Plain, &[]), (3, kind, &[0]), (2, other, &[0]), (1, Plain, &[1]), (1, Plain, &[2, 3])];
                 let mut schedule = schedule(&nodes(&list));
@@ -289,7 +289,7 @@ fn shuttle_a_panic_between_nodes_fails_the_run_and_the_next_frame_is_whole() {
         check(move || {
             let list: [(usize, Kind, &[usize]); 5] =
                 [(2, Plain, &[]), (3, Plain, &[0]), (1, Pinned, &[0]), (0, Plain, &[1]), (1, Plain, &[2, 3])];
-            let scheduler = Scheduler::builder().workers(workers).wake_price(WAKE_PRICE).build().unwrap();
+            let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE).build().unwrap();
             let mut schedule = schedule(&nodes(&list));
             schedule.always_parallel(always_parallel);
             dispatcher::with_default(&dispatch, || {
@@ -310,7 +310,7 @@ fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
     const WIDTHS: [usize; 3] = [3, 1, 0];
     check(|| {
         // Room for less than two runs.
-        let builder = Scheduler::builder().workers(2).wake_price(WAKE_PRICE).timeline_capacity(8);
+        let builder = Scheduler::builder().workers(2).wake_up_cost(WAKE_PRICE).timeline_capacity(8);
         let scheduler = Arc::new(builder.build().unwrap());
         let looks = thread::spawn({
             let scheduler = Arc::clone(&scheduler);

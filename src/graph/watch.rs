@@ -177,7 +177,7 @@ impl Watching for Watch<'_> {
     }
 
     fn forget_stolen(&self, worker: &Worker) {
-        worker.forget_stolen();
+        worker.clear_stolen();
     }
 
     fn let_others_in(&self) {

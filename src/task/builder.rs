@@ -17,7 +17,7 @@ use super::{
     scheduler::{Scheduler, Shared},
     seat,
     shuffle::Shuffle,
-    wake_price,
+    wake_up_cost,
     worker::{Until, Worker},
 };
 
@@ -43,7 +43,7 @@ pub struct SchedulerBuilder {
     on_start: Option<Hook>,
     on_stop: Option<Hook>,
     shuffle: Option<u64>,
-    wake_price: Option<Duration>,
+    wake_up_cost: Option<Duration>,
     timeline: Setup,
 }
 
@@ -100,9 +100,9 @@ impl SchedulerBuilder {
     }
 
     /// What it costs to wake a worker, instead of what is measured when the scheduler is built: see
-    /// [`Scheduler::wake_price`]. With a price of 0 every loop is shared from its first chunk on.
-    pub fn wake_price(mut self, price: Duration) -> Self {
-        self.wake_price = Some(price);
+    /// [`Scheduler::wake_up_cost`]. With a price of 0 every loop is shared from its first chunk on.
+    pub fn wake_up_cost(mut self, price: Duration) -> Self {
+        self.wake_up_cost = Some(price);
         self
     }
 
@@ -166,19 +166,19 @@ impl SchedulerBuilder {
         if self.affinity.is_some() || self.on_start.is_some() {
             is_ready.into_iter().collect::<Result<(), SchedulerError>>()?;
         }
-        shared.set_wake_price(self.wake_price.unwrap_or_else(|| wake_price::measure(&scheduler, may_move)));
+        shared.set_wake_price(self.wake_up_cost.unwrap_or_else(|| wake_up_cost::measure(&scheduler, may_move)));
         Ok(scheduler)
     }
 
     fn checked_workers(&self) -> Result<usize, SchedulerError> {
         match self.workers {
             Some(0) => Err(SchedulerError::NoWorkers),
-            Some(workers) if workers > Scheduler::MOST_WORKERS => Err(SchedulerError::TooManyWorkers { workers }),
+            Some(workers) if workers > Scheduler::MAX_WORKERS => Err(SchedulerError::TooManyWorkers { workers }),
             Some(workers) => Ok(workers),
             None => {
                 let threads =
                     available_parallelism().map_err(|source| SchedulerError::UnknownParallelism { source })?;
-                Ok(threads.get().min(Scheduler::MOST_WORKERS))
+                Ok(threads.get().min(Scheduler::MAX_WORKERS))
             }
         }
     }
@@ -266,8 +266,8 @@ pub enum SchedulerError {
     /// 0 workers were asked for.
     #[error("a scheduler needs at least 1 worker, which is the thread that calls it")]
     NoWorkers,
-    /// More than [`Scheduler::MOST_WORKERS`] were asked for.
-    #[error("a scheduler has at most {} workers, and {workers} were asked for", Scheduler::MOST_WORKERS)]
+    /// More than [`Scheduler::MAX_WORKERS`] were asked for.
+    #[error("a scheduler has at most {} workers, and {workers} were asked for", Scheduler::MAX_WORKERS)]
     TooManyWorkers {
         /// How many were asked for.
         workers: usize,

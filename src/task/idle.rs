@@ -88,7 +88,7 @@ impl Idle {
             _ => now,
         };
         self.since = Some((since, is_live));
-        let most = if is_live { worker.shared().wake_price().min(LONGEST) } else { HOT };
+        let most = if is_live { worker.shared().wake_up_cost().min(LONGEST) } else { HOT };
         now.duration_since(since) >= most
     }
 

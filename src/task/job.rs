@@ -4,7 +4,7 @@ use crate::unwind::catch;
 
 use super::{
     closure::Closure,
-    region::{Crew, Region},
+    region::{Region, TokenContext},
     worker::Worker,
 };
 
@@ -31,7 +31,7 @@ impl Job {
         let Self { work, region, .. } = self;
         let outcome = match work {
             Work::Closure(closure) => catch(|| closure.call(region, worker)),
-            Work::Token(token) => catch(|| region.tokens().run(token, &Crew::new(region, worker))),
+            Work::Token(token) => catch(|| region.tokens().run(token, &TokenContext::new(region, worker))),
         };
         if let Err(panic) = outcome {
             region.fail(panic);

@@ -13,7 +13,7 @@ use std::{collections::VecDeque, fmt};
 
 use crate::sync::{AtomicUsize, Mutex, Ordering};
 
-use super::{job::Job, queue::Band, region::Region};
+use super::{job::Job, priority::Priority, region::Region};
 
 /// The jobs of a worker's open regions that lie in no queue.
 pub(super) struct Mailbox {
@@ -59,12 +59,12 @@ impl Mailbox {
     }
 
     /// A shared job of this band, of whichever region.
-    pub(super) fn take_any_shared(&self, band: Band) -> Option<Job> {
-        self.shared(band == Band::Background).take_any()
+    pub(super) fn take_any_shared(&self, band: Priority) -> Option<Job> {
+        self.shared(band == Priority::Background).take_any()
     }
 
-    pub(super) fn has_any_shared(&self, band: Band) -> bool {
-        !self.shared(band == Band::Background).is_empty()
+    pub(super) fn has_any_shared(&self, band: Priority) -> bool {
+        !self.shared(band == Priority::Background).is_empty()
     }
 
     fn shared(&self, is_background: bool) -> &LevelQueues {

@@ -173,7 +173,7 @@
 //!
 //! A job that captures up to four words is spawned without an allocation, others are one each. A loop allocates nothing.
 //! Workers look for work for some microseconds after the end of a frame, and as long as waking them would take within
-//! one; then they sleep and take no time from anybody. [What waking one costs](Scheduler::wake_price) is measured when
+//! one; then they sleep and take no time from anybody. [What waking one costs](Scheduler::wake_up_cost) is measured when
 //! the scheduler is built; a loop should be worth more than that, and a graph that is not is run by its caller alone.
 
 mod affinity;
@@ -189,6 +189,7 @@ mod locked_queue;
 mod mailbox;
 mod parallel_for;
 mod placement;
+mod priority;
 mod queue;
 mod region;
 mod scheduler;
@@ -196,7 +197,8 @@ mod scope;
 mod seat;
 mod shuffle;
 mod sleep;
-mod wake_price;
+mod tickets;
+mod wake_up_cost;
 mod worker;
 
 #[cfg(all(test, drawloom_shuttle))]
@@ -211,6 +213,7 @@ pub use worker::Worker;
 
 pub use crate::unwind::{JobPanic, catch};
 
-pub(crate) use chunks::{Chunks, Pace, Tickets};
-pub(crate) use queue::Band;
-pub(crate) use region::{Crew, Tokens, run_tokens};
+pub(crate) use chunks::Chunks;
+pub(crate) use priority::Priority;
+pub(crate) use region::{TokenContext, Tokens, run_tokens};
+pub(crate) use tickets::{TicketSize, Tickets};

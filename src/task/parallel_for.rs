@@ -22,9 +22,10 @@ use crate::{
 };
 
 use super::{
-    chunks::{Chunks, Pace, Tickets},
-    queue::Band,
-    region::{Crew, Tokens, run_tokens},
+    chunks::Chunks,
+    priority::Priority,
+    region::{TokenContext, Tokens, run_tokens},
+    tickets::{TicketSize, Tickets},
     worker::Worker,
 };
 
@@ -51,7 +52,7 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
     }
 
     fn run_all(&mut self, worker: &Worker) -> Result<(), JobPanic> {
-        self.chunks = self.chunks.shuffled(worker);
+        self.chunks = self.chunks.shuffled(|count| worker.draw(count));
         let count = self.chunks.count();
         let done = if count == 1 || worker.workers() == 1 {
             catch(|| self.run_chunks(0..count, worker)).map(|()| count)
@@ -77,7 +78,7 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
             self.run_chunks(done..next, worker);
             done = next;
             let expected = start.elapsed().as_nanos() * (count / done) as u128;
-            if expected > worker.wake_price().as_nanos() {
+            if expected > worker.wake_up_cost().as_nanos() {
                 break;
             }
         }
@@ -89,26 +90,26 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
     }
 
     /// Takes chunks until there are none. After a panic nobody begins another.
-    fn join(&self, crew: &Crew<'_>) {
+    fn join(&self, crew: &TokenContext<'_>) {
         let pace = self.tickets.join();
         if let Err(panic) = catch(|| self.work(pace, crew)) {
-            self.tickets.revoke();
+            self.tickets.cancel();
             crew.fail(panic);
         }
     }
 
-    fn work(&self, mut pace: Pace, crew: &Crew<'_>) {
+    fn work(&self, mut pace: TicketSize, crew: &TokenContext<'_>) {
         let worker = crew.worker();
         loop {
             let places = self.tickets.take(&self.chunks, &mut pace, worker.workers(), Instant::now);
             if places.is_empty() {
                 return;
             }
-            if self.tickets.invites(places.end, &self.chunks, worker.workers()) {
-                crew.push(0, Band::Normal);
+            if self.tickets.should_invite(places.end, &self.chunks, worker.workers()) {
+                crew.push(0, Priority::Normal);
             }
             for place in places {
-                if self.tickets.are_revoked() {
+                if self.tickets.are_cancelled() {
                     return;
                 }
                 (self.body)(self.chunks.range(place), worker);
@@ -119,7 +120,7 @@ impl<Body: Fn(Range<usize>, &Worker) + Sync> Pass<Body> {
 
 impl<Body: Fn(Range<usize>, &Worker) + Sync> Tokens for Pass<Body> {
     /// There is but one sort of token.
-    fn run(&self, _token: u64, crew: &Crew<'_>) {
+    fn run(&self, _token: u64, crew: &TokenContext<'_>) {
         self.join(crew);
     }
 }

@@ -16,24 +16,7 @@ use crossbeam_utils::CachePadded;
 
 use crate::sync::{Arc, Deque, Steal, Stealer};
 
-use super::{job::Job, locked_queue::LockedQueue, region::Region, shuffle::Shuffle};
-
-/// How urgent a job is: of their own jobs workers take the more urgent ones first, and of others' too.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Band {
-    /// What the end of the frame waits for.
-    Urgent,
-    /// Everything else of a frame.
-    Normal,
-    /// What no frame waits for. Worker 0 never takes it up of its own accord.
-    Background,
-}
-
-impl Band {
-    pub(super) const ALL: [Self; 3] = [Self::Urgent, Self::Normal, Self::Background];
-    /// What a frame consists of.
-    pub(crate) const FRAME: [Self; 2] = [Self::Urgent, Self::Normal];
-}
+use super::{job::Job, locked_queue::LockedQueue, priority::Priority, region::Region, shuffle::Shuffle};
 
 /// How many jobs lie in the deque at most. Crossbeam's has room for 64 at first, and grows when that is full.
 const MOST_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 60 };
@@ -43,12 +26,12 @@ const MOST_AT_ONCE: usize = 59;
 
 /// A worker's own end of its queues, one for each band.
 pub(super) struct Queues {
-    bands: [Queue; Band::ALL.len()],
+    bands: [Queue; Priority::ALL.len()],
     /// What decides who is next instead of age.
     shuffle: Option<Shuffle>,
     /// Per band, how many jobs have been queued here since the innermost wait in the midst of a job began, and have not
     /// been taken out here.
-    since_wait: [Cell<usize>; Band::ALL.len()],
+    since_wait: [Cell<usize>; Priority::ALL.len()],
 }
 
 /// What came of looking for a job.
@@ -62,7 +45,7 @@ pub(super) enum Popped {
 impl Queues {
     /// Empty queues, which give jobs out newest first, or in some other order that the shuffle decides.
     pub(super) fn new(shuffle: Option<Shuffle>) -> Self {
-        Self { bands: Band::ALL.map(|_| Queue::new()), shuffle, since_wait: Band::ALL.map(|_| Cell::new(0)) }
+        Self { bands: Priority::ALL.map(|_| Queue::new()), shuffle, since_wait: Priority::ALL.map(|_| Cell::new(0)) }
     }
 
     /// The end for thieves.
@@ -70,7 +53,7 @@ impl Queues {
         Loot { bands: self.bands.each_ref().map(Queue::loot) }
     }
 
-    pub(super) fn push(&self, job: Job, band: Band) {
+    pub(super) fn push(&self, job: Job, band: Priority) {
         let since_wait = &self.since_wait[band as usize];
         since_wait.set(since_wait.get() + 1);
         let queue = &self.bands[band as usize];
@@ -82,7 +65,7 @@ impl Queues {
 
     /// Takes over the oldest jobs of somebody else, if there are any, as if they had been queued here, and gives back the
     /// first.
-    pub(super) fn steal_from(&self, loot: &Loot, band: Band) -> Option<Job> {
+    pub(super) fn steal_from(&self, loot: &Loot, band: Priority) -> Option<Job> {
         let loot = &loot.bands[band as usize];
         let mut stolen = loot.steal();
         if stolen.is_none() && !loot.overflow.is_empty() {
@@ -92,7 +75,7 @@ impl Queues {
     }
 
     /// The newest job.
-    pub(super) fn pop(&self, band: Band) -> Option<Job> {
+    pub(super) fn pop(&self, band: Priority) -> Option<Job> {
         let queue = &self.bands[band as usize];
         match &self.shuffle {
             None => queue.pop(),
@@ -101,7 +84,7 @@ impl Queues {
     }
 
     /// The newest job, if it is one of this region, which the worker waits for.
-    pub(super) fn pop_awaited(&self, band: Band, region: &Region) -> Popped {
+    pub(super) fn pop_awaited(&self, band: Priority, region: &Region) -> Popped {
         let queue = &self.bands[band as usize];
         if let Some(shuffle) = &self.shuffle {
             let job = queue.overflow.take_any(shuffle, |job| job.region.is(region));
@@ -130,12 +113,12 @@ impl Queues {
     }
 
     /// A wait begins in the midst of a job. Gives back what the end of the wait is to be told.
-    pub(super) fn start_wait(&self) -> [usize; Band::ALL.len()] {
+    pub(super) fn start_wait(&self) -> [usize; Priority::ALL.len()] {
         self.since_wait.each_ref().map(Cell::take)
     }
 
     /// A wait ends, and the one goes on that it was inside of.
-    pub(super) fn end_wait(&self, before: [usize; Band::ALL.len()]) {
+    pub(super) fn end_wait(&self, before: [usize; Priority::ALL.len()]) {
         for (since_wait, before) in self.since_wait.iter().zip(before) {
             since_wait.set(before);
         }
@@ -203,11 +186,11 @@ impl Queue {
 
 /// The end of a worker's queues that other workers see.
 pub(super) struct Loot {
-    bands: [BandLoot; Band::ALL.len()],
+    bands: [BandLoot; Priority::ALL.len()],
 }
 
 impl Loot {
-    pub(super) fn of(&self, band: Band) -> &BandLoot {
+    pub(super) fn of(&self, band: Priority) -> &BandLoot {
         &self.bands[band as usize]
     }
 
@@ -301,9 +284,9 @@ impl Overflow {
 mod loom_tests {
     use loom::{model::Builder, thread};
 
-    use super::{Band, Job, Queues};
+    use super::{Job, Priority, Queues};
     use crate::task::{
-        Crew, Scheduler, Tokens,
+        Scheduler, TokenContext, Tokens,
         job::Work,
         region::{self, Region},
     };
@@ -311,7 +294,7 @@ mod loom_tests {
     struct NoTokens;
 
     impl Tokens for NoTokens {
-        fn run(&self, _token: u64, _crew: &Crew<'_>) {
+        fn run(&self, _token: u64, _crew: &TokenContext<'_>) {
             unreachable!("the jobs are taken, and not run");
         }
     }
@@ -330,19 +313,19 @@ mod loom_tests {
         let loot = queues.loot();
         let thief = thread::spawn(move || {
             let own = Queues::new(None);
-            let mut stolen: Vec<u64> = (0..3).filter_map(|_| token(own.steal_from(&loot, Band::Normal))).collect();
+            let mut stolen: Vec<u64> = (0..3).filter_map(|_| token(own.steal_from(&loot, Priority::Normal))).collect();
             // What it took over beside those.
-            stolen.extend(std::iter::from_fn(|| token(own.pop(Band::Normal))));
+            stolen.extend(std::iter::from_fn(|| token(own.pop(Priority::Normal))));
             stolen
         });
         let mut taken_early = None;
         for number in 0..jobs {
             if number == early {
-                taken_early = token(queues.pop(Band::Normal));
+                taken_early = token(queues.pop(Priority::Normal));
             }
-            queues.push(Job { work: Work::Token(number), region, is_stolen: false }, Band::Normal);
+            queues.push(Job { work: Work::Token(number), region, is_stolen: false }, Priority::Normal);
         }
-        let taken = std::iter::from_fn(|| token(queues.pop(Band::Normal))).collect();
+        let taken = std::iter::from_fn(|| token(queues.pop(Priority::Normal))).collect();
         (taken_early, taken, thief.join().unwrap())
     }
 
@@ -351,7 +334,7 @@ mod loom_tests {
         builder.preemption_bound = Some(3);
         builder.check(move || {
             let scheduler = Scheduler::new(1).unwrap();
-            let outcome = scheduler.seated(|worker| {
+            let outcome = scheduler.with_worker(|worker| {
                 region::open(worker, &NoTokens, |region| {
                     let (taken_early, taken, stolen) = share(region, jobs, early);
                     assert!(taken.is_sorted_by(|earlier, later| earlier > later), "not the newest first: {taken:?}");

@@ -24,7 +24,7 @@ use crate::{
 use super::{
     job::{Job, Work},
     latch::Latch,
-    queue::Band,
+    priority::Priority,
     scheduler::Shared,
     worker::Worker,
 };
@@ -32,16 +32,16 @@ use super::{
 /// What the tokens of a region stand for.
 pub(crate) trait Tokens: Sync {
     /// Does what this token stands for.
-    fn run(&self, token: u64, crew: &Crew<'_>);
+    fn run(&self, token: u64, crew: &TokenContext<'_>);
 }
 
 /// A worker at work on the tokens of a region: the way to push more.
-pub(crate) struct Crew<'worker> {
+pub(crate) struct TokenContext<'worker> {
     region: &'static Region,
     worker: &'worker Worker,
 }
 
-impl<'worker> Crew<'worker> {
+impl<'worker> TokenContext<'worker> {
     /// Only for the length of a job of this region, or of the body that opened it.
     pub(super) fn new(region: &'static Region, worker: &'worker Worker) -> Self {
         Self { region, worker }
@@ -67,7 +67,7 @@ impl<'worker> Crew<'worker> {
     }
 
     /// Queues a token, for any worker.
-    pub(crate) fn push(&self, token: u64, band: Band) {
+    pub(crate) fn push(&self, token: u64, band: Priority) {
         self.worker.push(self.region, Work::Token(token), band);
     }
 
@@ -82,8 +82,12 @@ impl<'worker> Crew<'worker> {
 /// # Errors
 ///
 /// The first panic of `start` or of a token. All other tokens have run.
-pub(crate) fn run_tokens(worker: &Worker, tokens: &dyn Tokens, start: impl FnOnce(&Crew<'_>)) -> Result<(), JobPanic> {
-    open(worker, tokens, |region| start(&Crew::new(region, worker)))
+pub(crate) fn run_tokens(
+    worker: &Worker,
+    tokens: &dyn Tokens,
+    start: impl FnOnce(&TokenContext<'_>),
+) -> Result<(), JobPanic> {
+    open(worker, tokens, |region| start(&TokenContext::new(region, worker)))
 }
 
 /// Opens a region on the worker, runs `body` in it, and works until its jobs have run. Does not unwind.

@@ -22,7 +22,8 @@ use super::{
     mailbox::Mailbox,
     parallel_for::Pass,
     placement::Placement,
-    queue::{Band, Loot, Queues},
+    priority::Priority,
+    queue::{Loot, Queues},
     scope::{self, Scope},
     seat::{self, Seat},
     sleep::{Sleep, WakeFor},
@@ -63,7 +64,7 @@ pub struct Scheduler {
 
 impl Scheduler {
     /// The most workers a scheduler can have.
-    pub const MOST_WORKERS: usize = 1000;
+    pub const MAX_WORKERS: usize = 1000;
 
     /// A scheduler of that many workers, the calling thread included: 1 starts no thread. There may be more workers
     /// than the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
@@ -71,7 +72,7 @@ impl Scheduler {
     /// # Errors
     ///
     /// [`SchedulerError::NoWorkers`] for 0 and [`SchedulerError::TooManyWorkers`] beyond
-    /// [`MOST_WORKERS`](Self::MOST_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those
+    /// [`MAX_WORKERS`](Self::MAX_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those
     /// started by then have ended when this returns.
     pub fn new(workers: usize) -> Result<Self, SchedulerError> {
         Self::builder().workers(workers).build()
@@ -99,8 +100,8 @@ impl Scheduler {
 
     /// How long it takes from a call of [`Scope::spawn`] until a worker that slept begins on the job, as found in a few tries
     /// while the scheduler was built; 0 with a single worker. A graph whose work takes no longer than this is not shared.
-    pub fn wake_price(&self) -> Duration {
-        self.shared.wake_price()
+    pub fn wake_up_cost(&self) -> Duration {
+        self.shared.wake_up_cost()
     }
 
     /// What records which worker does what, once it is [started](Timeline::start).
@@ -119,7 +120,7 @@ impl Scheduler {
     /// The first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler is
     /// as good as new.
     pub fn scope<'scope, R>(&self, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
-        self.seated(|worker| scope::open(worker, body))
+        self.with_worker(|worker| scope::open(worker, body))
     }
 
     /// Calls `body` with ranges that cover `0..length`, each index in exactly one, on as many workers as there is work
@@ -144,7 +145,7 @@ impl Scheduler {
             return catch(|| drop(body));
         }
         let pass = Pass::new(length, chunk, body);
-        self.seated(|worker| pass.run(worker))
+        self.with_worker(|worker| pass.run(worker))
     }
 
     /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a worker
@@ -156,7 +157,7 @@ impl Scheduler {
     /// for.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let job = BackgroundJob::queued(self.shared.background(), job);
-        self.shared.sleep().wake_beside(Band::Background);
+        self.shared.sleep().wake_beside(Priority::Background);
         job
     }
 
@@ -188,7 +189,7 @@ impl Scheduler {
     }
 
     /// Calls `body` as the worker this thread is already, or else from the seat. `body` must not unwind.
-    pub(crate) fn seated<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
+    pub(crate) fn with_worker<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
         seat::with_current(&self.shared, |current| match current {
             Some(worker) => body(worker),
             None => self.work_seated(self.shared.seat.take(), body),
@@ -275,7 +276,7 @@ pub(super) struct Shared {
     timeline: std::sync::Arc<Timeline>,
     is_shuffled: bool,
     /// In nanoseconds.
-    wake_price: AtomicUsize,
+    wake_up_cost: AtomicUsize,
     is_live: AtomicBool,
     shut_down: AtomicBool,
 }
@@ -291,7 +292,7 @@ impl Shared {
             timeline: std::sync::Arc::new(timeline),
             loot,
             is_shuffled,
-            wake_price: AtomicUsize::new(0),
+            wake_up_cost: AtomicUsize::new(0),
             is_live: AtomicBool::new(false),
             shut_down: AtomicBool::new(false),
         }
@@ -339,12 +340,12 @@ impl Shared {
     // The rest are hints and a flag that hand nothing over, so relaxed is enough. That sleepers see the flag is up to the lock
     // that `Sleep::wake_all` takes.
 
-    pub(super) fn wake_price(&self) -> Duration {
-        Duration::from_nanos(self.wake_price.load(Ordering::Relaxed) as u64)
+    pub(super) fn wake_up_cost(&self) -> Duration {
+        Duration::from_nanos(self.wake_up_cost.load(Ordering::Relaxed) as u64)
     }
 
     pub(super) fn set_wake_price(&self, price: Duration) {
-        self.wake_price.store(price.as_nanos().try_into().unwrap_or(usize::MAX), Ordering::Relaxed);
+        self.wake_up_cost.store(price.as_nanos().try_into().unwrap_or(usize::MAX), Ordering::Relaxed);
     }
 
     /// Whether a frame, or whatever a thread from outside has called for, is being worked on.

@@ -7,8 +7,8 @@ use crate::unwind::JobPanic;
 use super::{
     closure::Closure,
     job::Work,
-    queue::Band,
-    region::{self, Crew, Region, Tokens},
+    priority::Priority,
+    region::{self, Region, TokenContext, Tokens},
     seat,
     worker::Worker,
 };
@@ -49,7 +49,7 @@ impl<'scope> Scope<'scope> {
     pub fn spawn(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let work = Self::work(job);
         seat::with_current(self.region.shared(), |current| match current {
-            Some(worker) => worker.push(self.region, work, Band::Normal),
+            Some(worker) => worker.push(self.region, work, Priority::Normal),
             None => self.region.post(work),
         });
     }
@@ -95,7 +95,7 @@ pub(super) fn open<'scope, R>(worker: &Worker, body: impl FnOnce(&Scope<'scope>)
 struct NoTokens;
 
 impl Tokens for NoTokens {
-    fn run(&self, _token: u64, _crew: &Crew<'_>) {
+    fn run(&self, _token: u64, _crew: &TokenContext<'_>) {
         unreachable!("nobody pushes tokens into a scope");
     }
 }

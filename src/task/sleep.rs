@@ -75,7 +75,7 @@ use crossbeam_utils::CachePadded;
 
 use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering, fence};
 
-use super::{queue::Band, scheduler::Scheduler};
+use super::{priority::Priority, scheduler::Scheduler};
 
 /// What work a sleeper is to be woken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +101,7 @@ const ANY_SLEEPER: usize = 1 << BITS;
 const SEARCHER: usize = 1 << (2 * BITS);
 const BITS: u32 = usize::BITS / 3;
 const MASK: usize = (1 << BITS) - 1;
-const _: () = assert!(Scheduler::MOST_WORKERS <= MASK, "a count runs over into the next");
+const _: () = assert!(Scheduler::MAX_WORKERS <= MASK, "a count runs over into the next");
 
 impl Sleep {
     /// A bed for each worker.
@@ -120,17 +120,17 @@ impl Sleep {
 
     /// Counts a searcher out that has found something to do. If `sees_more_work` of some bands it wakes another: for a frame
     /// if it was the last searcher, and for background jobs in any case, since other searchers may be no workers for those.
-    pub(super) fn end_search(&self, sees_more_work: impl Fn(&[Band]) -> bool) {
+    pub(super) fn end_search(&self, sees_more_work: impl Fn(&[Priority]) -> bool) {
         let before = self.counts.fetch_sub(SEARCHER, Ordering::Relaxed);
         fence(Ordering::SeqCst);
         if any_sleepers(self.counts.load(Ordering::Relaxed)) == 0 {
             return;
         }
-        if searchers(before) == 1 && sees_more_work(&Band::FRAME) {
+        if searchers(before) == 1 && sees_more_work(&Priority::FRAME) {
             self.wake_any();
         }
-        if sees_more_work(&[Band::Background]) {
-            self.call(|&sleeper| takes(sleeper, Band::Background));
+        if sees_more_work(&[Priority::Background]) {
+            self.call(|&sleeper| takes(sleeper, Priority::Background));
         }
     }
 
@@ -164,7 +164,7 @@ impl Sleep {
 
     /// Wakes a worker that takes jobs of this band, if one sleeps. Searchers are no reason not to: the caller may be one
     /// itself, and worker 0 may be one, which does not look for background jobs. The job has been published.
-    pub(super) fn wake_beside(&self, band: Band) {
+    pub(super) fn wake_beside(&self, band: Priority) {
         fence(Ordering::SeqCst);
         if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
             self.call(|&sleeper| takes(sleeper, band));
@@ -173,7 +173,7 @@ impl Sleep {
 
     /// Wakes the owner of a region for a job of that, if it sleeps until there is one, and else a worker that takes jobs of
     /// this band. The job has been published where both look for it.
-    pub(super) fn wake_owner_or_other(&self, owner: usize, level: usize, band: Band) {
+    pub(super) fn wake_owner_or_other(&self, owner: usize, level: usize, band: Priority) {
         fence(Ordering::SeqCst);
         let counts = self.counts.load(Ordering::Relaxed);
         let waits_for_it = |wake_for| wake_for == WakeFor::Any || wake_for == WakeFor::Region { level };
@@ -181,7 +181,7 @@ impl Sleep {
             return;
         }
         // As in `wake_any` and `wake_beside`. The fence comes after the job and before the read of the counts there as here.
-        if any_sleepers(counts) > 0 && (band == Band::Background || searchers(counts) == 0) {
+        if any_sleepers(counts) > 0 && (band == Priority::Background || searchers(counts) == 0) {
             self.call(|&sleeper| takes(sleeper, band));
         }
     }
@@ -240,8 +240,8 @@ impl Sleep {
 }
 
 /// Whether a sleeper takes jobs of this band, whoever waits for them.
-fn takes((worker, wake_for): (usize, WakeFor), band: Band) -> bool {
-    wake_for == WakeFor::Any && (worker != 0 || band != Band::Background)
+fn takes((worker, wake_for): (usize, WakeFor), band: Priority) -> bool {
+    wake_for == WakeFor::Any && (worker != 0 || band != Priority::Background)
 }
 
 fn weight(wake_for: WakeFor) -> usize {

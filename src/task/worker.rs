@@ -12,7 +12,8 @@ use super::{
     background::Queued,
     idle::Idle,
     job::{Job, Work},
-    queue::{Band, Popped, Queues},
+    priority::Priority,
+    queue::{Popped, Queues},
     region::Region,
     scheduler::Shared,
     sleep::WakeFor,
@@ -46,7 +47,7 @@ pub struct Worker {
     depth: Cell<usize>,
     /// Whether what runs is a background job.
     is_in_background: Cell<bool>,
-    /// Whether the job that runs was stolen, until it is [past](Self::forget_stolen) what it was stolen for.
+    /// Whether the job that runs was stolen, until it is [past](Self::clear_stolen) what it was stolen for.
     has_stolen: Cell<bool>,
     /// For how many jobs that are not there this worker is counted, and by which region. While there is credit, the
     /// region waits for it to come back; where there is none, a job of the region is running here.
@@ -97,8 +98,8 @@ impl Worker {
 
     /// What it costs to wake one of them.
     #[inline]
-    pub(crate) fn wake_price(&self) -> Duration {
-        self.shared.wake_price()
+    pub(crate) fn wake_up_cost(&self) -> Duration {
+        self.shared.wake_up_cost()
     }
 
     /// What records what workers do.
@@ -115,7 +116,7 @@ impl Worker {
 
     /// What the job was stolen for is done, and what it goes on with was not stolen.
     #[inline]
-    pub(crate) fn forget_stolen(&self) {
+    pub(crate) fn clear_stolen(&self) {
         self.has_stolen.set(false);
     }
 
@@ -126,7 +127,7 @@ impl Worker {
 
     /// Whether somebody sleeps who would have to be woken, and whom a worker may do without for what is not worth that.
     pub(super) fn may_be_alone(&self) -> bool {
-        !self.is_shuffled() && !self.wake_price().is_zero() && self.shared.sleep().sleepers() > 0
+        !self.is_shuffled() && !self.wake_up_cost().is_zero() && self.shared.sleep().sleepers() > 0
     }
 
     /// Whether jobs are to run in no particular order.
@@ -164,16 +165,16 @@ impl Worker {
     /// The job stays in this worker's queues only if no owner can wait for it in vain there. A worker keeps jobs of the
     /// innermost region that it waits for in the midst of a job. If it waits for none, it keeps those of an outermost region,
     /// whose owner steals.
-    pub(super) fn push(&self, region: &'static Region, work: Work, band: Band) {
+    pub(super) fn push(&self, region: &'static Region, work: Work, band: Priority) {
         self.spend(region);
         let job = Job { work, region, is_stolen: false };
-        let band = if region.is_background() { Band::Background } else { band };
+        let band = if region.is_background() { Priority::Background } else { band };
         let may_keep = self.awaited.get().map_or(region.is_outermost(), |awaited| awaited.is(region));
         let (owner, level) = (region.owner(), region.level());
         if !may_keep {
             self.shared.mailbox(owner).put_shared(job);
             self.shared.sleep().wake_owner_or_other(owner, level, band);
-        } else if band == Band::Background {
+        } else if band == Priority::Background {
             self.queues.push(job, band);
             self.shared.sleep().wake_beside(band);
         } else {
@@ -259,19 +260,23 @@ impl Worker {
     pub(super) fn sees_work(&self, until: Until) -> bool {
         until.has_come(&self.shared)
             || match until {
-                Until::Shutdown => self.sees_loot(&Band::ALL),
+                Until::Shutdown => self.sees_loot(&Priority::ALL),
                 Until::Finished { region } => {
                     let mailbox = self.shared.mailbox(self.index);
                     mailbox.has_pinned(region)
-                        || if region.is_outermost() { self.sees_loot(&Band::FRAME) } else { mailbox.has_shared(region) }
+                        || if region.is_outermost() {
+                            self.sees_loot(&Priority::FRAME)
+                        } else {
+                            mailbox.has_shared(region)
+                        }
                 }
             }
     }
 
     /// Whether there is something in these bands that this worker could take up, and does not have itself.
-    pub(super) fn sees_loot(&self, bands: &[Band]) -> bool {
+    pub(super) fn sees_loot(&self, bands: &[Priority]) -> bool {
         let shared = &self.shared;
-        let has_queued = self.index > 0 && bands.contains(&Band::Background) && !shared.background().is_empty();
+        let has_queued = self.index > 0 && bands.contains(&Priority::Background) && !shared.background().is_empty();
         let mut others = shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
         has_queued
             || others.any(|(_, loot)| bands.iter().any(|&band| !loot.of(band).is_empty()))
@@ -338,8 +343,8 @@ impl Worker {
         match until {
             Until::Shutdown => self
                 .frame_job()
-                .or_else(|| self.shared_job(Band::Background))
-                .or_else(|| self.steal(&[Band::Background])),
+                .or_else(|| self.shared_job(Priority::Background))
+                .or_else(|| self.steal(&[Priority::Background])),
             Until::Finished { region } => {
                 let mailbox = self.shared.mailbox(self.index);
                 let pinned = mailbox.take_pinned(region);
@@ -357,19 +362,19 @@ impl Worker {
     /// A job of whatever belongs to the frame. What lies in mailboxes comes before what can be stolen: somebody waits for it
     /// in the midst of a job.
     fn frame_job(&self) -> Option<Job> {
-        let own = Band::FRAME.into_iter().find_map(|band| self.queues.pop(band));
-        own.or_else(|| self.shared_job(Band::Normal)).or_else(|| self.steal(&Band::FRAME))
+        let own = Priority::FRAME.into_iter().find_map(|band| self.queues.pop(band));
+        own.or_else(|| self.shared_job(Priority::Normal)).or_else(|| self.steal(&Priority::FRAME))
     }
 
     /// A job out of somebody's mailbox, for whoever looks for work of this band.
-    fn shared_job(&self, band: Band) -> Option<Job> {
+    fn shared_job(&self, band: Priority) -> Option<Job> {
         let job = self.shared.mailboxes().find_map(|mailbox| mailbox.take_any_shared(band))?;
         Some(Job { is_stolen: true, ..job })
     }
 
     /// The newest job here, if it is one of this region, which the worker waits for in the midst of another job.
     fn awaited_job(&self, region: &Region) -> Option<Job> {
-        Band::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, region) {
+        Priority::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, region) {
             Popped::Job(job) => Some(job),
             Popped::Nothing => None,
             Popped::PutBack => {
@@ -381,7 +386,7 @@ impl Worker {
     }
 
     /// One job of somebody else, the more urgent bands first.
-    fn steal(&self, bands: &[Band]) -> Option<Job> {
+    fn steal(&self, bands: &[Priority]) -> Option<Job> {
         let loot = self.shared.loot();
         let first = self.victim.get();
         bands.iter().find_map(|&band| {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::subdivision_level::subdivision_level;
-use crate::blocks::Blocks;
+use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthCodes, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
@@ -38,14 +38,14 @@ struct DepthOrder {
 impl Fill<'_> {
     /// Writes one command for each visible object whose rank is in `ranks`, at the index that is its rank: its index among the
     /// visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
-    pub(crate) fn run(&self, ranks: Range<usize>, commands: &Blocks<RenderCommand>) {
+    pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
         let camera = &self.view.camera;
         let order = DepthOrder {
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
             opaque: self.quality.opaque_order.codes(camera.near, camera.far),
             blended: self.quality.blended_order.codes(camera.near, camera.far),
         };
-        for (block, part) in Blocks::<RenderCommand>::parts(ranks) {
+        for (block, part) in ChunkedArray::<RenderCommand>::block_ranges(ranks) {
             let mut slots = commands.write(block);
             // Visible objects come in order, so a block stays open for many of them.
             let mut open = None;
@@ -56,7 +56,7 @@ impl Fill<'_> {
                     Some((current, guard)) if current == index => open.insert((current, guard)),
                     _ => open.insert((index, self.table.block(index))),
                 };
-                let start = rank % Blocks::<RenderCommand>::SIZE;
+                let start = rank % ChunkedArray::<RenderCommand>::BLOCK_SIZE;
                 for (slot, bit) in slots[start..].iter_mut().zip(places(bits)) {
                     *slot = self.command(first + bit, objects, &order);
                 }

@@ -7,7 +7,7 @@ use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::frustum::Judged;
 use super::{Boxes, FixedPosition, Frustum, GpuObject, ObjectBox, RejectionReason, Rejections, Spheres, WorldBounds};
-use crate::blocks::parts;
+use crate::chunked_array::block_ranges;
 use crate::command::{Cull, DrawState};
 use crate::quality::CullingVolume;
 use crate::scene::{Material, Mesh, SceneRef, is_unit};
@@ -127,7 +127,7 @@ impl ObjectTable {
 
     /// Fills in the objects of `range`.
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
-        for (index, part) in parts(range, Self::BLOCK) {
+        for (index, part) in block_ranges(range, Self::BLOCK) {
             let mut block = self.blocks[index].write();
             let ObjectBlock { records, spheres, boxes, draws } = &mut **block;
             for object in part {

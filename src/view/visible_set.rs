@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::RwLock;
 
-use crate::blocks::parts;
+use crate::chunked_array::block_ranges;
 
 /// The objects that a view sees, as a bit each, and how many come before each word of 64.
 ///
@@ -30,7 +30,7 @@ impl VisibleSet {
     /// multiple of that, and answers with a bit each, from the lowest; further bits are left out. Ranges tested at the same
     /// time must not share objects, but may share words.
     pub fn test(&self, objects: Range<usize>, sees: impl Fn(Range<usize>) -> u64) {
-        for (word, asked) in parts(objects, Self::WORD) {
+        for (word, asked) in block_ranges(objects, Self::WORD) {
             let known = u64::MAX >> (Self::WORD - asked.len());
             let bits = (sees(asked.clone()) & known) << (asked.start % Self::WORD);
             // Whoever reads the bits does so in a job that depends on this one, which orders the two.
@@ -43,7 +43,7 @@ impl VisibleSet {
     /// with beyond those do not count. Ranges looked at at the same time must not share objects, but may share words.
     pub fn hide(&self, objects: Range<usize>, hides: impl Fn(usize, u64) -> u64) -> usize {
         let mut count = 0;
-        for (word, asked) in parts(objects, Self::WORD) {
+        for (word, asked) in block_ranges(objects, Self::WORD) {
             let known = (u64::MAX >> (Self::WORD - asked.len())) << (asked.start % Self::WORD);
             let seen = self.words[word].load(Ordering::Relaxed) & known;
             if seen != 0 {

@@ -384,7 +384,7 @@ fn any_number_of_pinned_jobs_is_run() {
 #[test]
 fn a_loop_that_is_not_worth_waking_anybody_for_is_the_callers() {
     let run = |price| {
-        let scheduler = Scheduler::builder().workers(4).wake_price(price).build().unwrap();
+        let scheduler = Scheduler::builder().workers(4).wake_up_cost(price).build().unwrap();
         let by: [AtomicUsize; 4] = Default::default();
         for _frame in 0..20 {
             // Until the others sleep.

@@ -23,7 +23,7 @@ fn a_loop_of_more_chunks_than_could_ever_run_ends_at_its_first_panic() {
         let together = Barrier::new(workers);
         let begun: Vec<_> = (0..workers).map(|_| AtomicUsize::new(0)).collect();
         // Where it costs nothing to wake workers they are woken before the first chunk is run.
-        let scheduler = Scheduler::builder().workers(workers).wake_price(Duration::ZERO).build().unwrap();
+        let scheduler = Scheduler::builder().workers(workers).wake_up_cost(Duration::ZERO).build().unwrap();
         let outcome = scheduler.parallel_for(usize::MAX, chunk, |range, _worker| {
             // The first chunk of each worker waits for those of the others, so that all are there to go on too long.
             let Some(begun) = begun.get(range.start / range.len()) else { return };

@@ -75,7 +75,7 @@ pub fn run(seed: u64) -> Totals {
         3..5 => builder.timeline_clock(clock(u64::MAX)),
         _ => builder.timeline_clock(clock(random.next() % 500)),
     };
-    let scheduler = builder.wake_price(price).build().expect("threads can be started");
+    let scheduler = builder.wake_up_cost(price).build().expect("threads can be started");
     let world = World::new(format!("seed {seed}, {workers} workers, shuffled by {shuffle:?}"), scheduler);
     watchdog::watch(&world);
     let done_before = watchdog::done();

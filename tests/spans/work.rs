@@ -104,7 +104,7 @@ impl Way {
     /// A scheduler that goes that way, if the schedule is made to.
     pub fn scheduler(self, workers: usize) -> SchedulerBuilder {
         let price = if self == Self::Alone { Duration::from_secs(1_000) } else { Duration::from_nanos(1) };
-        Scheduler::builder().workers(workers).wake_price(price)
+        Scheduler::builder().workers(workers).wake_up_cost(price)
     }
 
     pub fn set(self, schedule: &mut Schedule<Work>) {

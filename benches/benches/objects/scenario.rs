@@ -73,7 +73,7 @@ pub fn measure(
     let held = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held));
     let held_share = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held / turn.frame));
     let [single, multi @ ..] = &turns;
-    let ceiling = ceiling(frame(single), middle(serial), two.wake_price().as_secs_f64());
+    let ceiling = ceiling(frame(single), middle(serial), two.wake_up_cost().as_secs_f64());
     let row = |instancing: bool| {
         let multi = &multi[usize::from(instancing)];
         Row {

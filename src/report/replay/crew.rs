@@ -9,7 +9,7 @@ use std::{
     collections::{BinaryHeap, VecDeque},
 };
 
-use crate::task::Band;
+use crate::task::Priority;
 
 use super::{costs::nanoseconds, prices::Prices};
 
@@ -37,7 +37,7 @@ pub(super) struct Crew<T, A> {
 struct Member<T, A> {
     state: State<A>,
     /// One queue for each band of a frame, the newest last.
-    bands: [VecDeque<T>; Band::FRAME.len()],
+    bands: [VecDeque<T>; Priority::FRAME.len()],
     /// Whom to steal from first.
     victim: usize,
     /// Since when it has had nothing to do.
@@ -149,7 +149,7 @@ impl<T, A> Crew<T, A> {
     }
 
     /// Queues a token of this worker, and says how long that takes the worker.
-    pub(super) fn push(&mut self, worker: usize, token: T, band: Band) -> u64 {
+    pub(super) fn push(&mut self, worker: usize, token: T, band: Priority) -> u64 {
         self.members[worker].bands[band as usize].push_back(token);
         let spent = self.wake_any();
         let looker = self.members.iter().position(|member| matches!(member.state, State::Looking));
@@ -210,7 +210,7 @@ impl<T, A> Crew<T, A> {
             return Some((token, false));
         }
         let (first, count) = (self.members[worker].victim, self.members.len());
-        for band in Band::FRAME {
+        for band in Priority::FRAME {
             for victim in (first..count).chain(0..first).filter(|&victim| victim != worker) {
                 if let Some(token) = self.members[victim].bands[band as usize].pop_front() {
                     self.members[worker].victim = victim;

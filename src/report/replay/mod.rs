@@ -121,9 +121,9 @@ impl Replay {
         self.run(workers).time
     }
 
-    /// The frame on so many workers: 0 is taken for 1, and more than [`Scheduler::MOST_WORKERS`] for that many.
+    /// The frame on so many workers: 0 is taken for 1, and more than [`Scheduler::MAX_WORKERS`] for that many.
     pub fn run(&self, workers: usize) -> Replayed {
-        let workers = workers.clamp(1, Scheduler::MOST_WORKERS);
+        let workers = workers.clamp(1, Scheduler::MAX_WORKERS);
         let mut all = Replayed { time: self.serial, alone: true, busy: vec![Duration::ZERO; workers] };
         for costs in &self.runs {
             let one = self.run_one(costs, workers);
@@ -329,7 +329,7 @@ mod tests {
     fn there_are_no_more_workers_than_a_scheduler_may_have() {
         let pass = Sketch::new().add(&[], &[10; 64]);
         let replay = replay(&pass, Prices::FREE);
-        assert_eq!(replay.run(usize::MAX), replay.run(Scheduler::MOST_WORKERS));
+        assert_eq!(replay.run(usize::MAX), replay.run(Scheduler::MAX_WORKERS));
     }
 
     #[test]

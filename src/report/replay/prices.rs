@@ -12,7 +12,7 @@ use crate::{
 /// What the scheduler's own doings cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Prices {
-    /// From the waking of a worker until it begins: [`Scheduler::wake_price`].
+    /// From the waking of a worker until it begins: [`Scheduler::wake_up_cost`].
     pub wake: Duration,
     /// What of that is the waker's time.
     pub waker: Duration,
@@ -81,8 +81,8 @@ impl Prices {
             Some((lowest(times) / PROCESSES as u32).saturating_sub(chunk))
         };
         Ok(Self {
-            wake: scheduler.wake_price(),
-            waker: lowest((0..TRIES).filter_map(|_| waker(&scheduler))).min(scheduler.wake_price()),
+            wake: scheduler.wake_up_cost(),
+            waker: lowest((0..TRIES).filter_map(|_| waker(&scheduler))).min(scheduler.wake_up_cost()),
             steal,
             silence: lowest((0..TRIES).map(|_| time(|| (0..PAUSES).for_each(|_| spin_loop())))),
             // The count of tickets comes from another core's cache: half of what a steal is, there and back.

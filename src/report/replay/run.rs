@@ -6,7 +6,7 @@ use std::{ops::Range, time::Duration};
 use crate::{
     graph::Flow,
     sync::Instant,
-    task::{Band, Pace, Tickets},
+    task::{Priority, TicketSize, Tickets},
 };
 
 use super::{
@@ -94,7 +94,7 @@ enum Action {
     /// Takes chunks of a pass, of which it has done so many.
     TakeChunks {
         process: u32,
-        pace: Pace,
+        pace: TicketSize,
         finished: usize,
     },
     Complete(u32),
@@ -161,7 +161,13 @@ impl Run<'_> {
         Action::TakeChunks { process, pace: self.replays.tickets[process as usize].join(), finished: 0 }
     }
 
-    fn take_chunks(&mut self, process: u32, mut pace: Pace, finished: usize, worker: usize) -> (u64, Option<Action>) {
+    fn take_chunks(
+        &mut self,
+        process: u32,
+        mut pace: TicketSize,
+        finished: usize,
+        worker: usize,
+    ) -> (u64, Option<Action>) {
         let replays = self.replays;
         let tickets = &replays.tickets[process as usize];
         let chunks = &replays.costs.processes[process as usize].chunks;
@@ -176,7 +182,7 @@ impl Run<'_> {
         }
         let finished = finished + places.len();
         let mut spent = nanoseconds(replays.prices.ticket);
-        if tickets.invites(places.end, chunks, self.crew.workers()) {
+        if tickets.should_invite(places.end, chunks, self.crew.workers()) {
             spent += self.invite(process, worker);
         }
         spent += self.work(process, places, worker);
@@ -255,8 +261,8 @@ impl Run<'_> {
         worker == 0 && self.crew.has_pinned()
     }
 
-    fn band(&self, process: u32) -> Band {
-        if self.flow.is_urgent(process) { Band::Urgent } else { Band::Normal }
+    fn band(&self, process: u32) -> Priority {
+        if self.flow.is_urgent(process) { Priority::Urgent } else { Priority::Normal }
     }
 }
 

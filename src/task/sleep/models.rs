@@ -7,7 +7,7 @@ use loom::{model, model::Builder, thread};
 use super::{Sleep, WakeFor};
 use crate::{
     sync::{Arc, AtomicBool, AtomicUsize, Ordering},
-    task::{latch::Latch, queue::Band},
+    task::{latch::Latch, priority::Priority},
 };
 
 /// Jobs are only counted here, and relaxed, so that nothing but the protocol's fences orders them.
@@ -43,9 +43,10 @@ impl Room {
     }
 
     /// What a worker sees that ends its search: `jobs` are a frame's.
-    fn sees(&self, bands: &[Band]) -> bool {
+    fn sees(&self, bands: &[Priority]) -> bool {
         let background = || self.background.load(Ordering::Relaxed) > 0;
-        (bands.contains(&Band::Normal) && self.has_jobs()) || (bands.contains(&Band::Background) && background())
+        (bands.contains(&Priority::Normal) && self.has_jobs())
+            || (bands.contains(&Priority::Background) && background())
     }
 
     fn try_consume(&self) -> bool {
@@ -88,7 +89,7 @@ impl Room {
         };
         let mut is_searcher = false;
         while !(take(&self.jobs) || take(&self.background)) {
-            is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, || self.sees(&Band::ALL));
+            is_searcher = self.sleep.sleep(worker, WakeFor::Any, is_searcher, || self.sees(&Priority::ALL));
         }
         if is_searcher {
             self.sleep.end_search(|bands| self.sees(bands));
@@ -106,7 +107,7 @@ impl Room {
     /// Puts a job into the mailbox of worker 0, for the region of that level.
     fn produce_for_owner(&self, level: usize) {
         self.jobs.fetch_add(1, Ordering::Relaxed);
-        self.sleep.wake_owner_or_other(0, level, Band::Normal);
+        self.sleep.wake_owner_or_other(0, level, Priority::Normal);
     }
 
     /// What the owner of a region does that helps others: it looks for jobs, and for the end of its region only where there
@@ -272,7 +273,7 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
         let worker = start(&room, |room| room.consume(1));
         room.sleep.start_search();
         room.jobs.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_beside(Band::Background);
+        room.sleep.wake_beside(Priority::Background);
         // Worker 0 has no eyes for it.
         room.sleep.end_search(|_| false);
         worker.join().unwrap();
@@ -327,7 +328,7 @@ fn a_worker_called_for_a_background_job_that_finds_a_frames_passes_the_call_on()
         let room = Room::new(1);
         let workers = [1, 2].map(|worker| start(&room, move |room| room.consume_either(worker)));
         room.background.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_beside(Band::Background);
+        room.sleep.wake_beside(Priority::Background);
         room.jobs.fetch_add(1, Ordering::Relaxed);
         room.sleep.wake_any();
         join(workers);

@@ -1,0 +1,181 @@
+//! Which worker runs which chunks of a loop or a node.
+
+use std::ops::Range;
+
+use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
+
+use super::chunks::Chunks;
+
+/// Hands out the chunks of a loop or a node to the workers that have joined it. A ticket is a claim on some chunks.
+///
+/// A worker claims several chunks at a time, so that workers seldom contend, and fewer towards the end, so that they finish
+/// together (guided self-scheduling: Polychronopoulos & Kuck, 1987). Claimed chunks cannot be stolen, so [`TicketSize`] limits how
+/// long the chunks of one ticket take.
+///
+/// # Memory ordering
+///
+/// All accesses are relaxed. A ticket only decides who runs a chunk. The data that the chunk reads came with the job through
+/// which the worker joined; the data that it writes is ordered by whoever counts finished chunks.
+#[derive(Debug)]
+pub(crate) struct Tickets {
+    /// How many chunks are claimed: the position of the next one.
+    claimed: AtomicUsize,
+    /// Whether some queue holds a job through which another worker can join.
+    has_invitation: AtomicBool,
+    /// How many workers have joined.
+    joined: AtomicUsize,
+    /// The ticket size of the worker that last found no more chunks, in this execution or an earlier one.
+    initial_size: AtomicUsize,
+}
+
+impl Tickets {
+    /// A value of `claimed` that is greater than the number of chunks can be.
+    const CANCELLED: usize = usize::MAX;
+
+    pub(crate) fn new() -> Self {
+        Self {
+            claimed: AtomicUsize::new(0),
+            has_invitation: AtomicBool::new(false),
+            joined: AtomicUsize::new(0),
+            initial_size: AtomicUsize::new(1),
+        }
+    }
+
+    /// Starts over, with the first `claimed` chunks claimed. No worker may be using the tickets.
+    pub(crate) fn reset(&self, claimed: usize) {
+        self.claimed.store(claimed, Ordering::Relaxed);
+        self.has_invitation.store(false, Ordering::Relaxed);
+        self.joined.store(0, Ordering::Relaxed);
+    }
+
+    /// Counts a worker in. Every worker but the first comes through an invitation.
+    pub(crate) fn join(&self) -> TicketSize {
+        self.has_invitation.store(false, Ordering::Relaxed);
+        self.joined.fetch_add(1, Ordering::Relaxed);
+        TicketSize::new(self.initial_size.load(Ordering::Relaxed))
+    }
+
+    /// Counts out a worker that leaves before all chunks are claimed. Returns true if it should queue a job through which another
+    /// worker can join.
+    pub(crate) fn leave(&self, chunks: &Chunks) -> bool {
+        self.joined.fetch_sub(1, Ordering::Relaxed);
+        self.claimed.load(Ordering::Relaxed) < chunks.count() && !self.has_invitation.swap(true, Ordering::Relaxed)
+    }
+
+    /// Claims the next chunks for one of `workers` workers: their positions in the order, empty if none are left. `now` reads the
+    /// clock, which not every ticket does.
+    pub(crate) fn take(
+        &self,
+        chunks: &Chunks,
+        size: &mut TicketSize,
+        workers: usize,
+        now: impl Fn() -> Instant,
+    ) -> Range<usize> {
+        let mut claimed = self.claimed.load(Ordering::Relaxed);
+        while claimed < chunks.count() {
+            let remaining = chunks.count() - claimed;
+            let end = claimed + size.of(remaining, workers);
+            match self.claimed.compare_exchange_weak(claimed, end, Ordering::Relaxed, Ordering::Relaxed) {
+                Ok(_) => {
+                    if end - claimed > 1 || remaining > 2 * workers {
+                        size.adapt(end - claimed, now);
+                    }
+                    return claimed..end;
+                }
+                Err(changed) => claimed = changed,
+            }
+        }
+        // Measures the last ticket too: there may have been no other.
+        if size.since.is_some() {
+            size.measure(0, now);
+        }
+        if size.max != self.initial_size.load(Ordering::Relaxed) {
+            self.initial_size.store(size.max, Ordering::Relaxed);
+        }
+        0..0
+    }
+
+    /// Claims all chunks that are left.
+    pub(crate) fn take_rest(&self, chunks: &Chunks) -> Range<usize> {
+        let claimed = self.claimed.swap(chunks.count(), Ordering::Relaxed);
+        claimed.min(chunks.count())..chunks.count()
+    }
+
+    /// Whether one of `workers` workers, which has claimed the chunks up to `end`, should queue a job through which another
+    /// worker can join.
+    pub(crate) fn should_invite(&self, end: usize, chunks: &Chunks, workers: usize) -> bool {
+        // The loads before the swap keep the cache line shared.
+        end < chunks.count()
+            && !self.has_invitation.load(Ordering::Relaxed)
+            && self.joined.load(Ordering::Relaxed) < workers
+            && !self.has_invitation.swap(true, Ordering::Relaxed)
+    }
+
+    /// Cancels all chunks that have not begun.
+    pub(crate) fn cancel(&self) {
+        self.claimed.store(Self::CANCELLED, Ordering::Relaxed);
+    }
+
+    /// Whether claimed chunks that have not begun must not begin.
+    pub(crate) fn are_cancelled(&self) -> bool {
+        self.claimed.load(Ordering::Relaxed) == Self::CANCELLED
+    }
+}
+
+/// How many chunks a worker claims at once: one at first, more if the chunks before were quick.
+#[derive(Debug)]
+pub(crate) struct TicketSize {
+    /// At least one.
+    max: usize,
+    /// The last reading of the clock, and how many chunks have been claimed since.
+    since: Option<(Instant, usize)>,
+    /// After how many chunks the clock is read again.
+    measure_after: usize,
+}
+
+impl TicketSize {
+    /// How many nanoseconds the chunks of one ticket may take: long enough that the ticket itself costs nothing beside them, and
+    /// short enough that it does not matter who runs them.
+    const TARGET_NANOSECONDS: usize = 8_000;
+    /// The smallest ticket is this fraction of the largest, even if less is left for each worker.
+    const MIN_FRACTION: usize = 16;
+    /// The factor by which a ticket may exceed the last one: one cheap chunk says little about the rest.
+    const GROWTH: usize = 4;
+    /// How many chunks pass between two readings of the clock, once their cost is known.
+    const STEADY: usize = 8;
+
+    fn new(max: usize) -> Self {
+        Self { max, since: None, measure_after: 1 }
+    }
+
+    /// How many of the remaining chunks to claim: two thirds of this worker's share, within bounds.
+    #[inline]
+    fn of(&self, remaining: usize, workers: usize) -> usize {
+        let share = 2 * (remaining / (3 * workers));
+        share.clamp((self.max / Self::MIN_FRACTION).max(1), self.max).min(remaining)
+    }
+
+    /// The chunks of the last ticket are done, and `claimed` more begin.
+    #[inline]
+    fn adapt(&mut self, claimed: usize, now: impl FnOnce() -> Instant) {
+        match &mut self.since {
+            Some((_, chunks)) if *chunks < self.measure_after => *chunks += claimed,
+            _ => self.measure(claimed, now),
+        }
+    }
+
+    fn measure(&mut self, claimed: usize, now: impl FnOnce() -> Instant) {
+        // In loom's models the clock is the real one, and says nothing about the modelled threads.
+        if cfg!(drawloom_loom) {
+            return;
+        }
+        let now = now();
+        if let Some((since, chunks)) = self.since {
+            let nanoseconds = (now.duration_since(since).as_nanos() as usize).max(1);
+            let fitting = chunks.saturating_mul(Self::TARGET_NANOSECONDS) / nanoseconds;
+            self.max = fitting.clamp(1, self.max.max(chunks.saturating_mul(Self::GROWTH)));
+            self.measure_after = Self::STEADY;
+        }
+        self.since = Some((now, claimed));
+    }
+}
