@@ -104,10 +104,10 @@ fn bounds_of_an_engine_are_its_word() -> Result<(), Box<dyn Error>> {
         (CullingVolume::OrientedBox, 0b010),
     ] {
         let mut table = ObjectTable::default();
-        table.hold(volume);
+        table.configure(volume);
         table.reset(3);
         table.fill(&lent, 0..3);
-        assert_eq!(table.block(0).seen(&frustum, volume, 0..3), seen, "{volume:?}");
+        assert_eq!(table.block(0).visible(&frustum, volume, 0..3), seen, "{volume:?}");
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }
     Ok(())

@@ -60,7 +60,7 @@ struct Order {
 
 impl Order {
     fn of(key: DepthKey, distances: &[f32]) -> Self {
-        let number = |distance: f32| key.code(distance, NEAR, FAR);
+        let number = |distance: f32| key.quantize(distance, NEAR, FAR);
         let share = |count: usize| count as f64 / (distances.len() - 1) as f64;
 
         let mut exact = distances.to_vec();

@@ -116,7 +116,7 @@ pub struct FrameRequest<'a> {
     pub plan: &'a FramePlan,
     /// What each process draws, in the plan's order.
     pub draws: &'a [Draws<'a>],
-    /// The views. A kept one's targets still hold what an earlier frame drew: see [`RenderView::is_kept`].
+    /// The views. A kept one's targets still hold what an earlier frame drew: see [`RenderView::is_cached`].
     pub views: &'a [RenderView],
     /// The lights that reach each view.
     pub lights: &'a [LightTable],

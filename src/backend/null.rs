@@ -105,7 +105,7 @@ impl Backend for NullBackend {
     ) -> Result<(), BackendError> {
         let mut uploaded = frame.uploaded.lock();
         for block in blocks {
-            let (first, records) = objects.records_of(block);
+            let (first, records) = objects.gpu_objects(block);
             for object in first..first + records.len() {
                 ensure(object < frame.object_count, || format!("object {object} is not in the scene"))?;
                 ensure(uploaded.insert(object), || format!("object {object} was uploaded twice"))?;

@@ -33,7 +33,7 @@ use code::{Coder, Fault, LONGEST};
 /// use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
 /// use drawloom::quality::DepthKey;
 ///
-/// let depth = DepthKey::EXACT.code(12.0, 0.1, 100.0);
+/// let depth = DepthKey::EXACT.quantize(12.0, 0.1, 100.0);
 /// let command = |object| {
 ///     let key = SortKey::opaque(DrawState::PLAIN, 3, depth);
 ///     RenderCommand { key, object, mesh: 3, material: 7, state: DrawState::PLAIN }

@@ -127,7 +127,7 @@ mod tests {
         let width = |bits: u32, blends: bool| {
             let key = |depth: u16| {
                 let order = DepthKey { bits, curve: DepthCurve::Logarithmic };
-                let depth = order.code(f32::from(depth) * 0.37, 0.1, 1e4);
+                let depth = order.quantize(f32::from(depth) * 0.37, 0.1, 1e4);
                 if blends { SortKey::blended(depth) } else { SortKey::opaque(DrawState::PLAIN, 5, depth) }
             };
             let differing = (0..5_000).fold(0, |bits, depth| bits | (key(depth).bits() ^ key(0).bits()));

@@ -72,11 +72,11 @@ mod tests {
 
     /// As [`Quality::balanced`] has them, in a view from 5 cm to infinity.
     fn opaque_code(depth: f32) -> u32 {
-        Quality::balanced().opaque_order.code(depth, 0.05, f32::INFINITY)
+        Quality::balanced().opaque_order.quantize(depth, 0.05, f32::INFINITY)
     }
 
     fn blended_code(depth: f32) -> u32 {
-        Quality::balanced().blended_order.code(depth, 0.05, f32::INFINITY)
+        Quality::balanced().blended_order.quantize(depth, 0.05, f32::INFINITY)
     }
 
     proptest! {

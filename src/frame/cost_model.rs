@@ -130,7 +130,7 @@ const FIRST: usize = 512;
 
 /// Objects and commands lie in blocks, and jobs that share none do not wait for each other.
 fn whole_blocks(items: usize) -> usize {
-    if items < ObjectTable::BLOCK { items.max(1) } else { items - items % ObjectTable::BLOCK }
+    if items < ObjectTable::BLOCK_SIZE { items.max(1) } else { items - items % ObjectTable::BLOCK_SIZE }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]

@@ -54,7 +54,7 @@ impl FrameJobs {
     ) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
-            if !view.is_kept && !passes.iter().any(|pass| pass.view == index) {
+            if !view.is_cached && !passes.iter().any(|pass| pass.view == index) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
@@ -109,7 +109,7 @@ impl FrameJobs {
         let Nodes { graph, kinds, count } = nodes;
         let costs = CostModel::new(kinds.len(), count);
         let schedule = graph.compile().map_err(|error| FrameError::Jobs(error.problem))?;
-        let views = views.iter().map(|view| (view.name().to_owned(), view.kind(), view.is_kept)).collect();
+        let views = views.iter().map(|view| (view.name().to_owned(), view.kind(), view.is_cached)).collect();
         let selections = draws.iter().map(Draws::selection).collect();
         let hides = draws.iter().map(Draws::hides).collect();
         let payoffs = vec![Payoff::default(); occluders.len()];
@@ -138,12 +138,12 @@ impl FrameJobs {
         occlusion: Option<u32>,
         culls_triangles: bool,
     ) -> bool {
-        let names = self.views.iter().map(|(name, kind, is_kept)| (name.as_str(), *kind, *is_kept));
+        let names = self.views.iter().map(|(name, kind, is_cached)| (name.as_str(), *kind, *is_cached));
         self.plan.identity() == plan.identity()
             && self.occlusion == occlusion
             && self.culls_triangles == culls_triangles
             && self.hides.iter().copied().eq(draws.iter().map(Draws::hides))
-            && names.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_kept)))
+            && names.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_cached)))
             && self.selections.iter().copied().eq(draws.iter().map(Draws::selection))
     }
 
@@ -238,7 +238,7 @@ impl JobsCache {
 fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
     let mut passes = Vec::new();
     for (process, planned) in plan.processes().iter().enumerate() {
-        let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_kept;
+        let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_cached;
         for (view, _) in views.iter().enumerate().filter(|(_, view)| is_drawn(view)) {
             passes.push(Pass { process, view });
         }

@@ -69,8 +69,8 @@ impl KeptMaps {
         };
         kept.age += 1;
         for map in &kept.maps {
-            views[map.place] = RenderView { is_kept: true, ..map.view.clone() };
-            if let Some(light) = map.view.light.and_then(|light| lights.get_mut(light)) {
+            views[map.place] = RenderView { is_cached: true, ..map.view.clone() };
+            if let Some(light) = map.view.valid_light.and_then(|light| lights.get_mut(light)) {
                 *light = as_bright_as(map.light, light);
             }
         }
@@ -109,9 +109,9 @@ impl MapsOfFrame {
     fn fits(&self, views: &[RenderView], lights: &[Light]) -> bool {
         let same = |map: &Map, (place, view): (usize, &RenderView)| {
             let kind = |light: &Light| discriminant(light);
-            let light = view.light.and_then(|light| lights.get(light));
-            (map.place, map.view.name(), map.view.light, map.view.layer, map.view.camera.size)
-                == (place, view.name(), view.light, view.layer, view.camera.size)
+            let light = view.valid_light.and_then(|light| lights.get(light));
+            (map.place, map.view.name(), map.view.valid_light, map.view.layer, map.view.camera.size)
+                == (place, view.name(), view.valid_light, view.layer, view.camera.size)
                 && light.map(kind) == Some(kind(&map.light))
                 && still_covers(&map.view, view)
         };
@@ -139,12 +139,12 @@ fn still_covers(kept: &RenderView, wanted: &RenderView) -> bool {
 
 /// The views that draw a light's map, each with its index. A shadow camera of the engine's own is not for Drawloom to keep.
 fn maps(views: &[RenderView]) -> impl Iterator<Item = (usize, &RenderView)> {
-    views.iter().enumerate().filter(|(_, view)| view.light.is_some())
+    views.iter().enumerate().filter(|(_, view)| view.valid_light.is_some())
 }
 
 fn maps_of(views: &[RenderView], lights: &[Light]) -> Vec<Map> {
     let map = |(place, view): (usize, &RenderView)| {
-        let light = *view.light.and_then(|light| lights.get(light))?;
+        let light = *view.valid_light.and_then(|light| lights.get(light))?;
         Some(Map { place, view: view.clone(), light })
     };
     maps(views).filter_map(map).collect()

@@ -9,12 +9,12 @@ use crate::backend::Backend;
 use crate::command::{Blending, Selection};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::{Blend, SceneRef, ViewKind};
-use crate::view::{Occlusion, RenderView};
+use crate::view::{OcclusionCuller, RenderView};
 
 /// What a view's objects hide in one frame; kept from frame to frame so that its memory is reused.
 #[derive(Debug, Default)]
 pub(super) struct ViewOcclusion {
-    pub(super) occlusion: Occlusion,
+    pub(super) occlusion: OcclusionCuller,
     is_on: bool,
     hidden: AtomicUsize,
     /// What the view took: looking for what is hidden, and drawing the rest.
@@ -110,7 +110,7 @@ impl FrameTables {
         side: Option<u32>,
     ) {
         if side.is_some() {
-            self.occluder_meshes.follow(scene.assets);
+            self.occluder_meshes.sync(scene.assets);
         }
         for (index, view) in views.iter().enumerate() {
             let is_on = jobs.occluders[index].is_some() && jobs.payoffs[index].is_on();
@@ -138,7 +138,7 @@ fn has_room(view: &RenderView, side: u32) -> bool {
 pub(super) fn choose_occluders<B: Backend>(frame: &FrameContext<'_, B>, view: usize) {
     let FrameTables { objects, visible, occlusion, occluder_meshes, .. } = frame.tables;
     let occluders = frame.occluders[view].as_deref().unwrap_or_default();
-    occlusion[view].occlusion.choose(frame.request.scene, objects, &visible[view], occluder_meshes, |draw| {
+    occlusion[view].occlusion.select_occluders(frame.request.scene, objects, &visible[view], occluder_meshes, |draw| {
         let is_drawn = |selection: &Selection| selection.contains(draw.state.blend(), draw.material);
         draw.state.blend() == Blend::None && occluders.iter().any(is_drawn)
     });

@@ -252,7 +252,7 @@ impl Phase {
     /// How many objects or draws are in the smallest part that can be a job.
     fn items_per_part(self) -> usize {
         match self {
-            Self::Upload => ObjectTable::BLOCK,
+            Self::Upload => ObjectTable::BLOCK_SIZE,
             Self::Record { .. } => DrawList::BATCHES_PER_BUNDLE,
             _ => 1,
         }
@@ -332,7 +332,9 @@ impl FrameNode {
             }
             Phase::Visibility { view } => see(frame, view, range),
             Phase::Occluders { view } => choose_occluders(frame, view),
-            Phase::CoarseDepth { view } => range.for_each(|strip| tables.occlusion[view].occlusion.draw(strip)),
+            Phase::CoarseDepth { view } => {
+                range.for_each(|strip| tables.occlusion[view].occlusion.draw_occluders(strip))
+            }
             Phase::Occlusion { view } => {
                 let occlusion = &tables.occlusion[view].occlusion;
                 let hides = |first, seen| occlusion.hidden(frame.request.scene, &tables.objects, first, seen);
@@ -426,9 +428,9 @@ fn join<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) {
 fn see<B: Backend>(frame: &FrameContext<'_, B>, view: usize, range: Range<usize>) {
     let frustum = &frame.request.views[view].frustum;
     frame.tables.visible[view].test(range, |objects| {
-        let block = frame.tables.objects.block(objects.start / ObjectTable::BLOCK);
-        let first = objects.start % ObjectTable::BLOCK;
-        block.seen(frustum, frame.request.quality.culling, first..first + objects.len())
+        let block = frame.tables.objects.block(objects.start / ObjectTable::BLOCK_SIZE);
+        let first = objects.start % ObjectTable::BLOCK_SIZE;
+        block.visible(frustum, frame.request.quality.culling, first..first + objects.len())
     });
 }
 

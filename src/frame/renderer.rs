@@ -107,7 +107,7 @@ impl<B: Backend> Renderer<B> {
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
         check(&scene)?;
-        self.tables.objects.hold(self.quality.culling);
+        self.tables.objects.configure(self.quality.culling);
         self.tables.objects.reset(scene.object_count());
         let mut lights = ValidLights::new(&scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let plan = self.plans.follow(&SceneRef { lights: &lights.lights, ..scene })?;
@@ -173,7 +173,7 @@ impl<B: Backend> Renderer<B> {
         let uploaded = self.backend.uploaded().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
-        let keeps_maps = views.iter().any(|view| view.is_kept);
+        let keeps_maps = views.iter().any(|view| view.is_cached);
         warn_of_changes(&statistics.rejections, keeps_maps, &mut self.told);
         let on_its_way = self.kept_maps.keep(maps);
         Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number, on_its_way })

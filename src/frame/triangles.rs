@@ -105,7 +105,7 @@ impl PassTriangles {
             let object = list.objects[list.batches[item.batch as usize].first as usize] as usize;
             let mut remaining = remaining.lock();
             remaining.clear();
-            culled += view.cull_some_triangles(scene, object, item.triangles.clone(), &mut remaining);
+            culled += view.cull_triangle_range(scene, object, item.triangles.clone(), &mut remaining);
         }
         *self.culled.lock() += culled;
     }

@@ -49,14 +49,15 @@ pub(super) fn views_of(
         let lit = views.iter().filter(|view| view.kind() != ViewKind::Shadow);
         let cameras: Vec<_> = lit.cloned().collect();
         for (light, (index, definition)) in lights.indices.iter().zip(&lights.lights).enumerate() {
-            let reaches =
-                |(center, radius)| cameras.iter().any(|view: &RenderView| view.frustum.may_see(center, radius));
+            let reaches = |(center, radius)| {
+                cameras.iter().any(|view: &RenderView| view.frustum.intersects_sphere(center, radius))
+            };
             if !definition.casts_shadow() || !definition.reach().is_none_or(reaches) {
                 continue;
             }
             let name = format!("shadow of light {index}");
             let camera = maps.camera(name, definition, scene.cameras);
-            views.extend(camera.map(|camera| RenderView { light: Some(light), ..RenderView::new(&camera) }));
+            views.extend(camera.map(|camera| RenderView { valid_light: Some(light), ..RenderView::new(&camera) }));
         }
     }
     let mut layers = [0; ViewKind::COUNT];

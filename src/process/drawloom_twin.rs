@@ -205,10 +205,10 @@ mod tests {
             let steps = |count: f64| point.map(|value| ((value * 0.5 + 0.5) * count).round() / count * 2.0 - 1.0);
             let half = point.map(|value| (value * 2048.0).round() / 2048.0);
             for (stored, bound) in [
-                (steps(255.0), NormalFormat::Octahedral8.bound()),
-                (steps(1023.0), NormalFormat::Octahedral10.bound()),
-                (steps(65535.0), NormalFormat::Octahedral16.bound()),
-                (half, NormalFormat::HalfFloat.bound()),
+                (steps(255.0), NormalFormat::Octahedral8.max_error_degrees()),
+                (steps(1023.0), NormalFormat::Octahedral10.max_error_degrees()),
+                (steps(65535.0), NormalFormat::Octahedral16.max_error_degrees()),
+                (half, NormalFormat::HalfFloat.max_error_degrees()),
             ] {
                 let found = as_double(direction_from_octahedral(stored));
                 prop_assert!((found.length() - 1.0).abs() < 1e-12);

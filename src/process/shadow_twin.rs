@@ -156,7 +156,7 @@ mod tests {
         let (position, direction) = (DVec3::new(1.0, 2.0, -3.0), Vec3::new(0.48, -0.6, 0.64));
         let (intensity, range, casts_shadow) = (Vec3::ONE, 8.0, true);
         let [inner_angle, outer_angle] = [0.3, 0.7];
-        let maps = ShadowMaps { side: SIDE as u32, reach: 10.0, ..ShadowMaps::default() };
+        let maps = ShadowMaps { side: SIDE as u32, max_distance: 10.0, ..ShadowMaps::default() };
         let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
         [
             Light::Directional { direction, illuminance: intensity, casts_shadow },
@@ -226,7 +226,7 @@ mod tests {
             across in prop::array::uniform2(-0.8..0.8_f64),
             distance in 0.2..0.8_f64,
             normal in direction(),
-            filter in 0..=ShadowMaps::WIDEST_FILTER,
+            filter in 0..=ShadowMaps::MAX_FILTER,
         ) {
             for (light, map) in shadowed() {
                 let light = light_values::<f32>(&light, Some(&map));
@@ -248,7 +248,7 @@ mod tests {
             across in -0.6..0.6_f64,
             row in -0.6..0.6_f64,
             edge in 20..44_usize,
-            filter in 0..=ShadowMaps::WIDEST_FILTER,
+            filter in 0..=ShadowMaps::MAX_FILTER,
         ) {
             let (light, map) = &shadowed()[1];
             let light = light_values::<f64>(light, Some(map));

@@ -164,9 +164,9 @@ mod tests {
                 directions().into_iter().map(|normal| off(read(format, normal), normal)).fold(0.0, f64::max)
             };
             for worst in [worst(read_back::<f32>), worst(read_back::<f64>)] {
-                assert!(worst <= normals.bound(), "{normals:?}: {worst}");
+                assert!(worst <= normals.max_error_degrees(), "{normals:?}: {worst}");
                 // Or else the bound would not say much.
-                assert!(worst >= normals.bound() * 0.4, "{normals:?}: {worst}");
+                assert!(worst >= normals.max_error_degrees() * 0.4, "{normals:?}: {worst}");
             }
         }
     }
@@ -192,7 +192,8 @@ mod tests {
                 assert!(off(read_back::<f64>(format, normal), DVec3::Z) < 1e-12, "{format:?} {normal}");
             }
             for length in [1e-30, 1e-3, 7.0, 1e30] {
-                let bound = 2.0 * ALL.iter().find(|&&normals| Format::from(normals) == format).unwrap().bound();
+                let bound =
+                    2.0 * ALL.iter().find(|&&normals| Format::from(normals) == format).unwrap().max_error_degrees();
                 assert!(off(read_back::<f32>(format, across * length), across) <= bound, "{format:?} {length}");
             }
         }

@@ -27,21 +27,21 @@ pub enum DepthCurve {
 
 impl DepthKey {
     /// The most bits that opaque commands have for their distance.
-    pub const MOST_OPAQUE_BITS: u32 = 20;
+    pub const MAX_OPAQUE_BITS: u32 = 20;
 
     /// The most bits that blended commands have for their distance: then it is the f32 itself, whatever the curve.
-    pub const MOST_BLENDED_BITS: u32 = 32;
+    pub const MAX_BLENDED_BITS: u32 = 32;
 
     /// The whole f32: nothing is drawn in the wrong order that f32 can tell apart.
-    pub const EXACT: Self = Self { bits: Self::MOST_BLENDED_BITS, curve: DepthCurve::Logarithmic };
+    pub const EXACT: Self = Self { bits: Self::MAX_BLENDED_BITS, curve: DepthCurve::Logarithmic };
 
     /// The number of a distance along the view's axis, in metres, in a view from `near` to `far`: the farther, the greater. It is
     /// in the upper [`DepthKey::bits`] of the 32, and those below are 0, so that keys of fewer bits have fewer to sort by.
     ///
     /// What is no number counts as nearest; but to 32 bits, which tell apart what is behind the camera as well, as beyond the end
     /// that its sign is of.
-    pub fn code(self, depth: f32, near: f32, far: f32) -> u32 {
-        self.codes(near, far).of(depth)
+    pub fn quantize(self, depth: f32, near: f32, far: f32) -> u32 {
+        self.quantizer(near, far).quantize(depth)
     }
 
     /// How far apart two things can be, in metres, that are drawn in the wrong order, where the farther of them is at `distance`:
@@ -60,8 +60,8 @@ impl DepthKey {
     ///
     /// To 32 bits it is 0, whatever the curve.
     pub fn step(self, distance: f32, near: f32, far: f32) -> f64 {
-        let bits = self.bits.clamp(1, Self::MOST_BLENDED_BITS);
-        if bits == Self::MOST_BLENDED_BITS {
+        let bits = self.bits.clamp(1, Self::MAX_BLENDED_BITS);
+        if bits == Self::MAX_BLENDED_BITS {
             return 0.0;
         }
         let numbers = 2_f64.powi(bits as i32);
@@ -79,26 +79,26 @@ impl DepthKey {
     }
 
     /// The numbers of distances in a view from `near` to `far`.
-    pub(crate) fn codes(self, near: f32, far: f32) -> DepthCodes {
-        let bits = self.bits.clamp(1, Self::MOST_BLENDED_BITS);
-        let unused = Self::MOST_BLENDED_BITS - bits;
+    pub(crate) fn quantizer(self, near: f32, far: f32) -> DepthQuantizer {
+        let bits = self.bits.clamp(1, Self::MAX_BLENDED_BITS);
+        let unused = Self::MAX_BLENDED_BITS - bits;
         let curve = match self.curve {
-            _ if unused == 0 => CodedCurve::Exact,
+            _ if unused == 0 => QuantizedCurve::Exact,
             DepthCurve::Linear { far } => {
                 let numbers = 2_f64.powi(bits as i32);
-                CodedCurve::Linear { per_metre: numbers / f64::from(far), last: (numbers - 1.0) as u32 }
+                QuantizedCurve::Linear { per_metre: numbers / f64::from(far), last: (numbers - 1.0) as u32 }
             }
             DepthCurve::Logarithmic => {
                 let (nearest, floats) = span(near, far);
-                CodedCurve::Logarithmic { nearest, last: floats - 1, per_float: (1 << 63) / u64::from(floats) }
+                QuantizedCurve::Logarithmic { nearest, last: floats - 1, per_float: (1 << 63) / u64::from(floats) }
             }
         };
-        DepthCodes { curve, unused }
+        DepthQuantizer { curve, unused }
     }
 
     pub(super) fn check(&self, knob: &'static str, most: u32) -> Result<(), QualityError> {
         if !(1..=most).contains(&self.bits) {
-            let range = if most == Self::MOST_OPAQUE_BITS { "1 to 20 bits" } else { "1 to 32 bits" };
+            let range = if most == Self::MAX_OPAQUE_BITS { "1 to 20 bits" } else { "1 to 32 bits" };
             return Err(QualityError::OutOfRange { knob, value: format!("{} bits", self.bits), range });
         }
         match self.curve {
@@ -113,14 +113,14 @@ impl DepthKey {
 
 /// The numbers of distances in one view: what of a [`DepthKey`] is the same for all of them, worked out once.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DepthCodes {
-    curve: CodedCurve,
+pub(crate) struct DepthQuantizer {
+    curve: QuantizedCurve,
     /// How many of the 32 bits.
     unused: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum CodedCurve {
+enum QuantizedCurve {
     Exact,
     Linear {
         per_metre: f64,
@@ -135,15 +135,17 @@ enum CodedCurve {
     },
 }
 
-impl DepthCodes {
-    /// See [`DepthKey::code`].
+impl DepthQuantizer {
+    /// See [`DepthKey::quantize`].
     #[inline]
-    pub(crate) fn of(&self, depth: f32) -> u32 {
+    pub(crate) fn quantize(&self, depth: f32) -> u32 {
         match self.curve {
-            CodedCurve::Exact => ordered_bits(depth),
+            QuantizedCurve::Exact => ordered_bits(depth),
             // To turn a float into an integer also turns a NaN into 0, and what is too large into the greatest.
-            CodedCurve::Linear { per_metre, last } => ((f64::from(depth) * per_metre) as u32).min(last) << self.unused,
-            CodedCurve::Logarithmic { nearest, last, per_float } => {
+            QuantizedCurve::Linear { per_metre, last } => {
+                ((f64::from(depth) * per_metre) as u32).min(last) << self.unused
+            }
+            QuantizedCurve::Logarithmic { nearest, last, per_float } => {
                 let beyond = bits_above_zero(depth).saturating_sub(nearest).min(last);
                 ((u64::from(beyond) * per_float) >> (31 + self.unused) << self.unused) as u32
             }
@@ -219,7 +221,7 @@ mod tests {
         ) {
             depths.retain(|&depth| depth.is_finite() && key.step(depth, near, far).is_finite());
             depths.sort_by(|one, other| other.total_cmp(one));
-            depths.sort_by_key(|&depth| key.code(depth, near, far));
+            depths.sort_by_key(|&depth| key.quantize(depth, near, far));
             let mut farthest = f32::NEG_INFINITY;
             for &depth in &depths {
                 let behind_by = f64::from(farthest) - f64::from(depth);
@@ -243,13 +245,13 @@ mod tests {
         #[test]
         fn every_float_has_an_exact_number_of_its_own(first in any::<f32>(), second in any::<f32>()) {
             prop_assume!(!first.is_nan() && !second.is_nan());
-            let number = |depth| DepthKey::EXACT.code(depth, 1.0, 2.0);
+            let number = |depth| DepthKey::EXACT.quantize(depth, 1.0, 2.0);
             prop_assert_eq!(number(first).partial_cmp(&number(second)), first.partial_cmp(&second));
         }
 
         #[test]
         fn bits_that_are_not_asked_for_are_0(key in any_key(), (near, far) in any_planes(), depth in any::<f32>()) {
-            prop_assert_eq!(key.code(depth, near, far).unbounded_shl(key.bits), 0);
+            prop_assert_eq!(key.quantize(depth, near, far).unbounded_shl(key.bits), 0);
         }
     }
 
@@ -258,10 +260,10 @@ mod tests {
         for bits in 1..32 {
             for key in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 50.0 }].map(|curve| DepthKey { bits, curve })
             {
-                assert_eq!(key.code(0.0, 0.1, 50.0), 0);
+                assert_eq!(key.quantize(0.0, 0.1, 50.0), 0);
                 // Where there are fewer floats than numbers, the last of these is nobody's.
                 if bits < 26 {
-                    assert_eq!(key.code(50.0, 0.1, 50.0) >> (32 - bits), (1 << bits) - 1, "{key:?}");
+                    assert_eq!(key.quantize(50.0, 0.1, 50.0) >> (32 - bits), (1 << bits) - 1, "{key:?}");
                 }
             }
         }
@@ -271,7 +273,7 @@ mod tests {
     fn what_is_out_of_range_counts_as_the_end() {
         for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 10.0 }] {
             let key = DepthKey { bits: 16, curve };
-            let number = |depth| key.code(depth, 0.5, 10.0);
+            let number = |depth| key.quantize(depth, 0.5, 10.0);
             for near in [f32::NAN, -f32::NAN, f32::NEG_INFINITY, -3.0, -0.0, 0.0, f32::MIN_POSITIVE, 1e-40] {
                 assert_eq!(number(near), number(0.0), "{near}");
             }
@@ -282,8 +284,8 @@ mod tests {
             assert_eq!(key.step(f32::NAN, 0.5, 10.0), f64::INFINITY);
         }
         let key = DepthKey { bits: 16, curve: DepthCurve::Logarithmic };
-        assert!(key.code(f32::MAX, 0.5, f32::INFINITY) < u32::MAX);
-        assert_eq!(key.code(7.0, 5.0, 5.0), key.code(3.0, 5.0, 5.0));
+        assert!(key.quantize(f32::MAX, 0.5, f32::INFINITY) < u32::MAX);
+        assert_eq!(key.quantize(7.0, 5.0, 5.0), key.quantize(3.0, 5.0, 5.0));
     }
 
     #[test]
@@ -294,7 +296,7 @@ mod tests {
             {
                 for (near, far) in [(f32::NAN, f32::NAN), (9.0, 1.0), (-1.0, f32::INFINITY), (0.0, 0.0)] {
                     let key = DepthKey { bits, curve };
-                    let _ = (key.code(3.0, near, far), key.code(f32::NAN, near, far), key.step(3.0, near, far));
+                    let _ = (key.quantize(3.0, near, far), key.quantize(f32::NAN, near, far), key.step(3.0, near, far));
                 }
             }
         }

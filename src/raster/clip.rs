@@ -9,7 +9,7 @@ pub(super) type ClipCorner<R, const V: usize> = (Vector4<R>, [R; V]);
 
 /// How a triangle lies to the planes of clip space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Position {
+pub(super) enum Overlap {
     /// No part of it can be seen.
     Outside,
     /// It can be drawn as it is.
@@ -20,23 +20,23 @@ pub(super) enum Position {
 
 /// How many times as wide and as high as the picture the guard band is: what reaches past the picture's edge is cut
 /// only where it reaches past this. In the largest picture that is 2²⁷ steps away, within
-/// [`FARTHEST`](super::grid::FARTHEST).
+/// [`MAX_COORDINATE`](super::grid::MAX_COORDINATE).
 const GUARD_BAND: f64 = 64.0;
 
 /// The near plane, the far plane, and the four sides.
 const PLANES: usize = 6;
 
 /// How three corners lie. What is not finite cannot be seen.
-pub(super) fn position<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> Position {
+pub(super) fn classify<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> Overlap {
     let is_finite = |(clip, _): &ClipCorner<R, V>| clip.0.iter().all(|number| number.is_finite());
-    let beyond_all = |band| corners.iter().fold(u32::MAX, |beyond, (clip, _)| beyond & planes_before(clip, band));
-    let beyond_any = |band| corners.iter().fold(0, |beyond, (clip, _)| beyond | planes_before(clip, band));
+    let beyond_all = |band| corners.iter().fold(u32::MAX, |beyond, (clip, _)| beyond & outside_planes(clip, band));
+    let beyond_any = |band| corners.iter().fold(0, |beyond, (clip, _)| beyond | outside_planes(clip, band));
     if !corners.iter().all(is_finite) || beyond_all(1.0) != 0 {
-        Position::Outside
+        Overlap::Outside
     } else if beyond_any(GUARD_BAND) == 0 {
-        Position::Inside
+        Overlap::Inside
     } else {
-        Position::Across
+        Overlap::Across
     }
 }
 
@@ -68,7 +68,7 @@ pub(super) fn clip<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> 
 }
 
 /// A bit for each plane that has the place on its outer side.
-fn planes_before<R: Real>(clip: &Vector4<R>, band: f64) -> u32 {
+fn outside_planes<R: Real>(clip: &Vector4<R>, band: f64) -> u32 {
     distances(clip, band).iter().fold(0, |beyond, &distance| beyond << 1 | u32::from(distance < R::zero()))
 }
 

@@ -5,33 +5,33 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use super::silhouettes::{Silhouette, Silhouettes};
 
-/// How near the nearest things are that cover each square of a picture as a whole, taken where they are farthest within the
-/// square (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where
+/// How near the nearest things are that cover each tile of a picture as a whole, taken where they are farthest within the
+/// tile (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where
 /// theirs is by samples).
 ///
-/// A square is covered if each of its cells lies between all lines of some [silhouette](Silhouettes): of a line only the cell's
+/// A tile is covered if each of its cells lies between all lines of some [silhouette](Silhouettes): of a line only the cell's
 /// worst corner counts, and of a plane over the silhouette again its worst corner, since both are linear. So what is farther than
-/// the square's number is hidden in all of the square. Silhouettes that each cover some cells are taken together until they have
+/// the tile's number is hidden in all of the tile. Silhouettes that each cover some cells are taken together until they have
 /// all, and then as near as the farthest of them: those that are drawn nearest first are so as near as they can be.
 ///
 /// Strips may be drawn at the same time, and looked at when all are drawn.
 #[derive(Debug, Default)]
 pub struct CoarseDepth {
-    /// A square's width in pixels.
-    side: f64,
+    /// A tile's width in pixels.
+    tile_size: f64,
     /// In cells.
     cells: usize,
-    /// Squares to the right, and down.
+    /// Tiles to the right, and down.
     size: [usize; 2],
-    /// The nearness of each square, as an f32's bits; 0 where nothing is.
-    squares: Vec<AtomicU32>,
-    /// The least nearness of each tile of [`CoarseDepth::TILE`] by as many squares.
+    /// The nearness of each tile, as an f32's bits; 0 where nothing is.
     tiles: Vec<AtomicU32>,
-    /// For each square, while it is drawn, a [`Layer`].
+    /// The least nearness of each block of [`CoarseDepth::BLOCK`] by as many tiles.
+    blocks: Vec<AtomicU32>,
+    /// For each tile, while it is drawn, a [`Layer`].
     layers: Vec<AtomicU64>,
 }
 
-/// Some of a square's cells, a bit each, and how near what covers them is at least.
+/// Some of a tile's cells, a bit each, and how near what covers them is at least.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     cells: u32,
@@ -56,27 +56,27 @@ impl Layer {
 }
 
 impl CoarseDepth {
-    /// How many squares a tile is wide: what is as large as several is asked for tiles first. A strip is a row of tiles.
-    pub const TILE: usize = 8;
+    /// How many tiles a block is wide: what is as large as several is asked for blocks first. A strip is a row of blocks.
+    pub const BLOCK: usize = 8;
 
-    /// Makes room for a picture in squares of so many pixels. What is in them counts only when it has been drawn.
-    pub fn reset(&mut self, picture: [u32; 2], side: u32) {
-        self.side = f64::from(side.max(1));
+    /// Makes room for a picture in tiles of so many pixels. What is in them counts only when it has been drawn.
+    pub fn reset(&mut self, picture: [u32; 2], tile_size: u32) {
+        self.tile_size = f64::from(tile_size.max(1));
         // A cell is a pixel wide at least.
-        self.cells = (side.max(1) as usize).min(MOST_CELLS);
-        self.size = picture.map(|pixels| pixels.div_ceil(side.max(1)) as usize);
+        self.cells = (tile_size.max(1) as usize).min(MAX_CELLS);
+        self.size = picture.map(|pixels| pixels.div_ceil(tile_size.max(1)) as usize);
         let [columns, rows] = self.size;
-        self.squares.resize_with(columns * rows, AtomicU32::default);
+        self.tiles.resize_with(columns * rows, AtomicU32::default);
         self.layers.resize_with(columns * rows, AtomicU64::default);
-        self.tiles.resize_with(columns.div_ceil(Self::TILE) * self.strip_count(), AtomicU32::default);
+        self.blocks.resize_with(columns.div_ceil(Self::BLOCK) * self.strip_count(), AtomicU32::default);
     }
 
     /// The number of strips.
     pub fn strip_count(&self) -> usize {
-        self.size[1].div_ceil(Self::TILE)
+        self.size[1].div_ceil(Self::BLOCK)
     }
 
-    /// How many squares there are to the right, and down.
+    /// How many tiles there are to the right, and down.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
@@ -84,49 +84,49 @@ impl CoarseDepth {
     /// Draws a strip, whatever was there before. Strips that are drawn at the same time must not be the same.
     pub fn draw(&self, strip: usize, silhouettes: &Silhouettes) {
         let [columns, rows] = self.size;
-        let rows = strip * Self::TILE..rows.min((strip + 1) * Self::TILE);
-        // Whoever reads the squares does so in a job that depends on this one, which orders the two.
-        for square in rows.start * columns..rows.end * columns {
-            self.squares[square].store(0, Ordering::Relaxed);
-            self.layers[square].store(Layer::EMPTY, Ordering::Relaxed);
+        let rows = strip * Self::BLOCK..rows.min((strip + 1) * Self::BLOCK);
+        // Whoever reads the tiles does so in a job that depends on this one, which orders the two.
+        for tile in rows.start * columns..rows.end * columns {
+            self.tiles[tile].store(0, Ordering::Relaxed);
+            self.layers[tile].store(Layer::EMPTY, Ordering::Relaxed);
         }
-        let [low, high] = [rows.start, rows.end].map(|row| row as f64 * self.side);
+        let [low, high] = [rows.start, rows.end].map(|row| row as f64 * self.tile_size);
         for silhouette in silhouettes.between(low, high) {
             rows.clone().for_each(|row| self.draw_row(row, &silhouette));
         }
-        for (column, tile) in (0..columns).step_by(Self::TILE).zip(self.tiles_of(strip)) {
-            let squares = rows.clone().flat_map(|row| self.row(row, column..columns.min(column + Self::TILE)));
-            let least = squares.map(|square| square.load(Ordering::Relaxed)).min();
-            tile.store(least.unwrap_or(0), Ordering::Relaxed);
+        for (column, block) in (0..columns).step_by(Self::BLOCK).zip(self.blocks_in(strip)) {
+            let tiles = rows.clone().flat_map(|row| self.row(row, column..columns.min(column + Self::BLOCK)));
+            let least = tiles.map(|tile| tile.load(Ordering::Relaxed)).min();
+            block.store(least.unwrap_or(0), Ordering::Relaxed);
         }
     }
 
     fn draw_row(&self, row: usize, silhouette: &Silhouette<'_>) {
-        let [left, right] = silhouette.width.map(|x| (x / self.side).clamp(0.0, self.size[0] as f64));
-        let most = (silhouette.most as f32).max(0.0).next_up().to_bits();
-        let is_nearer = |square: &AtomicU32| square.load(Ordering::Relaxed) >= most;
+        let [left, right] = silhouette.width.map(|x| (x / self.tile_size).clamp(0.0, self.size[0] as f64));
+        let most = (silhouette.max_nearness as f32).max(0.0).next_up().to_bits();
+        let is_nearer = |tile: &AtomicU32| tile.load(Ordering::Relaxed) >= most;
         if self.row(row, left as usize..right.ceil() as usize).iter().all(is_nearer) {
             return;
         }
-        let mut covered = [const { 0..0 }; MOST_CELLS];
+        let mut covered = [const { 0..0 }; MAX_CELLS];
         let (mut first, mut end) = (usize::MAX, 0);
         for (line, cells) in covered[..self.cells].iter_mut().enumerate() {
-            *cells = self.covered(row * self.cells + line, silhouette);
+            *cells = self.covered_cells(row * self.cells + line, silhouette);
             if cells.start < cells.end {
                 (first, end) = (first.min(cells.start), end.max(cells.end));
             }
         }
         for column in first / self.cells..end.div_ceil(self.cells) {
-            self.draw_square(row, column, &covered[..self.cells], silhouette);
+            self.draw_tile(row, column, &covered[..self.cells], silhouette);
         }
     }
 
     /// Which cells of a row of cells a silhouette covers.
-    fn covered(&self, row: usize, silhouette: &Silhouette<'_>) -> Range<usize> {
-        let width = self.side / self.cells as f64;
+    fn covered_cells(&self, row: usize, silhouette: &Silhouette<'_>) -> Range<usize> {
+        let width = self.tile_size / self.cells as f64;
         let half = width / 2.0;
         let y = row as f64 * width + half;
-        let (mut first, mut last) = (0.0, self.size[0] as f64 * self.side);
+        let (mut first, mut last) = (0.0, self.size[0] as f64 * self.tile_size);
         for [right, down, offset, across] in silhouette.lines {
             // At the cell's worst corner, by the place of its centre.
             let rest = down * y + offset - (right.abs() + down.abs()) * half;
@@ -144,12 +144,12 @@ impl CoarseDepth {
         if first < end { first as usize..(end as usize).min(self.size[0] * self.cells) } else { 0..0 }
     }
 
-    fn draw_square(&self, row: usize, column: usize, covered: &[Range<usize>], silhouette: &Silhouette<'_>) {
+    fn draw_tile(&self, row: usize, column: usize, covered: &[Range<usize>], silhouette: &Silhouette<'_>) {
         // Only one job draws this strip.
         let place = row * self.size[0] + column;
-        let (square, layer) = (&self.squares[place], &self.layers[place]);
-        let behind = f32::from_bits(square.load(Ordering::Relaxed));
-        if f64::from(behind) >= silhouette.most {
+        let (tile, layer) = (&self.tiles[place], &self.layers[place]);
+        let behind = f32::from_bits(tile.load(Ordering::Relaxed));
+        if f64::from(behind) >= silhouette.max_nearness {
             return;
         }
         let first = column * self.cells;
@@ -166,9 +166,9 @@ impl CoarseDepth {
         if cells == 0 {
             return;
         }
-        let width = self.side / self.cells as f64;
-        let middle = |axis: usize, square: usize| {
-            (square * self.cells) as f64 * width + (low[axis] + high[axis]) as f64 * 0.5 * width
+        let width = self.tile_size / self.cells as f64;
+        let middle = |axis: usize, tile: usize| {
+            (tile * self.cells) as f64 * width + (low[axis] + high[axis]) as f64 * 0.5 * width
         };
         let half = |axis: usize| (high[axis] - low[axis]) as f64 * 0.5 * width;
         let ([x, y], [half_x, half_y]) = ([middle(0, column), middle(1, row)], [half(0), half(1)]);
@@ -185,7 +185,7 @@ impl CoarseDepth {
         }
         let all = u32::MAX >> (u32::BITS as usize - self.cells * self.cells);
         if cells == all {
-            square.store(nearness.to_bits(), Ordering::Relaxed);
+            tile.store(nearness.to_bits(), Ordering::Relaxed);
             return;
         }
         let own = Layer { cells, nearness };
@@ -193,7 +193,7 @@ impl CoarseDepth {
         // One that lies behind what covers all, or is empty, is of no use any more.
         let both = if known.nearness > behind { known.and(own) } else { own };
         if both.cells == all {
-            square.store(both.nearness.to_bits(), Ordering::Relaxed);
+            tile.store(both.nearness.to_bits(), Ordering::Relaxed);
             layer.store(Layer::EMPTY, Ordering::Relaxed);
         } else {
             layer.store(both.bits(), Ordering::Relaxed);
@@ -202,23 +202,23 @@ impl CoarseDepth {
 
     fn row(&self, row: usize, columns: Range<usize>) -> &[AtomicU32] {
         let start = row * self.size[0];
-        &self.squares[start + columns.start..start + columns.end.max(columns.start)]
+        &self.tiles[start + columns.start..start + columns.end.max(columns.start)]
     }
 
-    fn tiles_of(&self, strip: usize) -> &[AtomicU32] {
-        let count = self.size[0].div_ceil(Self::TILE);
-        &self.tiles[strip * count..][..count]
+    fn blocks_in(&self, strip: usize) -> &[AtomicU32] {
+        let count = self.size[0].div_ceil(Self::BLOCK);
+        &self.blocks[strip * count..][..count]
     }
 
-    /// How near what covers the square at a place of the picture is; 0 where nothing does, and outside of the picture.
+    /// How near what covers the tile at a place of the picture is; 0 where nothing does, and outside of the picture.
     pub fn nearness_at(&self, x: f64, y: f64) -> f32 {
-        let [column, row] = [x, y].map(|pixel| (pixel / self.side).floor());
+        let [column, row] = [x, y].map(|pixel| (pixel / self.tile_size).floor());
         let [columns, rows] = self.size.map(|count| count as f64);
         // No number is in any picture if it is none.
         if !(column >= 0.0 && row >= 0.0 && column < columns && row < rows) {
             return 0.0;
         }
-        f32::from_bits(self.squares[row as usize * self.size[0] + column as usize].load(Ordering::Relaxed))
+        f32::from_bits(self.tiles[row as usize * self.size[0] + column as usize].load(Ordering::Relaxed))
     }
 
     /// Whether all that lies in a rectangle of the picture and is nowhere nearer than `nearness` is hidden. `low` and `high` are
@@ -226,7 +226,7 @@ impl CoarseDepth {
     pub fn hides(&self, low: [f64; 2], high: [f64; 2], nearness: f32) -> bool {
         let range = |axis: usize| {
             let count = self.size[axis] as f64;
-            let [first, last] = [low[axis], high[axis]].map(|pixel| (pixel / self.side).floor());
+            let [first, last] = [low[axis], high[axis]].map(|pixel| (pixel / self.tile_size).floor());
             // Not a range where a number is none.
             let is_in = first < count && last >= 0.0 && count > 0.0;
             is_in.then(|| first.max(0.0) as usize..last.min(count - 1.0) as usize + 1)
@@ -234,16 +234,16 @@ impl CoarseDepth {
         let (Some(columns), Some(rows)) = (range(0), range(1)) else { return false };
         // Bits of numbers that are not negative are in the numbers' order.
         let nearness = nearness.max(0.0).to_bits();
-        let covers = |square: &AtomicU32| square.load(Ordering::Relaxed) > nearness;
-        let strips = rows.start / Self::TILE..(rows.end - 1) / Self::TILE + 1;
+        let covers = |tile: &AtomicU32| tile.load(Ordering::Relaxed) > nearness;
+        let strips = rows.start / Self::BLOCK..(rows.end - 1) / Self::BLOCK + 1;
         for strip in strips {
-            let rows = rows.start.max(strip * Self::TILE)..rows.end.min((strip + 1) * Self::TILE);
+            let rows = rows.start.max(strip * Self::BLOCK)..rows.end.min((strip + 1) * Self::BLOCK);
             let mut column = columns.start;
             while column < columns.end {
-                let tile = column / Self::TILE;
-                let part = column..columns.end.min((tile + 1) * Self::TILE);
+                let block = column / Self::BLOCK;
+                let part = column..columns.end.min((block + 1) * Self::BLOCK);
                 column = part.end;
-                if !covers(&self.tiles_of(strip)[tile])
+                if !covers(&self.blocks_in(strip)[block])
                     && !rows.clone().all(|row| self.row(row, part.clone()).iter().all(covers))
                 {
                     return false;
@@ -254,8 +254,8 @@ impl CoarseDepth {
     }
 }
 
-/// The most cells to a square's side. A layer has room for 5.
-const MOST_CELLS: usize = 4;
+/// The most cells to a tile's side. A layer has room for 5.
+const MAX_CELLS: usize = 4;
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
@@ -264,9 +264,9 @@ mod tests {
 
     use super::*;
 
-    fn drawn(picture: [u32; 2], side: u32, silhouettes: &Silhouettes) -> CoarseDepth {
+    fn drawn(picture: [u32; 2], tile_size: u32, silhouettes: &Silhouettes) -> CoarseDepth {
         let mut depth = CoarseDepth::default();
-        depth.reset(picture, side);
+        depth.reset(picture, tile_size);
         (0..depth.strip_count()).for_each(|strip| depth.draw(strip, silhouettes));
         depth
     }
@@ -283,7 +283,7 @@ mod tests {
         for row in 0..6 {
             for column in 0..8 {
                 let expected = if (1..3).contains(&column) && (1..5).contains(&row) { 0.5 } else { 0.0 };
-                let place = [column, row].map(|square| f64::from(square) * 8.0 + 4.0);
+                let place = [column, row].map(|tile| f64::from(tile) * 8.0 + 4.0);
                 assert_eq!(depth.nearness_at(place[0], place[1]), expected, "{column} {row}");
             }
         }
@@ -302,7 +302,7 @@ mod tests {
             let mut silhouettes = Silhouettes::default();
             silhouettes.add(rectangle([8.0, 8.0], [40.0, 40.0]), margin, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
             let depth = drawn([64, 64], 8, &silhouettes);
-            depth.squares.iter().filter(|square| square.load(Ordering::Relaxed) > 0).count()
+            depth.tiles.iter().filter(|tile| tile.load(Ordering::Relaxed) > 0).count()
         };
         assert_eq!([0.0, 0.01, 8.0, 8.01].map(count), [16, 4, 4, 0]);
     }
@@ -350,7 +350,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Everything at once, against places of each square and each silhouette looked at one by one.
+        /// Everything at once, against places of each tile and each silhouette looked at one by one.
         #[test]
         fn no_place_is_farther_than_its_square_says(
             shapes in prop::collection::vec(
@@ -390,7 +390,7 @@ mod tests {
             let [columns, rows] = depth.size();
             let width = f64::from(side);
             for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-                let [left, top] = [column, row].map(|square| square as f64 * width);
+                let [left, top] = [column, row].map(|tile| tile as f64 * width);
                 let found = f64::from(depth.nearness_at(left + width / 2.0, top + width / 2.0));
                 for share in [[0.01, 0.01], [0.99, 0.01], [0.01, 0.99], [0.99, 0.99], [0.5, 0.3]] {
                     let nearest = nearest_at(left + share[0] * width, top + share[1] * width);
@@ -400,12 +400,12 @@ mod tests {
             let [a, b, c, d] = rectangle;
             let (low, high) = ([a.min(b), c.min(d)], [a.max(b), c.max(d)]);
             let touched = |row: usize, column: usize| {
-                let [left, top] = [column, row].map(|square| square as f64 * width);
+                let [left, top] = [column, row].map(|tile| tile as f64 * width);
                 left <= high[0] && left + width > low[0] && top <= high[1] && top + width > low[1]
             };
-            let mut squares = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+            let mut tiles = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
             let mut any = false;
-            let all = squares.all(|(row, column)| {
+            let all = tiles.all(|(row, column)| {
                 let is_touched = touched(row, column);
                 any |= is_touched;
                 let found = depth.nearness_at((column as f64 + 0.5) * width, (row as f64 + 0.5) * width);

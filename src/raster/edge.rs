@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::grid::{MIDDLE, Place, STEPS};
+use super::grid::{GridPoint, HALF_PIXEL, STEPS_PER_PIXEL};
 
 /// Tells on which side of an edge a pixel's middle lies: the function is twice the area, in square steps, of the
 /// triangle that the edge makes with it, and not below 0 on the inner side.
@@ -21,13 +21,13 @@ pub(super) struct Edge {
 
 impl Edge {
     /// The edge of a triangle whose corners follow each other clockwise in the picture.
-    pub fn new(from: Place, to: Place) -> Self {
+    pub fn new(from: GridPoint, to: GridPoint) -> Self {
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let is_inside = y < 0 || (y == 0 && x > 0);
         Self {
-            at_first: x * (MIDDLE - from[1]) - y * (MIDDLE - from[0]),
-            across: -y * STEPS,
-            down: x * STEPS,
+            at_first: x * (HALF_PIXEL - from[1]) - y * (HALF_PIXEL - from[0]),
+            across: -y * STEPS_PER_PIXEL,
+            down: x * STEPS_PER_PIXEL,
             least: i64::from(!is_inside),
         }
     }

@@ -15,11 +15,11 @@ mod triangle;
 mod triangle_culling;
 
 pub use coarse_depth::CoarseDepth;
-pub use convex::{ConvexPart, Face};
-pub use grid::{LARGEST_SIDE, Winding};
+pub use convex::{ConvexPart, Plane};
+pub use grid::{MAX_PICTURE_SIZE, Winding};
 pub use pixel_bounds::PixelBounds;
 pub use real::Real;
 pub use silhouettes::Silhouettes;
 pub use triangle::{Interpolated, Triangle};
-pub use triangle_culling::{CullCorner, CulledTriangles, cull_triangles};
+pub use triangle_culling::{CullVertex, CulledTriangles, cull_triangles};
 pub use vector::{Quaternion, Vector, Vector2, Vector3, Vector4};

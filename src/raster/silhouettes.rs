@@ -31,7 +31,7 @@ struct Shape {
     /// What is nearer than this all over a place is not there.
     nearest: f64,
     /// No place is nearer than this.
-    most: f64,
+    max_nearness: f64,
 }
 
 /// One of them, as it is drawn.
@@ -42,7 +42,7 @@ pub(super) struct Silhouette<'a> {
     /// The lowest and highest x.
     pub(super) width: [f64; 2],
     pub(super) nearest: f64,
-    pub(super) most: f64,
+    pub(super) max_nearness: f64,
 }
 
 impl Silhouettes {
@@ -73,7 +73,7 @@ impl Silhouettes {
         corners: impl IntoIterator<Item = DVec2>,
         margin: f64,
         planes: impl IntoIterator<Item = [f64; 3]>,
-        [nearest, most]: [f64; 2],
+        [nearest, max_nearness]: [f64; 2],
     ) {
         self.corners.clear();
         self.corners.extend(corners);
@@ -95,7 +95,7 @@ impl Silhouettes {
             return;
         }
         let (lines, planes) = (first_line..self.lines.len(), first_plane..self.planes.len());
-        self.shapes.push(Shape { lines, planes, around, nearest, most });
+        self.shapes.push(Shape { lines, planes, around, nearest, max_nearness });
     }
 
     /// Those of which any may be between these heights.
@@ -106,7 +106,7 @@ impl Silhouettes {
             planes: &self.planes[shape.planes.clone()],
             width: shape.around.map(|corner| corner.x),
             nearest: shape.nearest,
-            most: shape.most,
+            max_nearness: shape.max_nearness,
         })
     }
 }

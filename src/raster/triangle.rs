@@ -2,9 +2,9 @@
 
 use std::array::from_fn;
 
-use super::clip::{self, ClipCorner, Position};
+use super::clip::{self, ClipCorner, Overlap};
 use super::edge::Edge;
-use super::grid::{self, LARGEST_SIDE, Winding};
+use super::grid::{self, MAX_PICTURE_SIZE, Winding};
 use super::{PixelBounds, Real, Vector4};
 
 /// A triangle, set up to be drawn into a picture of some size, with `V` numbers to interpolate.
@@ -27,7 +27,7 @@ pub struct Triangle<R, const V: usize> {
     varyings: [[R; V]; 3],
 }
 
-/// What [`Triangle::varyings`] gives.
+/// What [`Triangle::interpolate`] gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interpolated<R, const V: usize> {
     /// At the pixel's middle.
@@ -45,20 +45,20 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     ///
     /// Depth is reversed, and what is seen has 0 ≤ z ≤ w: the far plane is at z = 0, and may be infinitely far away. It
     /// clips, as it does in wgpu. A triangle is left out if a corner is not finite, or if the picture is larger than
-    /// [`LARGEST_SIDE`].
+    /// [`MAX_PICTURE_SIZE`].
     pub fn set_up(
         corners: &[(Vector4<R>, [R; V]); 3],
         picture: [usize; 2],
         culled: Option<Winding>,
         triangles: &mut Vec<Self>,
     ) {
-        if picture.iter().any(|&side| side > LARGEST_SIDE) {
+        if picture.iter().any(|&side| side > MAX_PICTURE_SIZE) {
             return;
         }
-        match clip::position(corners) {
-            Position::Outside => (),
-            Position::Inside => triangles.extend(Self::new(corners.each_ref(), picture, culled)),
-            Position::Across => {
+        match clip::classify(corners) {
+            Overlap::Outside => (),
+            Overlap::Inside => triangles.extend(Self::new(corners.each_ref(), picture, culled)),
+            Overlap::Across => {
                 let polygon = clip::clip(corners);
                 let parts = polygon.array_windows().skip(1).map(|[one, other]| [&polygon[0], one, other]);
                 triangles.extend(parts.filter_map(|corners| Self::new(corners, picture, culled)));
@@ -79,7 +79,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// corners (2⁻²⁴ of it each, in f32): it is the sum of each corner's depth times a share, where nothing is below 0,
     /// so that no error grows by cancelling. A share is an exact integer rounded once (1 unit), the product (1), two
     /// sums (2), one over the area (2), and the product with it (1).
-    pub fn cover(&self, within: PixelBounds, mut visit: impl FnMut([usize; 2], R)) {
+    pub fn rasterize(&self, within: PixelBounds, mut visit: impl FnMut([usize; 2], R)) {
         let bounds = self.bounds.intersection(within);
         for row in bounds.top..bounds.bottom {
             let all = bounds.left as i64..bounds.right as i64;
@@ -98,7 +98,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// pixels that the pixel belongs to, which start at even ones. Like a device, this looks at pixels outside of the
     /// triangle for it, where the numbers go on as they do inside. Where they would have to go on behind the camera,
     /// they do not change instead.
-    pub fn varyings(&self, place: [usize; 2]) -> Interpolated<R, V> {
+    pub fn interpolate(&self, place: [usize; 2]) -> Interpolated<R, V> {
         let [column, row] = place.map(|number| number as i64);
         let here = self.weights([column, row]).unwrap_or_else(|| self.flat_weights([column, row]));
         let value = self.blend(here);

@@ -3,7 +3,7 @@
 use std::ops::AddAssign;
 
 use super::Vector4;
-use super::grid::{self, LARGEST_SIDE, Place, Winding};
+use super::grid::{self, GridPoint, MAX_PICTURE_SIZE, Winding};
 
 /// How many triangles there were, and how many of them were left out, by the first reason that held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,12 +44,12 @@ impl AddAssign for CulledTriangles {
 
 /// A mesh's vertex, for [`cull_triangles`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CullCorner {
+pub struct CullVertex {
     /// Where it is in clip space, with reversed depth: what is seen has 0 ≤ z ≤ w. A device may have it elsewhere by 2⁻¹³ of
     /// |x| + |y| + |z| + |w|.
     pub clip: Vector4<f64>,
     /// Whether a device has it less than a 256th of a pixel from where that is in the picture, before it snaps it.
-    pub is_placed: bool,
+    pub is_accurate: bool,
 }
 
 /// Appends to `remaining` the indices of the `triangles` that may cover a pixel of a `picture` of so many pixels to the
@@ -63,7 +63,7 @@ pub struct CullCorner {
 ///   within some units of 2⁻²⁴ of the sum of their magnitudes, and these may be a thousand times those of the result.
 ///   If all corners are outside of a plane, so are all points between them, in front of the camera and behind it.
 /// - **Degenerate** is what has two corners with the same four numbers: a device puts them at the same place as well.
-/// - **Back-facing** and **zero-size** are decided of corners that are [placed](CullCorner::is_placed), after these are snapped to steps of a 256th of a pixel, in
+/// - **Back-facing** and **zero-size** are decided of corners that are [placed](CullVertex::is_accurate), after these are snapped to steps of a 256th of a pixel, in
 ///   integers, and so that each corner may be a step off along both axes. This holds if a device's corner is less than
 ///   a step away before it snaps it: the nearest integers of two numbers less than 1 apart are at most 1 apart. Drawn
 ///   relative to the camera, corners are within 1e-3 pixels, a quarter of a step, unless they are nearer to the camera
@@ -80,7 +80,7 @@ pub struct CullCorner {
 /// step farther, it has one. Triangles with an index beyond `corners`, or a corner that is not finite, are kept too: it is
 /// for who draws to refuse them.
 pub fn cull_triangles(
-    corners: &[CullCorner],
+    corners: &[CullVertex],
     triangles: impl Iterator<Item = [u32; 3]>,
     picture: [usize; 2],
     culled: Option<Winding>,
@@ -127,12 +127,12 @@ struct Corner {
     outside: u8,
     is_within_far_plane: bool,
     /// Where it is in the picture, if no other plane clips a triangle because of it.
-    place: Option<Place>,
+    place: Option<GridPoint>,
 }
 
 impl Corner {
     /// None if it is not finite.
-    fn new(&CullCorner { clip, is_placed }: &CullCorner, picture: [usize; 2]) -> Option<Self> {
+    fn new(&CullVertex { clip, is_accurate }: &CullVertex, picture: [usize; 2]) -> Option<Self> {
         let [x, y, z, w] = clip.0;
         // Of numbers so large that this is infinite nothing is decided: the comparisons below are false then.
         let margin = CLIP_MARGIN * (x.abs() + y.abs() + z.abs() + w.abs());
@@ -140,7 +140,7 @@ impl Corner {
         let outside = planes.iter().fold(0, |outside, &distance| outside << 1 | u8::from(distance < -margin));
         let band = GUARD_BAND * w - margin;
         let is_within = w > 0.0 && w - z > margin && x.abs() < band && y.abs() < band;
-        let is_drawable = is_placed && is_within && picture.iter().all(|&side| side <= LARGEST_SIDE);
+        let is_drawable = is_accurate && is_within && picture.iter().all(|&side| side <= MAX_PICTURE_SIZE);
         let place = is_drawable.then(|| grid::snap(&clip, picture));
         let is_finite = clip.0.iter().all(|number| number.is_finite());
         is_finite.then_some(Self { clip: clip.0, outside, is_within_far_plane: z > margin, place })
@@ -170,19 +170,19 @@ fn reason([a, b, c]: [&Corner; 3], culled: Option<Winding>) -> Option<Reason> {
 }
 
 /// Whether it is wound the way that is left out, wherever within a step its corners are.
-fn is_surely(culled: Option<Winding>, places: [Place; 3]) -> bool {
+fn is_surely(culled: Option<Winding>, places: [GridPoint; 3]) -> bool {
     let area = grid::doubled_area(places);
     let [a, b, c] = places;
-    let extent = |from: Place, to: Place| (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
+    let extent = |from: GridPoint, to: GridPoint| (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
     let change = extent(a, b) + extent(b, c) + extent(c, a) + 6;
     area.abs() > change && culled == Winding::of_area(area)
 }
 
 /// Whether there is no pixel's middle in the rectangle around the corners, wherever within a step they are.
-fn is_between_middles(places: [Place; 3]) -> bool {
+fn is_between_middles(places: [GridPoint; 3]) -> bool {
     [0, 1].into_iter().any(|axis| {
         let [a, b, c] = places.map(|place| place[axis]);
-        grid::middles(a.min(b).min(c) - 1, a.max(b).max(c) + 1).is_empty()
+        grid::pixel_centers(a.min(b).min(c) - 1, a.max(b).max(c) + 1).is_empty()
     })
 }
 

@@ -43,7 +43,7 @@ impl PackedVertex {
 impl Mesh {
     /// The vertices, packed. Textures repeat, so texture coordinates are counted from the whole number that is nearest the middle
     /// of the mesh's: half floats are finest near 0. How far off that leaves them is
-    /// [`VertexFormat::uv_bound`](crate::quality::VertexFormat::uv_bound).
+    /// [`VertexFormat::max_uv_error`](crate::quality::VertexFormat::max_uv_error).
     pub fn packed_vertices(&self) -> Vec<PackedVertex> {
         let places = || self.vertices().iter().map(|vertex| Vec2::from(vertex.uv).as_dvec2());
         let low = places().fold(DVec2::MAX, DVec2::min);
@@ -108,7 +108,7 @@ mod tests {
             let vertex = Vertex { normal: normal.to_array(), ..Vertex::default() };
             let unpacked = PackedVertex::new(&vertex, DVec2::ZERO).unpacked();
             let off = Vec3::from(unpacked.normal).as_dvec3().angle_between(normal.as_dvec3());
-            prop_assert!(off.to_degrees() <= VertexFormat::Packed.normal_bound(), "{}", off.to_degrees());
+            prop_assert!(off.to_degrees() <= VertexFormat::Packed.max_normal_error_degrees(), "{}", off.to_degrees());
         }
 
         #[test]
@@ -122,7 +122,7 @@ mod tests {
             for axis in 0..2 {
                 let all = uvs.map(|uv| f64::from(uv[axis]));
                 let repeats = all.into_iter().fold(f64::MIN, f64::max) - all.into_iter().fold(f64::MAX, f64::min);
-                let bound = VertexFormat::Packed.uv_bound(repeats);
+                let bound = VertexFormat::Packed.max_uv_error(repeats);
                 let shifts = packed.iter().zip(all).map(|(packed, uv)| f64::from(packed.unpacked().uv[axis]) - uv);
                 let shifts: Vec<_> = shifts.collect();
                 for shift in &shifts {
@@ -140,7 +140,7 @@ mod tests {
             let packed = mesh(&[[u, 7.0 + u], [0.0, 7.0], [1.0, 8.0]]).packed_vertices()[0].unpacked();
             for (found, meant) in packed.uv.into_iter().zip([u, 7.0 + u]) {
                 let off = whole(f64::from(found) - f64::from(meant)).abs();
-                assert!(off <= 0.5 / 1024.0 && off <= VertexFormat::Packed.uv_bound(1.0), "{u}: {off}");
+                assert!(off <= 0.5 / 1024.0 && off <= VertexFormat::Packed.max_uv_error(1.0), "{u}: {off}");
             }
         }
     }

@@ -5,11 +5,11 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::subdivision_level::subdivision_level;
+use super::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
 use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawState, RenderCommand, Selection, SortKey};
-use crate::quality::{DepthCodes, Quality};
+use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
-use crate::view::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, places};
 
 /// Fills the commands of one pass. It computes no state: it copies what the object table holds, so workers contend for nothing.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +31,8 @@ pub(crate) struct Fill<'a> {
 /// How a view orders commands by depth.
 struct DepthOrder {
     forward: DVec3,
-    opaque: DepthCodes,
-    blended: DepthCodes,
+    opaque: DepthQuantizer,
+    blended: DepthQuantizer,
 }
 
 impl Fill<'_> {
@@ -42,8 +42,8 @@ impl Fill<'_> {
         let camera = &self.view.camera;
         let order = DepthOrder {
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
-            opaque: self.quality.opaque_order.codes(camera.near, camera.far),
-            blended: self.quality.blended_order.codes(camera.near, camera.far),
+            opaque: self.quality.opaque_order.quantizer(camera.near, camera.far),
+            blended: self.quality.blended_order.quantizer(camera.near, camera.far),
         };
         for (block, part) in ChunkedArray::<RenderCommand>::block_ranges(ranks) {
             let mut slots = commands.write(block);
@@ -51,13 +51,13 @@ impl Fill<'_> {
             let mut open = None;
             self.visible.visit(part, |rank, word, bits| {
                 let first = word * VisibleSet::WORD;
-                let index = first / ObjectTable::BLOCK;
+                let index = first / ObjectTable::BLOCK_SIZE;
                 let (_, objects) = match open.take() {
                     Some((current, guard)) if current == index => open.insert((current, guard)),
                     _ => open.insert((index, self.table.block(index))),
                 };
                 let start = rank % ChunkedArray::<RenderCommand>::BLOCK_SIZE;
-                for (slot, bit) in slots[start..].iter_mut().zip(places(bits)) {
+                for (slot, bit) in slots[start..].iter_mut().zip(set_bits(bits)) {
                     *slot = self.command(first + bit, objects, &order);
                 }
             });
@@ -66,7 +66,7 @@ impl Fill<'_> {
 
     #[inline]
     fn command(&self, object: usize, objects: &ObjectBlock, order: &DepthOrder) -> RenderCommand {
-        let entry = object % ObjectTable::BLOCK;
+        let entry = object % ObjectTable::BLOCK_SIZE;
         let draw = objects.draws[entry];
         let blend = draw.state.blend();
         if !self.selection.contains(blend, draw.material) {
@@ -87,8 +87,8 @@ impl Fill<'_> {
         // In f64, rounded once: two depths that differ in f32 are in the right order, however far the objects are to the side.
         let depth = order.forward.dot(center - self.view.camera.position) as f32;
         let key = match blend {
-            Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.of(depth)),
-            _ => SortKey::blended(order.blended.of(depth)),
+            Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.quantize(depth)),
+            _ => SortKey::blended(order.blended.quantize(depth)),
         };
         RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
     }

@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use glam::{DVec3, Vec3};
 
-use super::Spheres;
+use super::BoundingSpheres;
 use crate::scene::{Camera, Projection, ViewKind};
 
 /// What a camera sees: a pyramid, a box or half a ball, within six planes.
@@ -47,7 +47,7 @@ pub(super) struct Place {
     pub(super) along: f32,
     /// `across · c` of both pairs of edges.
     pub(super) aside: [f32; 2],
-    /// ‖c‖₁, of which [`ALLOWANCE`] is allowed for the rounding of the distances from all planes: see [`Frustum::may_see`].
+    /// ‖c‖₁, of which [`ALLOWANCE`] is allowed for the rounding of the distances from all planes: see [`Frustum::intersects_sphere`].
     pub(super) length: f32,
 }
 
@@ -110,27 +110,27 @@ impl Frustum {
     ///
     /// What is not a number is not seen. What is so far away that it overflows is.
     #[inline]
-    pub fn may_see(&self, center: DVec3, radius: f32) -> bool {
+    pub fn intersects_sphere(&self, center: DVec3, radius: f32) -> bool {
         let place = self.place((center - self.origin).as_vec3().to_array());
         self.nearest(place) >= -reach(radius, place)
     }
 
-    /// The same for the [`Frustum::AT_ONCE`] spheres from `first` on: a bit each, from the lowest.
+    /// The same for the [`Frustum::WORD`] spheres from `first` on: a bit each, from the lowest.
     ///
     /// # Panics
     /// If there are fewer.
-    pub fn may_see_each(&self, spheres: &Spheres, first: usize) -> u64 {
+    pub fn intersects_spheres(&self, spheres: &BoundingSpheres, first: usize) -> u64 {
         self.judge_each(spheres, first).seen
     }
 
-    /// How many spheres [`Frustum::may_see_each`] looks at.
-    pub const AT_ONCE: usize = 64;
+    /// How many spheres [`Frustum::intersects_spheres`] looks at.
+    pub const WORD: usize = 64;
 
-    /// As [`Frustum::may_see_each`], and which of them are inside as a whole: that costs a third more, but nothing where it is not
+    /// As [`Frustum::intersects_spheres`], and which of them are inside as a whole: that costs a third more, but nothing where it is not
     /// used.
     #[inline(always)]
-    pub(super) fn judge_each(&self, spheres: &Spheres, first: usize) -> Judged {
-        let entries = first..first + Self::AT_ONCE;
+    pub(super) fn judge_each(&self, spheres: &BoundingSpheres, first: usize) -> Judged {
+        let entries = first..first + Self::WORD;
         let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[entries.clone()].as_chunks().0);
         let radii = spheres.radii()[entries].as_chunks::<LANES>().0;
         let mut judged = Judged { seen: 0, whole: 0 };
@@ -231,7 +231,7 @@ fn moved_out(offset: f32) -> f32 {
 /// How far behind a paraboloid's camera is looked, as a share of its range.
 const PAST_THE_RIM: f32 = 0.05;
 
-/// 16 unit roundoffs, of 2⁻²⁴ each: see [`Frustum::may_see`].
+/// 16 unit roundoffs, of 2⁻²⁴ each: see [`Frustum::intersects_sphere`].
 pub(super) const ALLOWANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -240,7 +240,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::view::WorldBounds;
+    use crate::view::BoundingSphere;
 
     /// How far the sphere's centre is inside the nearest plane, in f64, from the camera's own definition.
     fn depth_inside(camera: &Camera, center: DVec3) -> f64 {
@@ -315,36 +315,36 @@ mod tests {
             let tangent = if depth < 0.0 { -depth * (1.0 + nudge) } else { 10_f64.powf(radius_exponent) };
             let radius = tangent as f32;
             if depth >= -f64::from(radius) {
-                prop_assert!(Frustum::new(&camera).may_see(center, radius), "depth {depth} radius {radius}");
+                prop_assert!(Frustum::new(&camera).intersects_sphere(center, radius), "depth {depth} radius {radius}");
             }
         }
 
         #[test]
         fn spheres_are_seen_together_as_each_by_itself(
             camera in any_camera(),
-            exponents in prop::collection::vec((-3.0..7.0_f64, -6.0..7.0_f32), Spheres::COUNT),
+            exponents in prop::collection::vec((-3.0..7.0_f64, -6.0..7.0_f32), BoundingSpheres::COUNT),
             turn in 0.0..1.0_f64,
         ) {
             let frustum = Frustum::new(&camera);
-            let mut spheres = Spheres::default();
+            let mut spheres = BoundingSpheres::default();
             for (entry, (distance, radius)) in exponents.into_iter().enumerate() {
                 let (height, angle) = ((entry as f64 * 0.618 + turn).fract() * 2.0 - 1.0, entry as f64 * 2.4);
                 let across = (1.0 - height * height).sqrt();
                 let direction = DVec3::new(across * angle.cos(), height, across * angle.sin());
                 let center = camera.position + direction * 10_f64.powf(distance);
                 let bounds = match entry % 19 {
-                    0 => WorldBounds::NOTHING,
-                    1 => WorldBounds { center: DVec3::NAN, radius: 1.0 },
-                    2 => WorldBounds { center, radius: f32::INFINITY },
-                    _ => WorldBounds { center, radius: 10_f32.powf(radius) },
+                    0 => BoundingSphere::NOTHING,
+                    1 => BoundingSphere { center: DVec3::NAN, radius: 1.0 },
+                    2 => BoundingSphere { center, radius: f32::INFINITY },
+                    _ => BoundingSphere { center, radius: 10_f32.powf(radius) },
                 };
                 spheres.set(entry, bounds);
             }
             for first in [0, 64, 100, 192] {
-                let together = frustum.may_see_each(&spheres, first);
-                for entry in 0..Frustum::AT_ONCE {
-                    let WorldBounds { center, radius } = spheres.get(first + entry);
-                    prop_assert_eq!(together >> entry & 1 == 1, frustum.may_see(center, radius), "{} {}", center, radius);
+                let together = frustum.intersects_spheres(&spheres, first);
+                for entry in 0..Frustum::WORD {
+                    let BoundingSphere { center, radius } = spheres.get(first + entry);
+                    prop_assert_eq!(together >> entry & 1 == 1, frustum.intersects_sphere(center, radius), "{} {}", center, radius);
                 }
             }
         }
@@ -361,7 +361,7 @@ mod tests {
             let slack = 4e-6 * ((center - camera.position).length() + f64::from(camera.near) + far);
             if depth < -slack && camera.projection != Projection::Paraboloid {
                 let radius = (-depth - slack) as f32;
-                prop_assert!(!Frustum::new(&camera).may_see(center, radius), "depth {depth} radius {radius}");
+                prop_assert!(!Frustum::new(&camera).intersects_sphere(center, radius), "depth {depth} radius {radius}");
             }
         }
     }
@@ -375,18 +375,18 @@ mod tests {
             ..Camera::looking_at("lamp", DVec3::ZERO, DVec3::NEG_Y)
         };
         let frustum = Frustum::new(&camera);
-        assert!(frustum.may_see(DVec3::new(9.0, -0.1, 0.0), 0.0));
-        assert!(!frustum.may_see(DVec3::new(0.0, 2.0, 0.0), 1.0));
-        assert!(!frustum.may_see(DVec3::new(0.0, -12.0, 0.0), 1.0));
-        assert!(!frustum.may_see(DVec3::new(12.0, -1.0, 0.0), 1.0));
+        assert!(frustum.intersects_sphere(DVec3::new(9.0, -0.1, 0.0), 0.0));
+        assert!(!frustum.intersects_sphere(DVec3::new(0.0, 2.0, 0.0), 1.0));
+        assert!(!frustum.intersects_sphere(DVec3::new(0.0, -12.0, 0.0), 1.0));
+        assert!(!frustum.intersects_sphere(DVec3::new(12.0, -1.0, 0.0), 1.0));
     }
 
     #[test]
     fn what_is_not_a_number_is_not_seen() {
         let camera = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
         let frustum = Frustum::new(&camera);
-        assert!(frustum.may_see(DVec3::NEG_Z * 5.0, 1.0));
-        assert!(!frustum.may_see(DVec3::NEG_Z * f64::NAN, 1.0));
-        assert!(!frustum.may_see(DVec3::NEG_Z * 5.0, f32::NEG_INFINITY));
+        assert!(frustum.intersects_sphere(DVec3::NEG_Z * 5.0, 1.0));
+        assert!(!frustum.intersects_sphere(DVec3::NEG_Z * f64::NAN, 1.0));
+        assert!(!frustum.intersects_sphere(DVec3::NEG_Z * 5.0, f32::NEG_INFINITY));
     }
 }

@@ -60,13 +60,13 @@ impl LightTable {
         self.maps.clear();
         self.maps.resize(if shadows { lights.len() } else { 0 }, None);
         for (index, map) in views.iter().enumerate() {
-            if let Some(place) = map.light.and_then(|light| self.maps.get_mut(light)) {
+            if let Some(place) = map.valid_light.and_then(|light| self.maps.get_mut(light)) {
                 *place = Some(index);
             }
         }
         let mut counts = [0; LightClass::COUNT];
         for (index, light) in lights.iter().enumerate() {
-            if light.reach().is_none_or(|(center, radius)| view.frustum.may_see(center, radius)) {
+            if light.reach().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
                 let class = LightClass::of(light, shadows).index();
                 counts[class] += 1;
                 self.reaching.push((class, index));
@@ -132,7 +132,7 @@ mod tests {
         let view = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
         let lights = [spot(-3.0, true), point(-4.0), point(9.0), spot(-5.0, false), point(-6.0)];
         let map = RenderView {
-            light: Some(0),
+            valid_light: Some(0),
             layer: 7,
             ..RenderView::new(&Camera::looking_at("map", DVec3::ZERO, DVec3::Y))
         };

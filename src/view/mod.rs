@@ -1,6 +1,7 @@
 //! Views: "everything is a camera" (M 10.4). What there is, worked out once a frame, and what of it each view sees.
 
-mod boxes;
+mod bounding_boxes;
+mod bounding_spheres;
 mod fill;
 mod fixed_position;
 mod frustum;
@@ -13,12 +14,12 @@ mod occlusion;
 mod rejection;
 mod render_view;
 mod shadow_maps;
-mod spheres;
 mod subdivision_level;
 mod triangle_culling;
 mod visible_set;
 
-pub use boxes::{Boxes, ObjectBox};
+pub use bounding_boxes::{BoundingBoxes, OrientedBox};
+pub use bounding_spheres::{BoundingSphere, BoundingSpheres};
 pub(crate) use fill::Fill;
 pub use fixed_position::FixedPosition;
 pub use frustum::Frustum;
@@ -27,10 +28,9 @@ pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
 pub use light_table::{LightClass, LightTable};
 pub use object_table::{ObjectBlock, ObjectDraw, ObjectTable};
-pub use occlusion::{OccluderMeshes, Occlusion};
+pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
 pub use shadow_maps::ShadowMaps;
-pub use spheres::{Spheres, WorldBounds};
 pub use visible_set::VisibleSet;
-pub(crate) use visible_set::places;
+pub(crate) use visible_set::set_bits;

@@ -6,7 +6,10 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::frustum::Judged;
-use super::{Boxes, FixedPosition, Frustum, GpuObject, ObjectBox, RejectionReason, Rejections, Spheres, WorldBounds};
+use super::{
+    BoundingBoxes, BoundingSphere, BoundingSpheres, FixedPosition, Frustum, GpuObject, OrientedBox, RejectionReason,
+    Rejections,
+};
 use crate::chunked_array::block_ranges;
 use crate::command::{Cull, DrawState};
 use crate::quality::CullingVolume;
@@ -27,21 +30,21 @@ pub struct ObjectTable {
     held: CullingVolume,
 }
 
-/// What the table holds of [`ObjectTable::BLOCK`] objects; object `index` is at `index % BLOCK`.
+/// What the table holds of [`ObjectTable::BLOCK_SIZE`] objects; object `index` is at `index % BLOCK`.
 #[derive(Clone, Debug)]
 pub struct ObjectBlock {
     /// What is uploaded.
-    pub records: [GpuObject; ObjectTable::BLOCK],
+    pub gpu_objects: [GpuObject; ObjectTable::BLOCK_SIZE],
     /// Where they are.
-    pub spheres: Spheres,
+    pub spheres: BoundingSpheres,
     /// The boxes around them, where the table is told to hold some.
-    pub boxes: Option<Boxes>,
+    pub boxes: Option<BoundingBoxes>,
     /// How they are drawn.
-    pub draws: [ObjectDraw; ObjectTable::BLOCK],
+    pub draws: [ObjectDraw; ObjectTable::BLOCK_SIZE],
 }
 
 impl ObjectBlock {
-    /// Which of the objects `entries`, of one word of [`Frustum::AT_ONCE`], a view may see: a bit each, from the lowest. Never
+    /// Which of the objects `entries`, of one word of [`Frustum::WORD`], a view may see: a bit each, from the lowest. Never
     /// left out is one that it does see; those that cannot be drawn are.
     ///
     /// The sphere is asked for first, whatever volume it is: it tells of most objects whether they are outside or inside as a
@@ -49,26 +52,26 @@ impl ObjectBlock {
     ///
     /// # Panics
     /// If there are no such objects, or none.
-    pub fn seen(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
-        let place = entries.start % Frustum::AT_ONCE;
+    pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
+        let place = entries.start % Frustum::WORD;
         let first = entries.start - place;
         if volume == CullingVolume::None {
             let drawn = |bits, (offset, &radius): (usize, &f32)| bits | u64::from(radius >= 0.0) << offset;
             return self.spheres.radii()[entries].iter().enumerate().fold(0, drawn);
         }
         if entries.len() < FEW {
-            let may_see = |entry: usize| {
-                let WorldBounds { center, radius } = self.spheres.get(entry);
-                frustum.may_see(center, radius)
+            let intersects_sphere = |entry: usize| {
+                let BoundingSphere { center, radius } = self.spheres.get(entry);
+                frustum.intersects_sphere(center, radius)
             };
-            let one = |bits, entry: usize| bits | u64::from(may_see(entry)) << (entry - entries.start);
+            let one = |bits, entry: usize| bits | u64::from(intersects_sphere(entry)) << (entry - entries.start);
             return self.kept(frustum, first, entries.clone().fold(0, one) << place) >> place;
         }
         match &self.boxes {
-            None => frustum.may_see_each(&self.spheres, first) >> place,
+            None => frustum.intersects_spheres(&self.spheres, first) >> place,
             Some(_) => {
                 let Judged { seen, whole } = frustum.judge_each(&self.spheres, first);
-                let asked = (u64::MAX >> (Frustum::AT_ONCE - entries.len())) << place;
+                let asked = (u64::MAX >> (Frustum::WORD - entries.len())) << place;
                 (seen & whole | self.kept(frustum, first, seen & !whole & asked)) >> place
             }
         }
@@ -77,7 +80,7 @@ impl ObjectBlock {
     /// Those of the objects `asked` for, of the word from `first` on, of whose boxes any may be seen; all of them where there are
     /// no boxes.
     fn kept(&self, frustum: &Frustum, first: usize, asked: u64) -> u64 {
-        self.boxes.as_ref().map_or(asked, |boxes| frustum.may_see_boxes(&self.spheres, boxes, first, asked))
+        self.boxes.as_ref().map_or(asked, |boxes| frustum.intersects_boxes(&self.spheres, boxes, first, asked))
     }
 }
 
@@ -87,21 +90,21 @@ const FEW: usize = 12;
 impl Default for ObjectBlock {
     fn default() -> Self {
         Self {
-            records: [bytemuck::Zeroable::zeroed(); ObjectTable::BLOCK],
-            spheres: Spheres::default(),
+            gpu_objects: [bytemuck::Zeroable::zeroed(); ObjectTable::BLOCK_SIZE],
+            spheres: BoundingSpheres::default(),
             boxes: None,
-            draws: [ObjectDraw::default(); ObjectTable::BLOCK],
+            draws: [ObjectDraw::default(); ObjectTable::BLOCK_SIZE],
         }
     }
 }
 
 impl ObjectTable {
     /// Objects in a block.
-    pub const BLOCK: usize = Spheres::COUNT;
+    pub const BLOCK_SIZE: usize = BoundingSpheres::COUNT;
 
     /// Says what stands for objects when views are asked for them, from the next [`ObjectTable::reset`] on; spheres unless it is
     /// said otherwise.
-    pub fn hold(&mut self, volume: CullingVolume) {
+    pub fn configure(&mut self, volume: CullingVolume) {
         self.culling = volume;
     }
 
@@ -114,27 +117,28 @@ impl ObjectTable {
         // Blocks are only touched where something is to change.
         let right = if self.held == self.culling { before } else { 0 };
         for block in &mut self.blocks[right..] {
-            block.get_mut().boxes = Boxes::new(self.culling);
+            block.get_mut().boxes = BoundingBoxes::new(self.culling);
         }
         self.held = self.culling;
         // What lies behind the last object is tested with it, and is not to be seen.
-        if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK) {
+        if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK_SIZE) {
             let spheres = &mut last.get_mut().spheres;
-            (objects % Self::BLOCK..Self::BLOCK).for_each(|entry| spheres.set(entry, WorldBounds::NOTHING));
+            (objects % Self::BLOCK_SIZE..Self::BLOCK_SIZE)
+                .for_each(|entry| spheres.set(entry, BoundingSphere::NOTHING));
         }
         self.rejections = Rejections::default();
     }
 
     /// Fills in the objects of `range`.
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
-        for (index, part) in block_ranges(range, Self::BLOCK) {
+        for (index, part) in block_ranges(range, Self::BLOCK_SIZE) {
             let mut block = self.blocks[index].write();
-            let ObjectBlock { records, spheres, boxes, draws } = &mut **block;
+            let ObjectBlock { gpu_objects, spheres, boxes, draws } = &mut **block;
             for object in part {
-                let entry = object % Self::BLOCK;
+                let entry = object % Self::BLOCK_SIZE;
                 match describe(scene, object) {
                     Ok((record, bounds, draw)) => {
-                        records[entry] = record;
+                        gpu_objects[entry] = record;
                         spheres.set(entry, bounds);
                         if let Some(boxes) = boxes {
                             boxes.set(entry, &box_of(scene, object, bounds));
@@ -142,7 +146,7 @@ impl ObjectTable {
                         draws[entry] = draw;
                     }
                     Err(reason) => {
-                        spheres.set(entry, WorldBounds::NOTHING);
+                        spheres.set(entry, BoundingSphere::NOTHING);
                         self.rejections.count(reason, object);
                     }
                 }
@@ -162,17 +166,17 @@ impl ObjectTable {
 
     /// The number of blocks that the objects fill.
     pub fn block_count(&self) -> usize {
-        self.length.div_ceil(Self::BLOCK)
+        self.length.div_ceil(Self::BLOCK_SIZE)
     }
 
-    /// What is uploaded, 64 bytes an object: the first object of a block, and the records of all of them.
+    /// What is uploaded, 64 bytes an object: the first object of a block, and the gpu_objects of all of them.
     ///
     /// # Panics
     /// If there is no such block.
-    pub fn records_of(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [GpuObject]>) {
-        let first = block * Self::BLOCK;
-        let count = (self.length - first).min(Self::BLOCK);
-        (first, RwLockReadGuard::map(self.block(block), |block| &block.records[..count]))
+    pub fn gpu_objects(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [GpuObject]>) {
+        let first = block * Self::BLOCK_SIZE;
+        let count = (self.length - first).min(Self::BLOCK_SIZE);
+        (first, RwLockReadGuard::map(self.block(block), |block| &block.gpu_objects[..count]))
     }
 
     /// All there is of a block of objects.
@@ -206,7 +210,7 @@ impl Default for ObjectDraw {
     }
 }
 
-fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, WorldBounds, ObjectDraw), RejectionReason> {
+fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, BoundingSphere, ObjectDraw), RejectionReason> {
     let (position, scale, turn) = (scene.positions[object], scene.scales[object], scene.orientations[object]);
     let Some(fixed) = FixedPosition::new(position) else {
         let is_valid = scene.transform_is_valid(object);
@@ -240,7 +244,7 @@ fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, WorldBoun
         object: object as u32,
     };
     let draw = ObjectDraw { mesh: slots.0, material: slots.1, state: state_of(mesh, material, scale) };
-    Ok((record, WorldBounds { center, radius }, draw))
+    Ok((record, BoundingSphere { center, radius }, draw))
 }
 
 /// How far an object's centre may be from where it is drawn, in metres.
@@ -257,13 +261,13 @@ fn misplaced(center: DVec3, offset: Vec3) -> f64 {
 
 /// The box around an object's mesh, or around its sphere where the engine gave it other bounds than its mesh has.
 ///
-/// What is rounded in f64 is far below what [`misplaced`] and [`Frustum::may_see_boxes`] allow.
-fn box_of(scene: &SceneRef<'_>, object: usize, sphere: WorldBounds) -> ObjectBox {
+/// What is rounded in f64 is far below what [`misplaced`] and [`Frustum::intersects_boxes`] allow.
+fn box_of(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> OrientedBox {
     let bounds = scene.bounds[object];
     let mesh = scene.assets.get(scene.meshes[object]).ok().filter(|mesh| mesh.bounds() == bounds);
     let Some(mesh) = mesh else {
         let radius = f64::from(sphere.radius);
-        return ObjectBox { half_axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius), margin: 0.0 };
+        return OrientedBox { half_axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius), margin: 0.0 };
     };
     let [low, high] = mesh.corners().map(Vec3::as_dvec3);
     let center = bounds.center.as_dvec3();
@@ -271,7 +275,7 @@ fn box_of(scene: &SceneRef<'_>, object: usize, sphere: WorldBounds) -> ObjectBox
     let half = (high - center).max(center - low) * scale.abs().as_dvec3();
     let turn = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
     let offset = scale * bounds.center;
-    ObjectBox {
+    OrientedBox {
         half_axes: [turn.x_axis * half.x, turn.y_axis * half.y, turn.z_axis * half.z],
         // Turning it changes no coordinate by more than its length.
         margin: misplaced(sphere.center, offset),

@@ -14,18 +14,18 @@ pub struct RenderView {
     /// What it sees.
     pub frustum: Frustum,
     /// The light whose shadow map it draws, by its index in the scene.
-    pub light: Option<usize>,
+    pub valid_light: Option<usize>,
     /// Which layer it draws of the targets that all views of its kind share.
     pub layer: u32,
     /// Whether its targets keep what the frame before had in them. Then no process draws in it, and it is here for those that
     /// read them: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
-    pub is_kept: bool,
+    pub is_cached: bool,
 }
 
 impl RenderView {
     /// The view of `camera`.
     pub fn new(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), frustum: Frustum::new(camera), light: None, layer: 0, is_kept: false }
+        Self { camera: camera.clone(), frustum: Frustum::new(camera), valid_light: None, layer: 0, is_cached: false }
     }
 
     /// What it is called in reports: the camera's name.

@@ -10,32 +10,32 @@ use crate::scene::{Camera, Light, Projection, ViewKind};
 pub struct ShadowMaps {
     /// Width and height of a map in pixels. At a distance of d metres a pixel is about 4·d/side metres wide for a hemispherical
     /// light, 2·d·tan(angle)/side for a spot light, and as wide as the ball around what main cameras see is over `side` for a
-    /// directional one: at 60° and 16:9 some 2.3·`reach`/side.
+    /// directional one: at 60° and 16:9 some 2.3·`max_distance`/side.
     pub side: u32,
     /// How much of the main cameras' view a directional light's map covers, in metres from the camera, up to 1,000 km. Beyond
     /// that, objects are lit. There is one map for all main cameras: the farther they are apart, the coarser it is.
-    pub reach: f32,
+    pub max_distance: f32,
     /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope
     /// ask for. Less than 1 makes lit surfaces shadow themselves in stripes; more lets light through under objects.
     pub bias: f32,
     /// Shadows fade over 2·`filter` + 1 pixels of the map; 0 still blends each pixel with its neighbour. At most
-    /// [`ShadowMaps::WIDEST_FILTER`].
+    /// [`ShadowMaps::MAX_FILTER`].
     pub filter: u32,
 }
 
 impl ShadowMaps {
     /// The widest [`ShadowMaps::filter`]: 100 pixels of the map are read for one of the picture.
-    pub const WIDEST_FILTER: u32 = 4;
+    pub const MAX_FILTER: u32 = 4;
 
     /// Says what is wrong with them, if anything.
     pub(crate) fn problem(&self) -> Option<&'static str> {
         if self.side == 0 {
             Some("a side of 0 pixels")
-        } else if !(self.reach > 0.0 && self.reach <= 1e6) {
-            Some("a reach that is not a positive distance of at most 1,000 km")
+        } else if !(self.max_distance > 0.0 && self.max_distance <= 1e6) {
+            Some("a max_distance that is not a positive distance of at most 1,000 km")
         } else if !(self.bias >= 0.0 && self.bias.is_finite()) {
             Some("a bias that is negative or not finite")
-        } else if self.filter > Self::WIDEST_FILTER {
+        } else if self.filter > Self::MAX_FILTER {
             Some("a filter wider than there is")
         } else {
             None
@@ -87,7 +87,7 @@ impl ShadowMaps {
     fn seen_by(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
         let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
         main.map(|camera| {
-            let reach = f64::from(self.reach.min(camera.far));
+            let reach = f64::from(self.max_distance.min(camera.far));
             let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
             let aspect = f64::from(camera.aspect());
             match camera.projection {
@@ -122,7 +122,7 @@ impl ShadowMaps {
 
 impl Default for ShadowMaps {
     fn default() -> Self {
-        Self { side: 1024, reach: 60.0, bias: 1.0, filter: 1 }
+        Self { side: 1024, max_distance: 60.0, bias: 1.0, filter: 1 }
     }
 }
 
@@ -187,7 +187,7 @@ mod tests {
             let map = RenderView::new(&maps.camera("sun".into(), &sun(), &cameras).unwrap());
             for camera in &cameras {
                 let [right, up, forward] = RenderView::new(camera).picture_axes();
-                let seen = (right * pixel[0] + up * pixel[1] + forward) * (share * maps.reach);
+                let seen = (right * pixel[0] + up * pixel[1] + forward) * (share * maps.max_distance);
                 let place = camera.position + seen.as_dvec3() - map.camera.position;
                 let clip = map.clip_from_relative() * place.as_vec3().extend(1.0);
                 prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 + 1e-4, "{clip}");

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use super::RenderView;
 use crate::scene::SceneRef;
-use crate::view::RenderView;
 
 /// The subdivision level of an object in a paraboloid view: how often its edges are halved until none is seen under more than
 /// `widest_angle` radians; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DMat4, DVec4, Vec3};
 
 use super::RenderView;
-use crate::raster::{CullCorner, CulledTriangles, Vector, Winding, cull_triangles};
+use crate::raster::{CullVertex, CulledTriangles, Vector, Winding, cull_triangles};
 use crate::scene::{Projection, SceneRef, Vertex, ViewKind};
 
 impl RenderView {
@@ -25,7 +25,7 @@ impl RenderView {
         let mesh = scene.assets.get(scene.meshes[object]);
         mesh.map_or_else(
             |_| CulledTriangles::default(),
-            |mesh| self.cull_some_triangles(scene, object, 0..mesh.triangle_count(), remaining),
+            |mesh| self.cull_triangle_range(scene, object, 0..mesh.triangle_count(), remaining),
         )
     }
 
@@ -43,7 +43,7 @@ impl RenderView {
     ///
     /// # Panics
     /// If there is no such object, or there are not as many triangles.
-    pub(crate) fn cull_some_triangles(
+    pub(crate) fn cull_triangle_range(
         &self,
         scene: &SceneRef<'_>,
         object: usize,
@@ -110,27 +110,27 @@ const OF_SIZE: f64 = 1.0 / 1_048_576.0;
 /// Twice a step of a [`FixedPosition`](super::FixedPosition), in metres.
 const STEP: f64 = 2.0 / 1_073_741_824.0;
 
-/// The share of |x| + |y| + |z| + |w| by which [`CullCorner::clip`] may be wrong.
+/// The share of |x| + |y| + |z| + |w| by which [`CullVertex::clip`] may be wrong.
 const OF_CLIP: f64 = 1.0 / 8192.0;
 
 /// A corner that a device may draw `slack` metres away. In the picture it moves by as much as its distance from the middle does in x and
 /// y, and by its w; the viewport's three roundings are as large as the picture is wide. What may be anywhere is no number, and keeps its
 /// triangles.
-fn corner_within(slack: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 2]) -> CullCorner {
+fn corner_within(slack: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 2]) -> CullVertex {
     let rows = clip_from_relative.transpose();
     let reach = |row: DVec4| row.truncate().length() * slack;
     let [in_x, in_y, in_z, in_w] = [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis].map(reach);
     let may_be_wrong = OF_CLIP * clip.abs().element_sum();
     if [in_x, in_y, in_z, in_w].iter().any(|&reach| reach > may_be_wrong) {
-        return CullCorner { clip: Vector([f64::NAN; 4]), is_placed: false };
+        return CullVertex { clip: Vector([f64::NAN; 4]), is_accurate: false };
     }
     let stays = |place: f64, reach: f64, side: u32| {
         let steps = f64::from(side) * 256.0;
         let moved = (reach + (place / clip.w).abs() * in_w) / (clip.w - in_w) * 0.5 * steps;
         moved + 3.0 * steps * f64::from(f32::EPSILON) * 0.5 < 1.0
     };
-    let is_placed = clip.w > in_w && stays(clip.x, in_x, size[0]) && stays(clip.y, in_y, size[1]);
-    CullCorner { clip: Vector(clip.to_array()), is_placed }
+    let is_accurate = clip.w > in_w && stays(clip.x, in_x, size[0]) && stays(clip.y, in_y, size[1]);
+    CullVertex { clip: Vector(clip.to_array()), is_accurate }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -170,7 +170,7 @@ mod tests {
             for (axis, side) in [(0, 1920.0), (1, 1080.0)] {
                 let off = (by_device[axis] / by_device.w - clip[axis] / clip.w).abs() * side * 0.5 * 256.0;
                 let viewport = 3.0 * side * 256.0 * f64::from(f32::EPSILON) * 0.5;
-                prop_assert!(!corner.is_placed || off < 1.0 - viewport, "{off}");
+                prop_assert!(!corner.is_accurate || off < 1.0 - viewport, "{off}");
             }
         }
     }
@@ -238,7 +238,7 @@ mod tests {
                 let mut start = 0;
                 for length in (1..).map(|part| part * 7 % 50 + 1) {
                     let end = expected.triangles.min(start + length);
-                    found += view.cull_some_triangles(&scene, object, start..end, &mut in_parts);
+                    found += view.cull_triangle_range(&scene, object, start..end, &mut in_parts);
                     start = end;
                     if start == expected.triangles {
                         break;

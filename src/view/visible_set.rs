@@ -108,7 +108,7 @@ impl VisibleSet {
 }
 
 /// The set bits' places, from the lowest.
-pub(crate) fn places(mut bits: u64) -> impl Iterator<Item = usize> {
+pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let place = (bits != 0).then(|| bits.trailing_zeros() as usize);
         bits &= bits.wrapping_sub(1);
@@ -147,7 +147,7 @@ mod tests {
             for start in (0..seen.len() + 1).step_by(ranks) {
                 set.visit(start..start + ranks, |rank, word, bits| {
                     assert_eq!(rank, found.len());
-                    found.extend(places(bits).map(|place| word * VisibleSet::WORD + place));
+                    found.extend(set_bits(bits).map(|place| word * VisibleSet::WORD + place));
                 });
                 prop_assert_eq!(found.len(), expected.len().min(start + ranks));
             }

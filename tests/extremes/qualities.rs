@@ -80,7 +80,7 @@ fn ends(studio: &mut Studio) -> Result<(), Failed> {
     let linear = |far| DepthCurve::Linear { far };
     for quality in [
         Quality { opaque_order: key(1, DepthCurve::Logarithmic), ..usual },
-        Quality { opaque_order: key(DepthKey::MOST_OPAQUE_BITS, linear(f32::MAX)), ..usual },
+        Quality { opaque_order: key(DepthKey::MAX_OPAQUE_BITS, linear(f32::MAX)), ..usual },
         Quality { opaque_order: key(1, linear(f32::MIN_POSITIVE)), ..usual },
         Quality { blended_order: key(1, linear(f32::from_bits(1))), ..usual },
         Quality { blended_order: key(31, linear(f32::MAX)), ..usual },

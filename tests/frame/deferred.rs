@@ -146,12 +146,12 @@ fn shadow_maps_that_cannot_be_are_refused() {
     let good = ShadowMaps::default();
     let bad = [
         (ShadowMaps { side: 0, ..good }, "side"),
-        (ShadowMaps { reach: f32::NAN, ..good }, "reach"),
-        (ShadowMaps { reach: f32::INFINITY, ..good }, "reach"),
-        (ShadowMaps { reach: 0.0, ..good }, "reach"),
+        (ShadowMaps { max_distance: f32::NAN, ..good }, "max_distance"),
+        (ShadowMaps { max_distance: f32::INFINITY, ..good }, "max_distance"),
+        (ShadowMaps { max_distance: 0.0, ..good }, "max_distance"),
         (ShadowMaps { bias: -0.1, ..good }, "bias"),
         (ShadowMaps { bias: f32::NAN, ..good }, "bias"),
-        (ShadowMaps { filter: ShadowMaps::WIDEST_FILTER + 1, ..good }, "filter"),
+        (ShadowMaps { filter: ShadowMaps::MAX_FILTER + 1, ..good }, "filter"),
     ];
     for (maps, named) in bad {
         let by_deferred = build_error(builder(Deferred::to_picture().shadow_maps(Some(maps))));
@@ -161,7 +161,7 @@ fn shadow_maps_that_cannot_be_are_refused() {
             assert!(problem.contains(named), "{problem}");
         }
     }
-    let widest = ShadowMaps { filter: ShadowMaps::WIDEST_FILTER, bias: 0.0, side: 1, ..good };
+    let widest = ShadowMaps { filter: ShadowMaps::MAX_FILTER, bias: 0.0, side: 1, ..good };
     assert!(build(builder(Deferred::to_picture().shadow_maps(Some(widest)))).is_ok());
 }
 

@@ -80,7 +80,7 @@ fn what_is_hidden_is_not_drawn_and_all_else_is() {
 #[test]
 fn whoever_does_the_work_the_same_is_hidden() {
     for scene in [yard(), field(3000)] {
-        for side in Quality::OCCLUSION_SQUARES {
+        for side in Quality::OCCLUSION_TILE_SIZES {
             let first = |workers, granularity| {
                 let (lists, statistics) =
                     drawn(&mut renderer(Some(side), workers, granularity), &scene, "geometry buffer");

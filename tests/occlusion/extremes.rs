@@ -35,7 +35,7 @@ fn check(scene: &Scene, case: &str) -> usize {
     let scene = scene.as_scene_ref();
     let samples = Samples::new(&scene, &scene.cameras[0], 0.25, |_| true);
     let mut count = 0;
-    for side in Quality::OCCLUSION_SQUARES {
+    for side in Quality::OCCLUSION_TILE_SIZES {
         let (_, hidden) = occlusion(&scene, side);
         for (object, (hidden, shown)) in hidden.into_iter().zip(&samples.shown).enumerate() {
             assert!(!(hidden && *shown), "{case}: {object} at {side}");

@@ -5,7 +5,7 @@ mod properties;
 mod walls;
 
 use drawloom::scene::{Blend, SceneRef, ViewKind};
-use drawloom::view::{ObjectTable, OccluderMeshes, Occlusion, RenderView, VisibleSet};
+use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
 
 /// For each object, whether the scene's first camera sees it, and whether that was found to be hidden.
 fn occlusion(scene: &SceneRef<'_>, side: u32) -> (Vec<bool>, Vec<bool>) {
@@ -19,8 +19,8 @@ fn occlusion(scene: &SceneRef<'_>, side: u32) -> (Vec<bool>, Vec<bool>) {
     visible.reset(count);
     visible.test(0..count, |objects| {
         objects.enumerate().fold(0, |bits, (place, object)| {
-            let bounds = table.block(object / ObjectTable::BLOCK).spheres.get(object % ObjectTable::BLOCK);
-            bits | u64::from(view.frustum.may_see(bounds.center, bounds.radius)) << place
+            let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
+            bits | u64::from(view.frustum.intersects_sphere(bounds.center, bounds.radius)) << place
         })
     });
     let bits = |visible: &VisibleSet| {
@@ -30,11 +30,11 @@ fn occlusion(scene: &SceneRef<'_>, side: u32) -> (Vec<bool>, Vec<bool>) {
     };
     let seen: Vec<bool> = bits(&visible);
     let mut meshes = OccluderMeshes::default();
-    meshes.follow(scene.assets);
-    let mut occlusion = Occlusion::default();
+    meshes.sync(scene.assets);
+    let mut occlusion = OcclusionCuller::default();
     occlusion.reset(&view, side);
-    occlusion.choose(scene, &table, &visible, &meshes, |draw| draw.state.blend() == Blend::None);
-    (0..occlusion.strip_count()).for_each(|strip| occlusion.draw(strip));
+    occlusion.select_occluders(scene, &table, &visible, &meshes, |draw| draw.state.blend() == Blend::None);
+    (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
     let hidden = visible.hide(0..count, |first, seen| occlusion.hidden(scene, &table, first, seen));
     let left: Vec<bool> = bits(&visible);
     let hidden_ones: Vec<bool> = seen.iter().zip(&left).map(|(&seen, &left)| seen && !left).collect();

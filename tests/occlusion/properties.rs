@@ -98,7 +98,7 @@ proptest! {
         let scene = scene_of(&things, camera);
         let scene = scene.as_scene_ref();
         let samples = Samples::new(&scene, &scene.cameras[0], 0.25, |_| true);
-        for side in Quality::OCCLUSION_SQUARES {
+        for side in Quality::OCCLUSION_TILE_SIZES {
             let (_, hidden) = occlusion(&scene, side);
             for object in 0..things.len() {
                 prop_assert!(!(hidden[object] && samples.shown[object]), "{object} at {side}: {:?}", things[object]);
@@ -128,7 +128,7 @@ proptest! {
         let scene = scene_of(&all, camera);
         let scene = scene.as_scene_ref();
         let samples = Samples::new(&scene, &scene.cameras[0], 0.25, |_| true);
-        for side in Quality::OCCLUSION_SQUARES {
+        for side in Quality::OCCLUSION_TILE_SIZES {
             let (_, hidden) = occlusion(&scene, side);
             for object in 0..all.len() {
                 prop_assert!(!(hidden[object] && samples.shown[object]), "{object} at {side}: {:?}", all[object]);

@@ -140,10 +140,10 @@ fn normals() -> Result<(), Failed> {
     for normals in NORMALS {
         let quality = Quality { normals, ..Quality::balanced() };
         let worst = worst(&directions, quality)?;
-        println!("{normals:?}: up to {worst:.5} degrees off, of {}", normals.bound());
+        println!("{normals:?}: up to {worst:.5} degrees off, of {}", normals.max_error_degrees());
         // Or else the directions are not those that are hard.
-        if !(normals.bound() * 0.4..=normals.bound()).contains(&worst) {
-            return Err(format!("{normals:?} is {worst} off, of {}", normals.bound()).into());
+        if !(normals.max_error_degrees() * 0.4..=normals.max_error_degrees()).contains(&worst) {
+            return Err(format!("{normals:?} is {worst} off, of {}", normals.max_error_degrees()).into());
         }
         let axes = &directions[..6];
         for (found, axis) in normals_of(axes, quality)?.into_iter().zip(axes) {
@@ -154,7 +154,7 @@ fn normals() -> Result<(), Failed> {
         }
         // A normal of 0 stands for the triangle's own, which is found by differences of places a pixel apart.
         for found in &normals_of(&[Vec3::ZERO; SIDE], quality)?[..SIDE] {
-            if off(*found, DVec3::Z) > normals.bound() + 0.002 {
+            if off(*found, DVec3::Z) > normals.max_error_degrees() + 0.002 {
                 return Err(format!("{normals:?}: none is {found}").into());
             }
         }
@@ -166,7 +166,8 @@ fn packed_normals() -> Result<(), Failed> {
     let normals = NormalFormat::Octahedral16;
     let directions = directions();
     let quality = Quality { normals, vertices: VertexFormat::Packed, ..Quality::balanced() };
-    let (worst, bound) = (worst(&directions, quality)?, VertexFormat::Packed.normal_bound() + normals.bound());
+    let (worst, bound) =
+        (worst(&directions, quality)?, VertexFormat::Packed.max_normal_error_degrees() + normals.max_error_degrees());
     println!("packed: up to {worst:.5} degrees off, of {bound}");
     if !(0.3..=bound).contains(&worst) {
         return Err(format!("{worst} degrees off, of {bound}").into());
@@ -177,7 +178,7 @@ fn packed_normals() -> Result<(), Failed> {
         DVec3::from(drawloom::scene::PackedVertex::new(&vertex, Default::default()).unpacked().normal.map(f64::from))
     };
     for (found, normal) in normals_of(&directions, quality)?.into_iter().zip(&directions) {
-        if off(found, unpacked(normal)) > normals.bound() {
+        if off(found, unpacked(normal)) > normals.max_error_degrees() {
             return Err(format!("{normal} is {found}, and should be {}", unpacked(normal)).into());
         }
     }
@@ -285,7 +286,7 @@ fn targets_alike() -> Result<(), Failed> {
     for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
         for normals in NORMALS {
             // As above, of the angles by which both are off.
-            let angle = (normals.bound() + NormalFormat::HalfFloat.bound()).to_radians();
+            let angle = (normals.max_error_degrees() + NormalFormat::HalfFloat.max_error_degrees()).to_radians();
             let most = Distance { root_mean_square: angle + 0.002, worst_square: 2.0 * angle + 0.004 };
             expect_alike(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, most)?;
         }

@@ -24,7 +24,7 @@ pub const CASES: &[Case] = &[
     ("processes_follow_what_a_scene_requires_and_are_kept", processes_follow),
 ];
 
-const MAPS: ShadowMaps = ShadowMaps { side: 128, reach: 20.0, bias: 1.0, filter: 1 };
+const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1 };
 const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
 /// A list, a mirrored list, and a double-sided strip, which subdivision turns into a list.
 const OPAQUE_STATES: i64 = 3;

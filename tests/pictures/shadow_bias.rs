@@ -65,7 +65,7 @@ fn surfaces(light: impl Fn(DVec3, DVec3) -> Light, leavings: &[f64]) -> Result<(
     let turns = [0.0, PI / 4.0].into_iter().flat_map(|turn| leavings.iter().map(move |&leaving| [turn, leaving]));
     let turns: Vec<_> = turns.collect();
     for (side, filter) in [(64, 1), (256, 0), (1024, 4), (2048, 1)] {
-        let maps = ShadowMaps { side, filter, reach: 60.0, ..MAPS };
+        let maps = ShadowMaps { side, filter, max_distance: 60.0, ..MAPS };
         let mut studio = studio_with(maps)?;
         for (distance, angle) in [0.5, 12.0].into_iter().flat_map(|distance| SLOPES.map(|angle| (distance, angle))) {
             for &[turn, leaving] in &turns {

@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     ("shadows_far_from_the_origin_are_as_near_it", far_away),
 ];
 
-pub const MAPS: ShadowMaps = ShadowMaps { side: 512, reach: 12.0, bias: 1.0, filter: 1 };
+pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1 };
 
 /// The shipped processes, with shadow maps like these.
 pub fn studio_with(maps: ShadowMaps) -> Result<Studio, Failed> {
@@ -165,14 +165,17 @@ fn long_beam() -> Result<(), Failed> {
         let beam = Panel::new(DVec3::new(0.0, y, z), DVec3::X * 10.0, normal.cross(DVec3::X) * 0.1).double_sided();
         for light in [hemisphere(DVec3::ZERO, DVec3::NEG_Y), sun(normal), spot(DVec3::ZERO, normal, 80.0)] {
             // A map that sees as much as this would be too coarse for the beam.
-            let maps =
-                if matches!(light, Light::Directional { .. }) { ShadowMaps { reach: 20.0, ..maps } } else { maps };
+            let maps = if matches!(light, Light::Directional { .. }) {
+                ShadowMaps { max_distance: 20.0, ..maps }
+            } else {
+                maps
+            };
             let stage = stage(vec![floor, wall, beam], vec![light], maps);
             let views = [
                 camera(DVec3::new(0.5, 1.0, 3.0), DVec3::new(0.0, -3.0, -3.0), 70.0),
                 camera(DVec3::new(1.0, 0.5, 1.0), DVec3::new(7.0, -3.0, -4.0), 80.0),
             ];
-            let counts = if maps.reach == 20.0 {
+            let counts = if maps.max_distance == 20.0 {
                 stage.expect(&mut studio_with(maps)?, &views)
             } else {
                 stage.expect(&mut studio, &views)
@@ -273,7 +276,7 @@ fn tower() -> Result<(), Failed> {
 }
 
 fn beyond_the_reach() -> Result<(), Failed> {
-    let maps = ShadowMaps { reach: 5.0, ..MAPS };
+    let maps = ShadowMaps { max_distance: 5.0, ..MAPS };
     let mut studio = studio_with(maps)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     // What it would have cast its shadow on is seen from too far away, and so all of that is lit.

@@ -161,7 +161,7 @@ fn lights() -> Vec<Light> {
 }
 
 fn lit_like_opaque() -> Result<(), Failed> {
-    let maps = ShadowMaps { side: 256, reach: 12.0, ..ShadowMaps::default() };
+    let maps = ShadowMaps { side: 256, max_distance: 12.0, ..ShadowMaps::default() };
     let picture = |light: Light, blend| -> Result<Picture, Failed> {
         let mut scene = panes(&[])?;
         scene.cameras[0].size = [48; 2];

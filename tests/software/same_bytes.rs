@@ -73,7 +73,7 @@ fn what_is_hidden_does_not_show() {
             Studio::new(2, maps).picture(&scene)
         };
         let whole = draw(None);
-        for square in Quality::OCCLUSION_SQUARES {
+        for square in Quality::OCCLUSION_TILE_SIZES {
             assert!(draw(Some(square)) == whole, "squares of {square}");
         }
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::CullingVolume;
 use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
-use drawloom::view::{Frustum, ObjectTable, WorldBounds};
+use drawloom::view::{BoundingSphere, Frustum, ObjectTable};
 use drawloom_benches::boxes::new_box;
 use drawloom_benches::stopwatch::middle;
 use drawloom_testing::culling::naive::Naive;
@@ -53,7 +53,7 @@ pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<
         let scene = cloud(objects, size)?;
         let tables = [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox].map(|volume| {
             let mut table = ObjectTable::default();
-            table.hold(volume);
+            table.configure(volume);
             table.reset(objects);
             table.fill(&scene.as_scene_ref(), 0..objects);
             table
@@ -97,12 +97,12 @@ fn ways<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Way<'a>> {
     ];
     all.push((
         "sphere, one by one",
-        Box::new(move || one_by_one(spheres, |bounds| frustum.may_see(bounds.center, bounds.radius))),
+        Box::new(move || one_by_one(spheres, |bounds| frustum.intersects_sphere(bounds.center, bounds.radius))),
     ));
     // What stands in f32 already, as such engines have it: 16 bytes an object.
     let plain: Vec<(Vec3, f32)> = (0..spheres.len())
         .map(|object| {
-            let bounds = spheres.block(object / ObjectTable::BLOCK).spheres.get(object % ObjectTable::BLOCK);
+            let bounds = spheres.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
             (bounds.center.as_vec3(), bounds.radius)
         })
         .collect();
@@ -116,18 +116,19 @@ fn ways<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Way<'a>> {
 /// As a frame does it: a word of objects at a time, and their block's lock for each.
 fn seen_by_words(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
     let word = |first: usize| {
-        let count = (table.len() - first).min(Frustum::AT_ONCE);
-        let entry = first % ObjectTable::BLOCK;
-        let bits = table.block(first / ObjectTable::BLOCK).seen(black_box(frustum), volume, entry..entry + count);
-        u64::from((bits & u64::MAX >> (Frustum::AT_ONCE - count)).count_ones())
+        let count = (table.len() - first).min(Frustum::WORD);
+        let entry = first % ObjectTable::BLOCK_SIZE;
+        let bits =
+            table.block(first / ObjectTable::BLOCK_SIZE).visible(black_box(frustum), volume, entry..entry + count);
+        u64::from((bits & u64::MAX >> (Frustum::WORD - count)).count_ones())
     };
-    (0..table.len()).step_by(Frustum::AT_ONCE).map(word).sum()
+    (0..table.len()).step_by(Frustum::WORD).map(word).sum()
 }
 
-fn one_by_one(table: &ObjectTable, sees: impl Fn(WorldBounds) -> bool) -> u64 {
+fn one_by_one(table: &ObjectTable, sees: impl Fn(BoundingSphere) -> bool) -> u64 {
     let block = |index: usize| {
         let block = table.block(index);
-        let count = (table.len() - index * ObjectTable::BLOCK).min(ObjectTable::BLOCK);
+        let count = (table.len() - index * ObjectTable::BLOCK_SIZE).min(ObjectTable::BLOCK_SIZE);
         (0..count).filter(|&entry| sees(block.spheres.get(entry))).count() as u64
     };
     (0..table.block_count()).map(block).sum()

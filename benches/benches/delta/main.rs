@@ -80,8 +80,8 @@ fn scattered(objects: u32) -> Vec<RenderCommand> {
         let (mesh, material) = (random.below(64) as u32, random.below(16) as u32);
         let (depth, state) = (random.between(100.0, 200.0) as f32, DrawState::PLAIN);
         let key = match object % 10 {
-            0 => SortKey::blended(blended_order.code(depth, 0.05, f32::INFINITY)),
-            _ => SortKey::opaque(state, mesh, opaque_order.code(depth, 0.05, f32::INFINITY)),
+            0 => SortKey::blended(blended_order.quantize(depth, 0.05, f32::INFINITY)),
+            _ => SortKey::opaque(state, mesh, opaque_order.quantize(depth, 0.05, f32::INFINITY)),
         };
         RenderCommand { key, object, mesh, material, state }
     };

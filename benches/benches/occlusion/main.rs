@@ -30,14 +30,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (boxes, picture, rounds) = if quick { (1_500, [240, 136], 3) } else { (20_000, [960, 540], 31) };
     let city = city::new(boxes, picture)?;
     let scene = city.as_scene_ref();
-    let progress = ProgressBar::new((scene.cameras.len() * (1 + Quality::OCCLUSION_SQUARES.len())) as u64);
+    let progress = ProgressBar::new((scene.cameras.len() * (1 + Quality::OCCLUSION_TILE_SIZES.len())) as u64);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left  {msg}")?);
     let mut rows = Vec::new();
     for camera in scene.cameras {
         progress.set_message(camera.name.clone());
         let sight = Sight::new(&scene, camera);
         progress.inc(1);
-        for side in Quality::OCCLUSION_SQUARES {
+        for side in Quality::OCCLUSION_TILE_SIZES {
             rows.push(sight.measure(side, rounds));
             progress.inc(1);
         }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, SceneRef};
-use drawloom::view::{ObjectTable, OccluderMeshes, Occlusion, RenderView, VisibleSet};
+use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
 use drawloom_benches::table::Table;
 use drawloom_testing::samples::Samples;
 use serde::Serialize;
@@ -60,7 +60,7 @@ impl Row {
                 object_ns: mean(|row| row.object_ns),
             }
         };
-        Quality::OCCLUSION_SQUARES.into_iter().map(total).collect()
+        Quality::OCCLUSION_TILE_SIZES.into_iter().map(total).collect()
     }
 }
 
@@ -81,11 +81,11 @@ impl<'a> Sight<'a> {
         table.reset(count);
         table.fill(scene, 0..count);
         let mut meshes = OccluderMeshes::default();
-        meshes.follow(scene.assets);
+        meshes.sync(scene.assets);
         let view = RenderView::new(camera);
         let sees = |object: usize| {
-            let bounds = table.block(object / ObjectTable::BLOCK).spheres.get(object % ObjectTable::BLOCK);
-            view.frustum.may_see(bounds.center, bounds.radius)
+            let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
+            view.frustum.intersects_sphere(bounds.center, bounds.radius)
         };
         let seen: Vec<_> = (0..count).map(sees).collect();
         let truth = Samples::new(scene, camera, 0.25, |object| seen[object]);
@@ -96,7 +96,7 @@ impl<'a> Sight<'a> {
     pub fn measure(&self, side: u32, rounds: usize) -> Row {
         let Self { scene, view, table, meshes, seen, truth } = self;
         let count = seen.len();
-        let mut occlusion = Occlusion::default();
+        let mut occlusion = OcclusionCuller::default();
         let mut visible = VisibleSet::default();
         let mut times: [Vec<f64>; 3] = Default::default();
         for _ in 0..rounds {
@@ -105,9 +105,9 @@ impl<'a> Sight<'a> {
             visible.test(0..count, |objects| objects.enumerate().fold(0, |all, object| all | bits(object)));
             occlusion.reset(view, side);
             let start = Instant::now();
-            occlusion.choose(scene, table, &visible, meshes, |draw| draw.state.blend() == Blend::None);
+            occlusion.select_occluders(scene, table, &visible, meshes, |draw| draw.state.blend() == Blend::None);
             let chosen = Instant::now();
-            (0..occlusion.strip_count()).for_each(|strip| occlusion.draw(strip));
+            (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
             let drawn = Instant::now();
             visible.hide(0..count, |first, seen| occlusion.hidden(scene, table, first, seen));
             let spans = [chosen - start, drawn - chosen, drawn.elapsed()];

@@ -45,7 +45,7 @@ impl Sphere {
     }
 
     pub fn is_seen(&self, frustum: &Frustum) -> bool {
-        frustum.may_see(self.center, self.radius)
+        frustum.intersects_sphere(self.center, self.radius)
     }
 }
 

@@ -151,10 +151,11 @@ impl Case<'_> {
         });
         let bound = match knob {
             Knob::Vertices => {
-                let of_mixtures = 3.0_f64.sqrt() * self.quality.vertices.normal_bound();
-                vertices::normals_are_tame(self.scene).then_some(of_mixtures + 2.0 * Quality::exact().normals.bound())
+                let of_mixtures = 3.0_f64.sqrt() * self.quality.vertices.max_normal_error_degrees();
+                vertices::normals_are_tame(self.scene)
+                    .then_some(of_mixtures + 2.0 * Quality::exact().normals.max_error_degrees())
             }
-            _ => Some(self.quality.normals.bound() + Quality::exact().normals.bound()),
+            _ => Some(self.quality.normals.max_error_degrees() + Quality::exact().normals.max_error_degrees()),
         };
         let error = angles.reduce(worse);
         Ok(KnobError { error, metric: "degrees", bound, oracle: "the same target of exact" })

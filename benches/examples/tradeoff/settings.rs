@@ -141,7 +141,7 @@ pub fn all() -> Vec<Setting> {
     {
         add(Knob::Culling, name, Quality { culling, ..exact });
     }
-    for square in Quality::OCCLUSION_SQUARES {
+    for square in Quality::OCCLUSION_TILE_SIZES {
         add(Knob::Occlusion, &format!("1/{square}"), Quality { occlusion: Some(square), ..exact });
     }
     for (name, normals) in [

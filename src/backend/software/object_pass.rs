@@ -69,7 +69,7 @@ impl<R: Number> ObjectPass<'_, R> {
         let writes_depth = self.writes_depth && face.blend == Blend::None;
         let (draws_pixels, colors) = (self.twin.draws_pixels(), tile.color_count());
         let mut targets = [Vector4::zero(); MOST_COLORS];
-        triangle.cover(tile.bounds, |place, depth| {
+        triangle.rasterize(tile.bounds, |place, depth| {
             // Reversed: what is nearer is greater.
             let is_seen = tile.depth(place).is_none_or(|there| if matches { depth == there } else { depth > there });
             if !is_seen {
@@ -91,7 +91,7 @@ impl<R: Number> ObjectPass<'_, R> {
 }
 
 fn pixel_of<R: Number, const V: usize>(triangle: &Triangle<R, V>, place: [usize; 2], material: u32) -> ObjectPixel<R> {
-    let found = triangle.varyings(place);
+    let found = triangle.interpolate(place);
     let all = |numbers: [R; V]| std::array::from_fn(|index| numbers.get(index).copied().unwrap_or_default());
     ObjectPixel { place, varyings: all(found.value), across: all(found.across), down: all(found.down), material }
 }

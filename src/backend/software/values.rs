@@ -21,21 +21,21 @@ pub(super) struct Uploaded {
 impl Uploaded {
     pub(super) fn new(scene: &SceneRef<'_>) -> Self {
         let mut blocks = Vec::new();
-        blocks.resize_with(scene.object_count().div_ceil(ObjectTable::BLOCK), OnceLock::new);
+        blocks.resize_with(scene.object_count().div_ceil(ObjectTable::BLOCK_SIZE), OnceLock::new);
         Self { blocks }
     }
 
     pub(super) fn upload(&self, table: &ObjectTable, blocks: Range<usize>) {
         for block in blocks {
             if let Some(place) = self.blocks.get(block) {
-                place.get_or_init(|| Box::from(&*table.records_of(block).1));
+                place.get_or_init(|| Box::from(&*table.gpu_objects(block).1));
             }
         }
     }
 
     pub(super) fn get(&self, index: usize, camera: &CameraPlace) -> Option<ObjectValues<f32>> {
-        let block = self.blocks.get(index / ObjectTable::BLOCK)?.get()?;
-        let record = block.get(index % ObjectTable::BLOCK)?;
+        let block = self.blocks.get(index / ObjectTable::BLOCK_SIZE)?.get()?;
+        let record = block.get(index % ObjectTable::BLOCK_SIZE)?;
         let place = FixedPosition::from_halves(record.position_low, record.position_high);
         let (from, taken_last) = match camera.transforms {
             TransformPrecision::CameraRelative => (camera.fixed, [0.0; 3]),

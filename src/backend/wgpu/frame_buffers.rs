@@ -165,14 +165,14 @@ impl FrameBuffers {
 
     /// Uploads blocks of objects at once: every write costs the same again, however small.
     pub(super) fn write_objects(&self, uploads: &Uploads, objects: &ObjectTable, blocks: Range<usize>) {
-        let first = blocks.start * ObjectTable::BLOCK;
-        let end = objects.len().min(blocks.end * ObjectTable::BLOCK);
+        let first = blocks.start * ObjectTable::BLOCK_SIZE;
+        let end = objects.len().min(blocks.end * ObjectTable::BLOCK_SIZE);
         let bytes = |objects: usize| objects * size_of::<GpuObject>();
         let size = NonZeroU64::new(bytes(end - first) as u64);
         let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
         let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
         for block in blocks {
-            let (start, records) = objects.records_of(block);
+            let (start, records) = objects.gpu_objects(block);
             let place = bytes(start - first)..bytes(start - first + records.len());
             staged.slice(place).copy_from_slice(bytemuck::cast_slice(&records));
         }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::raster::Vector;
-use crate::raster::grid::{FARTHEST, MIDDLE, Place, STEPS};
+use crate::raster::grid::{GridPoint, HALF_PIXEL, MAX_COORDINATE, STEPS_PER_PIXEL};
 
 const PICTURE: [usize; 2] = [32, 16];
 
@@ -21,7 +21,7 @@ proptest! {
             let (mut clip, []) = corner_at::<f64, 0>(place, [0.5, 2.0]);
             for axis in 0..2 {
                 // Less than half a step from where it snaps to.
-                clip[axis] += off[axis] * 2.0 * 2.0 / (PICTURE[axis] as f64 * STEPS as f64);
+                clip[axis] += off[axis] * 2.0 * 2.0 / (PICTURE[axis] as f64 * STEPS_PER_PIXEL as f64);
             }
             (clip, [])
         });
@@ -34,7 +34,7 @@ proptest! {
         prop_assert_eq!(drawn.len(), expected.len());
         for triangle in set_up(&corners, None) {
             let mut places = Vec::new();
-            triangle.cover(inner, |place, depth| {
+            triangle.rasterize(inner, |place, depth| {
                 assert_eq!(drawn[&place], depth);
                 places.push(place);
             });
@@ -95,9 +95,9 @@ proptest! {
             (clip, [clip[0], clip[1], clip[3], 7.1])
         });
         for triangle in set_up(&corners, None) {
-            triangle.cover(PixelBounds::of_picture(PICTURE), |place, _| {
-                let Interpolated { value: [x, y, w, constant], .. } = triangle.varyings(place);
-                let expected = clip_of(place.map(|number| number as i64 * STEPS + MIDDLE));
+            triangle.rasterize(PixelBounds::of_picture(PICTURE), |place, _| {
+                let Interpolated { value: [x, y, w, constant], .. } = triangle.interpolate(place);
+                let expected = clip_of(place.map(|number| number as i64 * STEPS_PER_PIXEL + HALF_PIXEL));
                 assert!((x / w - expected[0]).abs() < 1e-9 && (y / w - expected[1]).abs() < 1e-9, "{place:?}");
                 assert_eq!(constant, 7.1);
             });
@@ -114,10 +114,10 @@ proptest! {
         let single = corners.map(|(clip, _)| (Vector(clip.0.map(|number| number as f32)), []));
         prop_assert!(draw(&single, None).values().all(|depth| (0.0..=1.0).contains(depth)));
         for triangle in set_up(&corners, None) {
-            triangle.cover(PixelBounds::of_picture(PICTURE), |place, _| {
-                let [x, y, w] = triangle.varyings(place).value;
-                let expected = clip_of(place.map(|number| number as i64 * STEPS + MIDDLE));
-                let half_step = PICTURE.map(|side| 1.0 / (side as f64 * STEPS as f64) + 1e-9);
+            triangle.rasterize(PixelBounds::of_picture(PICTURE), |place, _| {
+                let [x, y, w] = triangle.interpolate(place).value;
+                let expected = clip_of(place.map(|number| number as i64 * STEPS_PER_PIXEL + HALF_PIXEL));
+                let half_step = PICTURE.map(|side| 1.0 / (side as f64 * STEPS_PER_PIXEL as f64) + 1e-9);
                 assert!((x / w - expected[0]).abs() <= half_step[0] && (y / w - expected[1]).abs() <= half_step[1]);
             });
         }
@@ -132,11 +132,11 @@ proptest! {
         let step = PICTURE.map(|side| 2.0 / side as f64);
         for triangle in set_up(&corners, None) {
             let area = 1.0 / triangle.per_area;
-            triangle.cover(PixelBounds::of_picture(PICTURE), |place, _| {
+            triangle.rasterize(PixelBounds::of_picture(PICTURE), |place, _| {
                 let [column, row] = place;
-                let here = triangle.varyings(place);
-                let columns = [column & !1, column | 1].map(|column| triangle.varyings([column, row]).value);
-                let rows = [row & !1, row | 1].map(|row| triangle.varyings([column, row]).value);
+                let here = triangle.interpolate(place);
+                let columns = [column & !1, column | 1].map(|column| triangle.interpolate([column, row]).value);
+                let rows = [row & !1, row | 1].map(|row| triangle.interpolate([column, row]).value);
                 for index in 0..2 {
                     assert_eq!(here.across[index], columns[1][index] - columns[0][index]);
                     assert_eq!(here.down[index], rows[1][index] - rows[0][index]);
@@ -154,7 +154,7 @@ proptest! {
     #[test]
     fn any_numbers_are_drawn_or_left_out(
         bits in prop::array::uniform12(any_number()),
-        picture in prop::array::uniform2(prop::sample::select(vec![0, 1, 7, LARGEST_SIDE, LARGEST_SIDE + 1, usize::MAX])),
+        picture in prop::array::uniform2(prop::sample::select(vec![0, 1, 7, MAX_PICTURE_SIZE, MAX_PICTURE_SIZE + 1, usize::MAX])),
     ) {
         check_any(bits, picture);
         check_any(bits.map(f64::from), picture);
@@ -167,8 +167,8 @@ fn behind_the_camera_nothing_changes() {
     let corner = |x: f64, w: f64| (Vector([x, 1.0 - 0.125 * w, 1e-3, w]), [w]);
     let mut at_horizon = 0;
     for triangle in set_up(&[corner(-9e3, 1e3), corner(9e3, 1e3), corner(0.0, 0.1)], None) {
-        triangle.cover(PixelBounds::of_picture(PICTURE), |[column, row], _| {
-            let Interpolated { value: [here], across: [across], down: [down] } = triangle.varyings([column, row]);
+        triangle.rasterize(PixelBounds::of_picture(PICTURE), |[column, row], _| {
+            let Interpolated { value: [here], across: [across], down: [down] } = triangle.interpolate([column, row]);
             for (place, change) in [(column, across), (row, down)] {
                 let beside = if place & 1 == 0 { here + change } else { here - change };
                 assert!(here > 0.0 && beside > 0.0, "{column} {row}: {here} {beside}");
@@ -184,7 +184,7 @@ fn the_far_end_of_what_begins_at_the_camera_has_its_numbers() {
     let corner = |place, w| (corner_at::<f32, 0>(place, [0.5, w]).0, [7.0]);
     let far = f64::from(2_f32.powi(100));
     let triangles = set_up(&[corner([128, 128], far), corner([4224, 128], far), corner([128, 2176], 1.0 / far)], None);
-    assert_eq!(triangles[0].varyings([5, 0]).value, [7.0]);
+    assert_eq!(triangles[0].interpolate([5, 0]).value, [7.0]);
 }
 
 #[test]
@@ -214,15 +214,15 @@ fn check_any<R: Real>(numbers: [R; 12], picture: [usize; 2]) {
     let mut triangles = Vec::new();
     Triangle::set_up(&corners, picture, None, &mut triangles);
     assert!(triangles.is_empty() || numbers.iter().all(|number| number.is_finite()));
-    let within = [0, LARGEST_SIDE / 2 - 4, LARGEST_SIDE - 8];
+    let within = [0, MAX_PICTURE_SIZE / 2 - 4, MAX_PICTURE_SIZE - 8];
     for triangle in &triangles {
         let bounds = triangle.bounds();
-        assert!(bounds.right <= picture[0] && bounds.bottom <= picture[1] && picture[0] <= LARGEST_SIDE);
+        assert!(bounds.right <= picture[0] && bounds.bottom <= picture[1] && picture[0] <= MAX_PICTURE_SIZE);
         for [left, top] in within.into_iter().flat_map(|left| within.map(|top| [left, top])) {
             let within = PixelBounds { left, top, right: left + 8, bottom: top + 8 };
-            triangle.cover(within, |place, depth| {
+            triangle.rasterize(within, |place, depth| {
                 assert!(R::zero() <= depth && depth <= R::one(), "{depth:?}");
-                let constant = triangle.varyings(place).value[0];
+                let constant = triangle.interpolate(place).value[0];
                 assert!(constant == R::one(), "{constant:?}");
             });
         }
@@ -236,7 +236,7 @@ fn covers<R: Real>(triangles: &[[[f64; 4]; 3]]) -> Vec<i32> {
         let corners = corners.map(|corner| (Vector(corner.map(R::of)), []));
         for (culled, count) in [(Winding::Clockwise, 1), (Winding::CounterClockwise, -1)] {
             for triangle in set_up::<R, 0>(&corners, Some(culled)) {
-                triangle.cover(PixelBounds::of_picture(PICTURE), |place, _| {
+                triangle.rasterize(PixelBounds::of_picture(PICTURE), |place, _| {
                     covers[place[1] * PICTURE[0] + place[0]] += count
                 });
             }
@@ -278,7 +278,7 @@ fn set_up<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3], culled: Opti
 fn draw<R: Real>(corners: &[ClipCorner<R, 0>; 3], culled: Option<Winding>) -> BTreeMap<[usize; 2], R> {
     let mut drawn = BTreeMap::new();
     for triangle in set_up(corners, culled) {
-        triangle.cover(PixelBounds::of_picture(PICTURE), |place, depth| {
+        triangle.rasterize(PixelBounds::of_picture(PICTURE), |place, depth| {
             assert_eq!(drawn.insert(place, depth), None, "{place:?} is covered twice");
         });
     }
@@ -286,19 +286,19 @@ fn draw<R: Real>(corners: &[ClipCorner<R, 0>; 3], culled: Option<Winding>) -> BT
 }
 
 /// A corner that is just at this place, with this depth, and w a power of 2.
-fn corner_at<R: Real, const V: usize>(place: Place, [depth, w]: [f64; 2]) -> (Vector4<R>, [R; V]) {
+fn corner_at<R: Real, const V: usize>(place: GridPoint, [depth, w]: [f64; 2]) -> (Vector4<R>, [R; V]) {
     let [x, y] = clip_of(place);
     (Vector([x * w, y * w, depth * w, w].map(R::of)), [R::zero(); V])
 }
 
-fn clip_of(place: Place) -> [f64; 2] {
-    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS as f64 / 2.0));
+fn clip_of(place: GridPoint) -> [f64; 2] {
+    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS_PER_PIXEL as f64 / 2.0));
     [x - 1.0, 1.0 - y]
 }
 
 /// Every pixel that a triangle covers, in order, and 1 if it is wound clockwise, or else -1. A pixel's middle is moved to the
 /// right by next to nothing, and down by still less: what was on a left edge, or a top edge, is inside then.
-fn covered_by_hand(places: [Place; 3]) -> Vec<([usize; 2], i32)> {
+fn covered_by_hand(places: [GridPoint; 3]) -> Vec<([usize; 2], i32)> {
     const FINER: i128 = 1 << 40;
     let [a, b, c] = places.map(|place| place.map(|number| i128::from(number) * FINER));
     let area = |a: [i128; 2], b: [i128; 2], c: [i128; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -312,8 +312,8 @@ fn covered_by_hand(places: [Place; 3]) -> Vec<([usize; 2], i32)> {
     pixels.filter_map(winding).collect()
 }
 
-fn shares_by_hand([a, b, c]: [Place; 3], place: [usize; 2]) -> [i64; 3] {
-    let middle = place.map(|number| number as i64 * STEPS + MIDDLE);
+fn shares_by_hand([a, b, c]: [GridPoint; 3], place: [usize; 2]) -> [i64; 3] {
+    let middle = place.map(|number| number as i64 * STEPS_PER_PIXEL + HALF_PIXEL);
     [[middle, b, c], [a, middle, c], [a, b, middle]].map(grid::doubled_area)
 }
 
@@ -322,12 +322,17 @@ fn is_in(bounds: PixelBounds, [column, row]: [usize; 2]) -> bool {
 }
 
 /// Anywhere in and around the picture, often at the edge or the middle of a pixel.
-fn any_place() -> impl Strategy<Value = Place> {
+fn any_place() -> impl Strategy<Value = GridPoint> {
     let along = |side: usize| {
-        let (low, high) = (-(side as i64) * STEPS / 2, side as i64 * STEPS * 3 / 2);
-        let few = (8..12_i64).prop_map(|number| number * MIDDLE);
+        let (low, high) = (-(side as i64) * STEPS_PER_PIXEL / 2, side as i64 * STEPS_PER_PIXEL * 3 / 2);
+        let few = (8..12_i64).prop_map(|number| number * HALF_PIXEL);
         let beside = few.clone().prop_flat_map(|place| (-1..=1_i64).prop_map(move |off| place + off));
-        prop_oneof![low..high, (low / MIDDLE..high / MIDDLE).prop_map(|number| number * MIDDLE), few, beside]
+        prop_oneof![
+            low..high,
+            (low / HALF_PIXEL..high / HALF_PIXEL).prop_map(|number| number * HALF_PIXEL),
+            few,
+            beside
+        ]
     };
     [along(PICTURE[0]), along(PICTURE[1])]
 }
@@ -354,14 +359,18 @@ fn any_number() -> impl Strategy<Value = f32> {
 
 #[test]
 fn places_leave_no_product_out_of_range() {
-    let far = FARTHEST;
+    let far = MAX_COORDINATE;
     let [a, b, c] = [[-far, -far], [far, -far], [-far, far]];
     assert!(grid::doubled_area([a, b, c]) > 0 && grid::doubled_area([c, b, a]) < 0);
-    let last = LARGEST_SIDE as i64 - 1;
+    let last = MAX_PICTURE_SIZE as i64 - 1;
     for [from, to] in [[a, b], [b, c], [c, a], [[far, far], a]] {
         for [column, row] in [[0, 0], [last, 0], [0, last], [last, last]] {
             let edge = Edge::new(from, to);
-            let expected = grid::doubled_area([from, to, [column * STEPS + MIDDLE, row * STEPS + MIDDLE]]);
+            let expected = grid::doubled_area([
+                from,
+                to,
+                [column * STEPS_PER_PIXEL + HALF_PIXEL, row * STEPS_PER_PIXEL + HALF_PIXEL],
+            ]);
             assert_eq!(edge.at(column, row), expected);
         }
     }

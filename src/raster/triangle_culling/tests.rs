@@ -2,7 +2,7 @@ use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::raster::grid::{MIDDLE, STEPS};
+use crate::raster::grid::{HALF_PIXEL, STEPS_PER_PIXEL};
 use crate::raster::{PixelBounds, Real, Triangle, Vector};
 
 const PICTURE: [usize; 2] = [1024, 512];
@@ -76,7 +76,7 @@ fn no_sliver_is_left_out_that_could_be_drawn() {
 #[test]
 fn each_reason_is_counted() {
     let places = [[40, 40], [40, 80], [80, 40], [42, 41], [42, 44], [44, 41]];
-    let mut clip: Vec<_> = places.map(|place| corner_at(place.map(|number| number * STEPS / 2))).into();
+    let mut clip: Vec<_> = places.map(|place| corner_at(place.map(|number| number * STEPS_PER_PIXEL / 2))).into();
     clip.extend([[3.0, 0.0, 0.5, 1.0], [9.0, 0.3, 0.5, 1.0], [2.0, -5.0, 0.5, 1.0]].map(Vector));
     // Beside the camera plane, and behind it.
     clip.extend([[0.0, 0.0, 0.5, 0.1], [1.0, 0.0, 0.5, -1.0], [0.0, 1.0, 0.5, -2.0]].map(Vector));
@@ -142,7 +142,7 @@ fn most_of_what_cannot_be_seen_of_a_ball_is_left_out() {
 
 fn cull(clip: &[Vector4<f64>], triangles: &[[u32; 3]], culled: Option<Winding>) -> (Vec<u32>, CulledTriangles) {
     let mut kept = Vec::new();
-    let corners: Vec<_> = clip.iter().map(|&clip| CullCorner { clip, is_placed: true }).collect();
+    let corners: Vec<_> = clip.iter().map(|&clip| CullVertex { clip, is_accurate: true }).collect();
     let counts = cull_triangles(&corners, triangles.iter().copied(), PICTURE, culled, &mut kept);
     (kept, counts)
 }
@@ -152,27 +152,27 @@ fn covers_any<R: Real>(corners: [Vector4<f64>; 3], culled: Option<Winding>) -> b
     let (mut triangles, mut covers) = (Vec::new(), false);
     Triangle::<R, 0>::set_up(&corners, PICTURE, culled, &mut triangles);
     for triangle in triangles {
-        triangle.cover(PixelBounds::of_picture(PICTURE), |_, _| covers = true);
+        triangle.rasterize(PixelBounds::of_picture(PICTURE), |_, _| covers = true);
     }
     covers
 }
 
-fn exact_area(places: [Place; 3]) -> i128 {
+fn exact_area(places: [GridPoint; 3]) -> i128 {
     let [a, b, c] = places.map(|place| place.map(i128::from));
     a[0] * b[1] - b[0] * a[1] + b[0] * c[1] - c[0] * b[1] + c[0] * a[1] - a[0] * c[1]
 }
 
-fn has_no_middle(places: [Place; 3]) -> bool {
+fn has_no_middle(places: [GridPoint; 3]) -> bool {
     (0..2).any(|axis| {
         let along = places.map(|place| place[axis]);
         let (low, high) = (along.into_iter().min().unwrap() - 1, along.into_iter().max().unwrap() + 1);
-        (low..=high).all(|place| place.rem_euclid(STEPS) != MIDDLE)
+        (low..=high).all(|place| place.rem_euclid(STEPS_PER_PIXEL) != HALF_PIXEL)
     })
 }
 
 /// A corner that is just at this place of the picture.
-fn corner_at(place: Place) -> Vector4<f64> {
-    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS as f64 / 2.0));
+fn corner_at(place: GridPoint) -> Vector4<f64> {
+    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS_PER_PIXEL as f64 / 2.0));
     Vector([x - 1.0, 1.0 - y, 0.5, 1.0])
 }
 
@@ -204,9 +204,9 @@ impl Random {
     }
 
     /// Two corners up to 2000 steps apart, or 6, and one within a few steps of the line between them.
-    fn sliver(&mut self) -> [Place; 3] {
+    fn sliver(&mut self) -> [GridPoint; 3] {
         let reach = if self.below(2) == 0 { 2000 } else { 6 };
-        let from = [0, 1].map(|axis| self.below(PICTURE[axis] as i64 * STEPS));
+        let from = [0, 1].map(|axis| self.below(PICTURE[axis] as i64 * STEPS_PER_PIXEL));
         let to = from.map(|along| along + self.below(2 * reach + 1) - reach);
         let share = self.below(1001);
         let off = 1 + self.below(8);

@@ -7,22 +7,22 @@ use crate::scene::Assets;
 #[derive(Debug, Default)]
 pub struct OccluderMeshes {
     /// Whose meshes they are, and as of when.
-    seen: Option<(u64, u64)>,
+    synced: Option<(u64, u64)>,
     /// For each slot: the mesh's revision, and its parts.
     parts: Vec<(u64, Vec<ConvexPart>)>,
 }
 
 impl OccluderMeshes {
     /// Takes in what has changed.
-    pub fn follow(&mut self, assets: &Assets) {
+    pub fn sync(&mut self, assets: &Assets) {
         let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
-        if self.seen == Some((identity, revision)) {
+        if self.synced == Some((identity, revision)) {
             return;
         }
-        if self.seen.is_none_or(|(other, _)| other != identity) {
+        if self.synced.is_none_or(|(other, _)| other != identity) {
             self.parts.clear();
         }
-        self.seen = Some((identity, revision));
+        self.synced = Some((identity, revision));
         self.parts.resize_with(assets.meshes.slot_count(), || (0, Vec::new()));
         for (slot, parts) in (0..).zip(&mut self.parts) {
             match assets.meshes.revised_at(slot) {

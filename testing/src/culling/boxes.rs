@@ -108,12 +108,12 @@ struct Case {
     volumes: [Verdict; 3],
 }
 
-/// Tries one camera with [`ObjectTable::BLOCK`] objects for each number of `batches`.
+/// Tries one camera with [`ObjectTable::BLOCK_SIZE`] objects for each number of `batches`.
 pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
     let mut tallies = BoxTallies::default();
     let mut tables = VOLUMES.map(|volume| {
         let mut table = ObjectTable::default();
-        table.hold(volume);
+        table.configure(volume);
         table
     });
     for batch in batches {
@@ -121,16 +121,17 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
         let camera = any_camera(&mut random);
         let (oracle, frustum) = (Oracle::new(&camera), Frustum::new(&camera));
         let mut objects = Objects::default();
-        let cases: Vec<_> =
-            (0..ObjectTable::BLOCK).map(|entry| objects.add(shapes, &oracle, entry % 4 != 0, &mut random)).collect();
+        let cases: Vec<_> = (0..ObjectTable::BLOCK_SIZE)
+            .map(|entry| objects.add(shapes, &oracle, entry % 4 != 0, &mut random))
+            .collect();
         for (volume, table) in tables.iter_mut().enumerate() {
-            table.reset(ObjectTable::BLOCK);
-            table.fill(&objects.as_scene_ref(shapes), 0..ObjectTable::BLOCK);
+            table.reset(ObjectTable::BLOCK_SIZE);
+            table.fill(&objects.as_scene_ref(shapes), 0..ObjectTable::BLOCK_SIZE);
             tallies.rejected += table.rejections().list().iter().map(|rejection| rejection.count as u64).sum::<u64>();
             let block = table.block(0);
-            for first in (0..ObjectTable::BLOCK).step_by(Frustum::AT_ONCE) {
-                let seen = block.seen(&frustum, VOLUMES[volume], first..first + Frustum::AT_ONCE);
-                for (place, case) in cases[first..][..Frustum::AT_ONCE].iter().enumerate() {
+            for first in (0..ObjectTable::BLOCK_SIZE).step_by(Frustum::WORD) {
+                let seen = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);
+                for (place, case) in cases[first..][..Frustum::WORD].iter().enumerate() {
                     // It must be seen where the object is inside, and need not be where its volume is outside.
                     let verdict = match (case.object, case.volumes[volume]) {
                         (Verdict::Inside, _) => Verdict::Inside,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use drawloom::view::{Frustum, Spheres, WorldBounds};
+use drawloom::view::{BoundingSphere, BoundingSpheres, Frustum};
 
 use super::cameras::{any_camera, magnitude};
 use super::naive::Naive;
@@ -24,15 +24,15 @@ impl SphereTallies {
     }
 }
 
-/// Tries one camera with [`Spheres::COUNT`] spheres for each number of `batches`.
+/// Tries one camera with [`BoundingSpheres::COUNT`] spheres for each number of `batches`.
 pub fn try_batches(batches: Range<usize>) -> SphereTallies {
     let mut tallies = SphereTallies::default();
-    let mut spheres = Spheres::default();
+    let mut spheres = BoundingSpheres::default();
     for batch in batches {
         let mut random = Random::stream(batch as u64);
         let camera = any_camera(&mut random);
         let (oracle, frustum, naive) = (Oracle::new(&camera), Frustum::new(&camera), Naive::new(&camera));
-        let mut cases = [(false, Verdict::Touching); Spheres::COUNT];
+        let mut cases = [(false, Verdict::Touching); BoundingSpheres::COUNT];
         for (entry, case) in cases.iter_mut().enumerate() {
             let is_tangent = entry % 4 != 0;
             let bounds = if is_tangent { tangent(&oracle, &mut random) } else { anywhere(&oracle, &mut random) };
@@ -40,15 +40,15 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
             *case = (is_tangent, oracle.judge(oracle.relative(bounds.center), [radius; 6], radius));
             spheres.set(entry, bounds);
         }
-        for first in (0..Spheres::COUNT).step_by(Frustum::AT_ONCE) {
-            let seen = frustum.may_see_each(&spheres, first);
-            for (place, &(is_tangent, verdict)) in cases[first..][..Frustum::AT_ONCE].iter().enumerate() {
+        for first in (0..BoundingSpheres::COUNT).step_by(Frustum::WORD) {
+            let seen = frustum.intersects_spheres(&spheres, first);
+            for (place, &(is_tangent, verdict)) in cases[first..][..Frustum::WORD].iter().enumerate() {
                 tallies.ours.of(is_tangent).count(verdict, seen >> place & 1 == 1);
             }
         }
         if let Some(naive) = naive {
             for (entry, &(is_tangent, verdict)) in cases.iter().enumerate() {
-                let WorldBounds { center, radius } = spheres.get(entry);
+                let BoundingSphere { center, radius } = spheres.get(entry);
                 tallies.naive.of(is_tangent).count(verdict, naive.sees_in_world(center, radius));
             }
         }
@@ -57,7 +57,7 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
 }
 
 /// One that touches a plane, two at an edge or three at a corner, to within four steps of its radius or of its distance.
-fn tangent(oracle: &Oracle, random: &mut Random) -> WorldBounds {
+fn tangent(oracle: &Oracle, random: &mut Random) -> BoundingSphere {
     let radius = if random.below(16) == 0 { 0.0 } else { magnitude(random, -6.0, 7.0) };
     let place = oracle.touching(any_planes(random), [radius; 6], any_along(random), any_aside(random));
     let center = oracle.world(place);
@@ -69,17 +69,17 @@ fn tangent(oracle: &Oracle, random: &mut Random) -> WorldBounds {
         for _ in 0..steps.abs() {
             radius = if steps < 0 { radius.next_down().max(0.0) } else { radius.next_up() };
         }
-        return WorldBounds { center, radius };
+        return BoundingSphere { center, radius };
     }
     let radius = (-depth(center)).max(0.0) as f32;
     let center = oracle.world(place * (1.0 + f64::from(steps) * f64::from(f32::EPSILON)));
-    WorldBounds { center, radius }
+    BoundingSphere { center, radius }
 }
 
 /// Up to 10,000 km away, and from a millionth of a metre to as large.
-fn anywhere(oracle: &Oracle, random: &mut Random) -> WorldBounds {
+fn anywhere(oracle: &Oracle, random: &mut Random) -> BoundingSphere {
     let center = oracle.world(random.direction() * magnitude(random, -3.0, 7.0));
-    WorldBounds { center, radius: magnitude(random, -6.0, 7.0) as f32 }
+    BoundingSphere { center, radius: magnitude(random, -6.0, 7.0) as f32 }
 }
 
 /// One, two or three planes, no two of them opposite.

@@ -74,7 +74,7 @@ impl Kind {
             }
             Self::Directional { reach } => {
                 let light = Light::Directional { direction, illuminance: intensity, casts_shadow };
-                seen_from(ShadowMaps { reach, ..maps }, light, &[main])
+                seen_from(ShadowMaps { max_distance: reach, ..maps }, light, &[main])
             }
             Self::Hemispherical => {
                 let light = Light::Hemispherical { position: place, direction, intensity, range, casts_shadow };
@@ -163,7 +163,7 @@ impl Records {
         self.table.fill(&scene, 0..cases.len());
         assert!(self.table.rejections().list().is_empty(), "an object was left out");
         for block in 0..self.table.block_count() {
-            let (first, records) = self.table.records_of(block);
+            let (first, records) = self.table.gpu_objects(block);
             for (index, record) in records.iter().enumerate() {
                 visit(&cases[first + index], record);
             }

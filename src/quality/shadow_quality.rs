@@ -10,7 +10,7 @@ pub struct ShadowQuality {
     /// Error: pixels of the picture that are lit and should not be, or the other way round: along a shadow's edge, as wide as a
     /// pixel of the map. Cost: pixels drawn, and 4 bytes each.
     pub side: u32,
-    /// Shadows fade over 2·`filter` + 1 pixels of the map, 0 to [`ShadowQuality::WIDEST_FILTER`]; 0 still blends each pixel with its
+    /// Shadows fade over 2·`filter` + 1 pixels of the map, 0 to [`ShadowQuality::MAX_FILTER`]; 0 still blends each pixel with its
     /// neighbour. Cost: (2·`filter` + 2)² pixels of the map read for one of the picture.
     pub filter: u32,
     /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope ask
@@ -31,7 +31,7 @@ pub struct ShadowQuality {
 
 impl ShadowQuality {
     /// The widest [`ShadowQuality::filter`]: 100 pixels of the map are read for one of the picture.
-    pub const WIDEST_FILTER: u32 = 4;
+    pub const MAX_FILTER: u32 = 4;
 
     pub(super) fn check(&self) -> Result<(), QualityError> {
         let Self { side, filter, bias, interval, widest_edge } = *self;
@@ -39,7 +39,7 @@ impl ShadowQuality {
             if holds { Ok(()) } else { Err(QualityError::OutOfRange { knob, value, range }) }
         };
         check(side > 0, "shadows.side", side.to_string(), "1 pixel or more")?;
-        check(filter <= Self::WIDEST_FILTER, "shadows.filter", filter.to_string(), "0 to 4")?;
+        check(filter <= Self::MAX_FILTER, "shadows.filter", filter.to_string(), "0 to 4")?;
         check(bias >= 0.0 && bias.is_finite(), "shadows.bias", bias.to_string(), "0 or more, and finite")?;
         check(interval > 0, "shadows.interval", interval.to_string(), "1 frame or more")?;
         let is_angle = widest_edge > 0.0 && widest_edge <= 90.0;

@@ -19,5 +19,5 @@ pub enum QualityError {
     OcclusionWithoutVolume,
     /// Occlusion is asked for, and objects are not drawn where they are.
     #[error("occlusion needs camera-relative transforms: absolute ones draw objects elsewhere than they are")]
-    OcclusionOfAbsolute,
+    OcclusionWithAbsoluteTransforms,
 }

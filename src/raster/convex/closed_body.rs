@@ -1,7 +1,7 @@
 //! Closed convex bodies.
 
-use super::welded::{Welded, edges};
-use super::{ConvexPart, Face};
+use super::welded_mesh::{WeldedMesh, edges};
+use super::{ConvexPart, Plane};
 
 /// A piece of a mesh as a closed convex body, if that is what it is: every edge has a triangle on either side, and no corner is
 /// farther outside of any triangle's plane than the tolerance.
@@ -15,14 +15,15 @@ use super::{ConvexPart, Face};
 /// **Its depth.** A ray that meets the piece enters it through a triangle that is seen, and that is at most δ behind its face.
 /// Triangles that lie in one plane to within δ share a face; where one of them is seen and the face is not, the plane through the
 /// eye and the triangle supports the piece to within 2δ, so the triangle is at the rim.
-pub(super) fn solid(welded: &Welded, piece: &[u32], tolerance: f64) -> Option<ConvexPart> {
-    let mut faces: Vec<Face> = Vec::new();
+pub(super) fn closed_body(welded: &WeldedMesh, piece: &[u32], tolerance: f64) -> Option<ConvexPart> {
+    let mut faces: Vec<Plane> = Vec::new();
     let mut depth: f64 = 0.0;
     let mut face_of = Vec::with_capacity(piece.len());
     for &triangle in piece {
         let corners = welded.corners(triangle);
         let own = welded.faces[triangle as usize];
-        let off = |face: &Face| corners.map(|corner| face.height(corner).abs()).into_iter().fold(0.0, f64::max);
+        let off =
+            |face: &Plane| corners.map(|corner| face.signed_distance(corner).abs()).into_iter().fold(0.0, f64::max);
         let known = faces.iter().position(|face| face.normal.dot(own.normal) > 0.5 && off(face) <= tolerance);
         let face = known.unwrap_or_else(|| {
             faces.push(own);
@@ -30,7 +31,7 @@ pub(super) fn solid(welded: &Welded, piece: &[u32], tolerance: f64) -> Option<Co
         });
         depth = depth.max(off(&faces[face]));
         face_of.push(face);
-        if faces.len() > ConvexPart::MOST_FACES {
+        if faces.len() > ConvexPart::MAX_FACES {
             return None;
         }
     }
@@ -41,7 +42,7 @@ pub(super) fn solid(welded: &Welded, piece: &[u32], tolerance: f64) -> Option<Co
     let points: Vec<_> = places.iter().map(|&place| welded.places[place as usize]).collect();
     for face in &faces {
         for &point in &points {
-            depth = depth.max(face.height(point));
+            depth = depth.max(face.signed_distance(point));
         }
         if depth > tolerance {
             return None;

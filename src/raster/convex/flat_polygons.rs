@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::welded::{Welded, edges};
-use super::{ConvexPart, Face};
+use super::welded_mesh::{WeldedMesh, edges};
+use super::{ConvexPart, Plane};
 
 /// Joins triangles that lie in one plane into convex polygons, as large as come about by taking away the longest edges between
 /// them first (after Hertel and Mehlhorn, "Fast triangulation of the plane with respect to simple polygons", 1985).
@@ -11,7 +11,7 @@ use super::{ConvexPart, Face};
 /// Triangles that are wound alike and whose edges cancel but for those of a convex loop cover what the loop encloses just once,
 /// so from the side that is seen every ray through the polygon meets one of them. That still holds where each corner is a little
 /// off its place, but for rays that pass the loop within as much.
-pub(super) fn polygons(welded: &Welded, piece: &[u32], tolerance: f64, parts: &mut Vec<ConvexPart>) {
+pub(super) fn flat_polygons(welded: &WeldedMesh, piece: &[u32], tolerance: f64, parts: &mut Vec<ConvexPart>) {
     let mut pool = Pool { welded, tolerance, polygons: Vec::new(), owners: vec![0; welded.triangles.len()] };
     for &triangle in piece {
         pool.owners[triangle as usize] = pool.polygons.len();
@@ -49,7 +49,7 @@ pub(super) fn polygons(welded: &Welded, piece: &[u32], tolerance: f64, parts: &m
 }
 
 struct Pool<'a> {
-    welded: &'a Welded,
+    welded: &'a WeldedMesh,
     tolerance: f64,
     /// `None` for those that have become part of another.
     polygons: Vec<Option<Polygon>>,
@@ -60,7 +60,7 @@ struct Pool<'a> {
 struct Polygon {
     /// Counter-clockwise seen from the side that is seen.
     corners: Vec<u32>,
-    face: Face,
+    face: Plane,
     /// How far its corners are from a convex loop in the face's plane.
     slack: f64,
     area: f64,
@@ -87,9 +87,9 @@ impl Pool<'_> {
     }
 
     /// How far a loop's corners are from a convex one in the plane; `None` where that is beyond the tolerance.
-    fn slack(&self, corners: &[u32], face: &Face) -> Option<f64> {
+    fn slack(&self, corners: &[u32], face: &Plane) -> Option<f64> {
         let places: Vec<DVec3> = corners.iter().map(|&place| self.welded.places[place as usize]).collect();
-        let off_plane = places.iter().map(|&place| face.height(place).abs()).fold(0.0, f64::max);
+        let off_plane = places.iter().map(|&place| face.signed_distance(place).abs()).fold(0.0, f64::max);
         let mut off_loop: f64 = 0.0;
         for (&from, &to) in places.iter().zip(places.iter().cycle().skip(1)) {
             let outwards = (to - from).cross(face.normal).try_normalize()?;
@@ -130,5 +130,5 @@ fn joined(one: &[u32], other: &[u32], [from, to]: [u32; 2]) -> Option<Vec<u32>> 
     let mut sorted = corners.clone();
     sorted.sort_unstable();
     sorted.dedup();
-    (sorted.len() == corners.len() && (3..=ConvexPart::MOST_CORNERS).contains(&corners.len())).then_some(corners)
+    (sorted.len() == corners.len() && (3..=ConvexPart::MAX_CORNERS).contains(&corners.len())).then_some(corners)
 }

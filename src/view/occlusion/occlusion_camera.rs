@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3, Quat, Vec3};
 
-use crate::raster::Face;
+use crate::raster::Plane;
 use crate::scene::{Camera, Projection};
 
 /// A camera as occlusion needs it. Its axes are right, down and forward, so the last coordinate is the depth in metres; its
@@ -10,7 +10,7 @@ use crate::scene::{Camera, Projection};
 ///
 /// **Nearness** is what devices write as depth: near ÷ depth in perspective, and (far − depth) ÷ (far − near) without.
 #[derive(Clone, Debug)]
-pub(super) struct Eye {
+pub(super) struct OcclusionCamera {
     position: DVec3,
     /// From the world's axes.
     turn: DMat3,
@@ -32,13 +32,13 @@ pub(super) struct Placement {
     turn: DMat3,
     scale: DVec3,
     origin: DVec3,
-    /// How far from here a device may draw the object's places, in metres. See [`Eye::slack`].
+    /// How far from here a device may draw the object's places, in metres. See [`OcclusionCamera::slack`].
     pub(super) slack: f64,
     /// No place of the object is farther from the camera, in metres.
     pub(super) distance: f64,
 }
 
-impl Eye {
+impl OcclusionCamera {
     /// That of a camera.
     pub(super) fn new(camera: &Camera) -> Self {
         let [width, height] = camera.size.map(f64::from);
@@ -187,8 +187,8 @@ impl Eye {
     ///
     /// A device interpolates depth between corners, so it may be off by some unit roundoffs of what it is at the nearest of them, which
     /// is at least `nearest` away.
-    pub(super) fn plane(&self, face: &Face, nearest: f64) -> Option<[f64; 3]> {
-        let Face { normal, offset } = *face;
+    pub(super) fn plane(&self, face: &Plane, nearest: f64) -> Option<[f64; 3]> {
+        let Plane { normal, offset } = *face;
         let slope = normal.truncate() / self.focal;
         let start = slope.dot(self.center);
         if self.is_perspective {
@@ -215,11 +215,11 @@ impl Placement {
     }
 
     /// A face, which stays where it is outside also of a mirrored object: normals go by the inverse of the scale.
-    pub(super) fn face(&self, face: &Face) -> Face {
+    pub(super) fn face(&self, face: &Plane) -> Plane {
         let normal = face.normal / self.scale;
         let length = normal.length();
         let normal = self.turn * (normal / length);
-        Face { normal, offset: face.offset / length + normal.dot(self.origin) }
+        Plane { normal, offset: face.offset / length + normal.dot(self.origin) }
     }
 
     /// Whether the object has any volume left.
@@ -236,7 +236,7 @@ impl Placement {
 /// 16 unit roundoffs of f32.
 const SINGLE: f64 = 1.0 / 1_048_576.0;
 
-/// Twice a step of a [`FixedPosition`](super::super::FixedPosition).
+/// Twice a step of a [`FixedPosition`](crate::view::FixedPosition).
 const STEP: f64 = 2.0 / 1_073_741_824.0;
 
 /// The grid that devices snap corners of triangles to, in pixels.
@@ -245,7 +245,7 @@ const SNAP: f64 = 1.0 / 256.0;
 /// 4 unit roundoffs of f32: of z ÷ w, of the share, of their product and of the sum.
 const INTERPOLATED: f64 = 4.0 / 16_777_216.0;
 
-/// See [`Eye::nearness_at_most`].
+/// See [`OcclusionCamera::nearness_at_most`].
 const DEPTH: f64 = 1.0 / 262_144.0;
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -289,7 +289,7 @@ mod tests {
             turn in prop::array::uniform4(-1.0..1.0_f32),
             stretch in 0.1..10.0_f32,
         ) {
-            let eye = Eye::new(&camera);
+            let eye = OcclusionCamera::new(&camera);
             let view = RenderView::new(&camera);
             let [right, up, forward] = view.picture_axes().map(|axis| axis.as_dvec3());
             let ray = right * f64::from(aside[0]) + up * f64::from(aside[1]);
@@ -336,16 +336,16 @@ mod tests {
             let is_usual = Vec3::from(scale).abs().min_element() > 0.05 && orientation.length() > 0.1;
             prop_assume!(normal.length() > 1.0 && is_usual);
             let normal = normal.normalize() * -normal.dot(inside - a).signum();
-            let face = Face { normal, offset: normal.dot(a) };
-            prop_assume!(face.height(inside) < -0.1);
+            let face = Plane { normal, offset: normal.dot(a) };
+            prop_assume!(face.signed_distance(inside) < -0.1);
 
-            let eye = Eye::new(&camera);
+            let eye = OcclusionCamera::new(&camera);
             let position = camera.position + DVec3::from(aside);
             let placement = eye.place(position, orientation.normalize(), scale.into(), 50.0);
             let placed = placement.face(&face);
             let places = [a, b, c].map(|place| placement.place(place));
-            prop_assert!(places.iter().all(|&place| placed.height(place).abs() < 1e-5));
-            prop_assert!(placed.height(placement.place(inside)) < 0.0);
+            prop_assert!(places.iter().all(|&place| placed.signed_distance(place).abs() < 1e-5));
+            prop_assert!(placed.signed_distance(placement.place(inside)) < 0.0);
             // Where it is seen and the eye outside, it is as near at each place of the picture as its corners there.
             if let Some([right, down, offset]) = eye.plane(&placed, f64::INFINITY) {
                 for place in places.into_iter().filter(|place| place.z > 1.0 && placed.offset < -1.0) {
@@ -364,7 +364,7 @@ mod tests {
             sides in prop::array::uniform3(prop::array::uniform3(-3.0..3.0_f64)),
             share in prop::array::uniform3(-1.0..1.0_f64),
         ) {
-            let eye = Eye::new(&camera);
+            let eye = OcclusionCamera::new(&camera);
             let sides = sides.map(DVec3::from);
             let reach: f64 = sides.iter().map(|side| side.length()).sum();
             let [x, y, z] = center;

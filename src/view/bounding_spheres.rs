@@ -4,29 +4,29 @@ use glam::DVec3;
 
 /// Where an object is in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WorldBounds {
+pub struct BoundingSphere {
     /// The centre of a sphere around it, in metres.
     pub center: DVec3,
     /// The sphere's radius in metres.
     pub radius: f32,
 }
 
-impl WorldBounds {
+impl BoundingSphere {
     /// Seen by nobody.
     pub const NOTHING: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
 }
 
-/// The bounds of [`Spheres::COUNT`] objects, an array for each coordinate: what tests them reads no more than it needs, and
+/// The bounds of [`BoundingSpheres::COUNT`] objects, an array for each coordinate: what tests them reads no more than it needs, and
 /// several with one instruction.
 #[derive(Clone, Debug)]
-pub struct Spheres {
+pub struct BoundingSpheres {
     /// In metres, in the world.
     centers: [[f64; Self::COUNT]; 3],
     /// In metres.
     radii: [f32; Self::COUNT],
 }
 
-impl Spheres {
+impl BoundingSpheres {
     /// How many there are.
     pub const COUNT: usize = 256;
 
@@ -35,9 +35,9 @@ impl Spheres {
     /// # Panics
     /// If there is no such sphere.
     #[inline]
-    pub fn get(&self, entry: usize) -> WorldBounds {
+    pub fn get(&self, entry: usize) -> BoundingSphere {
         let [x, y, z] = &self.centers;
-        WorldBounds { center: DVec3::new(x[entry], y[entry], z[entry]), radius: self.radii[entry] }
+        BoundingSphere { center: DVec3::new(x[entry], y[entry], z[entry]), radius: self.radii[entry] }
     }
 
     /// Changes one of them.
@@ -45,7 +45,7 @@ impl Spheres {
     /// # Panics
     /// If there is no such sphere.
     #[inline]
-    pub fn set(&mut self, entry: usize, bounds: WorldBounds) {
+    pub fn set(&mut self, entry: usize, bounds: BoundingSphere) {
         for (coordinates, coordinate) in self.centers.iter_mut().zip(bounds.center.to_array()) {
             coordinates[entry] = coordinate;
         }
@@ -63,9 +63,9 @@ impl Spheres {
     }
 }
 
-impl Default for Spheres {
+impl Default for BoundingSpheres {
     /// Those of objects that nobody sees.
     fn default() -> Self {
-        Self { centers: [[0.0; Self::COUNT]; 3], radii: [WorldBounds::NOTHING.radius; Self::COUNT] }
+        Self { centers: [[0.0; Self::COUNT]; 3], radii: [BoundingSphere::NOTHING.radius; Self::COUNT] }
     }
 }

@@ -4,24 +4,24 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::Face;
+use super::Plane;
 use crate::scene::Mesh;
 
 /// The triangles of a mesh that have an area, over places that each occur once.
-pub(super) struct Welded {
+pub(super) struct WeldedMesh {
     /// In object space.
     pub(super) places: Vec<DVec3>,
     /// The places of their corners, counter-clockwise seen from their visible side.
     pub(super) triangles: Vec<[u32; 3]>,
     /// The plane of each.
-    pub(super) faces: Vec<Face>,
+    pub(super) faces: Vec<Plane>,
     /// In square metres.
     pub(super) areas: Vec<f64>,
     /// Which triangle has an edge in this direction; `None` where several have.
     owners: HashMap<[u32; 2], Option<u32>>,
 }
 
-impl Welded {
+impl WeldedMesh {
     pub(super) fn new(mesh: &Mesh) -> Self {
         let mut welded = Self {
             places: Vec::new(),
@@ -55,7 +55,7 @@ impl Welded {
         let Some(normal) = across.try_normalize() else { return };
         let index = self.triangles.len() as u32;
         self.triangles.push(triangle);
-        self.faces.push(Face { normal, offset: normal.dot(a) });
+        self.faces.push(Plane { normal, offset: normal.dot(a) });
         self.areas.push(across.length() / 2.0);
         for edge in edges(triangle) {
             self.owners.entry(edge).and_modify(|owner| *owner = None).or_insert(Some(index));

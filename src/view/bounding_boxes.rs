@@ -5,21 +5,21 @@ use std::array::from_fn;
 use glam::{DVec3, Vec3};
 
 use super::frustum::{ALLOWANCE, LANES, bits, least};
-use super::{Frustum, Spheres};
+use super::{BoundingSpheres, Frustum};
 use crate::quality::CullingVolume;
 
 /// A box around an object. It is centred where the object's sphere is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectBox {
+pub struct OrientedBox {
     /// From the centre to the middle of three of its faces, in metres along the world's axes.
     pub half_axes: [DVec3; 3],
     /// How much farther than the box the object may reach, in metres, since centres are rounded.
     pub margin: f64,
 }
 
-/// The boxes of as many objects as there are [`Spheres`], around the same centres.
+/// The boxes of as many objects as there are [`BoundingSpheres`], around the same centres.
 #[derive(Clone, Debug)]
-pub enum Boxes {
+pub enum BoundingBoxes {
     /// Along the world's axes ([`CullingVolume::Box`]): half of what each measures along x, y and z, and its margin.
     World(Box<Groups<4>>),
     /// Along axes of their own ([`CullingVolume::OrientedBox`]): three half axes of three coordinates each, and its margin.
@@ -28,9 +28,9 @@ pub enum Boxes {
 
 /// So many numbers a box, in metres. Those of eight boxes lie together, so that asking for one of them reads few lines of memory,
 /// and for all of them no more than is needed.
-pub type Groups<const NUMBERS: usize> = [[[f32; LANES]; NUMBERS]; Spheres::COUNT / LANES];
+pub type Groups<const NUMBERS: usize> = [[[f32; LANES]; NUMBERS]; BoundingSpheres::COUNT / LANES];
 
-impl Boxes {
+impl BoundingBoxes {
     /// Boxes as a volume asks for them, all of them points; `None` where it asks for none.
     pub fn new(volume: CullingVolume) -> Option<Self> {
         match volume {
@@ -44,7 +44,7 @@ impl Boxes {
     ///
     /// # Panics
     /// If there is no such box.
-    pub fn set(&mut self, entry: usize, object: &ObjectBox) {
+    pub fn set(&mut self, entry: usize, object: &OrientedBox) {
         match self {
             Self::World(groups) => {
                 let half = object.half_axes.iter().fold(DVec3::ZERO, |half, axis| half + axis.abs());
@@ -77,7 +77,7 @@ impl Boxes {
 }
 
 /// Rounds a box of so many numbers and a margin. What is allowed for the rounding of its reach is known here already: see
-/// [`Frustum::may_see_boxes`].
+/// [`Frustum::intersects_boxes`].
 fn put<const NUMBERS: usize, const SIZES: usize>(
     groups: &mut Groups<NUMBERS>,
     entry: usize,
@@ -94,32 +94,36 @@ fn put<const NUMBERS: usize, const SIZES: usize>(
 }
 
 impl Frustum {
-    /// Of the [`Frustum::AT_ONCE`] objects from `first` on that are `asked` for, those of whose boxes any may be seen: a bit each,
+    /// Of the [`Frustum::WORD`] objects from `first` on that are `asked` for, those of whose boxes any may be seen: a bit each,
     /// from the lowest. Never left out is one that is, and sometimes kept one just outside.
     ///
     /// A box with the half axes a reaches Σ|n·a| from its centre towards a plane of normal n (Gottschalk et al. 1996). Each
     /// product carries five roundings of u = 2⁻²⁴ (of the normal, of the axis, of itself, and of two sums), and the sum over the
     /// axes two more; normals have unit length, so the reach R is off by no more than 7u·Σ‖a‖₁. The distance is off by no more
-    /// than [`Frustum::may_see`] tells, 11.5uN + u|o|, and adding the two by u(|d| + R) ≤ u(1.5N + |o|) + u·Σ‖a‖₁. 16u each are
+    /// than [`Frustum::intersects_sphere`] tells, 11.5uN + u|o|, and adding the two by u(|d| + R) ≤ u(1.5N + |o|) + u·Σ‖a‖₁. 16u each are
     /// allowed of N, of |o| and, in the margin, of Σ‖a‖₁.
     ///
     /// What is not a number is kept: whoever asks has left out what is nowhere.
     ///
     /// # Panics
     /// If there are fewer, or `first` is no multiple of 8.
-    pub fn may_see_boxes(&self, spheres: &Spheres, boxes: &Boxes, first: usize, asked: u64) -> u64 {
+    pub fn intersects_boxes(&self, spheres: &BoundingSpheres, boxes: &BoundingBoxes, first: usize, asked: u64) -> u64 {
         assert!(first.is_multiple_of(LANES), "boxes lie in groups of {LANES}");
         match boxes {
-            Boxes::World(groups) => self.keep_boxes(spheres, groups, first, asked, |[x, y, z, _], normal, lane| {
-                normal.x.abs() * x[lane] + normal.y.abs() * y[lane] + normal.z.abs() * z[lane]
-            }),
-            Boxes::Oriented(groups) => self.keep_boxes(spheres, groups, first, asked, |numbers, normal, lane| {
-                let [a, b, c, d, e, f, g, h, i, _] = numbers;
-                let along = |x: &[f32; LANES], y: &[f32; LANES], z: &[f32; LANES]| {
-                    (normal.x * x[lane] + normal.y * y[lane] + normal.z * z[lane]).abs()
-                };
-                along(a, b, c) + along(d, e, f) + along(g, h, i)
-            }),
+            BoundingBoxes::World(groups) => {
+                self.keep_boxes(spheres, groups, first, asked, |[x, y, z, _], normal, lane| {
+                    normal.x.abs() * x[lane] + normal.y.abs() * y[lane] + normal.z.abs() * z[lane]
+                })
+            }
+            BoundingBoxes::Oriented(groups) => {
+                self.keep_boxes(spheres, groups, first, asked, |numbers, normal, lane| {
+                    let [a, b, c, d, e, f, g, h, i, _] = numbers;
+                    let along = |x: &[f32; LANES], y: &[f32; LANES], z: &[f32; LANES]| {
+                        (normal.x * x[lane] + normal.y * y[lane] + normal.z * z[lane]).abs()
+                    };
+                    along(a, b, c) + along(d, e, f) + along(g, h, i)
+                })
+            }
         }
     }
 
@@ -127,14 +131,14 @@ impl Frustum {
     #[inline(always)]
     fn keep_boxes<const NUMBERS: usize>(
         &self,
-        spheres: &Spheres,
+        spheres: &BoundingSpheres,
         groups: &Groups<NUMBERS>,
         first: usize,
         asked: u64,
         reach: impl Fn(&[[f32; LANES]; NUMBERS], Vec3, usize) -> f32 + Copy,
     ) -> u64 {
-        let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[first..first + Self::AT_ONCE].as_chunks().0);
-        let groups = &groups[first / LANES..][..Self::AT_ONCE / LANES];
+        let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[first..first + Self::WORD].as_chunks().0);
+        let groups = &groups[first / LANES..][..Self::WORD / LANES];
         let mut kept = 0;
         for (place, (((x, y), z), group)) in x.iter().zip(y).zip(z).zip(groups).enumerate() {
             let here = asked >> (place * LANES) & ((1 << LANES) - 1);
@@ -185,7 +189,7 @@ mod tests {
         /// What is held is around what was given, and is found again at every place.
         #[test]
         fn a_box_holds_its_corners(
-            entry in 0..Spheres::COUNT,
+            entry in 0..BoundingSpheres::COUNT,
             axis in prop::array::uniform3(-1.0..1.0_f64),
             angle in -3.2..3.2_f64,
             exponents in prop::array::uniform3(-6.0..7.0_f64),
@@ -195,9 +199,9 @@ mod tests {
             let half = DVec3::from(exponents.map(|exponent| 10_f64.powf(exponent)));
             let half_axes = [turn.x_axis * half.x, turn.y_axis * half.y, turn.z_axis * half.z];
             for volume in [CullingVolume::Box, CullingVolume::OrientedBox] {
-                let mut boxes = Boxes::new(volume).unwrap();
-                boxes.set(entry, &ObjectBox { half_axes, margin });
-                prop_assert_eq!(boxes.get((entry + 1) % Spheres::COUNT).0, [Vec3::ZERO; 3]);
+                let mut boxes = BoundingBoxes::new(volume).unwrap();
+                boxes.set(entry, &OrientedBox { half_axes, margin });
+                prop_assert_eq!(boxes.get((entry + 1) % BoundingSpheres::COUNT).0, [Vec3::ZERO; 3]);
                 let (held, held_margin) = boxes.get(entry);
                 let held = held.map(Vec3::as_dvec3);
                 for signs in [[1.0, 1.0, 1.0], [1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]] {
