@@ -21,7 +21,6 @@ const KNOWN_CIRCLES: &[&str] = &[
     "frame",
     "graph",
     "process",
-    "raster",
     "report",
     "scene",
     "task",
