@@ -38,6 +38,7 @@
 //! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, with a
 //!   backend that counts and checks, and one that draws on the processor.
 //! - `obj` (default): OBJ files and their textures.
+//! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.
 //!
 //! # Spans
 //!
@@ -71,6 +72,8 @@ pub mod graph;
 pub mod quality;
 pub mod handle;
 pub mod scene;
+#[cfg(feature = "demo")]
+pub mod demo;
 pub mod raster;
 pub mod command;
 pub mod view;

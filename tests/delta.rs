@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use drawloom::command::DeltaCommands;
-use drawloom::scene::{Scene, obj, sample};
+use drawloom::demo;
+use drawloom::scene::{Scene, obj};
 use drawloom_testing::draw_lists::draw_lists;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
@@ -15,9 +16,10 @@ fn main() -> ExitCode {
     let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza/sponza_part.obj");
     let is_missing = !sponza.is_file();
     let trials = vec![
-        Trial::test("the_projects_own_scene", || check(&sample::colonnade()?)),
+        Trial::test("the_projects_own_scene", || check(&demo::colonnade()?)),
         Trial::test("shared::sponza_twenty_times", move || {
             let mut scene = obj::load(sponza)?.scene;
+            demo::add_camera_and_lights(&mut scene);
             scene.duplicate_objects(20);
             check(&scene)
         })

@@ -14,8 +14,9 @@ use std::time::Duration;
 
 use clap::Parser;
 use drawloom::backend::{Picture, SoftwareBackend};
+use drawloom::demo;
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
-use drawloom::scene::{Scene, sample};
+use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
@@ -47,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let progress = ProgressBar::new((sizes.len() * (rounds + WARM_UP)) as u64);
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} rounds, {eta} left")?);
     let rows: Result<Vec<_>, _> =
-        sizes.iter().map(|&size| measure(sample::colonnade()?, size, maps, rounds, &progress)).collect();
+        sizes.iter().map(|&size| measure(demo::colonnade()?, size, maps, rounds, &progress)).collect();
     progress.finish_and_clear();
     let rows = rows?;
 

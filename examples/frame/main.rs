@@ -15,8 +15,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, NullBackend, Picture, SoftwareBackend, WgpuBackend};
+use drawloom::demo;
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
-use drawloom::scene::{Mesh, Scene, obj, sample};
+use drawloom::scene::{Mesh, Scene, obj};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
@@ -115,9 +116,9 @@ fn wgpu_backend(
 
 fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
     let mut scene = match &arguments.scene {
-        None => sample::colonnade()?,
+        None => demo::colonnade()?,
         Some(path) => {
-            let imported = obj::load(path)?;
+            let mut imported = obj::load(path)?;
             for warning in &imported.warnings {
                 eprintln!("warning: {warning}");
             }
@@ -127,6 +128,7 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
                 imported.triangles,
                 imported.degenerate_triangles
             );
+            demo::add_camera_and_lights(&mut imported.scene);
             imported.scene
         }
     };

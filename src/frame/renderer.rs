@@ -27,15 +27,23 @@ use crate::view::{Rejection, RejectionReason, RenderView};
 /// use std::sync::Arc;
 ///
 /// use drawloom::backend::NullBackend;
+/// use drawloom::glam::DVec3;
 /// use drawloom::process::Deferred;
-/// use drawloom::scene::sample;
+/// use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 /// use drawloom::task::Scheduler;
 /// use drawloom::Renderer;
 ///
 /// let scheduler = Arc::new(Scheduler::new(2)?);
 /// let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
 ///
-/// let scene = sample::colonnade()?;
+/// let mut scene = Scene::new();
+/// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+/// let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)];
+/// let mesh = scene.add(Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?)?;
+/// let material = scene.add(Material::default())?;
+/// scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+/// scene.cameras.push(Camera::looking_at("main", DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO));
+///
 /// let recorded = renderer.record(scene.as_scene_ref())?;
 /// // From here on the scene may change again.
 /// let submitted = submitter.submit(recorded)?;

@@ -78,6 +78,43 @@ pub trait Asset: Sized + sealed::Sealed + 'static {
     }
 }
 
+impl Asset for Mesh {
+    fn slots(assets: &Assets) -> &Slots<Self> {
+        &assets.meshes
+    }
+
+    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
+        &mut assets.meshes
+    }
+}
+
+impl Asset for Material {
+    fn slots(assets: &Assets) -> &Slots<Self> {
+        &assets.materials
+    }
+
+    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
+        &mut assets.materials
+    }
+
+    fn check(&self, assets: &Assets) -> Result<(), SceneError> {
+        if let Some(texture) = self.texture {
+            assets.textures.get(texture)?;
+        }
+        if self.is_valid() { Ok(()) } else { Err(SceneError::InvalidMaterial { material: self.name.clone() }) }
+    }
+}
+
+impl Asset for Texture {
+    fn slots(assets: &Assets) -> &Slots<Self> {
+        &assets.textures
+    }
+
+    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
+        &mut assets.textures
+    }
+}
+
 mod sealed {
     pub trait Sealed {}
     impl Sealed for super::Mesh {}

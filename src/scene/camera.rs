@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::SceneError;
-use super::scene_ref::is_unit;
+use super::transform::is_unit;
 
 /// A camera: it looks along its own −Z, +Y is up, +X to the right.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 use glam::{DVec3, Vec3};
 
 use super::SceneError;
-use super::scene_ref::is_unit;
+use super::transform::is_unit;
 
 /// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
 ///

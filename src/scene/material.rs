@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Asset, Assets, SceneError};
-use crate::handle::{Handle, Slots};
+use super::SceneError;
+use crate::handle::Handle;
 
 /// What a surface is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,26 +38,12 @@ impl Default for Material {
     }
 }
 
-impl Asset for Material {
-    fn slots(assets: &Assets) -> &Slots<Self> {
-        &assets.materials
-    }
-
-    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
-        &mut assets.materials
-    }
-
-    fn check(&self, assets: &Assets) -> Result<(), SceneError> {
-        if let Some(texture) = self.texture {
-            assets.textures.get(texture)?;
-        }
+impl Material {
+    /// Whether its colours are finite and not negative, and its opacity is from 0 to 1.
+    pub(super) fn is_valid(&self) -> bool {
         let finite = self.diffuse.is_finite() && self.emission.is_finite() && self.opacity.is_finite();
         let positive = self.diffuse.min_element() >= 0.0 && self.emission.min_element() >= 0.0;
-        if finite && positive && (0.0..=1.0).contains(&self.opacity) {
-            Ok(())
-        } else {
-            Err(SceneError::InvalidMaterial { material: self.name.clone() })
-        }
+        finite && positive && (0.0..=1.0).contains(&self.opacity)
     }
 }
 
@@ -121,15 +107,5 @@ impl Texture {
     /// RGBA bytes, sRGB encoded, rows from top to bottom.
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
-    }
-}
-
-impl Asset for Texture {
-    fn slots(assets: &Assets) -> &Slots<Self> {
-        &assets.textures
-    }
-
-    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
-        &mut assets.textures
     }
 }

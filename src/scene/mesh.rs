@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::{Asset, Assets, SceneError};
-use crate::handle::Slots;
+use super::SceneError;
 
 /// A mesh: vertices, indices into them, and how indices make triangles. Right-handed, counter-clockwise triangles face
 /// the viewer, lengths in metres in the object's own space.
@@ -169,16 +168,6 @@ fn root_rounded_up(square: f64) -> f32 {
     let root = square.sqrt() as f32;
     // Squares of f32 are exact in f64.
     if f64::from(root) * f64::from(root) < square { root.next_up() } else { root }
-}
-
-impl Asset for Mesh {
-    fn slots(assets: &Assets) -> &Slots<Self> {
-        &assets.meshes
-    }
-
-    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self> {
-        &mut assets.meshes
-    }
 }
 
 /// A vertex, as it lies in memory and in the vertex buffer.

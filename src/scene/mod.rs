@@ -4,26 +4,25 @@
 
 mod assets;
 mod camera;
-mod collection;
-pub mod defaults;
 mod error;
 mod light;
 mod material;
 mod mesh;
 #[cfg(feature = "obj")]
 pub mod obj;
+mod owned_scene;
 mod packed_vertex;
-pub mod sample;
 mod scene_ref;
 mod subdivision;
+mod transform;
 
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
-pub use collection::{ObjectHandle, RenderObject, Scene};
 pub use error::SceneError;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
+pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;
 pub use scene_ref::SceneRef;
-pub(crate) use scene_ref::is_unit;
+pub(crate) use transform::is_unit;

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 
+use super::transform::transform_is_valid;
 use super::{Assets, Bounds, Camera, Light, Material, Mesh, SceneError};
 use crate::handle::Handle;
 
@@ -61,18 +62,32 @@ impl SceneRef<'_> {
         }
     }
 
-    /// Whether the object's transform can be drawn: finite, and its orientation a rotation.
+    /// Whether the object's transform can be drawn: it is finite, and its orientation is a rotation.
     pub(crate) fn transform_is_valid(&self, object: usize) -> bool {
         transform_is_valid(self.positions[object], self.orientations[object], self.scales[object])
     }
-}
 
-/// Whether the square of a length is that of a unit vector or quaternion. What an engine's own arithmetic has turned many
-/// times may have drifted by a thousandth, and is brought back to unit length where it is used.
-pub(crate) fn is_unit(length_squared: f32) -> bool {
-    (length_squared - 1.0).abs() < 2e-3
-}
+    /// The objects whose transforms can be drawn; none if the scene's slices differ in length.
+    pub(crate) fn drawable_objects(self) -> impl Iterator<Item = usize> {
+        let count = if self.check_lengths().is_ok() { self.object_count() } else { 0 };
+        (0..count).filter(move |&object| self.transform_is_valid(object))
+    }
 
-pub(super) fn transform_is_valid(position: DVec3, orientation: Quat, scale: Vec3) -> bool {
-    position.is_finite() && scale.is_finite() && is_unit(orientation.length_squared())
+    /// Centre and radius, in metres, of a sphere around all objects that can be drawn. Without any it is a sphere of
+    /// radius 1 around the world's origin.
+    pub fn bounding_sphere(self) -> (DVec3, f64) {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for object in self.drawable_objects() {
+            let scale = self.scales[object];
+            let bounds = self.bounds[object];
+            let center = self.positions[object] + (self.orientations[object] * (bounds.center * scale)).as_dvec3();
+            let reach = DVec3::splat(f64::from(bounds.radius * scale.abs().max_element()));
+            if center.is_finite() && reach.is_finite() {
+                low = low.min(center - reach);
+                high = high.max(center + reach);
+            }
+        }
+        let radius = (high - low).length() / 2.0;
+        if radius > 0.0 && radius.is_finite() { ((low + high) / 2.0, radius) } else { (DVec3::ZERO, 1.0) }
+    }
 }

@@ -139,7 +139,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, sample};
+    use crate::demo;
+    use crate::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology};
 
     proptest! {
         /// As a device has it: everything in f32, from the difference of the places on.
@@ -177,7 +178,7 @@ mod tests {
 
     #[test]
     fn most_triangles_of_a_scene_are_left_out_at_any_size_and_the_rest_kept() {
-        let scene = sample::colonnade().unwrap();
+        let scene = demo::colonnade().unwrap();
         for size in [[960, 540], [1920, 1080], [3840, 2160]] {
             let view = RenderView::new(&Camera { size, ..scene.cameras[0].clone() });
             let scene = scene.as_scene_ref();
@@ -217,7 +218,7 @@ mod tests {
 
     #[test]
     fn parts_are_the_whole_wherever_vertices_lie() {
-        let mut scene = sample::colonnade().unwrap();
+        let mut scene = demo::colonnade().unwrap();
         let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
         for scattered in [false, true] {
             for (handle, mesh) in &meshes {
@@ -253,7 +254,7 @@ mod tests {
 
     #[test]
     fn what_faces_away_is_left_out_in_either_projection() {
-        let scene = sample::colonnade().unwrap();
+        let scene = demo::colonnade().unwrap();
         let scene = scene.as_scene_ref();
         let center = scene.positions[0];
         let camera = Camera::looking_at("near", center + DVec3::new(3.0, 40.0, 5.0), center);

@@ -22,7 +22,6 @@ const KNOWN_CIRCLES: &[&str] = &[
     "graph",
     "process",
     "report",
-    "scene",
     "task",
 ];
 

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use drawloom::backend::{NullBackend, NullPass};
 use drawloom::command::{DrawList, Splitters};
+use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::{Blend, Projection, Scene, sample};
+use drawloom::scene::{Blend, Projection, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
 use drawloom_testing::scenes::field;
@@ -95,7 +96,7 @@ fn without_instancing_the_same_objects_are_drawn_each_by_itself() {
 
 #[test]
 fn the_projects_own_scene() {
-    assert_same_for_all(&sample::colonnade().unwrap());
+    assert_same_for_all(&demo::colonnade().unwrap());
 }
 
 #[test]

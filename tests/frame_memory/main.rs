@@ -19,9 +19,10 @@ use std::sync::Arc;
 
 use drawloom::Renderer;
 use drawloom::backend::{Encode, Record, WgpuBackend, WgpuSubmission};
+use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Scene, sample};
+use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom_testing::{adapter, scenes};
 
@@ -47,7 +48,7 @@ fn requests_for_memory_in_steady_frames() {
 
 fn count_requests() {
     let show = env::var_os("DRAWLOOM_SHOW_REQUESTS").is_some_and(|value| value == "1");
-    let scenes = [("colonnade", sample::colonnade().unwrap()), ("4 × 2,000 boxes", four_cameras())];
+    let scenes = [("colonnade", demo::colonnade().unwrap()), ("4 × 2,000 boxes", four_cameras())];
     for (name, scene) in &scenes {
         for workers in [1, 2] {
             let spells = steady_frames(scene, workers);

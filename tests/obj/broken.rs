@@ -2,6 +2,7 @@
 
 use std::io;
 
+use drawloom::demo;
 use drawloom::scene::obj;
 use libtest_mimic::Trial;
 use proptest::prelude::{Just, Strategy, any, prop_oneof};
@@ -78,7 +79,10 @@ fn read(file: &[u8], library: &[u8]) {
         _ => Err(io::ErrorKind::NotFound.into()),
     };
     match obj::read("a.obj", file, fetch) {
-        Ok(imported) => assert!(imported.triangles > 0 && imported.scene.cameras.len() == 1),
+        Ok(mut imported) => {
+            demo::add_camera_and_lights(&mut imported.scene);
+            assert!(imported.triangles > 0 && imported.scene.cameras.len() == 1);
+        }
         Err(error) => assert!(error.to_string().contains("a.obj")),
     }
 }

@@ -1,5 +1,6 @@
 //! Materials, textures and lights, of files written for one purpose each.
 
+use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::obj::{Imported, ObjWarning};
 use drawloom::scene::{Blend, Light, Material, Texture};
@@ -177,7 +178,9 @@ fn a_glowing_body_shines_everywhere() {
 }
 
 fn a_dark_scene_gets_lights() {
-    let imported = load(TRIANGLE);
+    let mut imported = load(TRIANGLE);
+    assert_eq!((imported.scene.lights.len(), imported.scene.cameras.len()), (0, 0));
+    demo::add_camera_and_lights(&mut imported.scene);
     let [
         Light::Directional { illuminance: key, .. },
         Light::Directional { illuminance: fill, .. },

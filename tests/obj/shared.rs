@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::obj::{self, Imported, ObjWarning};
 use drawloom::scene::{Blend, Light, Material, Scene};
@@ -109,7 +110,7 @@ fn every_malformed_file_has_an_outcome() {
 }
 
 fn cornell() {
-    let Imported { scene, warnings, triangles, degenerate_triangles } =
+    let Imported { mut scene, warnings, triangles, degenerate_triangles } =
         obj::load(scenes().join("cornell/CornellBox-Original.obj")).unwrap();
     assert_eq!((scene.object_count(), triangles, degenerate_triangles), (8, 36, 0));
     assert_eq!(warnings, []);
@@ -125,13 +126,14 @@ fn cornell() {
     assert!(intensity.abs_diff_eq(Vec3::new(3.0362, 2.1432, 0.7144), 1e-3), "{intensity}");
     assert!(range > 2.0, "{range}");
     // Its open side is +Z: the camera looks in from there, level and straight.
+    demo::add_camera_and_lights(&mut scene);
     let camera = &scene.cameras[0];
     assert!((camera.orientation * Vec3::NEG_Z).abs_diff_eq(Vec3::NEG_Z, 1e-4));
     assert!(camera.position.distance(DVec3::new(-0.01, 0.995, 3.5)) < 0.1, "{}", camera.position);
 }
 
 fn sponza() {
-    let Imported { scene, warnings, triangles, degenerate_triangles } =
+    let Imported { mut scene, warnings, triangles, degenerate_triangles } =
         obj::load(scenes().join("sponza/sponza_part.obj")).unwrap();
     assert_eq!(triangles + degenerate_triangles, 33_662);
     assert_eq!(scene.object_count(), 126);
@@ -147,6 +149,7 @@ fn sponza() {
     assert_eq!((missing, warnings.iter().filter(crossed).count(), warnings.len()), (10, 2, 14));
     assert!(warnings.iter().any(|warning| warning.to_string().contains("`textures/sponza_arch_diff.tga`")));
     // Inside, at eye height over the ground floor, looking down the nave.
+    demo::add_camera_and_lights(&mut scene);
     let camera = &scene.cameras[0];
     let forward = camera.orientation * Vec3::NEG_Z;
     assert!(forward.x.abs() > 0.9, "{forward}");

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use drawloom::demo;
 use drawloom::glam::Vec3;
-use drawloom::scene::{Light, Mesh, Scene, Vertex, obj, sample};
+use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
@@ -26,15 +27,22 @@ pub const CASES_OF_SHARED_SCENES: &[Case] = &[
 ];
 
 pub fn colonnade() -> Result<Scene, Failed> {
-    Ok(small(sample::colonnade()?))
+    Ok(small(demo::colonnade()?))
 }
 
 pub fn cornell() -> Result<Scene, Failed> {
-    Ok(small(obj::load(shared_scenes().join("cornell/CornellBox-Original.obj"))?.scene))
+    Ok(small(shared("cornell/CornellBox-Original.obj")?))
 }
 
 pub fn sponza() -> Result<Scene, Failed> {
-    Ok(small(obj::load(shared_scenes().join("sponza/sponza_part.obj"))?.scene))
+    Ok(small(shared("sponza/sponza_part.obj")?))
+}
+
+/// A shared scene with a camera and lights.
+pub fn shared(path: &str) -> Result<Scene, Failed> {
+    let mut scene = obj::load(shared_scenes().join(path))?.scene;
+    demo::add_camera_and_lights(&mut scene);
+    Ok(scene)
 }
 
 fn small(mut scene: Scene) -> Scene {
@@ -122,7 +130,8 @@ fn malformed_files() -> Result<(), Failed> {
         for entry in std::fs::read_dir(shared_scenes().join("malformed").join(folder))? {
             let path = entry?.path();
             let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-            let Some(imported) = is_obj.then(|| obj::load(&path).ok()).flatten() else { continue };
+            let Some(mut imported) = is_obj.then(|| obj::load(&path).ok()).flatten() else { continue };
+            demo::add_camera_and_lights(&mut imported.scene);
             let picture = draw(&small(imported.scene))?;
             let first = &picture.bytes[..4];
             let plain = picture.bytes.chunks_exact(4).all(|pixel| pixel == first);

@@ -4,18 +4,20 @@ use std::sync::Arc;
 
 use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
+use drawloom::demo;
 use drawloom::process::Deferred;
-use drawloom::scene::{Scene, obj, sample};
+use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
+use crate::Case;
+use crate::references::shared;
 use crate::studio::draw;
-use crate::{Case, shared_scenes};
 
 pub const CASES: &[Case] = &[
-    ("software_draws_the_projects_own_scene_as_wgpu_does", || judge(sample::colonnade()?)),
+    ("software_draws_the_projects_own_scene_as_wgpu_does", || judge(demo::colonnade()?)),
     ("software_draws_everything_as_wgpu_does", || judge(everything())),
     ("software_draws_a_field_of_boxes_as_wgpu_does", || judge(field(400))),
 ];
@@ -24,10 +26,6 @@ pub const CASES_OF_SHARED_SCENES: &[Case] = &[
     ("software_draws_cornell_as_wgpu_does", || judge(shared("cornell/CornellBox-Original.obj")?)),
     ("software_draws_sponza_as_wgpu_does", || judge(shared("sponza/sponza_part.obj")?)),
 ];
-
-fn shared(path: &str) -> Result<Scene, Failed> {
-    Ok(obj::load(shared_scenes().join(path))?.scene)
-}
 
 /// wgpu against the reference, and against the software backend in f32.
 fn judge(mut scene: Scene) -> Result<(), Failed> {

@@ -5,8 +5,8 @@ use std::io;
 use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
+use drawloom::demo;
 use drawloom::process::Deferred;
-use drawloom::scene::sample;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer};
 use serde_json::Value;
@@ -22,7 +22,7 @@ fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<Stri
     dispatcher::with_default(dispatch, || {
         let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
         let (mut renderer, submitter) = builder.granularity(Granularity::Chunk(16)).build(scheduler).unwrap();
-        let scene = sample::colonnade().unwrap();
+        let scene = demo::colonnade().unwrap();
         let timeline = Arc::clone(renderer.scheduler());
         timeline.timeline().start();
         for _frame in 0..2 {

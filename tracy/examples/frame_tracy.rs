@@ -9,8 +9,8 @@ use clap::Parser;
 use drawloom::{
     Renderer,
     backend::{Backend, WgpuBackend},
+    demo,
     process::{Deferred, Fxaa, ToneMapping},
-    scene::sample,
     task::Scheduler,
     wgpu,
 };
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("Rendering on {} with {} workers.", backend.adapter(), scheduler.workers());
     let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
-    let scene = sample::colonnade()?;
+    let scene = demo::colonnade()?;
 
     if !arguments.no_wait {
         wait_for_viewer()?;

@@ -3,9 +3,10 @@
 use std::error::Error;
 use std::rc::Rc;
 
+use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError, sample};
+use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::boxes::new_box;
 use drawloom_benches::table::Table;
@@ -30,7 +31,7 @@ pub struct Line {
 /// # Errors
 /// If a frame cannot be drawn.
 pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Line>, Box<dyn Error>> {
-    let mut colonnade = sample::colonnade()?;
+    let mut colonnade = demo::colonnade()?;
     for camera in &mut colonnade.cameras {
         camera.size = extent.picture;
     }

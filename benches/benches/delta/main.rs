@@ -20,8 +20,9 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
+use drawloom::demo;
 use drawloom::quality::Quality;
-use drawloom::scene::{obj, sample};
+use drawloom::scene::obj;
 use drawloom_benches::quick::Quick;
 use drawloom_benches::stopwatch::median;
 use drawloom_testing::draw_lists::draw_lists;
@@ -58,12 +59,13 @@ struct Case {
 
 fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
     let mut cases = vec![
-        Case { scene: "colonnade", lists: draw_lists(&sample::colonnade()?)? },
+        Case { scene: "colonnade", lists: draw_lists(&demo::colonnade()?)? },
         Case { scene: "scattered", lists: vec![scattered(10_000)] },
     ];
     let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/sponza/sponza_part.obj");
     if sponza.is_file() {
         let mut scene = obj::load(sponza)?.scene;
+        demo::add_camera_and_lights(&mut scene);
         scene.duplicate_objects(20);
         cases.push(Case { scene: "sponza x 20", lists: draw_lists(&scene)? });
     } else {

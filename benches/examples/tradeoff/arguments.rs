@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
-use drawloom::scene::{Scene, obj, sample};
+use drawloom::demo;
+use drawloom::scene::{Scene, obj};
 
 use crate::Failure;
 
@@ -81,11 +82,12 @@ impl Arguments {
     /// # Errors
     /// If the file cannot be read.
     pub fn load_scene(&self) -> Result<Scene, Failure> {
-        let Some(path) = &self.scene else { return Ok(sample::colonnade()?) };
-        let imported = obj::load(path)?;
+        let Some(path) = &self.scene else { return Ok(demo::colonnade()?) };
+        let mut imported = obj::load(path)?;
         for warning in &imported.warnings {
             eprintln!("warning: {warning}");
         }
+        demo::add_camera_and_lights(&mut imported.scene);
         Ok(imported.scene)
     }
 }

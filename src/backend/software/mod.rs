@@ -54,16 +54,24 @@ pub use submission::SoftwareSubmission;
 ///
 /// use drawloom::Renderer;
 /// use drawloom::backend::SoftwareBackend;
+/// use drawloom::glam::DVec3;
 /// use drawloom::process::Deferred;
-/// use drawloom::scene::sample;
+/// use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 /// use drawloom::task::Scheduler;
 ///
 /// let scheduler = Arc::new(Scheduler::new(2)?);
 /// let backend = SoftwareBackend::new(Arc::clone(&scheduler));
 /// let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
 ///
-/// let mut scene = sample::colonnade()?;
-/// scene.cameras[0].size = [96, 54];
+/// let mut scene = Scene::new();
+/// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+/// let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)];
+/// let mesh = scene.add(Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?)?;
+/// let material = scene.add(Material::default())?;
+/// scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+/// let camera = Camera::looking_at("main", DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO);
+/// scene.cameras.push(Camera { size: [96, 54], ..camera });
+///
 /// let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
 /// let picture = submitted.submission.read(0, "picture")?;
 /// assert_eq!(picture.bytes.len(), 96 * 54 * 4);

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::shape::Shape;
+use super::geometry::ModelGeometry;
 use crate::scene::Light;
 
 /// A mesh whose mean normal is at least this long is planar.
@@ -13,10 +13,10 @@ const PLANAR: f64 = 0.9;
 ///
 /// A planar mesh shines from its front with the intensity radiance × area on its axis. Any other one shines everywhere,
 /// with a quarter of that, which is what a convex body shows of its surface on average.
-pub(super) fn light(shape: &Shape, position: DVec3, radiance: Vec3, size: f64) -> Option<Light> {
+pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, size: f64) -> Option<Light> {
     let (mut area, mut facing, mut centroid) = (0.0, DVec3::ZERO, DVec3::ZERO);
-    for corners in shape.indices.as_chunks::<3>().0 {
-        let corners = corners.map(|index| shape.vertices[index as usize]);
+    for corners in geometry.indices.as_chunks::<3>().0 {
+        let corners = corners.map(|index| geometry.vertices[index as usize]);
         let [a, b, c] = corners.map(|corner| Vec3::from(corner.position).as_dvec3());
         let normal = corners.iter().map(|corner| Vec3::from(corner.normal).as_dvec3()).sum::<DVec3>();
         let product = (b - a).cross(c - a) / 2.0;

@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
-use super::ObjWarning;
-use super::tidy::statements;
+use super::error::ObjWarning;
+use super::preprocessing::statements;
 
 /// A material as its library defines it.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,24 +6,24 @@ use std::io::{self, Cursor};
 use glam::Vec3;
 use image::{ImageFormat, ImageReader, imageops};
 
-use super::ObjWarning;
+use super::error::ObjWarning;
 use super::library::{self, Definition};
-use super::tidy::Tidy;
+use super::preprocessing::Preprocessed;
 use crate::handle::Handle;
 use crate::scene::{Blend, Material, Scene, SceneError, Texture};
 
 /// This share of materials with opacity 0 is an exporter's mistake: 3ds Max writes transparency where opacity belongs.
 const INVERTED_SHARE: f64 = 0.8;
 
-/// The materials an OBJ file uses, in the order of [`Tidy::materials`], and last the default one.
+/// The materials an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default one.
 pub(super) fn add_materials(
     scene: &mut Scene,
-    tidy: &Tidy,
+    file: &Preprocessed,
     fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
     warnings: &mut Vec<ObjWarning>,
 ) -> Result<Vec<Handle<Material>>, SceneError> {
     let mut definitions = Vec::new();
-    for library in &tidy.libraries {
+    for library in &file.libraries {
         add_library(library, fetch, &mut definitions, warnings);
     }
     correct_opacity(&mut definitions, warnings);
@@ -32,7 +32,7 @@ pub(super) fn add_materials(
     let mut textures = Textures { fetch, known: HashMap::new() };
     let default = || Material { double_sided: true, ..Material::default() };
     let mut handles = Vec::new();
-    for name in &tidy.materials {
+    for name in &file.materials {
         let material = match defined.get(name.as_str()) {
             Some(definition) => textures.material(scene, definition, warnings)?,
             None => {

@@ -1,5 +1,7 @@
-use super::*;
-use crate::scene::{Blend, Bounds, Light, Texture, Topology, Vertex};
+use glam::{Quat, Vec3};
+
+use super::colonnade;
+use crate::scene::{Blend, Bounds, Light, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
 
 /// A mesh's triangles as they are wound, every second one of a strip turned around.
 fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
@@ -133,7 +135,8 @@ fn the_lamp_over_the_nave_stands_in_a_ring_of_what_throws_shadows() {
     let [lamp] = lamps.collect::<Vec<_>>()[..] else { panic!("one lamp hangs over the nave") };
     let around = of_mesh(&scene, "candlestick").map(|object| object.position - lamp.with_y(0.0)).collect::<Vec<_>>();
     for [x, z] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
-        let has_one = around.iter().any(|place| place.x * x > 0.5 && place.z * z > 0.5 && place.length() < lamp.y);
+        let has_one =
+            around.iter().any(|position| position.x * x > 0.5 && position.z * z > 0.5 && position.length() < lamp.y);
         assert!(has_one, "none stands towards {x}, {z}");
     }
     // None of the lamp is where it shines.

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 /// What tobj is given, and what it is not told.
 #[derive(Debug, Default)]
-pub(super) struct Tidy {
+pub(super) struct Preprocessed {
     /// What tobj reads. Materials are called by their index in `materials`. Every corner of a face has all three indices,
     /// and what it lacked refers to [`NOTHING`].
     pub text: String,
@@ -64,14 +64,14 @@ const ORIGIN_STEP: f64 = 4096.0;
 /// Farther than a frame draws. A vertex out there is a mistake that the others do not have to follow.
 const FARTHEST_ORIGIN: f64 = 1e10;
 
-impl Tidy {
+impl Preprocessed {
     pub(super) fn new(source: &str) -> Result<Self, BadLine> {
-        let mut tidy = Self { text: String::from(NOTHING), ..Self::default() };
+        let mut preprocessed = Self { text: String::from(NOTHING), ..Self::default() };
         for (line, statement) in statements(source) {
-            tidy.statement(&statement).map_err(|reason| BadLine { line, reason })?;
+            preprocessed.statement(&statement).map_err(|reason| BadLine { line, reason })?;
         }
-        tidy.place();
-        Ok(tidy)
+        preprocessed.write_positions();
+        Ok(preprocessed)
     }
 
     fn statement(&mut self, statement: &str) -> Result<(), String> {
@@ -137,7 +137,7 @@ impl Tidy {
 
     /// Writes the positions, before all else, relative to the first corner of a face: vertices that no face refers to may be
     /// anywhere.
-    fn place(&mut self) {
+    fn write_positions(&mut self) {
         let within = |position: &&DVec3| position.abs().cmple(DVec3::splat(FARTHEST_ORIGIN)).all();
         let anchor = self.first_corner.and_then(|corner| self.positions.get(corner)).filter(within);
         self.origin = anchor.map_or(DVec3::ZERO, |anchor| (*anchor / ORIGIN_STEP).trunc() * ORIGIN_STEP);
@@ -263,11 +263,11 @@ mod tests {
     fn a_scene_far_away_keeps_its_millimetres() {
         let stray_vertex = "v 999999999 0 0\n";
         let face = "v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\nf 2 3 2\n";
-        let tidy = Tidy::new(&format!("{stray_vertex}{face}")).unwrap();
-        assert_eq!(tidy.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
+        let preprocessed = Preprocessed::new(&format!("{stray_vertex}{face}")).unwrap();
+        assert_eq!(preprocessed.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
         let second: Vec<f32> =
-            tidy.text.lines().nth(2).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
-        assert!((f64::from(second[1]) + tidy.origin.y - 4_500_000.002).abs() < 5e-4);
+            preprocessed.text.lines().nth(2).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
+        assert!((f64::from(second[1]) + preprocessed.origin.y - 4_500_000.002).abs() < 5e-4);
     }
 
     #[test]

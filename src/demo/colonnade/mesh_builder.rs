@@ -1,4 +1,4 @@
-//! The shapes the scene is built of: flat faces, and profiles turned around an axis.
+//! Procedural meshes: flat faces and surfaces of revolution.
 
 use std::f32::consts::{PI, TAU};
 
@@ -7,30 +7,30 @@ use glam::{Vec2, Vec3};
 use crate::handle::Handle;
 use crate::scene::{Mesh, Scene, SceneError, Topology, Vertex};
 
-/// A mesh in the making: counter-clockwise triangles, seen from outside.
+/// A mesh while it is built. Its triangles are counter-clockwise seen from outside.
 #[derive(Default)]
-pub(super) struct Shape {
+pub(super) struct MeshBuilder {
     vertices: Vec<Vertex>,
     indices: Vec<u32>,
 }
 
-impl Shape {
+impl MeshBuilder {
     pub(super) fn add_to(self, scene: &mut Scene, name: &str) -> Result<Handle<Mesh>, SceneError> {
         scene.add(Mesh::new(name, Topology::TriangleList, self.vertices, self.indices)?)
     }
 
-    /// A face with its corners counter-clockwise; a picture on it has its lower left at the first corner.
+    /// Adds a quad with its corners counter-clockwise. The first corner is a texture's lower left.
     pub(super) fn quad(mut self, corners: [Vec3; 4]) -> Self {
         let normal = (corners[2] - corners[0]).cross(corners[3] - corners[1]).normalize();
-        let places = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
+        let uvs = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
         let first = self.vertices.len() as u32;
-        self.vertices.extend(corners.into_iter().zip(places).map(|(corner, uv)| vertex(corner, normal, uv)));
+        self.vertices.extend(corners.into_iter().zip(uvs).map(|(corner, uv)| vertex(corner, normal, uv)));
         self.indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
         self
     }
 
-    /// What stands upright on a footprint: corners (x, z) counter-clockwise seen from above, between two heights. Its
-    /// cover and bottom are cut into fans, so the footprint is convex.
+    /// Adds an upright prism between two heights. The corners (x, z) of the footprint are counter-clockwise seen from above.
+    /// Both ends are triangle fans, so the footprint must be convex.
     pub(super) fn prism(mut self, footprint: &[Vec2], bottom: f32, top: f32) -> Self {
         let at = |corner: Vec2, height: f32| Vec3::new(corner.x, height, corner.y);
         for (&from, &to) in footprint.iter().zip(footprint.iter().cycle().skip(1)) {
@@ -47,29 +47,29 @@ impl Shape {
         self
     }
 
-    /// A box between two corners.
-    pub(super) fn block(self, low: Vec3, high: Vec3) -> Self {
+    /// Adds a box between two corners.
+    pub(super) fn cuboid(self, low: Vec3, high: Vec3) -> Self {
         let footprint = [[low.x, low.z], [low.x, high.z], [high.x, high.z], [high.x, low.z]].map(Vec2::from);
         self.prism(&footprint, low.y, high.y)
     }
 
-    /// A profile (radius, height), from the bottom up, turned around the Y axis.
-    pub(super) fn turned(mut self, profile: &[Vec2], turning: &Turning) -> Self {
-        let pieces = profile.len() - 1;
-        for piece in 0..pieces {
-            let ends = [profile[piece], profile[piece + 1]];
-            // A smooth profile has, at each point, the direction from the one before to the one after.
-            let slope = |point: usize| profile[(point + 1).min(pieces)] - profile[point.saturating_sub(1)];
+    /// Adds the surface of revolution of a profile (radius, height), from the bottom up, around the Y axis.
+    pub(super) fn revolved(mut self, profile: &[Vec2], revolution: &Revolution) -> Self {
+        let bands = profile.len() - 1;
+        for band in 0..bands {
+            let ends = [profile[band], profile[band + 1]];
+            // At a point of a smooth profile, the direction from the previous to the next point.
+            let slope = |point: usize| profile[(point + 1).min(bands)] - profile[point.saturating_sub(1)];
             let slopes =
-                if turning.smooth { [slope(piece), slope(piece + 1)] } else { [ends[1] - ends[0], ends[1] - ends[0]] };
+                if revolution.smooth { [slope(band), slope(band + 1)] } else { [ends[1] - ends[0], ends[1] - ends[0]] };
             let first = self.vertices.len() as u32;
             for (end, slope) in ends.into_iter().zip(slopes) {
-                self.vertices.extend((0..=turning.steps).map(|step| turning.vertex(end, slope, step)));
+                self.vertices.extend((0..=revolution.segments).map(|step| revolution.vertex(end, slope, step)));
             }
-            let row = turning.steps as u32 + 1;
-            for step in 0..turning.steps as u32 {
+            let row = revolution.segments as u32 + 1;
+            for step in 0..revolution.segments as u32 {
                 let [here, next] = [first + step, first + step + 1];
-                // On the axis a face has three corners.
+                // A face that touches the axis is a triangle.
                 if ends[0].x > 0.0 {
                     self.indices.extend([here, next, next + row]);
                 }
@@ -81,8 +81,8 @@ impl Shape {
         self
     }
 
-    /// A wall `width` wide and `thickness` deep, centred on the Y axis, with a round arch of `radius` cut out of its
-    /// bottom, which lies at 0.
+    /// Adds a wall `width` wide and `thickness` deep, centred on the Y axis, with its bottom at 0 and a round arch of `radius`
+    /// cut out of it.
     pub(super) fn arch(mut self, width: f32, radius: f32, height: f32, thickness: f32) -> Self {
         const STEPS: usize = 20;
         let curve = (0..=STEPS).map(|step| {
@@ -107,24 +107,24 @@ impl Shape {
     }
 }
 
-/// How a profile is turned.
-pub(super) struct Turning {
-    /// Around the axis.
-    pub steps: usize,
-    /// Grooves around the axis, and their depth as a share of the radius.
+/// How a profile becomes a surface of revolution.
+pub(super) struct Revolution {
+    /// The number of segments around the axis.
+    pub segments: usize,
+    /// The number of grooves around the axis, and their depth relative to the radius.
     pub grooves: Option<(usize, f32)>,
-    /// Whether the profile is a curve, and not a row of edges.
+    /// Whether normals are smooth along the profile; otherwise each band is shaded flat.
     pub smooth: bool,
 }
 
-impl Turning {
-    pub(super) const EDGES: Self = Self { steps: 28, grooves: None, smooth: false };
-    pub(super) const CURVE: Self = Self { steps: 28, grooves: None, smooth: true };
+impl Revolution {
+    pub(super) const EDGES: Self = Self { segments: 28, grooves: None, smooth: false };
+    pub(super) const CURVE: Self = Self { segments: 28, grooves: None, smooth: true };
 
     fn vertex(&self, point: Vec2, slope: Vec2, step: usize) -> Vertex {
-        let share = step as f32 / self.steps as f32;
+        let share = step as f32 / self.segments as f32;
         let (sine, cosine) = (share * TAU).sin_cos();
-        // The radius shrinks by `depth` times a squared sine, and this is how it changes along the circle.
+        // The radius is scaled by 1 − depth · sin², and `change` is the derivative of that factor.
         let (shrunk, change) = self.grooves.map_or((1.0, 0.0), |(count, depth)| {
             let angle = share * PI * count as f32;
             (1.0 - depth * angle.sin().powi(2), -depth * count as f32 * angle.sin() * angle.cos())
@@ -136,7 +136,7 @@ impl Turning {
     }
 }
 
-/// Cloth that hangs from the X axis in folds, 1 wide and `length` long, as one triangle strip. It faces +Z.
+/// Cloth that hangs from the X axis in folds, 1 wide and `length` long, as one triangle strip facing +Z.
 pub(super) fn banner(length: f32) -> Result<Mesh, SceneError> {
     const ROWS: u32 = 32;
     let vertices = (0..=ROWS).flat_map(|row| {

@@ -2,12 +2,25 @@
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::scene_ref::transform_is_valid;
+use super::transform::transform_is_valid;
 use super::{Asset, Assets, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// A scene that owns its objects as one array a property, and their assets. Everything can be added, changed and removed
 /// between frames.
+///
+/// ```
+/// use drawloom::glam::DVec3;
+/// use drawloom::scene::{Material, Mesh, RenderObject, Scene, Topology, Vertex};
+///
+/// let mut scene = Scene::new();
+/// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+/// let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)];
+/// let mesh = scene.add(Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?)?;
+/// let material = scene.add(Material::default())?;
+/// scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+/// # Ok::<(), drawloom::scene::SceneError>(())
+/// ```
 #[derive(Debug, Default)]
 pub struct Scene {
     /// A view for each.

@@ -1,7 +1,8 @@
-use glam::Quat;
+use glam::{DVec3, Quat, Vec3};
 
-use super::*;
-use crate::scene::{Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex};
+use super::camera;
+use crate::demo::lights;
+use crate::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, Vertex};
 
 /// The sides of a cube from −1 to 1, as normal and two directions along the side.
 const SIDES: [[Vec3; 3]; 6] = [

@@ -9,7 +9,7 @@ use crate::scene::Vertex;
 
 /// What can be drawn of a model: triangles with an area, around their own centre, each vertex with a normal.
 #[derive(Debug, Default)]
-pub(super) struct Shape {
+pub(super) struct ModelGeometry {
     /// The centre of its box. Vertices are relative to it.
     pub center: DVec3,
     pub vertices: Vec<Vertex>,
@@ -22,29 +22,29 @@ pub(super) struct Shape {
 /// is nothing but rounding.
 const THINNEST: f64 = 1e-7;
 
-impl Shape {
+impl ModelGeometry {
     pub(super) fn new(mesh: &tobj::Mesh) -> Self {
-        let mut shape = Self::default();
+        let mut geometry = Self::default();
         let source = Source::new(mesh);
-        let triangles = shape.triangles(mesh, &source.positions);
+        let triangles = geometry.triangles(mesh, &source.positions);
         let points = triangles.iter().flat_map(|triangle| triangle.corners.map(|corner| source.positions[corner]));
         let (low, high) =
             points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
         if !triangles.is_empty() {
-            shape.center = (low + high) / 2.0;
+            geometry.center = (low + high) / 2.0;
         }
         // Vertices are shared where the file gives them a normal; where a face lends its own, they are not.
         let mut shared = HashMap::new();
         for Triangle { corners, normal } in triangles {
             for corner in corners {
                 let index = match source.normals[corner].try_normalize() {
-                    Some(given) => *shared.entry(corner).or_insert_with(|| shape.add_vertex(&source, corner, given)),
-                    None => shape.add_vertex(&source, corner, normal),
+                    Some(given) => *shared.entry(corner).or_insert_with(|| geometry.add_vertex(&source, corner, given)),
+                    None => geometry.add_vertex(&source, corner, normal),
                 };
-                shape.indices.push(index);
+                geometry.indices.push(index);
             }
         }
-        shape
+        geometry
     }
 
     /// Every triangle with an area; the others are counted.

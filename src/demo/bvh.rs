@@ -1,31 +1,30 @@
-//! The triangles of a scene, and what a ray meets first.
+//! A bounding volume hierarchy over the triangles of a scene, for ray casts.
 
 use glam::{DVec3, Vec3};
 
-use super::drawable_objects;
 use crate::scene::{Mesh, SceneRef, Topology};
 
-/// All triangles in a unit of their own: the centre of their box is the origin, and its corners are at distance 1. So
-/// scenes of every size and anywhere are alike, and 32 bits are enough.
-pub(super) struct Surfaces {
-    /// In the world, in metres.
+/// The triangles in normalised coordinates: the centre of their bounding box is the origin, and its corners are at distance
+/// 1. So f32 is precise enough for scenes of any size, anywhere.
+pub(super) struct Bvh {
+    /// The centre of the box in the world, in metres.
     pub center: DVec3,
     /// Half the box's diagonal, in metres.
     pub radius: f64,
-    /// Half the box's size, in units.
+    /// Half the box's size, normalised.
     pub half_size: Vec3,
     triangles: Vec<Triangle>,
-    /// A tree of boxes over `triangles`, the root first.
+    /// The root is first.
     nodes: Vec<Node>,
 }
 
-/// What a ray meets.
+/// The nearest intersection of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
-    /// In units.
+    /// Normalised.
     pub distance: f32,
-    /// Whether the surface faces where the ray comes from, by its normals.
-    pub faces: bool,
+    /// Whether the surface faces the ray's origin, by its normals.
+    pub front_facing: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -38,25 +37,26 @@ struct Triangle {
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// The triangles below it.
+    /// The first of its triangles.
     first: usize,
     count: usize,
-    /// Its second child; the first one follows it. None for a leaf.
+    /// The index of its second child; the first child follows the node. `None` for a leaf.
     second: Option<usize>,
 }
 
-const LEAF: usize = 6;
+/// The most triangles of a leaf.
+const MAX_LEAF_TRIANGLES: usize = 6;
 
-/// Beyond this many, every second, third ... is looked at, which is enough to see a room from an object.
-const MOST_TRIANGLES: usize = 2_000_000;
+/// Of more triangles only every second, third ... is kept, which is enough to tell an interior from an object.
+const MAX_TRIANGLES: usize = 2_000_000;
 
-impl Surfaces {
-    /// None if no triangle can be drawn.
+impl Bvh {
+    /// `None` if no triangle can be drawn.
     pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
         let with_mesh = |object: usize| scene.assets.get(scene.meshes[object]).ok().map(|mesh| (object, mesh));
-        let objects = || drawable_objects(scene).filter_map(with_mesh);
+        let objects = || scene.drawable_objects().filter_map(with_mesh);
         let total: usize = objects().map(|(_, mesh)| mesh.triangle_count()).sum();
-        let step = total.div_ceil(MOST_TRIANGLES).max(1);
+        let step = total.div_ceil(MAX_TRIANGLES).max(1);
         let world: Vec<_> = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step).collect();
         let points = world.iter().flat_map(|(corners, _)| corners);
         let (low, high) = points
@@ -70,12 +70,12 @@ impl Surfaces {
             Triangle { corner: a, edges: [b - a, c - a], normal }
         });
         let half_size = ((high - low) / (2.0 * radius)).as_vec3();
-        let mut surfaces = Self { center, radius, half_size, triangles: triangles.collect(), nodes: Vec::new() };
-        surfaces.build(0, surfaces.triangles.len());
-        Some(surfaces)
+        let mut bvh = Self { center, radius, half_size, triangles: triangles.collect(), nodes: Vec::new() };
+        bvh.build(0, bvh.triangles.len());
+        Some(bvh)
     }
 
-    /// What a ray meets first. `direction` is of unit length.
+    /// The nearest intersection of a ray. `direction` has unit length.
     pub(super) fn cast(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
         let inverse = direction.recip();
         let mut nearest = None;
@@ -83,7 +83,7 @@ impl Surfaces {
         let mut pending = vec![0];
         while let Some(index) = pending.pop() {
             let node = &self.nodes[index];
-            if !node.is_met(origin, inverse, limit) {
+            if !node.may_be_hit(origin, inverse, limit) {
                 continue;
             }
             if let Some(second) = node.second {
@@ -93,14 +93,14 @@ impl Surfaces {
             for triangle in &self.triangles[node.first..node.first + node.count] {
                 if let Some(distance) = triangle.distance(origin, direction).filter(|&distance| distance < limit) {
                     limit = distance;
-                    nearest = Some(Hit { distance, faces: triangle.normal.dot(direction) < 0.0 });
+                    nearest = Some(Hit { distance, front_facing: triangle.normal.dot(direction) < 0.0 });
                 }
             }
         }
         nearest
     }
 
-    /// Adds the node over `count` triangles from `first` on, and those below it: halves along the longest side.
+    /// Adds the node over `count` triangles from `first` on and its descendants: a median split along the longest axis.
     fn build(&mut self, first: usize, count: usize) {
         let triangles = &mut self.triangles[first..first + count];
         let corners = triangles.iter().flat_map(Triangle::corners);
@@ -108,12 +108,12 @@ impl Surfaces {
             corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
         let index = self.nodes.len();
         self.nodes.push(Node { low, high, first, count, second: None });
-        if count <= LEAF {
+        if count <= MAX_LEAF_TRIANGLES {
             return;
         }
         let axis = (high - low).max_position();
         let half = count / 2;
-        triangles.select_nth_unstable_by(half, |one, other| one.middle()[axis].total_cmp(&other.middle()[axis]));
+        triangles.select_nth_unstable_by(half, |one, other| one.centroid()[axis].total_cmp(&other.centroid()[axis]));
         self.build(first, half);
         self.nodes[index].second = Some(self.nodes.len());
         self.build(first + half, count - half);
@@ -121,11 +121,11 @@ impl Surfaces {
 }
 
 impl Node {
-    fn is_met(&self, origin: Vec3, inverse: Vec3, limit: f32) -> bool {
+    fn may_be_hit(&self, origin: Vec3, inverse: Vec3, limit: f32) -> bool {
         let (one, other) = ((self.low - origin) * inverse, (self.high - origin) * inverse);
         let enter = one.min(other).max_element().max(0.0);
         let leave = one.max(other).min_element();
-        // A ray within the plane of a side gives NaN, which counts as met: a box too many costs time only.
+        // A ray in the plane of a side gives NaN, which counts as a hit: a false positive only costs time.
         !(enter > leave * 1.00001 || enter > limit)
     }
 }
@@ -135,11 +135,11 @@ impl Triangle {
         [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
     }
 
-    fn middle(&self) -> Vec3 {
+    fn centroid(&self) -> Vec3 {
         self.corner + (self.edges[0] + self.edges[1]) / 3.0
     }
 
-    /// Möller and Trumbore's intersection, from both sides.
+    /// Möller–Trumbore intersection, without backface culling.
     fn distance(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let across = direction.cross(self.edges[1]);
         let inverse = self.edges[0].dot(across).recip();
@@ -148,12 +148,12 @@ impl Triangle {
         let turned = offset.cross(self.edges[0]);
         let v = direction.dot(turned) * inverse;
         let distance = self.edges[1].dot(turned) * inverse;
-        // A ray along the triangle's plane divides by 0, and no comparison holds then.
+        // A ray parallel to the triangle divides by 0; every comparison is then false.
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 1e-6).then_some(distance)
     }
 }
 
-/// The finite triangles of an object, with the way their vertices' normals point.
+/// The finite triangles of an object in the world, each with the sum of its vertex normals.
 fn in_world<'a>(
     scene: SceneRef<'a>,
     object: usize,
@@ -179,20 +179,20 @@ fn in_world<'a>(
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::scene::sample;
+    use crate::demo::colonnade;
 
     #[test]
-    fn the_tree_finds_what_a_look_at_every_triangle_finds() {
-        let scene = sample::colonnade().unwrap();
-        let surfaces = Surfaces::new(scene.as_scene_ref()).unwrap();
+    fn a_ray_cast_equals_a_brute_force_search() {
+        let scene = colonnade().unwrap();
+        let bvh = Bvh::new(scene.as_scene_ref()).unwrap();
         let mut hits = 0;
         for number in 0..200 {
             let turn = number as f32;
             let origin = Vec3::new((turn * 0.7).sin() * 0.5, (turn * 0.3).cos() * 0.1, (turn * 1.3).sin() * 0.5);
             let direction = Vec3::new((turn * 2.1).sin(), (turn * 0.9).sin(), (turn * 1.7).cos()).normalize();
-            let distances = surfaces.triangles.iter().filter_map(|triangle| triangle.distance(origin, direction));
+            let distances = bvh.triangles.iter().filter_map(|triangle| triangle.distance(origin, direction));
             let expected = distances.min_by(f32::total_cmp);
-            assert_eq!(surfaces.cast(origin, direction).map(|hit| hit.distance), expected, "{number}");
+            assert_eq!(bvh.cast(origin, direction).map(|hit| hit.distance), expected, "{number}");
             hits += usize::from(expected.is_some());
         }
         assert!((50..200).contains(&hits), "{hits}");

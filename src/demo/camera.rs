@@ -1,0 +1,39 @@
+//! A camera that shows any scene.
+
+use glam::{DVec3, Vec3};
+
+use super::bvh::Bvh;
+use super::viewpoint;
+use crate::scene::{Camera, Projection, SceneRef};
+
+/// A camera called `main` that shows the scene, whose size may be 1 µm to 10,000 km, at any distance from the world's origin.
+///
+/// Rays classify the scene. If its bvh face points inside and not points outside, it is an interior: the camera stands
+/// in it at eye height, looking along the longest free line of sight, or looks in through a missing wall. Otherwise it is an
+/// object, shown from outside and slightly above. The scene is upright along +Y. The near plane is at a thousandth of the
+/// scene's radius.
+///
+/// If nothing in the scene can be drawn, or its slices differ in length, the camera looks at the world's origin.
+///
+/// ```
+/// use drawloom::demo;
+///
+/// let mut scene = demo::colonnade()?;
+/// scene.cameras = vec![demo::camera(scene.as_scene_ref())];
+/// # Ok::<(), drawloom::scene::SceneError>(())
+/// ```
+pub fn camera(scene: SceneRef<'_>) -> Camera {
+    let Some(bvh) = Bvh::new(scene) else {
+        return Camera::looking_at("main", DVec3::new(2.0, 1.5, 3.0), DVec3::ZERO);
+    };
+    let view = viewpoint::choose(&bvh);
+    let in_world = |point: Vec3| bvh.center + point.as_dvec3() * bvh.radius;
+    Camera {
+        projection: Projection::Perspective { field_of_view: view.field_of_view },
+        near: ((bvh.radius * 1e-3) as f32).max(f32::MIN_POSITIVE),
+        ..Camera::looking_at("main", in_world(view.eye), in_world(view.target))
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests;

@@ -1,0 +1,51 @@
+//! Lights that make any scene visible.
+
+use glam::{DVec3, Vec3};
+
+use super::camera::camera;
+use crate::scene::{Camera, Light, Scene, SceneRef};
+
+/// Weak, cool ambient light.
+pub const AMBIENT: Vec3 = Vec3::new(0.10, 0.11, 0.13);
+
+/// A dark bluish background.
+pub const BACKGROUND: Vec3 = Vec3::new(0.015, 0.02, 0.035);
+
+/// Prepares a scene of objects, such as one from an OBJ file, for drawing: adds [`camera`], adds [`lights`] if the scene has
+/// none, and sets [`AMBIENT`] and [`BACKGROUND`].
+pub fn add_camera_and_lights(scene: &mut Scene) {
+    let camera = camera(scene.as_scene_ref());
+    if scene.lights.is_empty() {
+        let lights = lights(scene.as_scene_ref(), &camera);
+        scene.lights.extend(lights);
+    }
+    scene.cameras.push(camera);
+    scene.ambient = AMBIENT;
+    scene.background = BACKGROUND;
+}
+
+/// A warm key light from the camera's upper left, a cool fill light from its right, and a point light above it. The
+/// intensity and range of the point light follow from the scene's size.
+pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
+    let (_, radius) = scene.bounding_sphere();
+    let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| camera.orientation * axis);
+    let lamp = (up * 0.25 - right * 0.2 - back * 0.3).as_dvec3() * radius;
+    let intensity = (Vec3::new(1.0, 0.85, 0.65).as_dvec3() * (0.6 * radius * radius)).min(DVec3::splat(1e30)).as_vec3();
+    [
+        Light::Directional {
+            direction: (right * 0.5 - up * 0.75 - back * 0.6).normalize(),
+            illuminance: Vec3::new(2.2, 1.9, 1.5),
+            casts_shadow: false,
+        },
+        Light::Directional {
+            direction: (-right * 0.8 - up * 0.2 - back * 0.5).normalize(),
+            illuminance: Vec3::new(0.3, 0.45, 0.8),
+            casts_shadow: false,
+        },
+        Light::Point {
+            position: camera.position + lamp,
+            intensity,
+            range: Light::range_for(intensity).max(f32::MIN_POSITIVE),
+        },
+    ]
+}
