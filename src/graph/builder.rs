@@ -1,4 +1,4 @@
-//! The graph as an engine builds it.
+//! The graph while an engine builds it.
 
 use std::{
     collections::{HashMap, VecDeque},
@@ -10,34 +10,34 @@ use crate::timeline::Labels;
 
 use super::error::GraphProblem;
 
-/// Nodes, the resources they read and write, and the order that follows.
+/// Nodes, the resources they read and write, and the order that follows from that.
 ///
-/// `P` is what a node carries: anything for a graph that is only put in order, a [`Node`](super::Node) for one that runs.
+/// `P` is a node's payload: anything in a graph that is only put in order, a [`Node`](super::Node) in a graph that is run.
 ///
-/// # Who comes before whom
+/// # Order
 ///
-/// A node can *write* a resource, *modify* it (read and write it) or *read* it. Of each resource, the writers come
-/// first, then the modifiers, then the readers, and each of them waits for all it needs:
+/// A node *writes*, *modifies* (reads and writes) or *reads* a resource. The writers of a resource come first, then its
+/// modifiers, then its readers:
 ///
-/// - every modifier for every writer,
-/// - every reader for every writer and every modifier.
+/// - every modifier waits for every writer,
+/// - every reader waits for every writer and every modifier.
 ///
-/// Two writers, or two modifiers, have no order of their own: something else must order them, [`order`](Self::order) for
-/// one, or the graph does not compile.
+/// Two writers, or two modifiers, of a resource have no order by themselves. Something else must order them, such as
+/// [`order`](Self::order), or the graph does not compile.
 ///
-/// A reader or modifier that [`order`](Self::order) puts before a writer, directly or through others, keeps that order and
-/// sees the earlier version. A reader that is put before a writer is before the modifiers of what that writer
-/// makes, too.
+/// If [`order`](Self::order) puts a reader or modifier before a writer, directly or through other nodes, it stays there and
+/// sees the earlier version of the resource. A reader that is put before a writer also comes before the modifiers of that
+/// writer's version.
 ///
-/// # What is kept
+/// # Dropped nodes
 ///
-/// The frame is for its outputs: a node is kept if an output, or a node that is [kept](Self::keep) whatever it
-/// writes, needs what it writes, directly or through others. All that must be waited for is needed, and so is, for a
-/// modifier, what the last modifiers before it left. Without an output and without a kept node all are dropped;
-/// [`Schedule::dropped`](super::Schedule::dropped) names those that were.
+/// A node is kept if an output of the graph depends on it, directly or through other nodes, or if a node depends on it that was
+/// [kept](Self::keep) explicitly. A modifier also depends on the version it modifies, so the modifiers before it are kept
+/// with it. All other nodes are dropped, and [`Schedule::dropped`](super::Schedule::dropped) names them; a graph without
+/// an output and without a kept node drops all its nodes.
 ///
-/// What [`order`](Self::order) says puts nodes in order but keeps none. A dropped node still hands on the order: if
-/// `a` comes before it, and it before `b`, then `a` comes before `b`.
+/// [`order`](Self::order) keeps no node. It does work through dropped nodes: if `a` comes before `b`, and `b` before `c`, then
+/// `a` comes before `c` even if `b` is dropped.
 ///
 /// ```
 /// use drawloom::graph::FrameGraph;
@@ -46,12 +46,12 @@ use super::error::GraphProblem;
 /// let [depth, image] = ["depth", "image"].map(|name| graph.resource(name));
 /// graph.output(image);
 ///
-/// let light = graph.add("light", "what a node carries");
+/// let light = graph.add("light", "the payload of a node");
 /// graph.read(light, depth);
 /// graph.write(light, image);
 /// let geometry = graph.add("geometry", "can be anything");
 /// graph.write(geometry, depth);
-/// graph.add("overlay", "and this one leads to no output");
+/// graph.add("overlay", "this node leads to no output");
 ///
 /// let schedule = graph.compile()?;
 /// let order: Vec<&str> = schedule.nodes().map(|(name, _)| name).collect();
@@ -60,24 +60,24 @@ use super::error::GraphProblem;
 /// # Ok::<(), drawloom::graph::CompileError<&str>>(())
 /// ```
 pub struct FrameGraph<P> {
-    /// Tells this graph's ids from those of all others.
+    /// Distinguishes this graph's ids from those of all others.
     identity: usize,
     nodes_added: usize,
     pub(super) nodes: Vec<NodeEntry<P>>,
     pub(super) resources: Vec<Resource>,
     resource_by_name: HashMap<String, usize>,
     pub(super) accesses: Vec<Access>,
-    /// Pairs of positions in `nodes`: the first comes before the second.
+    /// Pairs of indices into `nodes`: the first comes before the second.
     pub(super) orders: Vec<(usize, usize)>,
-    /// Calls that were given an id that means nothing here, oldest first.
-    pub(super) misuses: VecDeque<GraphProblem>,
+    /// Calls with ids that do not belong to this graph, oldest first.
+    pub(super) invalid_calls: VecDeque<GraphProblem>,
 }
 
 /// A node of one [`FrameGraph`], and of the [`Schedule`](super::Schedule) it compiles to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct NodeId {
     pub(super) graph: usize,
-    /// How many nodes had been added to the graph before it.
+    /// How many nodes were added to the graph before this one.
     pub(super) serial: usize,
 }
 
@@ -102,7 +102,7 @@ pub(super) struct Resource {
     pub(super) output: bool,
 }
 
-/// One call of `read` or `write`, by positions in `nodes` and `resources`.
+/// One call of `read` or `write`, by indices into `nodes` and `resources`.
 #[derive(Clone, Copy)]
 pub(super) struct Access {
     pub(super) resource: usize,
@@ -113,10 +113,10 @@ pub(super) struct Access {
 impl<P> FrameGraph<P> {
     /// An empty graph.
     pub fn new() -> Self {
-        // No loom atomic: those cannot stand in a static, and nothing is handed over here.
+        // Not a loom atomic: those cannot be statics, and this one hands nothing over.
         static GRAPHS: AtomicUsize = AtomicUsize::new(0);
         Self {
-            // Relaxed: only that no two graphs get one number matters.
+            // Relaxed: the numbers only have to be unique.
             identity: GRAPHS.fetch_add(1, Ordering::Relaxed),
             nodes_added: 0,
             nodes: Vec::new(),
@@ -124,11 +124,11 @@ impl<P> FrameGraph<P> {
             resource_by_name: HashMap::new(),
             accesses: Vec::new(),
             orders: Vec::new(),
-            misuses: VecDeque::new(),
+            invalid_calls: VecDeque::new(),
         }
     }
 
-    /// The resource of that name, which is made by naming it.
+    /// The resource of that name. The first call with a name creates the resource.
     pub fn resource(&mut self, name: impl Into<String>) -> ResourceId {
         let name = name.into();
         let index = *self.resource_by_name.entry(name).or_insert_with_key(|name| {
@@ -138,35 +138,35 @@ impl<P> FrameGraph<P> {
         ResourceId { graph: self.identity, index }
     }
 
-    /// Says that the resource comes from outside: it is there before the frame starts and needs no writer.
+    /// Marks the resource as imported: it exists before the frame starts, and needs no writer.
     pub fn import(&mut self, resource: ResourceId) {
-        match self.resource_position(resource) {
-            Some(position) => self.resources[position].imported = true,
-            None => self.misuses.push_back(GraphProblem::UnknownResource { call: "import(?)".to_owned() }),
+        match self.resource_index(resource) {
+            Some(index) => self.resources[index].imported = true,
+            None => self.invalid_calls.push_back(GraphProblem::UnknownResource { call: "import(?)".to_owned() }),
         }
     }
 
-    /// Says that the resource is what the frame is for.
+    /// Marks the resource as an output of the frame.
     pub fn output(&mut self, resource: ResourceId) {
-        match self.resource_position(resource) {
-            Some(position) => self.resources[position].output = true,
-            None => self.misuses.push_back(GraphProblem::UnknownResource { call: "output(?)".to_owned() }),
+        match self.resource_index(resource) {
+            Some(index) => self.resources[index].output = true,
+            None => self.invalid_calls.push_back(GraphProblem::UnknownResource { call: "output(?)".to_owned() }),
         }
     }
 
-    /// Adds a node. No two nodes of a graph that compiles have one name.
-    pub fn add(&mut self, name: impl Into<String>, node: P) -> NodeId {
+    /// Adds a node. The graph only compiles if each node's name is unique.
+    pub fn add(&mut self, name: impl Into<String>, payload: P) -> NodeId {
         let id = NodeId { graph: self.identity, serial: self.nodes_added };
         self.nodes_added += 1;
         let labels = Labels::default();
-        self.nodes.push(NodeEntry { name: name.into(), labels, id, kept: false, payload: node });
+        self.nodes.push(NodeEntry { name: name.into(), labels, id, kept: false, payload });
         id
     }
 
-    /// Takes a node out, with all that was said about it, and gives it back: `None` if it is not there.
+    /// Removes a node with its accesses, orders and labels, and returns its payload. `None` if the graph does not contain it.
     pub fn remove(&mut self, node: NodeId) -> Option<P> {
-        let removed = self.node_position(node)?;
-        let moved = |position: usize| position - usize::from(position > removed);
+        let removed = self.node_index(node)?;
+        let moved = |index: usize| index - usize::from(index > removed);
         self.accesses.retain(|access| access.node != removed);
         for access in &mut self.accesses {
             access.node = moved(access.node);
@@ -178,51 +178,51 @@ impl<P> FrameGraph<P> {
         Some(self.nodes.remove(removed).payload)
     }
 
-    /// Says that the node reads the resource.
+    /// Declares that the node reads the resource.
     pub fn read(&mut self, node: NodeId, resource: ResourceId) {
         self.access("read", node, resource, false);
     }
 
-    /// Says that the node writes the resource. One that also reads it modifies it in place.
+    /// Declares that the node writes the resource. A node that also reads it modifies it in place.
     pub fn write(&mut self, node: NodeId, resource: ResourceId) {
         self.access("write", node, resource, true);
     }
 
-    /// Says that one node runs before another, whatever they read and write. It keeps neither.
+    /// Makes one node run before another, whatever they read and write. This does not keep either of them.
     pub fn order(&mut self, before: NodeId, after: NodeId) {
-        match (self.node_position(before), self.node_position(after)) {
+        match (self.node_index(before), self.node_index(after)) {
             (Some(before), Some(after)) => self.orders.push((before, after)),
             (before, after) => {
                 let call = format!("order({}, {})", self.node_text(before), self.node_text(after));
-                self.misuses.push_back(GraphProblem::UnknownNode { call });
+                self.invalid_calls.push_back(GraphProblem::UnknownNode { call });
             }
         }
     }
 
-    /// Keeps the node whatever it writes, for what it does besides.
+    /// Keeps the node even if no output depends on it, because of its side effects.
     pub fn keep(&mut self, node: NodeId) {
-        match self.node_position(node) {
-            Some(position) => self.nodes[position].kept = true,
-            None => self.misuses.push_back(GraphProblem::UnknownNode { call: "keep(?)".to_owned() }),
+        match self.node_index(node) {
+            Some(index) => self.nodes[index].kept = true,
+            None => self.invalid_calls.push_back(GraphProblem::UnknownNode { call: "keep(?)".to_owned() }),
         }
     }
 
-    /// Says what the node is a part of, for [timelines](crate::timeline) and spans.
+    /// Labels the node with what it is a part of, for [timelines](crate::timeline) and spans.
     pub fn label(&mut self, node: NodeId, labels: Labels) {
-        match self.node_position(node) {
-            Some(position) => self.nodes[position].labels = labels,
-            None => self.misuses.push_back(GraphProblem::UnknownNode { call: "label(?)".to_owned() }),
+        match self.node_index(node) {
+            Some(index) => self.nodes[index].labels = labels,
+            None => self.invalid_calls.push_back(GraphProblem::UnknownNode { call: "label(?)".to_owned() }),
         }
     }
 
     fn access(&mut self, call: &str, node: NodeId, resource: ResourceId, writes: bool) {
-        match (self.node_position(node), self.resource_position(resource)) {
+        match (self.node_index(node), self.resource_index(resource)) {
             (Some(node), Some(resource)) => self.accesses.push(Access { resource, node, writes }),
             (node, resource) => {
                 let resource_text =
-                    resource.map_or_else(|| "?".to_owned(), |position| format!("{:?}", self.resources[position].name));
+                    resource.map_or_else(|| "?".to_owned(), |index| format!("{:?}", self.resources[index].name));
                 let text = format!("{call}({}, {resource_text})", self.node_text(node));
-                self.misuses.push_back(match node {
+                self.invalid_calls.push_back(match node {
                     None => GraphProblem::UnknownNode { call: text },
                     Some(_) => GraphProblem::UnknownResource { call: text },
                 });
@@ -230,19 +230,19 @@ impl<P> FrameGraph<P> {
         }
     }
 
-    fn node_position(&self, node: NodeId) -> Option<usize> {
+    fn node_index(&self, node: NodeId) -> Option<usize> {
         if node.graph != self.identity {
             return None;
         }
         self.nodes.binary_search_by_key(&node.serial, |node| node.id.serial).ok()
     }
 
-    fn resource_position(&self, resource: ResourceId) -> Option<usize> {
+    fn resource_index(&self, resource: ResourceId) -> Option<usize> {
         (resource.graph == self.identity).then_some(resource.index)
     }
 
-    fn node_text(&self, position: Option<usize>) -> String {
-        position.map_or_else(|| "?".to_owned(), |position| format!("{:?}", self.nodes[position].name))
+    fn node_text(&self, index: Option<usize>) -> String {
+        index.map_or_else(|| "?".to_owned(), |index| format!("{:?}", self.nodes[index].name))
     }
 }
 

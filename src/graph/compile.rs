@@ -1,73 +1,95 @@
-//! From a graph to its schedule: order it, see what is needed, check that, and lay it out flat.
+//! Compiles a graph to a schedule: orders the nodes, drops the unneeded ones, checks the rest, and flattens it.
 
-use std::collections::{HashMap, HashSet};
+use std::{
+    collections::{HashMap, HashSet},
+    fmt,
+};
 
 use petgraph::{
     Direction,
     graph::{DiGraph, NodeIndex},
     visit::EdgeRef,
 };
+use thiserror::Error;
 
 use super::{
+    adjacency::{Adjacency, RankedAdjacency},
     builder::FrameGraph,
-    costs::Costs,
+    costs::NodeCosts,
     edges::{self, Edges, Relation, Roles},
-    error::{CompileError, GraphProblem},
-    flow::Flow,
-    order::{Walk, circle, in_order, places},
+    error::GraphProblem,
+    execution_policy::ExecutionPolicy,
+    order::{find_cycle, ranks, topological_order},
     progress::Progress,
-    schedule::{Adjacency, Schedule},
-    sharing::Sharing,
+    schedule::Schedule,
+    traversal::Traversal,
 };
+
+/// A graph that does not compile, and why.
+#[derive(Error)]
+#[error("{problem}")]
+#[non_exhaustive]
+pub struct CompileError<P> {
+    /// The unchanged graph, so that it can be corrected and compiled again.
+    pub graph: Box<FrameGraph<P>>,
+    /// The first problem, in the order of [`GraphProblem`]'s variants.
+    pub problem: GraphProblem,
+}
+
+impl<P> fmt::Debug for CompileError<P> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("CompileError").field("problem", &self.problem).field("graph", &self.graph).finish()
+    }
+}
 
 impl<P> FrameGraph<P> {
     /// Orders the nodes, drops those that lead to no output, and checks the rest.
     ///
     /// # Errors
     ///
-    /// [`CompileError`], with the graph and the first [`GraphProblem`] in the order its variants are declared in. Names and
-    /// cycles are looked at in the whole graph; a missing producer and writers without an order only matter where
-    /// the nodes they belong to are kept.
+    /// Returns [`CompileError`] with the graph and its first [`GraphProblem`], in the order of the variants. Names and cycles are
+    /// checked in the whole graph. A missing producer and unordered writers are only reported if the nodes concerned are
+    /// kept.
     pub fn compile(mut self) -> Result<Schedule<P>, CompileError<P>> {
         match plan(&mut self) {
-            Ok(plan) => Ok(lay_out(self, &plan)),
+            Ok(plan) => Ok(flatten(self, &plan)),
             Err(problem) => Err(CompileError { graph: Box::new(self), problem }),
         }
     }
 }
 
-/// What a graph compiles to, before it is laid out: all by positions in the graph.
+/// What [`flatten`] makes the schedule from, by indices of the graph's nodes.
 struct Plan {
     needed: Vec<bool>,
-    /// The needed nodes in the order they run in.
+    /// The needed nodes in execution order.
     order: Vec<usize>,
     /// Per node, the needed nodes it waits for.
     dependencies: Vec<Vec<usize>>,
 }
 
 fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
-    if let Some(misuse) = graph.misuses.pop_front() {
-        return Err(misuse);
+    if let Some(problem) = graph.invalid_calls.pop_front() {
+        return Err(problem);
     }
     let graph = &*graph;
     check_names(graph)?;
     let roles = Roles::of_all(graph);
     let mut edges = edges::derive(graph, &roles);
-    let order = in_order(&edges, graph.nodes.len());
+    let order = topological_order(&edges, graph.nodes.len());
     if order.len() < edges.node_count() {
-        let circle = circle(&edges, graph.nodes.len(), &order);
-        let nodes = circle.into_iter().map(|node| name(graph, node)).collect();
+        let cycle = find_cycle(&edges, graph.nodes.len(), &order);
+        let nodes = cycle.into_iter().map(|vertex| name(graph, vertex)).collect();
         return Err(GraphProblem::Cycle { nodes });
     }
-    let place = places(order.len(), &order);
-    edges::add_versions(&mut edges, &roles, &place);
+    let rank = ranks(order.len(), &order);
+    edges::add_versions(&mut edges, &roles, &rank);
     let needed = edges::needed(graph, &roles, &edges);
-    let facts = Facts { graph, roles: &roles, edges: &edges, needed: &needed, place: &place };
-    facts.check_producers()?;
-    facts.check_writers()?;
-    let dependencies = facts.dependencies();
+    let analysis = Analysis { graph, roles: &roles, edges: &edges, needed: &needed, rank: &rank };
+    analysis.check_producers()?;
+    analysis.check_writers()?;
+    let dependencies = analysis.dependencies();
 
-    // Ordered anew, so that what was dropped has no say in how ties are broken.
+    // Ordered again without the dropped nodes, so that they do not influence how ties are broken.
     let mut remaining = DiGraph::<(), ()>::with_capacity(needed.len(), 0);
     for _ in &needed {
         remaining.add_node(());
@@ -77,13 +99,16 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
             remaining.add_edge(NodeIndex::new(dependency), NodeIndex::new(node), ());
         }
     }
-    let order =
-        in_order(&remaining, needed.len()).into_iter().map(NodeIndex::index).filter(|&node| needed[node]).collect();
+    let order = topological_order(&remaining, needed.len())
+        .into_iter()
+        .map(NodeIndex::index)
+        .filter(|&node| needed[node])
+        .collect();
     Ok(Plan { needed, order, dependencies })
 }
 
-fn name<P>(graph: &FrameGraph<P>, node: NodeIndex) -> String {
-    graph.nodes[node.index()].name.clone()
+fn name<P>(graph: &FrameGraph<P>, vertex: NodeIndex) -> String {
+    graph.nodes[vertex.index()].name.clone()
 }
 
 fn check_names<P>(graph: &FrameGraph<P>) -> Result<(), GraphProblem> {
@@ -94,24 +119,24 @@ fn check_names<P>(graph: &FrameGraph<P>) -> Result<(), GraphProblem> {
     }
 }
 
-/// What is known of a graph that can be put in order.
-struct Facts<'a, P> {
+/// An acyclic graph with its edges and order.
+struct Analysis<'a, P> {
     graph: &'a FrameGraph<P>,
     roles: &'a [Roles],
     edges: &'a Edges,
     needed: &'a [bool],
-    /// Per node, its place in the order of all, dropped ones included.
-    place: &'a [usize],
+    /// Per vertex, its index in the topological order, which includes dropped nodes.
+    rank: &'a [usize],
 }
 
-impl<P> Facts<'_, P> {
-    /// Whether it is a node that is needed. A junction is none.
-    fn is_needed(&self, node: NodeIndex) -> bool {
-        self.needed.get(node.index()).is_some_and(|&needed| needed)
+impl<P> Analysis<'_, P> {
+    /// Whether the vertex is a needed node. A junction is not a node.
+    fn is_needed(&self, vertex: NodeIndex) -> bool {
+        self.needed.get(vertex.index()).is_some_and(|&needed| needed)
     }
 
-    fn place(&self, node: NodeIndex) -> usize {
-        self.place[node.index()]
+    fn rank(&self, vertex: NodeIndex) -> usize {
+        self.rank[vertex.index()]
     }
 
     fn check_producers(&self) -> Result<(), GraphProblem> {
@@ -119,8 +144,8 @@ impl<P> Facts<'_, P> {
             if resource.imported {
                 continue;
             }
-            let has_producer = |node: NodeIndex| {
-                let mut incoming = self.edges.edges_directed(node, Direction::Incoming);
+            let has_producer = |vertex: NodeIndex| {
+                let mut incoming = self.edges.edges_directed(vertex, Direction::Incoming);
                 incoming.any(|edge| *edge.weight() == Relation::Data(index))
             };
             let readers = roles.modifiers.iter().chain(&roles.readers);
@@ -139,16 +164,16 @@ impl<P> Facts<'_, P> {
         Ok(())
     }
 
-    /// All makers of a resource have an order if each, in the order of all nodes, leads to the next.
+    /// The makers of a resource are ordered if each of them, by rank, has a path to the next.
     fn check_writers(&self) -> Result<(), GraphProblem> {
-        let mut walk = Walk::new();
+        let mut traversal = Traversal::new();
         for (resource, roles) in self.graph.resources.iter().zip(self.roles) {
             let mut makers: Vec<NodeIndex> = roles.makers().filter(|&maker| self.is_needed(maker)).collect();
-            makers.sort_unstable_by_key(|&maker| self.place(maker));
+            makers.sort_unstable_by_key(|&maker| self.rank(maker));
             for pair in makers.windows(2) {
-                let end = self.place(pair[1]);
-                walk.from(self.edges, &[pair[0]], Direction::Outgoing, |node, _| self.place(node) <= end);
-                if !walk.has_met(pair[1]) {
+                let end = self.rank(pair[1]);
+                traversal.run(self.edges, &[pair[0]], Direction::Outgoing, |vertex, _| self.rank(vertex) <= end);
+                if !traversal.has_visited(pair[1]) {
                     return Err(GraphProblem::UnorderedWriters {
                         resource: resource.name.clone(),
                         first: name(self.graph, pair[0]),
@@ -160,17 +185,17 @@ impl<P> Facts<'_, P> {
         Ok(())
     }
 
-    /// Per node, the needed ones it waits for, if it is needed itself.
+    /// Per node, the needed nodes it waits for; empty for a node that is not needed.
     fn dependencies(&self) -> Vec<Vec<usize>> {
-        let last_maker = self.last_makers_of_junctions();
-        let mut passed = vec![usize::MAX; self.edges.node_count()];
+        let last_makers = self.last_makers_of_junctions();
+        let mut visited_for = vec![usize::MAX; self.edges.node_count()];
         let mut dependencies = vec![Vec::new(); self.needed.len()];
-        for node in self.edges.node_indices().filter(|&node| self.is_needed(node)) {
+        for node in self.edges.node_indices().filter(|&vertex| self.is_needed(vertex)) {
             let dependencies = &mut dependencies[node.index()];
-            self.add_last_makers(node, &last_maker, dependencies);
-            // An order that leads through dropped nodes ends at the needed ones before them.
-            let mut open = vec![node];
-            while let Some(after) = open.pop() {
+            self.add_last_makers(node, &last_makers, dependencies);
+            // Explicit orders work through dropped nodes, up to the needed nodes before those.
+            let mut stack = vec![node];
+            while let Some(after) = stack.pop() {
                 for edge in self.edges.edges_directed(after, Direction::Incoming) {
                     let before = edge.source();
                     if after == node && *edge.weight() != Relation::Order {
@@ -178,9 +203,9 @@ impl<P> Facts<'_, P> {
                     }
                     if self.is_needed(before) {
                         dependencies.push(before.index());
-                    } else if passed[before.index()] != node.index() {
-                        passed[before.index()] = node.index();
-                        open.push(before);
+                    } else if visited_for[before.index()] != node.index() {
+                        visited_for[before.index()] = node.index();
+                        stack.push(before);
                     }
                 }
             }
@@ -190,24 +215,24 @@ impl<P> Facts<'_, P> {
         dependencies
     }
 
-    /// Per node, the last of the makers that lead to it, if it is a junction.
+    /// Per vertex, the last of the makers that lead to it, if it is a junction.
     fn last_makers_of_junctions(&self) -> Vec<Option<NodeIndex>> {
-        let last_maker = |node: NodeIndex| {
-            let is_junction = node.index() >= self.needed.len();
-            let makers = self.edges.neighbors_directed(node, Direction::Incoming).filter(|_| is_junction);
-            makers.max_by_key(|&maker| self.place(maker))
+        let last_maker = |vertex: NodeIndex| {
+            let is_junction = vertex.index() >= self.needed.len();
+            let makers = self.edges.neighbors_directed(vertex, Direction::Incoming).filter(|_| is_junction);
+            makers.max_by_key(|&maker| self.rank(maker))
         };
         self.edges.node_indices().map(last_maker).collect()
     }
 
-    /// Of all makers of a resource that a node needs, it has to wait for the last one only, since they have an order.
+    /// A node only has to wait for the last maker of each resource it needs, because makers are ordered.
     fn add_last_makers(&self, node: NodeIndex, of_junction: &[Option<NodeIndex>], dependencies: &mut Vec<usize>) {
         let mut last: HashMap<usize, NodeIndex> = HashMap::new();
         for edge in self.edges.edges_directed(node, Direction::Incoming) {
             if let Relation::Data(resource) = *edge.weight() {
                 let source = of_junction[edge.source().index()].unwrap_or(edge.source());
                 let maker = last.entry(resource).or_insert(source);
-                if self.place(source) > self.place(*maker) {
+                if self.rank(source) > self.rank(*maker) {
                     *maker = source;
                 }
             }
@@ -216,7 +241,7 @@ impl<P> Facts<'_, P> {
     }
 }
 
-fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
+fn flatten<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     let mut index_of = vec![0; plan.needed.len()];
     for (index, &node) in plan.order.iter().enumerate() {
         index_of[node] = index;
@@ -232,26 +257,26 @@ fn lay_out<P>(graph: FrameGraph<P>, plan: &Plan) -> Schedule<P> {
     }
     let mut dropped = Vec::new();
     let mut kept = Vec::with_capacity(plan.order.len());
-    for (position, node) in graph.nodes.into_iter().enumerate() {
-        if plan.needed[position] {
-            kept.push((index_of[position], node));
+    for (number, node) in graph.nodes.into_iter().enumerate() {
+        if plan.needed[number] {
+            kept.push((index_of[number], node));
         } else {
             dropped.push(node.name);
         }
     }
     kept.sort_unstable_by_key(|(index, _)| *index);
-    let flow = Flow::new(&dependencies);
+    let adjacency = RankedAdjacency::new(&dependencies);
     let mut schedule = Schedule {
         names: Vec::with_capacity(kept.len()),
         labels: Vec::with_capacity(kept.len()),
         nodes: Vec::with_capacity(kept.len()),
         indices: HashMap::with_capacity(kept.len()),
-        progress: Progress::new(&flow),
-        costs: Costs::new(flow.len()),
-        sharing: Sharing::default(),
-        graph: None,
+        progress: Progress::new(&adjacency),
+        costs: NodeCosts::new(adjacency.len()),
+        policy: ExecutionPolicy::default(),
+        description: None,
         always_parallel: false,
-        flow,
+        adjacency,
         dependencies: Adjacency::new(dependencies),
         dependents: Adjacency::new(dependents),
         dropped,

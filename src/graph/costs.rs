@@ -1,30 +1,30 @@
-//! What the nodes of a schedule cost, measured in some of the runs.
+//! What the nodes of a schedule cost, measured in some of its runs.
 
 use std::time::Duration;
 
 use crate::sync::{AtomicU32, AtomicUsize, Instant, Ordering};
 
-/// What has been measured so far. Durations are in nanoseconds.
-pub(super) struct Costs {
-    /// Per node, from its start to its end: an average of the latest measured runs, the latest counting most.
+/// The measured costs, in nanoseconds.
+pub(super) struct NodeCosts {
+    /// Per node, from its start to its end: a moving average over the measured runs.
     average: Box<[u64]>,
-    has_learnt: bool,
-    /// Per node, in the current run.
+    is_measured: bool,
+    /// Per node, in the current run: when it started, by the run's clock, and how long it took.
     started: Box<[AtomicU32]>,
     took: Box<[AtomicU32]>,
-    /// Of the current run, all workers' time together.
+    /// The current run's work: the time of all workers together.
     work: AtomicUsize,
 }
 
-/// The part of the latest run in the average.
-const WEIGHT: u64 = 4;
+/// The latest run's weight in the average is one part in this many.
+const AVERAGE_PARTS: u64 = 4;
 
-impl Costs {
+impl NodeCosts {
     pub(super) fn new(nodes: usize) -> Self {
         let zeros = || (0..nodes).map(|_| AtomicU32::new(0)).collect();
         Self {
             average: vec![0; nodes].into(),
-            has_learnt: false,
+            is_measured: false,
             started: zeros(),
             took: zeros(),
             work: AtomicUsize::new(0),
@@ -36,46 +36,46 @@ impl Costs {
         &self.average
     }
 
-    /// What the node costs, if that has been measured.
+    /// The node's average cost, if any run was measured.
     pub(super) fn of(&self, node: usize) -> Option<Duration> {
         let average = self.average.get(node)?;
-        self.has_learnt.then(|| Duration::from_nanos(*average))
+        self.is_measured.then(|| Duration::from_nanos(*average))
     }
 
-    /// Forgets the work of a run that was cancelled.
-    pub(super) fn forget_work(&self) {
+    /// Clears the work of a cancelled run.
+    pub(super) fn clear_work(&self) {
         self.work.store(0, Ordering::Relaxed);
     }
 
-    /// Takes in what the run that has ended cost, and says how much work it was.
-    pub(super) fn learn(&mut self) -> Duration {
+    /// Adds the measured run that has just ended to the averages, and returns how much work it was.
+    pub(super) fn update(&mut self) -> Duration {
         for (average, took) in self.average.iter_mut().zip(&self.took) {
             // Relaxed: the run is over.
             let took = u64::from(took.load(Ordering::Relaxed));
-            *average = if self.has_learnt { (*average * (WEIGHT - 1) + took) / WEIGHT } else { took };
+            *average = if self.is_measured { (*average * (AVERAGE_PARTS - 1) + took) / AVERAGE_PARTS } else { took };
         }
-        self.has_learnt = true;
+        self.is_measured = true;
         let work = self.work.load(Ordering::Relaxed);
         self.work.store(0, Ordering::Relaxed);
         Duration::from_nanos(work as u64)
     }
 }
 
-/// The clock of a run, which stands still in one that is not measured.
+/// Measures the nodes of one run; does nothing in a run that is not measured.
 #[derive(Clone, Copy)]
-pub(super) struct Clock<'run> {
-    start: Option<(Instant, &'run Costs)>,
+pub(super) struct CostTimer<'run> {
+    start: Option<(Instant, &'run NodeCosts)>,
 }
 
-impl<'run> Clock<'run> {
-    pub(super) fn new(costs: Option<&'run Costs>) -> Self {
+impl<'run> CostTimer<'run> {
+    pub(super) fn new(costs: Option<&'run NodeCosts>) -> Self {
         Self { start: costs.map(|costs| (Instant::now(), costs)) }
     }
 
     /// A node starts.
     pub(super) fn start(self, node: u32) {
         if let Some((start, costs)) = self.start {
-            // Relaxed, here and below: who reads it has come after, as those do who depend on the node.
+            // Relaxed, here and below: the reader is ordered after the write as a dependent is after the node.
             costs.started[node as usize].store(nanoseconds(start), Ordering::Relaxed);
         }
     }
@@ -89,7 +89,7 @@ impl<'run> Clock<'run> {
         }
     }
 
-    /// Calls what is work of the run.
+    /// Makes a call that counts as work of the run.
     pub(super) fn work<R>(self, call: impl FnOnce() -> R) -> R {
         let Some((_, costs)) = self.start else { return call() };
         let start = Instant::now();
@@ -99,7 +99,7 @@ impl<'run> Clock<'run> {
     }
 }
 
-/// Runs of more than four seconds are not told from those of four.
+/// Saturates after about four seconds.
 fn nanoseconds(since: Instant) -> u32 {
     since.elapsed().as_nanos().try_into().unwrap_or(u32::MAX)
 }

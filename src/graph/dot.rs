@@ -1,53 +1,55 @@
-//! Graphs and schedules in the language of Graphviz.
+//! Graphs and schedules in DOT, the language of Graphviz.
 
 use std::fmt::Write;
 
-use petgraph::adj::UnweightedList;
-use petgraph::algo::tred::dag_transitive_reduction_closure;
-use petgraph::visit::{EdgeRef, IntoEdgeReferences};
+use petgraph::{
+    adj::UnweightedList,
+    algo::tred::dag_transitive_reduction_closure,
+    visit::{EdgeRef, IntoEdgeReferences},
+};
 
 use super::{
     builder::FrameGraph,
     edges::{self, Roles},
-    order::{in_order, places},
+    order::{ranks, topological_order},
     schedule::Schedule,
 };
 
 impl<P> FrameGraph<P> {
-    /// The graph as Graphviz draws it: nodes as boxes, resources as ellipses, an arrow along each read and write, a
-    /// dotted one for each explicit order.
+    /// The graph in DOT: nodes as boxes, resources as ellipses, an arrow for each read and write, a dotted arrow for each explicit
+    /// order.
     ///
-    /// Outputs have a double rim, imported resources are filled. What leads to no output is dashed. A graph that
-    /// does not compile can be drawn as well.
+    /// Outputs have a double border, imported resources are filled. What leads to no output is dashed. A graph that does not
+    /// compile can be drawn, too.
     pub fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
-        let place = places(edges.node_count(), &in_order(&edges, self.nodes.len()));
-        edges::add_versions(&mut edges, &roles, &place);
+        let rank = ranks(edges.node_count(), &topological_order(&edges, self.nodes.len()));
+        edges::add_versions(&mut edges, &roles, &rank);
         let needed = edges::needed(self, &roles, &edges);
 
         let mut dot = Dot::new();
-        for (position, node) in self.nodes.iter().enumerate() {
-            let style = if needed[position] { "" } else { ", style=dashed" };
-            dot.line(format_args!("node{position} [shape=box, label={}{style}];", Quoted(&node.name)));
+        for (index, node) in self.nodes.iter().enumerate() {
+            let style = if needed[index] { "" } else { ", style=dashed" };
+            dot.line(format_args!("node{index} [shape=box, label={}{style}];", Quoted(&node.name)));
         }
-        for (position, (resource, roles)) in self.resources.iter().zip(&roles).enumerate() {
-            let touched = roles.makers().chain(roles.readers.iter().copied()).any(|node| needed[node.index()]);
-            let style = match (resource.imported, resource.output || touched) {
+        for (index, (resource, roles)) in self.resources.iter().zip(&roles).enumerate() {
+            let is_accessed = roles.makers().chain(roles.readers.iter().copied()).any(|node| needed[node.index()]);
+            let style = match (resource.imported, resource.output || is_accessed) {
                 (false, true) => "",
                 (false, false) => ", style=dashed",
                 (true, true) => ", style=filled",
                 (true, false) => ", style=\"filled,dashed\"",
             };
-            let rim = if resource.output { ", peripheries=2" } else { "" };
-            dot.line(format_args!("resource{position} [shape=ellipse, label={}{style}{rim}];", Quoted(&resource.name)));
+            let border = if resource.output { ", peripheries=2" } else { "" };
+            dot.line(format_args!("resource{index} [shape=ellipse, label={}{style}{border}];", Quoted(&resource.name)));
         }
-        for (position, roles) in roles.iter().enumerate() {
+        for (index, roles) in roles.iter().enumerate() {
             for reader in roles.modifiers.iter().chain(&roles.readers) {
-                dot.line(format_args!("resource{position} -> node{};", reader.index()));
+                dot.line(format_args!("resource{index} -> node{};", reader.index()));
             }
             for maker in roles.makers() {
-                dot.line(format_args!("node{} -> resource{position};", maker.index()));
+                dot.line(format_args!("node{} -> resource{index};", maker.index()));
             }
         }
         for (before, after) in &self.orders {
@@ -58,13 +60,13 @@ impl<P> FrameGraph<P> {
 }
 
 impl<P> Schedule<P> {
-    /// The schedule as Graphviz draws it: a box for each node, an arrow from each to what waits for it and for nothing that
-    /// waits for it too, and what was dropped, dashed and apart.
+    /// The schedule in DOT: a box for each node, an arrow from each node to its direct dependents (those that do not also depend on
+    /// it through another node), and the dropped nodes as dashed boxes without arrows.
     pub fn to_dot(&self) -> String {
         self.to_labelled_dot(|_, _| String::new())
     }
 
-    /// The same, with a label for each arrow that `label` finds one for: from the index of one node to that of another.
+    /// As [`to_dot`](Self::to_dot), with `label(from, to)` on each arrow unless it is empty. `from` and `to` are indices of nodes.
     pub(crate) fn to_labelled_dot(&self, label: impl Fn(usize, usize) -> String) -> String {
         let mut dot = Dot::new();
         for (index, name) in self.names.iter().enumerate() {
@@ -84,7 +86,7 @@ impl<P> Schedule<P> {
         dot.finish()
     }
 
-    /// Who waits for whom, without what follows from others.
+    /// The edges of the transitive reduction, from dependency to dependent.
     fn direct_dependencies(&self) -> Vec<(usize, usize)> {
         let mut all = UnweightedList::<usize>::with_capacity(self.len());
         for _ in 0..self.len() {
@@ -95,13 +97,13 @@ impl<P> Schedule<P> {
                 all.add_edge(index, dependent, ());
             }
         }
-        // Indices are in an order in which each comes after all it depends on, as this wants them.
+        // The indices are a topological order, which this function requires.
         let (direct, _) = dag_transitive_reduction_closure(&all);
         direct.edge_references().map(|edge| (edge.source(), edge.target())).collect()
     }
 }
 
-/// A drawing in the making.
+/// A DOT file while it is written.
 struct Dot(String);
 
 impl Dot {
@@ -120,7 +122,7 @@ impl Dot {
     }
 }
 
-/// A name as a quoted string that is drawn as the name itself, on one line, whatever is in it.
+/// A name as a DOT string, escaped so that Graphviz draws the name itself on one line.
 struct Quoted<'a>(&'a str);
 
 impl std::fmt::Display for Quoted<'_> {
@@ -130,9 +132,9 @@ impl std::fmt::Display for Quoted<'_> {
             match character {
                 '"' => formatter.write_str("\\\"")?,
                 '\\' => formatter.write_str("\\\\")?,
-                // Graphviz replaces HTML's entities in labels.
+                // Graphviz replaces HTML entities in labels.
                 '&' => formatter.write_str("&amp;")?,
-                // Drawn as its escape, with a backslash of its own.
+                // Drawn as its escape sequence, so the backslash is escaped.
                 control if control.is_control() => {
                     write!(formatter, "\\\\{}", &control.escape_default().to_string()[1..])?
                 }

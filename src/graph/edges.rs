@@ -1,8 +1,8 @@
-//! Who waits for whom, and why: the rules of [`FrameGraph`] turned into edges.
+//! Dependency edges: the rules of [`FrameGraph`], applied.
 //!
-//! Where many read what many make, an edge from each maker to each reader would be their product. So all makers lead to one
-//! *junction*, and that to all readers, which means the same with an edge each. Junctions are nodes behind those of the
-//! nodes: whoever follows edges passes through them, and they are in no result.
+//! If every maker of a resource had an edge to every reader, the number of edges would be their product. So all makers have an
+//! edge to one *junction*, and the junction has an edge to each reader. A junction is a vertex but not a node: traversals
+//! pass through it, and results leave it out.
 
 use petgraph::{
     Direction,
@@ -12,23 +12,23 @@ use petgraph::{
 
 use super::{
     builder::{Access, FrameGraph},
-    order::Walk,
+    traversal::Traversal,
 };
 
-/// An edge per reason to wait, from the node waited for. The node of a node is its position in the graph; those of
+/// An edge for each reason to wait, from the dependency to the dependent. The first vertices are the graph's nodes, by index;
 /// junctions follow.
 pub(super) type Edges = DiGraph<(), Relation>;
 
-/// Why one node waits for another.
+/// Why a node waits for another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relation {
-    /// It was told to.
+    /// [`FrameGraph::order`] says so.
     Order,
-    /// It needs what the other makes of this resource.
+    /// It needs what the other node writes to this resource.
     Data(usize),
 }
 
-/// The nodes that touch one resource, by what they do with it, each in the order they were added.
+/// The nodes that access one resource, by role, each list in the order the nodes were added.
 #[derive(Default)]
 pub(super) struct Roles {
     pub(super) writers: Vec<NodeIndex>,
@@ -37,7 +37,7 @@ pub(super) struct Roles {
 }
 
 impl Roles {
-    /// Every resource's.
+    /// The roles for every resource of the graph.
     pub(super) fn of_all<P>(graph: &FrameGraph<P>) -> Vec<Self> {
         let mut accesses = graph.accesses.clone();
         accesses.sort_unstable_by_key(|access| (access.resource, access.node, access.writes));
@@ -57,13 +57,13 @@ impl Roles {
         roles
     }
 
-    /// All that make something of the resource: writers and modifiers.
+    /// The writers, then the modifiers.
     pub(super) fn makers(&self) -> impl Iterator<Item = NodeIndex> {
         self.writers.iter().chain(&self.modifiers).copied()
     }
 }
 
-/// The edges that were told, and those that follow from what each node does with each resource alone.
+/// The explicit edges, and those that follow from each node's accesses. [`add_versions`] adds the rest.
 pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
     let mut edges = Edges::default();
     for _ in &graph.nodes {
@@ -72,48 +72,48 @@ pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
     for (before, after) in &graph.orders {
         edges.add_edge(NodeIndex::new(*before), NodeIndex::new(*after), Relation::Order);
     }
-    let mut walk = Walk::new();
+    let mut traversal = Traversal::new();
     for (resource, roles) in roles.iter().enumerate() {
-        link(&mut edges, &mut walk, resource, &roles.writers, &roles.modifiers);
-        // A reader that goes before a writer finds that writer's modifiers behind it, through the edges just made.
+        link(&mut edges, &mut traversal, resource, &roles.writers, &roles.modifiers);
+        // A reader that comes before a writer also comes before that writer's modifiers, through the edges just added.
         let makers: Vec<NodeIndex> = roles.makers().collect();
-        link(&mut edges, &mut walk, resource, &makers, &roles.readers);
+        link(&mut edges, &mut traversal, resource, &makers, &roles.readers);
     }
     edges
 }
 
-/// Lets every sink wait for every source, but for the pairs in which the sink has been put before the source.
-fn link(edges: &mut Edges, walk: &mut Walk, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
+/// Makes every sink wait for every source, except for pairs in which the sink is already ordered before the source.
+fn link(edges: &mut Edges, traversal: &mut Traversal, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
     if sources.is_empty() || sinks.is_empty() {
         return;
     }
-    let told = |_: NodeIndex, relation| relation == Relation::Order || relation == Relation::Data(resource);
-    walk.from(edges, sources, Direction::Incoming, told);
-    let (some_before, all_after): (Vec<NodeIndex>, Vec<NodeIndex>) =
-        sinks.iter().copied().partition(|&sink| walk.has_met(sink));
+    let orders = |_: NodeIndex, relation| relation == Relation::Order || relation == Relation::Data(resource);
+    traversal.run(edges, sources, Direction::Incoming, orders);
+    let (before_a_source, after_all): (Vec<NodeIndex>, Vec<NodeIndex>) =
+        sinks.iter().copied().partition(|&sink| traversal.has_visited(sink));
     let mut pairs: Vec<(NodeIndex, NodeIndex)> = Vec::new();
-    for &sink in &some_before {
-        walk.from(edges, &[sink], Direction::Outgoing, told);
-        pairs.extend(sources.iter().filter(|&&source| !walk.has_met(source)).map(|&source| (source, sink)));
+    for &sink in &before_a_source {
+        traversal.run(edges, &[sink], Direction::Outgoing, orders);
+        pairs.extend(sources.iter().filter(|&&source| !traversal.has_visited(source)).map(|&source| (source, sink)));
     }
-    if sources.len() > 1 && all_after.len() > 1 {
+    if sources.len() > 1 && after_all.len() > 1 {
         let junction = edges.add_node(());
         pairs.extend(sources.iter().map(|&source| (source, junction)));
-        pairs.extend(all_after.iter().map(|&sink| (junction, sink)));
+        pairs.extend(after_all.iter().map(|&sink| (junction, sink)));
     } else {
-        pairs.extend(all_after.iter().flat_map(|&sink| sources.iter().map(move |&source| (source, sink))));
+        pairs.extend(after_all.iter().flat_map(|&sink| sources.iter().map(move |&source| (source, sink))));
     }
     for (source, sink) in pairs {
         edges.add_edge(source, sink, Relation::Data(resource));
     }
 }
 
-/// Lets modifiers wait for the version they are to modify: what the last makers before them left.
+/// Makes each modifier depend on the version it modifies: the last makers before it.
 ///
-/// Modifiers have no order of their own, so only once all edges are known is it known which of them come before which, and
-/// `place` is where. That one needs what the other left is no new order, but it is a reason to keep the other.
-pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) {
-    let mut walk = Walk::new();
+/// The accesses do not order modifiers. Which of them come before others is only known once all other edges are, and `rank` is
+/// the topological order of those. These edges add no new order; they are a reason to keep the earlier modifier.
+pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], rank: &[usize]) {
+    let mut traversal = Traversal::new();
     let mut made = vec![usize::MAX; edges.node_count()];
     for (resource, roles) in roles.iter().enumerate() {
         if roles.modifiers.len() < 2 {
@@ -121,27 +121,27 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
         }
         roles.makers().for_each(|maker| made[maker.index()] = resource);
         for &modifier in &roles.modifiers {
-            // What stands behind another maker is that maker's affair: the walk goes no further there.
+            // The traversal stops at makers: what comes before a maker belongs to that maker's version.
             let mut last = Vec::new();
-            walk.from(edges, &[modifier], Direction::Incoming, |before, _| {
+            traversal.run(edges, &[modifier], Direction::Incoming, |before, _| {
                 let is_maker = made[before.index()] == resource;
                 last.extend(is_maker.then_some(before));
                 !is_maker
             });
-            last.sort_unstable_by_key(|maker| place[maker.index()]);
+            last.sort_unstable_by_key(|maker| rank[maker.index()]);
             last.dedup();
-            for (at, &maker) in last.iter().enumerate() {
-                // Writers have their edge already. All lists of roles are ascending.
+            for (index, &maker) in last.iter().enumerate() {
+                // Writers have their edge already. Lists of roles are ascending.
                 if roles.modifiers.binary_search(&maker).is_err() {
                     continue;
                 }
-                // A maker can have been met although it stands behind another one as well, by a way past that one.
-                let later = &last[at + 1..];
+                // The traversal may have found a maker along one path although another maker follows it on another path.
+                let later = &last[index + 1..];
                 if let Some(end) = later.last() {
-                    let is_between = |node: NodeIndex, _| place[node.index()] <= place[end.index()];
-                    walk.from(edges, &[maker], Direction::Outgoing, is_between);
+                    let is_between = |vertex: NodeIndex, _| rank[vertex.index()] <= rank[end.index()];
+                    traversal.run(edges, &[maker], Direction::Outgoing, is_between);
                 }
-                if !later.iter().any(|&other| walk.has_met(other)) {
+                if !later.iter().any(|&other| traversal.has_visited(other)) {
                     edges.add_edge(maker, modifier, Relation::Data(resource));
                 }
             }
@@ -149,7 +149,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], place: &[usize]) 
     }
 }
 
-/// Which nodes are needed: kept ones, those that make an output, and all that these need.
+/// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data.
 pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -> Vec<bool> {
     let mut needed: Vec<bool> = graph.nodes.iter().map(|node| node.kept).collect();
     needed.resize(edges.node_count(), false);
@@ -158,13 +158,13 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
             roles.makers().for_each(|maker| needed[maker.index()] = true);
         }
     }
-    let mut open: Vec<NodeIndex> = edges.node_indices().filter(|node| needed[node.index()]).collect();
-    while let Some(node) = open.pop() {
-        for edge in edges.edges_directed(node, Direction::Incoming) {
+    let mut stack: Vec<NodeIndex> = edges.node_indices().filter(|vertex| needed[vertex.index()]).collect();
+    while let Some(vertex) = stack.pop() {
+        for edge in edges.edges_directed(vertex, Direction::Incoming) {
             let source = edge.source();
             if *edge.weight() != Relation::Order && !needed[source.index()] {
                 needed[source.index()] = true;
-                open.push(source);
+                stack.push(source);
             }
         }
     }
@@ -174,11 +174,12 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use super::{Roles, derive};
     use crate::graph::FrameGraph;
 
+    use super::{Roles, derive};
+
     #[test]
-    fn edges_grow_with_what_nodes_do_and_not_with_pairs_of_them() {
+    fn the_number_of_edges_is_linear_in_the_number_of_accesses() {
         const EACH: usize = if cfg!(miri) { 10 } else { 200 };
         let mut graph = FrameGraph::new();
         let image = graph.resource("image");
@@ -197,7 +198,7 @@ mod tests {
             }
         }
         let edges = derive(&graph, &Roles::of_all(&graph));
-        // Makers in a chain; writers to modifiers; both to readers.
+        // The explicit chain of makers; writers to modifiers; makers to readers.
         assert_eq!(edges.edge_count(), (2 * EACH - 1) + 2 * EACH + 3 * EACH);
         assert_eq!(edges.node_count(), 3 * EACH + 2);
         let schedule = graph.compile().unwrap();

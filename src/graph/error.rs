@@ -1,78 +1,58 @@
-//! What can be wrong with a graph, and what can go wrong in a run.
+//! What can be wrong with a graph, and how a run can fail.
 
-use std::{error::Error, fmt};
+use std::error::Error;
 
 use thiserror::Error;
 
 use crate::task::JobPanic;
 
-use super::builder::FrameGraph;
-
-/// What a [`Node`](super::Node) reports when it fails.
+/// The error that a [`Node`](super::Node) returns when it fails.
 pub type NodeError = Box<dyn Error + Send + Sync>;
-
-/// A graph that does not compile, and why.
-#[derive(Error)]
-#[error("{problem}")]
-#[non_exhaustive]
-pub struct CompileError<P> {
-    /// The graph as it was, so that it can be put right and compiled again.
-    pub graph: Box<FrameGraph<P>>,
-    /// The first thing that is wrong with it, in the order of [`GraphProblem`]'s variants.
-    pub problem: GraphProblem,
-}
-
-impl<P> fmt::Debug for CompileError<P> {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("CompileError").field("problem", &self.problem).field("graph", &self.graph).finish()
-    }
-}
 
 /// What is wrong with a graph.
 ///
-/// The variants stand in the order in which they are looked for. Calls that meant nothing come first, since what follows may
-/// only follow from them; then names, which all other problems speak in; then cycles, since nothing has an order before
-/// they are gone; then what the kept nodes lack.
+/// The variants are declared in the order in which they are checked. Invalid calls come first, because later problems may only
+/// follow from them; then names, because all other problems are reported by name; then cycles, because a graph with a
+/// cycle has no order; then what the kept nodes lack.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum GraphProblem {
-    /// A call was given a node of another graph, or one that had been removed. The call did nothing and, once reported
-    /// here, is forgotten.
+    /// A call was given a node of another graph, or a removed one. The call did nothing, and is reported here once.
     #[error("the node that stands as `?` in `{call}` does not belong to this graph")]
     UnknownNode {
-        /// The call, with the names of what it was given, and `?` for what is unknown.
+        /// The call with the names of its arguments, and `?` for the unknown ones.
         call: String,
     },
-    /// A call was given a resource of another graph. The call did nothing and, once reported here, is forgotten.
+    /// A call was given a resource of another graph. The call did nothing, and is reported here once.
     #[error("the resource that stands as `?` in `{call}` does not belong to this graph")]
     UnknownResource {
-        /// The call, with the names of what it was given, and `?` for what is unknown.
+        /// The call with the names of its arguments, and `?` for the unknown ones.
         call: String,
     },
-    /// Two nodes have one name.
+    /// Two nodes have the same name.
     #[error("two nodes are named {name:?}")]
     DuplicateNode {
         /// The name.
         name: String,
     },
-    /// Nodes wait for each other, dropped ones among them or not.
-    #[error("nodes wait for each other in a circle: {}", circle(nodes))]
+    /// Nodes wait for each other. Some of them may be nodes that would be dropped.
+    #[error("nodes wait for each other in a cycle: {}", cycle(nodes))]
     Cycle {
-        /// The nodes of one circle: each must run before the next, and the last before the first. The one that was
-        /// added first stands first.
+        /// The nodes of one cycle: each must run before the next, and the last before the first. The list starts at the node
+        /// that was added first.
         nodes: Vec<String>,
     },
-    /// Nothing makes a resource before it is needed, and it is not imported.
-    #[error("{}", missing(resource, *output, readers))]
+    /// Nothing writes a resource before it is needed, and it is not imported.
+    #[error("{}", missing_producer(resource, *output, readers))]
     MissingProducer {
         /// The resource.
         resource: String,
-        /// Whether it is missed because it is an output of the graph.
+        /// Whether it is needed because it is an output of the graph.
         output: bool,
-        /// The nodes that read it before anything has written it, in the order they were added.
+        /// The nodes that read it before any node has written it, in the order they were added.
         readers: Vec<String>,
     },
-    /// Two nodes write a resource, or modify it, and it is open which is first.
+    /// Two nodes write or modify a resource, and neither is ordered before the other.
     #[error("{first:?} and {second:?} both write {resource:?}, and nothing says which is first: put them in order")]
     UnorderedWriters {
         /// The resource.
@@ -84,12 +64,12 @@ pub enum GraphProblem {
     },
 }
 
-fn circle(nodes: &[String]) -> String {
+fn cycle(nodes: &[String]) -> String {
     let names: Vec<String> = nodes.iter().chain(nodes.first()).map(|name| format!("{name:?}")).collect();
     names.join(" before ")
 }
 
-fn missing(resource: &str, output: bool, readers: &[String]) -> String {
+fn missing_producer(resource: &str, output: bool, readers: &[String]) -> String {
     let names: Vec<String> = readers.iter().map(|name| format!("{name:?}")).collect();
     match (output, names.as_slice()) {
         (true, []) => format!("nothing writes {resource:?}, which is an output of the graph"),
@@ -100,19 +80,19 @@ fn missing(resource: &str, output: bool, readers: &[String]) -> String {
     }
 }
 
-/// A run that did not come to its end.
+/// Why a run failed.
 ///
-/// Of several failures the one is reported whose node stands first in the schedule, and of one node's chunks the one
-/// that starts first. Which failures there are besides the first can depend on timing, since the first one stops the rest.
+/// If several nodes fail, the run reports the one that comes first in the schedule, and of one node's chunks the one with the
+/// lowest items. Which other failures happen can depend on timing, since the first failure cancels the rest.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// A node reported an error.
+    /// A node returned an error.
     #[error("the node {node:?} failed: {source}")]
     Failed {
         /// The node's name.
         node: String,
-        /// What it reported.
+        /// What it returned.
         source: NodeError,
     },
     /// A node panicked.
@@ -120,7 +100,7 @@ pub enum RunError {
     Panicked {
         /// The node's name.
         node: String,
-        /// What the panic said.
+        /// The panic's message.
         message: String,
     },
     /// Something panicked outside of every node, such as a subscriber of the run's spans.

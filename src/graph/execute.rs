@@ -1,34 +1,35 @@
-//! A run of a schedule: chooses the way it goes, and says how it ended.
+//! Runs a schedule: chooses the run mode, executes the run, and returns its outcome.
 
-use std::{mem, ops::Range, time::Duration};
+use std::{mem, ops::Range, sync::Arc, time::Duration};
 
 use crate::{
     sync::{AtomicBool, Instant, Mutex, Ordering},
     task::{Chunks, Scheduler, Worker},
-    timeline::Ended,
+    timeline::{Graph, Process, RunEnd},
     unwind::{JobPanic, catch, discard},
 };
 
 use super::{
-    costs::Clock,
+    active_instrument::ActiveInstrument,
+    costs::CostTimer,
     error::{NodeError, RunError},
+    execution_policy::RunMode,
+    instrument::{Instrument, NoInstrument, NodeSpan},
     node::Node,
     schedule::Schedule,
-    sharing::Way,
-    watch::{Nobody, Onlooker, Watch, Watching},
 };
 
 impl<P> Schedule<P> {
-    /// Runs every node, each after all it depends on, and waits for the last.
+    /// Runs every node after all its dependencies, and waits for the last one.
     ///
-    /// The thread that calls it works too, and runs the [pinned](Node::pinned) nodes. The other workers join in where
-    /// that pays: a schedule of little work, as far as its last runs tell, is run by the calling thread alone, one node
-    /// after another. Once it has been run a few times a run takes no memory of its own.
+    /// The calling thread works too, and runs the [pinned](Node::pinned) nodes. A schedule of little work, judging by its last
+    /// runs, is executed serially by the calling thread; any other in parallel by all workers. After the first few runs, a run
+    /// allocates no memory.
     ///
     /// # Errors
     ///
-    /// [`RunError`] if a node failed or panicked. The rest was cancelled then: what had begun was finished, nothing else
-    /// was started. The next run starts over. With `panic = "abort"` a panic ends the program instead.
+    /// Returns [`RunError`] if a node failed or panicked. The rest of the run is cancelled: chunks that have begun are finished,
+    /// and no others start. The next run starts over. With `panic = "abort"`, a panic ends the program instead.
     pub fn run<C>(&mut self, scheduler: &Scheduler, context: &C) -> Result<(), RunError>
     where
         C: Sync + ?Sized,
@@ -42,37 +43,37 @@ impl<P> Schedule<P> {
         C: Sync + ?Sized,
         P: Node<C>,
     {
-        let way = if worker.is_shuffled() {
-            Way::Shared { is_measured: false }
+        let mode = if worker.is_shuffled() {
+            RunMode::Parallel { is_measured: false }
         } else if worker.workers() == 1 {
-            Way::Alone { at_most: None }
+            RunMode::Serial { limit: None }
         } else if self.always_parallel {
-            self.sharing.share()
+            self.policy.parallel()
         } else {
-            self.sharing.choose(worker.wake_up_cost())
+            self.policy.choose(worker.wake_up_cost())
         };
         self.describe(worker);
-        // Subscribers of spans are the engine's, and may panic between two nodes too.
-        let ran = catch(|| match Watch::new(worker, self.graph.as_ref()) {
-            Some(watch) => self.go(way, worker, context, watch),
-            None => self.go(way, worker, context, Nobody),
+        // Caught here because a subscriber of spans may panic between two nodes, too.
+        let execution = catch(|| match ActiveInstrument::new(worker, self.description.as_ref()) {
+            Some(instrument) => self.execute(mode, worker, context, instrument),
+            None => self.execute(mode, worker, context, NoInstrument),
         });
-        let Ran { took, is_shared, failure, outcome } = ran.unwrap_or_else(Ran::panicked);
-        // The time of a failed run says nothing about its cost.
+        let Execution { took, is_parallel, failure, outcome } = execution.unwrap_or_else(Execution::panicked);
+        // The duration of a failed run says nothing about its cost.
         if failure.is_some() || outcome.is_err() {
-            self.costs.forget_work();
+            self.costs.clear_work();
         } else {
-            match way {
-                Way::Alone { .. } if is_shared => self.sharing.gave_up(),
-                Way::Alone { .. } => self.sharing.went_alone(took),
-                Way::Shared { is_measured } => {
-                    let work = is_measured.then(|| self.learn());
-                    self.sharing.was_shared(took, work);
+            match mode {
+                RunMode::Serial { .. } if is_parallel => self.policy.report_exceeded(),
+                RunMode::Serial { .. } => self.policy.report_serial(took),
+                RunMode::Parallel { is_measured } => {
+                    let work = is_measured.then(|| self.update_costs());
+                    self.policy.report_parallel(took, work);
                 }
             }
         }
         if outcome.is_err() {
-            self.rearm();
+            self.reset();
         }
         match (failure, outcome) {
             (Some(failure), _) => Err(failure.error),
@@ -81,106 +82,123 @@ impl<P> Schedule<P> {
         }
     }
 
-    fn go<C, W>(&self, way: Way, worker: &Worker, context: &C, watch: W) -> Ran
+    fn execute<C, I>(&self, mode: RunMode, worker: &Worker, context: &C, instrument: I) -> Execution
     where
         C: Sync + ?Sized,
         P: Node<C>,
-        W: Watching,
+        I: Instrument,
     {
         let start = Instant::now();
         let run = Run {
             schedule: self,
             context,
-            clock: Clock::new((way == Way::Shared { is_measured: true }).then_some(&self.costs)),
-            watch,
+            timer: CostTimer::new((mode == RunMode::Parallel { is_measured: true }).then_some(&self.costs)),
+            instrument,
             is_stopped: AtomicBool::new(false),
             failure: Mutex::new(None),
         };
-        let (is_shared, outcome) = match way {
-            Way::Alone { at_most } => match run.go_alone(worker, at_most.map(|at_most| (start, at_most))) {
-                Some(left) => (true, run.share_rest(left, worker)),
+        let (is_parallel, outcome) = match mode {
+            RunMode::Serial { limit } => match run.run_serial(worker, limit.map(|limit| (start, limit))) {
+                Some(suspended) => (true, run.resume_parallel(suspended, worker)),
                 None => (false, Ok(())),
             },
-            Way::Shared { .. } => (true, run.share(worker)),
+            RunMode::Parallel { .. } => (true, run.run_parallel(worker)),
         };
         let took = start.elapsed();
         let failure = run.failure.lock().take();
         let failed = failure.is_some() || outcome.is_err();
-        run.watch.end(Ended { always_parallel: self.always_parallel, failed });
-        Ran { took, is_shared, failure, outcome }
+        run.instrument.end(RunEnd { always_parallel: self.always_parallel, failed });
+        Execution { took, is_parallel, failure, outcome }
     }
 
-    /// Takes in what the nodes cost in a measured run, and says how much work they were.
-    fn learn(&mut self) -> Duration {
-        let work = self.costs.learn();
-        self.flow.rank(self.costs.averages());
+    /// Builds the description of the schedule, if the run is to be instrumented and there is none yet.
+    fn describe<C>(&mut self, worker: &Worker)
+    where
+        C: ?Sized,
+        P: Node<C>,
+    {
+        if self.description.is_none() && ActiveInstrument::is_wanted(worker) {
+            let node = |index: usize| Process {
+                name: self.names[index].clone(),
+                labels: self.labels[index].clone(),
+                dependencies: self.dependencies(index).to_vec(),
+                pinned: catch(|| self.nodes[index].pinned()).unwrap_or(false),
+            };
+            self.description = Some(Arc::new(Graph { processes: (0..self.len()).map(node).collect() }));
+        }
+    }
+
+    /// Adds a measured run to the nodes' costs, ranks the nodes by them, and returns the run's work.
+    fn update_costs(&mut self) -> Duration {
+        let work = self.costs.update();
+        self.adjacency.rank(self.costs.averages());
         work
     }
 
-    /// Makes the schedule ready for the next run after one that failed outside of every node.
-    fn rearm(&mut self) {
-        for node in 0..self.flow.len() as u32 {
-            self.progress.arm(node, self.flow.dependency_count(node));
-            // Where a subscriber of spans panicked, one may have been left behind.
-            discard(self.progress.pass(node).opened.close());
+    /// Prepares the schedule for the next run after a panic outside of every node.
+    fn reset(&mut self) {
+        for node in 0..self.adjacency.len() as u32 {
+            self.progress.arm(node, self.adjacency.dependency_count(node));
+            // If a subscriber panicked, a node's span may not have been closed.
+            discard(self.progress.open_node(node).span.take());
         }
     }
 }
 
-/// A run that has come to its end.
-struct Ran {
+/// An ended run.
+struct Execution {
     took: Duration,
-    /// Whether others than the calling thread were let in.
-    is_shared: bool,
+    /// Whether the run was parallel at its end.
+    is_parallel: bool,
     failure: Option<Failure>,
     outcome: Result<(), JobPanic>,
 }
 
-impl Ran {
-    /// A panic outside of every node and every job ended it.
+impl Execution {
+    /// The run ended by a panic outside of every node and every job.
     fn panicked(panic: JobPanic) -> Self {
-        Self { took: Duration::ZERO, is_shared: false, failure: None, outcome: Err(panic) }
+        Self { took: Duration::ZERO, is_parallel: false, failure: None, outcome: Err(panic) }
     }
 }
 
-/// One run: what all its jobs share. `W` is who looks on.
-pub(super) struct Run<'run, P, C: ?Sized, W> {
+/// The state of one run that all its jobs share.
+pub(super) struct Run<'run, P, C: ?Sized, I> {
     pub(super) schedule: &'run Schedule<P>,
     pub(super) context: &'run C,
-    pub(super) clock: Clock<'run>,
-    pub(super) watch: W,
+    pub(super) timer: CostTimer<'run>,
+    pub(super) instrument: I,
     is_stopped: AtomicBool,
     failure: Mutex<Option<Failure>>,
 }
 
-/// A failure, and where it stands among others.
+/// The first failure of a run, by location.
 struct Failure {
-    position: Position,
+    location: Location,
     error: RunError,
 }
 
-/// Where a run is that does what is a user's: at a node, and the item at which a chunk of it starts.
+/// Which user code is running: the node, and the first item of its chunk.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Position {
+pub(super) struct Location {
     pub(super) node: u32,
     pub(super) item: usize,
 }
 
-impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
-    /// Calls what is a user's, beginning with this node, and stops the run if it fails: then there is no result. `call`
-    /// keeps its position up to date.
+impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
+    /// Calls user code, starting at this node. Returns `None` and stops the run if it fails. `call` keeps the location up to
+    /// date.
     #[inline]
-    pub(super) fn attempt<R>(&self, node: u32, call: impl FnOnce(&mut Position) -> Result<R, NodeError>) -> Option<R> {
-        let mut position = Position { node, item: 0 };
-        match catch(|| call(&mut position)) {
+    pub(super) fn attempt<R>(&self, node: u32, call: impl FnOnce(&mut Location) -> Result<R, NodeError>) -> Option<R> {
+        let mut location = Location { node, item: 0 };
+        match catch(|| call(&mut location)) {
             Ok(Ok(result)) => return Some(result),
-            Ok(Err(error)) => self.fail_with_error(position, error),
-            Err(panic) => self.fail_with_panic(position, panic),
+            Ok(Err(error)) => self.fail_with_error(location, error),
+            Err(panic) => self.fail_with_panic(location, panic),
         }
         None
     }
 
-    /// How much there is to do of a node.
+    /// The chunks of a node.
     #[inline]
     pub(super) fn chunks(&self, node: u32, worker: &Worker) -> Chunks {
         let node = self.node(node);
@@ -190,24 +208,24 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         if worker.is_shuffled() { chunks.shuffled(|count| worker.draw(count)) } else { chunks }
     }
 
-    /// Runs these chunks of the node at the position, as long as nothing fails.
+    /// Runs some chunks of the node at the location, unless the run is stopped.
     #[inline]
     pub(super) fn run_chunks(
         &self,
-        position: &mut Position,
+        location: &mut Location,
         chunks: &Chunks,
-        places: Range<usize>,
+        indices: Range<usize>,
         worker: &Worker,
-        onlooker: &mut impl Onlooker,
+        span: &mut impl NodeSpan,
     ) -> Result<(), NodeError> {
-        for place in places {
+        for index in indices {
             if self.is_stopped() {
                 break;
             }
-            let range = chunks.range(place);
-            position.item = range.start;
-            let run = |range| self.node(position.node).run(self.context, range, worker);
-            onlooker.chunk(range, run)?;
+            let range = chunks.range(index);
+            location.item = range.start;
+            let run = |range| self.node(location.node).run(self.context, range, worker);
+            span.chunk(range, run)?;
         }
         Ok(())
     }
@@ -217,36 +235,36 @@ impl<P: Node<C>, C: Sync + ?Sized, W: Watching> Run<'_, P, C, W> {
         &self.schedule.nodes[node as usize]
     }
 
-    /// Whether something failed, so that nothing more is to begin.
+    /// Whether a node has failed, so that nothing more may begin.
     pub(super) fn is_stopped(&self) -> bool {
-        // Relaxed: nothing is read on the strength of this flag; the failure itself goes through the lock.
+        // Relaxed: the flag hands nothing over; the failure itself is behind the lock.
         self.is_stopped.load(Ordering::Relaxed)
     }
 
     #[cold]
-    fn fail_with_error(&self, position: Position, source: NodeError) {
-        self.fail(position, RunError::Failed { node: self.name(position), source });
+    fn fail_with_error(&self, location: Location, source: NodeError) {
+        self.fail(location, RunError::Failed { node: self.name(location), source });
     }
 
     #[cold]
-    fn fail_with_panic(&self, position: Position, panic: JobPanic) {
-        self.fail(position, RunError::Panicked { node: self.name(position), message: panic.message });
+    fn fail_with_panic(&self, location: Location, panic: JobPanic) {
+        self.fail(location, RunError::Panicked { node: self.name(location), message: panic.message });
     }
 
-    fn name(&self, position: Position) -> String {
-        self.schedule.names[position.node as usize].clone()
+    fn name(&self, location: Location) -> String {
+        self.schedule.names[location.node as usize].clone()
     }
 
-    /// Stops the run, and keeps the failure unless one is kept that stands before it.
-    fn fail(&self, position: Position, error: RunError) {
+    /// Stops the run, and keeps the failure with the lowest location.
+    fn fail(&self, location: Location, error: RunError) {
         self.is_stopped.store(true, Ordering::Relaxed);
-        let mut failure = Some(Failure { position, error });
-        let mut kept = self.failure.lock();
-        if kept.as_ref().is_none_or(|kept| position < kept.position) {
-            mem::swap(&mut *kept, &mut failure);
+        let mut failure = Some(Failure { location, error });
+        let mut first = self.failure.lock();
+        if first.as_ref().is_none_or(|first| location < first.location) {
+            mem::swap(&mut *first, &mut failure);
         }
-        drop(kept);
-        // An error is a user's, and may panic when it is dropped.
+        drop(first);
+        // The error is the engine's, and may panic when it is dropped.
         discard(failure);
     }
 }

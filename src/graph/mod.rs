@@ -120,7 +120,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod alone;
+mod active_instrument;
+mod adjacency;
 mod builder;
 mod compile;
 mod costs;
@@ -128,27 +129,30 @@ mod dot;
 mod edges;
 mod error;
 mod execute;
-mod flow;
+mod execution_policy;
+mod instrument;
 mod node;
 mod order;
+mod parallel;
 mod progress;
 mod schedule;
-mod share;
-mod sharing;
+mod serial;
+mod shared_span;
 mod token;
-mod watch;
+mod traversal;
 
 #[cfg(all(test, drawloom_shuttle))]
 mod shuttle_tests;
 
 pub use self::{
     builder::{FrameGraph, NodeId, ResourceId},
-    error::{CompileError, GraphProblem, NodeError, RunError},
+    compile::CompileError,
+    error::{GraphProblem, NodeError, RunError},
     node::{Closure, Node},
     schedule::Schedule,
 };
 
 pub(crate) use self::{
-    flow::Flow,
-    sharing::{Sharing, Way},
+    adjacency::RankedAdjacency,
+    execution_policy::{ExecutionPolicy, RunMode},
 };

@@ -1,6 +1,6 @@
-//! Whole runs of small schedules, in interleavings that shuttle draws.
+//! Whole runs of small schedules, in random interleavings by shuttle.
 //!
-//! Each node counts how often each of its items has run, and looks whether all it depends on has run to the last item.
+//! Each node counts how often each of its items has run, and checks that all items of its dependencies have run.
 
 use std::{iter, ops::Range, panic::resume_unwind, sync::Arc, time::Duration};
 
@@ -13,46 +13,46 @@ use crate::{
 
 use super::{FrameGraph, Node, NodeError, RunError, Schedule};
 
-/// Between what the schedules here take as a rule and what they take at times, as far as moments that are drawn go, so that
-/// some runs go alone to the end, and some are given up halfway.
-const WAKE_PRICE: Duration = Duration::from_micros(2);
+/// Between the usual and the longest duration of these schedules by shuttle's random clock, so that some serial runs stay within
+/// their limit and some exceed it.
+const WAKE_UP_COST: Duration = Duration::from_micros(2);
 
-/// What a run works on.
+/// The context of a run.
 struct Frame<'frame> {
     scheduler: &'frame Scheduler,
     /// Per node, how often each of its items has run.
     ran: Vec<Vec<AtomicUsize>>,
-    /// How often a node was asked anything before all that it depends on had run.
-    too_early: AtomicUsize,
-    /// Whether the nodes that can fail do.
+    /// How often a node was called before all its dependencies had run.
+    called_too_early: AtomicUsize,
+    /// Whether nodes of the failing kinds fail.
     fails: bool,
 }
 
-/// What is particular about a node.
+/// What a node does besides counting.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Plain,
     Pinned,
-    /// It opens a scope and a loop in each item.
+    /// Opens a scope and a loop in each item.
     Nests,
-    /// Its second item ends in an error, or in a panic.
+    /// Its second item returns an error, or panics.
     Fails,
     Panics,
 }
 
 #[derive(Clone)]
-struct Process {
+struct TestNode {
     index: usize,
     width: usize,
     kind: Kind,
     after: Vec<usize>,
 }
 
-impl Process {
-    fn look_back(&self, frame: &Frame<'_>) {
+impl TestNode {
+    fn check_dependencies(&self, frame: &Frame<'_>) {
         let mut items = self.after.iter().flat_map(|&before| &frame.ran[before]);
         if items.any(|item| item.load(Ordering::Relaxed) != 1) {
-            frame.too_early.fetch_add(1, Ordering::Relaxed);
+            frame.called_too_early.fetch_add(1, Ordering::Relaxed);
         }
     }
 
@@ -66,9 +66,9 @@ impl Process {
     }
 }
 
-impl Node<Frame<'_>> for Process {
+impl Node<Frame<'_>> for TestNode {
     fn width(&self, frame: &Frame<'_>) -> usize {
-        self.look_back(frame);
+        self.check_dependencies(frame);
         self.width
     }
 
@@ -78,11 +78,11 @@ impl Node<Frame<'_>> for Process {
 
     fn run(&self, frame: &Frame<'_>, range: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
         assert!(worker.index() == 0 || self.kind != Kind::Pinned);
-        self.look_back(frame);
+        self.check_dependencies(frame);
         if frame.fails && range.contains(&1) {
             match self.kind {
                 Kind::Fails => return Err("as planned".into()),
-                // Without a word on the console, which would be said in each interleaving.
+                // Unlike `panic!`, this prints nothing, which it would do in each interleaving.
                 Kind::Panics => resume_unwind(Box::new("as planned")),
                 Kind::Plain | Kind::Pinned | Kind::Nests => {}
             }
@@ -97,9 +97,9 @@ impl Node<Frame<'_>> for Process {
     }
 }
 
-/// Nodes with their widths, and what they come after.
-fn nodes(list: &[(usize, Kind, &[usize])]) -> Vec<Process> {
-    let node = |(index, &(width, kind, after)): (usize, &(usize, Kind, &[usize]))| Process {
+/// Nodes with a width, a kind, and the indices of their dependencies.
+fn nodes(list: &[(usize, Kind, &[usize])]) -> Vec<TestNode> {
+    let node = |(index, &(width, kind, after)): (usize, &(usize, Kind, &[usize]))| TestNode {
         index,
         width,
         kind,
@@ -108,7 +108,7 @@ fn nodes(list: &[(usize, Kind, &[usize])]) -> Vec<Process> {
     list.iter().enumerate().map(node).collect()
 }
 
-fn schedule(nodes: &[Process]) -> Schedule<Process> {
+fn schedule(nodes: &[TestNode]) -> Schedule<TestNode> {
     let mut graph = FrameGraph::new();
     let mut ids = Vec::new();
     for node in nodes {
@@ -117,38 +117,38 @@ fn schedule(nodes: &[Process]) -> Schedule<Process> {
         node.after.iter().for_each(|&before| graph.order(ids[before], id));
         ids.push(id);
     }
-    graph.compile().expect("each comes after others")
+    graph.compile().expect("the dependencies have lower indices")
 }
 
-/// Runs one frame, and says how often each item has run.
+/// Runs one frame, and returns how often each item has run.
 fn run_frame(
-    schedule: &mut Schedule<Process>,
+    schedule: &mut Schedule<TestNode>,
     scheduler: &Scheduler,
     fails: bool,
 ) -> (Result<(), RunError>, Vec<Vec<usize>>) {
-    let counters = |node: &Process| iter::repeat_with(|| AtomicUsize::new(0)).take(node.width).collect();
+    let counters = |node: &TestNode| iter::repeat_with(|| AtomicUsize::new(0)).take(node.width).collect();
     let ran = schedule.nodes().map(|(_, node)| counters(node)).collect();
-    let frame = Frame { scheduler, ran, too_early: AtomicUsize::new(0), fails };
+    let frame = Frame { scheduler, ran, called_too_early: AtomicUsize::new(0), fails };
     let outcome = schedule.run(scheduler, &frame);
-    assert_eq!(frame.too_early.load(Ordering::Relaxed), 0);
+    assert_eq!(frame.called_too_early.load(Ordering::Relaxed), 0);
     let counts = |items: &Vec<AtomicUsize>| items.iter().map(|item| item.load(Ordering::Relaxed)).collect();
     (outcome, frame.ran.iter().map(counts).collect())
 }
 
-/// Runs a whole frame.
-fn run_all(schedule: &mut Schedule<Process>, scheduler: &Scheduler) {
+/// Runs a frame in which no node fails.
+fn run_all(schedule: &mut Schedule<TestNode>, scheduler: &Scheduler) {
     let (outcome, ran) = run_frame(schedule, scheduler, false);
     outcome.unwrap();
-    assert!(ran.iter().flatten().all(|&times| times == 1), "an item is missing, or has run twice: {ran:?}");
+    assert!(ran.iter().flatten().all(|&times| times == 1), "an item has not run, or has run twice: {ran:?}");
 }
 
-/// Checks that many frames of these nodes, on schedulers of a few workers and on one that shuffles.
-fn check_frames(frames: usize, always_parallel: bool, nodes: Vec<Process>) {
+/// Checks `frames` frames of these nodes, on schedulers of a few workers and on one that shuffles.
+fn check_frames(frames: usize, always_parallel: bool, nodes: Vec<TestNode>) {
     let nodes = Arc::new(nodes);
     for (workers, seed) in [(2, None), (3, None), (2, Some(1))] {
         let nodes = Arc::clone(&nodes);
         check(move || {
-            let builder = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE);
+            let builder = Scheduler::builder().workers(workers).wake_up_cost(WAKE_UP_COST);
             let scheduler = seed.into_iter().fold(builder, SchedulerBuilder::shuffle).build().unwrap();
             let mut schedule = schedule(&nodes);
             schedule.always_parallel(always_parallel);
@@ -164,7 +164,7 @@ fn shuttle_a_diamond_runs_in_order() {
 }
 
 #[test]
-fn shuttle_many_that_become_ready_together_all_run() {
+fn shuttle_nodes_that_become_ready_together_all_run() {
     use Kind::Plain;
     let fan = [(1, Plain, &[0][..]); 9];
     let list: Vec<_> =
@@ -173,7 +173,7 @@ fn shuttle_many_that_become_ready_together_all_run() {
 }
 
 #[test]
-fn shuttle_a_wide_node_is_done_when_its_last_item_is() {
+fn shuttle_a_wide_node_is_complete_when_its_last_item_is() {
     use Kind::Plain;
     check_frames(1, true, nodes(&[(1, Plain, &[]), (5, Plain, &[0]), (0, Plain, &[0]), (2, Plain, &[1, 2])]));
 }
@@ -201,7 +201,7 @@ fn shuttle_one_frame_follows_another() {
 }
 
 #[test]
-fn shuttle_a_run_that_is_too_long_for_one_thread_is_gone_on_with_by_all() {
+fn shuttle_a_serial_run_that_exceeds_its_limit_continues_in_parallel() {
     use Kind::{Pinned, Plain};
     let list: [(usize, Kind, &[usize]); 6] = [
         (2, Plain, &[]),
@@ -215,12 +215,12 @@ fn shuttle_a_run_that_is_too_long_for_one_thread_is_gone_on_with_by_all() {
 }
 
 #[test]
-fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
+fn shuttle_a_failure_cancels_the_dependents_and_the_next_frame_is_complete() {
     use Kind::{Fails, Panics, Plain};
     for (kind, other, always_parallel) in [(Fails, Plain, true), (Panics, Plain, false), (Fails, Panics, true)] {
         for workers in [2, 3] {
             check(move || {
-                let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE).build().unwrap();
+                let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_UP_COST).build().unwrap();
                 let list: [(usize, Kind, &[usize]); 5] =
                     [(1, Plain, &[]), (3, kind, &[0]), (2, other, &[0]), (1, Plain, &[1]), (1, Plain, &[2, 3])];
                 let mut schedule = schedule(&nodes(&list));
@@ -239,7 +239,7 @@ fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
                     }
                     other => panic!("a run with a failure: {other:?}"),
                 }
-                assert_eq!(ran[3..], [[0], [0]], "what depends on a failure");
+                assert_eq!(ran[3..], [[0], [0]], "dependents of a failed node have run");
                 assert!(ran.iter().flatten().all(|&times| times <= 1), "{ran:?}");
                 run_all(&mut schedule, &scheduler);
             });
@@ -247,8 +247,8 @@ fn shuttle_a_failure_cancels_what_follows_and_the_next_frame_is_whole() {
     }
 }
 
-/// A subscriber that panics at the `left`-th entry of a span from now on; 0 means never. All threads of a model are one of the
-/// system's, so it hears of all of them.
+/// A subscriber that panics when `left` more spans have been entered; 0 means never. All threads of a model run on one thread of
+/// the system, so it is the subscriber of all of them.
 struct PanickingSubscriber {
     left: std::sync::atomic::AtomicUsize,
 }
@@ -279,23 +279,23 @@ impl Subscriber for PanickingSubscriber {
 }
 
 #[test]
-fn shuttle_a_panic_between_nodes_fails_the_run_and_the_next_frame_is_whole() {
+fn shuttle_a_panic_between_nodes_fails_the_run_and_the_next_frame_is_complete() {
     use Kind::{Pinned, Plain};
-    let objects = Arc::new(PanickingSubscriber { left: std::sync::atomic::AtomicUsize::new(0) });
-    let dispatch = Dispatch::from(Arc::clone(&objects));
+    let subscriber = Arc::new(PanickingSubscriber { left: std::sync::atomic::AtomicUsize::new(0) });
+    let dispatch = Dispatch::from(Arc::clone(&subscriber));
     for (workers, always_parallel) in [(2, true), (3, true), (2, false)] {
-        let (objects, dispatch) = (Arc::clone(&objects), dispatch.clone());
-        let at = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+        let (subscriber, dispatch) = (Arc::clone(&subscriber), dispatch.clone());
+        let next = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         check(move || {
             let list: [(usize, Kind, &[usize]); 5] =
                 [(2, Plain, &[]), (3, Plain, &[0]), (1, Pinned, &[0]), (0, Plain, &[1]), (1, Plain, &[2, 3])];
-            let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_PRICE).build().unwrap();
+            let scheduler = Scheduler::builder().workers(workers).wake_up_cost(WAKE_UP_COST).build().unwrap();
             let mut schedule = schedule(&nodes(&list));
             schedule.always_parallel(always_parallel);
             dispatcher::with_default(&dispatch, || {
-                objects.left.store(1 + at.fetch_add(1, Ordering::Relaxed) % 12, Ordering::Relaxed);
+                subscriber.left.store(1 + next.fetch_add(1, Ordering::Relaxed) % 12, Ordering::Relaxed);
                 let (outcome, ran) = run_frame(&mut schedule, &scheduler, false);
-                let panicked = objects.left.swap(0, Ordering::Relaxed) == 0;
+                let panicked = subscriber.left.swap(0, Ordering::Relaxed) == 0;
                 assert_eq!(outcome.is_err(), panicked, "{outcome:?}");
                 assert!(ran.iter().flatten().all(|&times| times <= 1), "{ran:?}");
                 (0..2).for_each(|_frame| run_all(&mut schedule, &scheduler));
@@ -305,14 +305,14 @@ fn shuttle_a_panic_between_nodes_fails_the_run_and_the_next_frame_is_whole() {
 }
 
 #[test]
-fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
+fn shuttle_complete_runs_have_all_chunks_in_logs_taken_during_runs() {
     use Kind::Plain;
     const WIDTHS: [usize; 3] = [3, 1, 0];
     check(|| {
-        // Room for less than two runs.
-        let builder = Scheduler::builder().workers(2).wake_up_cost(WAKE_PRICE).timeline_capacity(8);
+        // Fewer events than two runs have.
+        let builder = Scheduler::builder().workers(2).wake_up_cost(WAKE_UP_COST).timeline_capacity(8);
         let scheduler = Arc::new(builder.build().unwrap());
-        let looks = thread::spawn({
+        let reader = thread::spawn({
             let scheduler = Arc::clone(&scheduler);
             move || {
                 let timeline = scheduler.timeline();
@@ -327,7 +327,7 @@ fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
         let mut schedule = schedule(&nodes(&list));
         schedule.always_parallel(true);
         (0..3).for_each(|_frame| run_all(&mut schedule, &scheduler));
-        let mut logs = Vec::from(looks.join().unwrap());
+        let mut logs = Vec::from(reader.join().unwrap());
         logs.push(scheduler.timeline().take());
         let (mut runs, mut events, mut dropped) = (0, 0, 0);
         for log in &logs {
@@ -341,7 +341,7 @@ fn shuttle_logs_taken_amid_runs_have_all_of_what_they_call_complete() {
                 }
             }
         }
-        // Four chunks a run, and one node without any. Idle times are dropped too.
+        // Each run has four chunks and one empty node. The dropped events include idle intervals.
         assert!(events + dropped as usize >= 5 * runs, "{events} events of {runs} runs, and {dropped} dropped");
     });
 }

@@ -1,28 +1,28 @@
-//! What a worker is to do next in a run, in 64 bits, so that it goes through the queues without taking memory.
+//! Jobs of a run, encoded in 64 bits, so that queueing them allocates nothing.
 
 use std::ops::Range;
 
-/// A piece of a run.
+/// A job of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Token {
-    /// Start the nodes that stand ready at these places.
+    /// Start the ready nodes in these slots.
     Ready(Range<u32>),
     /// Start this node.
     Start(u32),
     /// Start this node, which is pinned.
     StartPinned(u32),
-    /// Take part in this node, which another worker has started.
+    /// Join the workers that run the chunks of this node.
     Join(u32),
 }
 
-/// Places and nodes take 31 bits each. Long before there are so many, memory is full.
+/// Slots and nodes take 31 bits each. A graph that needs more does not fit into memory.
 const BITS: u32 = 31;
 const MASK: u64 = (1 << BITS) - 1;
 
 impl Token {
     pub(super) fn encode(self) -> u64 {
         let (kind, high, low) = match self {
-            Self::Ready(places) => (0, places.end, places.start),
+            Self::Ready(slots) => (0, slots.end, slots.start),
             Self::Start(node) => (1, 0, node),
             Self::StartPinned(node) => (2, 0, node),
             Self::Join(node) => (3, 0, node),
@@ -49,7 +49,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn tokens_come_back_as_they_were(low in 0..=MASK as u32, high in 0..=MASK as u32) {
+        fn a_decoded_token_equals_the_encoded_one(low in 0..=MASK as u32, high in 0..=MASK as u32) {
             for token in [Token::Ready(low..high), Token::Start(low), Token::StartPinned(low), Token::Join(low)] {
                 prop_assert_eq!(Token::decode(token.clone().encode()), token);
             }

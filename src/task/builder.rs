@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     sync::{Arc, thread},
-    timeline::{Setup, Timeline},
+    timeline::{Timeline, TimelineSettings},
     unwind::{AbortOnUnwind, JobPanic, catch, emit},
 };
 
@@ -44,7 +44,7 @@ pub struct SchedulerBuilder {
     on_stop: Option<Hook>,
     shuffle: Option<u64>,
     wake_up_cost: Option<Duration>,
-    timeline: Setup,
+    timeline: TimelineSettings,
 }
 
 /// Not the model checker's `Arc`, which cannot hold what has no size.

@@ -1,7 +1,6 @@
-//! The clock that a timeline reads: the processor's counter, the system's clock, or an engine's.
+//! The timeline's clock: the processor's time-stamp counter, the system's clock, or the engine's.
 //!
-//! What is written down are *marks*, as the clock gives them, and only what is taken out is put into nanoseconds, all of it
-//! by the same measure.
+//! Workers record raw *timestamps*. They are converted to nanoseconds, all at the same rate, when a log is taken.
 
 use std::{sync::OnceLock, thread, time::Duration};
 
@@ -12,45 +11,43 @@ use crate::{
 
 use super::ticks;
 
-/// What tells the time.
+/// The source of timestamps.
 pub(super) enum Clock {
-    Machine(Machine),
+    Machine(MachineClock),
     Engine(EngineClock),
 }
 
-/// The machine's clocks.
-pub(super) struct Machine {
+/// The processor's counter and the system's clock.
+pub(super) struct MachineClock {
     /// When the scheduler was built.
-    built: Moment,
-    /// How many nanoseconds a tick of the processor's counter is, times 2³²; 0 where the counter is of no use. It is found out
-    /// when it is first needed.
+    built: Reading,
+    /// The nanoseconds in a tick of the processor's counter, times 2³²; 0 if the counter cannot be used. Measured on first use.
     tick: OnceLock<u64>,
 }
 
-/// A moment on both of the machine's clocks.
+/// A simultaneous reading of the system's clock and the counter.
 #[derive(Clone, Copy)]
-struct Moment {
+struct Reading {
     time: Instant,
     ticks: u64,
 }
 
 impl Clock {
-    /// The machine's, from now on.
+    /// The machine's clock, starting now.
     pub(super) fn of_this_machine() -> Self {
-        Self::Machine(Machine { built: Moment::now(), tick: OnceLock::new() })
+        Self::Machine(MachineClock { built: Reading::now(), tick: OnceLock::new() })
     }
 
-    /// What reads it.
     #[inline]
-    pub(super) fn reader(&self) -> Reader<'_> {
+    pub(super) fn reader(&self) -> ClockReader<'_> {
         match self {
-            Self::Machine(machine) if machine.tick() > 0 => Reader::Counter { built: machine.built.ticks },
-            Self::Machine(machine) => Reader::System { built: machine.built.time },
-            Self::Engine(clock) => Reader::Engine(clock),
+            Self::Machine(machine) if machine.tick() > 0 => ClockReader::Counter { built: machine.built.ticks },
+            Self::Machine(machine) => ClockReader::System { built: machine.built.time },
+            Self::Engine(clock) => ClockReader::Engine(clock),
         }
     }
 
-    /// What the engine's clock said when it panicked, if it did.
+    /// The message of the engine's clock's panic, if it panicked.
     pub(super) fn panic_message(&self) -> Option<&str> {
         match self {
             Self::Machine(_) => None,
@@ -58,51 +55,51 @@ impl Clock {
         }
     }
 
-    /// What a mark is.
-    pub(super) fn time(&self, mark: u64) -> Duration {
+    /// Converts a timestamp.
+    pub(super) fn time(&self, timestamp: u64) -> Duration {
         let nanoseconds = match self {
             Self::Machine(machine) if machine.tick() > 0 => {
-                ((u128::from(mark) * u128::from(machine.tick())) >> 32).try_into().unwrap_or(u64::MAX)
+                ((u128::from(timestamp) * u128::from(machine.tick())) >> 32).try_into().unwrap_or(u64::MAX)
             }
-            _ => mark,
+            _ => timestamp,
         };
         Duration::from_nanos(nanoseconds)
     }
 
     /// The time.
     pub(super) fn now(&self) -> Duration {
-        self.time(self.reader().in_order())
+        self.time(self.reader().read_ordered())
     }
 }
 
-impl Machine {
-    /// The counter is compared with the system's clock over that time at least: it is right by some millionths then.
-    const COMPARED_FOR: Duration = Duration::from_millis(10);
+impl MachineClock {
+    /// The counter is compared with the system's clock over at least this time. The error is then a few parts per million.
+    const MIN_COMPARISON: Duration = Duration::from_millis(10);
 
     #[inline]
     fn tick(&self) -> u64 {
-        *self.tick.get_or_init(|| self.measured_tick())
+        *self.tick.get_or_init(|| self.measure_tick())
     }
 
     #[cold]
-    fn measured_tick(&self) -> u64 {
-        if !ticks::is_steady() {
+    fn measure_tick(&self) -> u64 {
+        if !ticks::is_reliable() {
             return 0;
         }
-        thread::sleep(Self::COMPARED_FOR.saturating_sub(self.built.time.elapsed()));
-        let now = Moment::now();
+        thread::sleep(Self::MIN_COMPARISON.saturating_sub(self.built.time.elapsed()));
+        let now = Reading::now();
         let time = now.time.duration_since(self.built.time).as_nanos() << 32;
         let ticks = u128::from(now.ticks.saturating_sub(self.built.ticks));
         time.checked_div(ticks).and_then(|tick| tick.try_into().ok()).unwrap_or(0)
     }
 }
 
-/// A clock that the engine supplies. Workers read it between two jobs, where no panic may pass.
+/// A clock that the engine supplies. Workers read it between two jobs, where a panic must not unwind.
 ///
-/// If it panics, it is not called again, and time stands still at its latest reading.
+/// If it panics, it is not called again, and time stops at its latest reading.
 pub(super) struct EngineClock {
     call: Box<dyn Fn() -> Duration + Send + Sync>,
-    /// The mark of the latest reading of any thread. Relaxed: it hands nothing over.
+    /// The latest reading of any thread. Relaxed: it hands nothing over.
     latest: AtomicU64,
     panic: OnceLock<JobPanic>,
 }
@@ -116,9 +113,9 @@ impl EngineClock {
         if self.panic.get().is_none() {
             match catch(&self.call) {
                 Ok(time) => {
-                    let mark = nanoseconds(time);
-                    self.latest.fetch_max(mark, Ordering::Relaxed);
-                    return mark;
+                    let timestamp = nanoseconds(time);
+                    self.latest.fetch_max(timestamp, Ordering::Relaxed);
+                    return timestamp;
                 }
                 Err(panic) => self.stop(panic),
             }
@@ -129,22 +126,22 @@ impl EngineClock {
     #[cold]
     fn stop(&self, panic: JobPanic) {
         let message = panic.message.clone();
-        // Of several threads whose readings panic at once, the first is reported.
+        // If several threads' readings panic at once, the first is reported.
         if self.panic.set(panic).is_ok() {
-            emit(|| tracing::error!(message = %message, "the timeline's clock panicked, and time stands still"));
+            emit(|| tracing::error!(message = %message, "the timeline's clock panicked, so its time stands still"));
         }
     }
 }
 
-impl Moment {
-    /// In some tries, nobody comes between the two readings at least once.
+impl Reading {
+    /// Enough tries that the thread is not preempted between the two readings in at least one of them.
     const TRIES: usize = 8;
 
     fn now() -> Self {
         let one = || {
-            let before = ticks::read_in_order();
+            let before = ticks::read_ordered();
             let time = Instant::now();
-            let after = ticks::read_in_order();
+            let after = ticks::read_ordered();
             (after.saturating_sub(before), Self { time, ticks: before + after.saturating_sub(before) / 2 })
         };
         let first = one();
@@ -152,39 +149,39 @@ impl Moment {
     }
 }
 
-/// Reads a clock.
+/// Reads a clock, whose kind is determined once and not at every reading.
 #[derive(Clone, Copy)]
-pub(super) enum Reader<'clock> {
+pub(super) enum ClockReader<'clock> {
     Counter { built: u64 },
     System { built: Instant },
     Engine(&'clock EngineClock),
 }
 
-impl Reader<'_> {
-    /// The mark of this moment, or of one some nanoseconds before.
+impl ClockReader<'_> {
+    /// The current time, or the time a few nanoseconds ago: the processor may read the counter early.
     #[inline]
     pub(super) fn read(self) -> u64 {
         match self {
             Self::Counter { built } => ticks::read().saturating_sub(built),
-            other => other.in_order(),
+            other => other.read_ordered(),
         }
     }
 
-    /// The mark of this moment. Whatever another thread marked before this one saw what it did is not later.
+    /// The current time. It is not earlier than what another thread read before this thread saw that thread's work.
     #[inline]
-    pub(super) fn in_order(self) -> u64 {
+    pub(super) fn read_ordered(self) -> u64 {
         match self {
-            Self::Counter { built } => ticks::read_in_order().saturating_sub(built),
+            Self::Counter { built } => ticks::read_ordered().saturating_sub(built),
             Self::System { built } => nanoseconds(built.elapsed()),
             Self::Engine(clock) => clock.read(),
         }
     }
 }
 
-/// More than 73 years are not told from that many: three bits of a mark are for something else.
+/// Saturates after 73 years, because an event uses three bits of a timestamp for its tag.
 #[inline]
 fn nanoseconds(time: Duration) -> u64 {
-    // Without the detour over 128 bits, which costs more than the rest.
+    // Faster than `as_nanos`, which computes with 128 bits.
     let nanoseconds = time.as_secs().saturating_mul(1_000_000_000).saturating_add(u64::from(time.subsec_nanos()));
     nanoseconds.min(u64::MAX >> 3)
 }
@@ -203,29 +200,29 @@ mod tests {
     use super::{Clock, EngineClock};
 
     #[test]
-    fn the_machines_clock_keeps_the_systems_time() {
+    fn the_counter_agrees_with_the_systems_clock() {
         let clock = Clock::of_this_machine();
         for _round in 0..5 {
             let (start, began) = (Instant::now(), clock.now());
             thread::sleep(Duration::from_millis(20));
             let (ended, took) = (clock.now(), start.elapsed());
-            let (least, most) = (Duration::from_millis(20).mul_f64(0.999), took.mul_f64(1.001));
-            assert!((least..most).contains(&(ended - began)), "{:?} of {took:?}", ended - began);
+            let (min, max) = (Duration::from_millis(20).mul_f64(0.999), took.mul_f64(1.001));
+            assert!((min..max).contains(&(ended - began)), "{:?} of {took:?}", ended - began);
         }
     }
 
     #[test]
-    fn marks_of_one_thread_ascend() {
+    fn timestamps_of_one_thread_ascend() {
         let clock = Clock::of_this_machine();
         let reader = clock.reader();
-        let marks: Vec<_> = (0..10_000).map(|_| (reader.in_order(), reader.in_order())).collect();
-        assert!(marks.iter().all(|(before, after)| before <= after));
-        assert!(marks.is_sorted());
-        assert!(clock.time(marks[0].0) < clock.time(marks[9_999].1));
+        let timestamps: Vec<_> = (0..10_000).map(|_| (reader.read_ordered(), reader.read_ordered())).collect();
+        assert!(timestamps.iter().all(|(before, after)| before <= after));
+        assert!(timestamps.is_sorted());
+        assert!(clock.time(timestamps[0].0) < clock.time(timestamps[9_999].1));
     }
 
     #[test]
-    fn an_engines_clock_is_taken_as_it_is() {
+    fn an_engines_clock_is_used_unchanged() {
         let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::new(3, 7))));
         assert_eq!(clock.now(), Duration::new(3, 7));
         assert_eq!(clock.reader().read(), 3_000_000_007);

@@ -1,8 +1,8 @@
-//! What ran where and when: the recorder of a scheduler's workers, and what it has recorded.
+//! Records what ran when on which worker.
 //!
-//! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and is switched on and off while that runs. Each
-//! worker writes into a ring of its own, so that nobody waits for anybody; what has been written is taken out as a [`Log`],
-//! which is plain data: frames, runs of schedules, and every chunk of them.
+//! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and can be switched on and off while the scheduler runs.
+//! Each worker writes to its own ring buffer, so no worker waits for another. A [`Log`] takes out what was recorded as plain
+//! data: frames, runs of schedules, and every chunk of each run.
 //!
 //! ```
 //! use drawloom::{
@@ -20,7 +20,7 @@
 //! schedule.run(&scheduler, &())?;
 //! let log = scheduler.timeline().take();
 //! for chunk in &log.runs[0].chunks {
-//!     println!("{:?} on worker {}, {:?} after it could have", chunk.items, chunk.worker, chunk.started - chunk.opened);
+//!     println!("{:?} on worker {}, {:?} after its node was opened", chunk.items, chunk.worker, chunk.started - chunk.opened);
 //! }
 //! assert_eq!(log.runs[0].chunks.len(), 10);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -28,22 +28,23 @@
 //!
 //! # What it costs
 //!
-//! While it is off, a look at a flag for every run and every worker that falls asleep. While it is on, a reading of the clock
-//! for every chunk and another for every process (of the processor's counter, on x86-64), and 48 bytes a chunk out of a ring
-//! whose size is [set](crate::task::SchedulerBuilder::timeline_capacity) beforehand. What does not fit is dropped and
+//! While the timeline is off: one read of a flag for each run, and for each worker that falls asleep. While it is on: one reading
+//! of the clock for each chunk and one for each node (on x86-64, of the processor's counter), and 48 bytes per chunk in a
+//! ring buffer of [fixed size](crate::task::SchedulerBuilder::timeline_capacity). Events that do not fit are dropped and
 //! counted.
 
-mod book;
+mod chunk_timer;
 mod clock;
-mod lane;
+mod event_store;
 mod log;
 mod recorder;
 mod ring;
 mod ticks;
+mod track;
 
 pub(crate) use self::{
-    lane::Lap,
-    recorder::{Ended, OpenRun, Setup},
+    chunk_timer::ChunkTimer,
+    recorder::{OpenRun, RunEnd, TimelineSettings},
 };
 
 pub use self::{

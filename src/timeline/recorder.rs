@@ -1,4 +1,4 @@
-//! The recorder: what workers and calling threads write into, and what takes it out.
+//! The recorder: workers and calling threads write to it, and a log takes out what they wrote.
 
 use std::{
     borrow::Cow,
@@ -14,112 +14,114 @@ use crossbeam_utils::CachePadded;
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
 use super::{
-    book::{Book, Kept, Marks, frames_of},
-    clock::{Clock, EngineClock, Reader},
-    lane::{Entry, Lane, Lap},
+    chunk_timer::ChunkTimer,
+    clock::{Clock, ClockReader, EngineClock},
+    event_store::{EventStore, Events, FrameSource, frames_of},
     log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog},
+    track::{Entry, Track},
 };
 
-/// Whether anything is recorded at all. A model checker has enough to do without; and what recording costs while it is off
-/// is measured against a build without it.
-const RECORDS: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
+/// Whether the build can record at all. It cannot under loom, which has enough state to explore without recording, and in the
+/// build that the cost of a switched-off timeline is measured against.
+const CAN_RECORD: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
 
 /// Records what the workers of a [`Scheduler`](crate::task::Scheduler) do.
 ///
-/// It is off at first. [`start`](Self::start) and [`stop`](Self::stop) may be called at any time, from any thread: a run of a
-/// schedule is recorded from its beginning to its end, or not at all.
+/// It is off by default. [`start`](Self::start) and [`stop`](Self::stop) may be called at any time from any thread. A run of a
+/// schedule is recorded either from beginning to end or not at all.
 pub struct Timeline {
     is_on: AtomicBool,
-    /// The mark of when it was last switched on.
+    /// The timestamp of when it was last switched on.
     started: AtomicU64,
     clock: Clock,
-    lanes: Box<[CachePadded<Lane>]>,
+    tracks: Box<[CachePadded<Track>]>,
     names: Box<[String]>,
-    book: Mutex<Book>,
-    /// Held by whoever takes a log: until when the last one told of each worker.
-    taker: Mutex<Box<[Duration]>>,
+    store: Mutex<EventStore>,
+    /// Locked while a log is taken. Per worker, the time up to which logs have reported it.
+    reported: Mutex<Box<[Duration]>>,
 }
 
-/// How a timeline is to be.
+/// The settings of a timeline.
 #[derive(Default)]
-pub(crate) struct Setup {
-    /// How many events each worker has room for.
+pub(crate) struct TimelineSettings {
+    /// The capacity of each worker's track, in events.
     pub(crate) capacity: Option<usize>,
-    /// What tells the time instead of the system.
+    /// The engine's clock, to be used instead of the machine's.
     pub(crate) clock: Option<Box<dyn Fn() -> Duration + Send + Sync>>,
 }
 
-impl Setup {
-    /// Room for the chunks of some hundred frames, in 3 MiB a worker.
-    const CAPACITY: usize = 1 << 16;
+impl TimelineSettings {
+    /// Enough for the chunks of some hundred frames. It takes 3 MiB per worker.
+    const DEFAULT_CAPACITY: usize = 1 << 16;
 
-    /// 768 MiB a worker.
-    const MOST_CAPACITY: usize = 1 << 24;
+    /// It takes 768 MiB per worker.
+    const MAX_CAPACITY: usize = 1 << 24;
 }
 
 impl Timeline {
-    /// Off, for workers of these names.
-    pub(crate) fn new(names: Vec<String>, setup: Setup) -> Self {
-        let capacity = setup.capacity.unwrap_or(Setup::CAPACITY).clamp(1, Setup::MOST_CAPACITY);
+    /// A timeline for workers with these names. It is off.
+    pub(crate) fn new(names: Vec<String>, settings: TimelineSettings) -> Self {
+        let capacity =
+            settings.capacity.unwrap_or(TimelineSettings::DEFAULT_CAPACITY).clamp(1, TimelineSettings::MAX_CAPACITY);
         Self {
             is_on: AtomicBool::new(false),
             started: AtomicU64::new(0),
-            clock: setup.clock.map_or_else(Clock::of_this_machine, |clock| Clock::Engine(EngineClock::new(clock))),
-            lanes: names.iter().map(|_| CachePadded::new(Lane::new(capacity))).collect(),
-            taker: Mutex::new(names.iter().map(|_| Duration::ZERO).collect()),
+            clock: settings.clock.map_or_else(Clock::of_this_machine, |clock| Clock::Engine(EngineClock::new(clock))),
+            tracks: names.iter().map(|_| CachePadded::new(Track::new(capacity))).collect(),
+            reported: Mutex::new(names.iter().map(|_| Duration::ZERO).collect()),
             names: names.into(),
-            book: Mutex::new(Book::default()),
+            store: Mutex::new(EventStore::default()),
         }
     }
 
-    /// Records from now on. The first time, memory for all workers is asked for; and for the processor's counter to be known well
-    /// enough, the scheduler has to be 10 ms old: so long it waits at most.
+    /// Switches the timeline on. The first call allocates the memory for all workers, and waits until the scheduler is 10 ms old,
+    /// because it calibrates the processor's counter over that time.
     pub fn start(&self) {
-        // What a tick is takes its time to find out, so nobody is to do that amid a run.
+        // Calibrates the counter on first use, which takes too long to be done during a run.
         let reader = self.clock.reader();
         if !self.is_on() {
-            self.started.store(reader.in_order(), Ordering::Relaxed);
-            self.book.lock().forget_frame();
+            self.started.store(reader.read_ordered(), Ordering::Relaxed);
+            self.store.lock().end_frame();
         }
-        self.lanes.iter().for_each(|lane| lane.make_room());
-        // Relaxed: whoever writes finds the memory by itself, and drops what it writes if that is not there yet.
+        self.tracks.iter().for_each(|track| track.allocate());
+        // Relaxed: a writer finds the memory through its `OnceLock`, and drops events until it is there.
         self.is_on.store(true, Ordering::Relaxed);
     }
 
-    /// Records no further. What was recorded can still be [taken](Self::take).
+    /// Switches the timeline off. What was recorded can still be [taken](Self::take).
     pub fn stop(&self) {
         self.is_on.store(false, Ordering::Relaxed);
     }
 
-    /// Whether it records.
+    /// Whether the timeline is on.
     #[inline]
     pub fn is_on(&self) -> bool {
-        RECORDS && self.is_on.load(Ordering::Relaxed)
+        CAN_RECORD && self.is_on.load(Ordering::Relaxed)
     }
 
-    /// How many bytes of memory its rings take: none before it was started for the first time, and never more from then on.
+    /// The size of the workers' ring buffers in bytes: 0 before the first [`start`](Self::start), and constant after it.
     pub fn bytes(&self) -> usize {
-        self.lanes.iter().map(|lane| lane.bytes()).sum()
+        self.tracks.iter().map(|track| track.bytes()).sum()
     }
 
-    /// The time on its axis: since the scheduler was built, unless an engine's clock says it. The first time, it waits as
+    /// The current time: since the scheduler was built, unless the engine supplies the clock. The first call waits as
     /// [`start`](Self::start) does.
     pub fn now(&self) -> Duration {
         self.clock.now()
     }
 
-    /// A frame begins. All that is recorded until the next one belongs to it.
+    /// Begins a frame. What is recorded until the next frame belongs to it.
     ///
-    /// An engine that never calls this need not: then every [`Renderer::record`](crate::Renderer::record) begins one, and where
-    /// there is no renderer every run of a schedule that begins while no other goes on. One that does, also while nothing is
-    /// recorded, has frames of its own, with any number of both in each.
+    /// Calling this is optional. If an engine never calls it, every [`Renderer::record`](crate::Renderer::record) begins a frame;
+    /// without a renderer, every run of a schedule does that begins while no other run is in progress. After the first call,
+    /// even one while the timeline is off, only these calls begin frames, and a frame can contain any number of records and
+    /// runs.
     pub fn mark_frame(&self) {
         let now = self.is_on().then(|| self.now());
-        self.book.lock().mark(Marks::Engine, now);
+        self.store.lock().mark_frame(FrameSource::Engine, now);
     }
 
-    /// Names what the calling thread does until the guard is dropped: a span of its own among those of the frame in which it
-    /// ends.
+    /// Begins a span of the calling thread, which ends when the guard is dropped. It belongs to the frame in which it ends.
     ///
     /// ```
     /// # let scheduler = drawloom::task::Scheduler::new(1)?;
@@ -135,39 +137,41 @@ impl Timeline {
         self.span_of(None, name)
     }
 
-    /// As [`span`](Self::span), of that frame if it is given.
+    /// As [`span`](Self::span), but in the given frame, if any.
     pub(crate) fn span_of(&self, frame: Option<u64>, name: impl Into<Cow<'static, str>>) -> OpenSpan<'_> {
         let open = self.is_on().then(|| (name.into(), frame, self.now()));
         OpenSpan { timeline: self, open, stays_on_its_thread: PhantomData }
     }
 
-    /// Notes what a counter stands at. Its name is the same each time, and says the unit.
+    /// Records the value of a counter. Its name includes the unit, and is the same each time.
     pub fn count(&self, name: impl Into<Cow<'static, str>>, value: f64) {
         if self.is_on() {
             let at = self.now();
-            self.book.lock().keep(|kept| &mut kept.counters, Counter { name: name.into().into_owned(), at, value });
+            self.store
+                .lock()
+                .push(|events| &mut events.counters, Counter { name: name.into().into_owned(), at, value });
         }
     }
 
-    /// Takes out all that was recorded since the last time.
+    /// Takes out what was recorded since the last call.
     ///
-    /// It may be called at any time, and keeps nobody waiting. But chunks of a run that goes on meanwhile are lost, and counted,
-    /// and that run is not [complete](Run::complete). So the best moment is between two frames.
+    /// This may be called at any time, and blocks no worker. It is best called between two frames: chunks of a run in progress are
+    /// lost and counted as dropped, and that run is not [complete](Run::complete).
     pub fn take(&self) -> Log {
-        let mut told = self.taker.lock();
-        let Kept { frames, runs, spans, counters, threads, dropped } = self.book.lock().take();
+        let mut reported = self.reported.lock();
+        let Events { frames, runs, spans, counters, threads, dropped } = self.store.lock().take();
         let mut log = Log { spans, counters, threads, dropped, ..Log::default() };
-        let mut places = HashMap::with_capacity(runs.len());
-        let mut too_early = HashSet::new();
+        let mut indices = HashMap::with_capacity(runs.len());
+        let mut open_runs = HashSet::new();
         for (number, run) in runs {
-            places.insert(number, log.runs.len());
+            indices.insert(number, log.runs.len());
             log.runs.push(run);
         }
-        for (worker, lane) in self.lanes.iter().enumerate() {
-            let drained = self.drain(worker, lane, &mut told[worker], &places, &mut log.runs, &mut too_early);
+        for (worker, track) in self.tracks.iter().enumerate() {
+            let drained = self.drain(worker, track, &mut reported[worker], &indices, &mut log.runs, &mut open_runs);
             log.workers.push(drained);
         }
-        self.book.lock().lose_chunks_of(&too_early);
+        self.store.lock().mark_incomplete(&open_runs);
         log.clock_panic = self.clock.panic_message().map(str::to_owned);
         for run in &mut log.runs {
             run.chunks.sort_unstable_by_key(|chunk| (chunk.process, chunk.items.start));
@@ -177,73 +181,73 @@ impl Timeline {
         log
     }
 
-    /// Takes out what one worker has written, and its idle times from where the last log ended. Chunks of a run that has no
-    /// place are lost, and its number goes to those that were taken out too early.
+    /// Takes out one worker's chunks, and its idle intervals since the last log. Chunks of a run without an index are lost, and
+    /// the run's number is added to `open_runs`.
     fn drain(
         &self,
         worker: usize,
-        lane: &Lane,
-        told: &mut Duration,
-        places: &HashMap<u32, usize>,
+        track: &Track,
+        reported: &mut Duration,
+        indices: &HashMap<u32, usize>,
         runs: &mut [Run],
-        too_early: &mut HashSet<u32>,
+        open_runs: &mut HashSet<u32>,
     ) -> WorkerLog {
         let mut log = WorkerLog { name: self.names[worker].clone(), ..WorkerLog::default() };
         let (mut until, mut lost) = (Duration::ZERO, 0);
-        let mut put = |run: u32, chunk: Chunk, list: fn(&mut Run) -> &mut Vec<Chunk>| match places.get(&run) {
-            Some(&place) => list(&mut runs[place]).push(chunk),
+        let mut add = |run: u32, chunk: Chunk, list: fn(&mut Run) -> &mut Vec<Chunk>| match indices.get(&run) {
+            Some(&index) => list(&mut runs[index]).push(chunk),
             None => {
                 lost += 1;
-                too_early.insert(run);
+                open_runs.insert(run);
             }
         };
-        // Who fell asleep while nothing was recorded has not said when.
+        // An idle interval that began while the timeline was off has no start time.
         let started = self.clock.time(self.started.load(Ordering::Relaxed));
-        let since_when = |idle: Idle, until: Duration| {
+        let with_start = |idle: Idle, until: Duration| {
             let began = if idle.began.is_zero() { until.max(started) } else { idle.began };
-            Idle { began: began.max(*told).min(idle.ended), ..idle }
+            Idle { began: began.max(*reported).min(idle.ended), ..idle }
         };
-        // Before the rest, so that it overlaps nothing that is taken out.
-        let now = lane.idle_until(self.now(), &self.clock);
-        let dropped = lane.drain(worker, &self.clock, |entry| match entry {
+        // Read before the ring is drained, so that the open interval overlaps nothing in the ring.
+        let open = track.idle_until(self.now(), &self.clock);
+        let dropped = track.drain(worker, &self.clock, |entry| match entry {
             Entry::Idle(idle) => {
-                // The last log may have told of all of it, where it ended as that was taken.
-                log.idle.extend((idle.ended >= *told).then(|| since_when(idle, until)));
+                // The last log has reported the whole interval if it ended while that log was taken.
+                log.idle.extend((idle.ended >= *reported).then(|| with_start(idle, until)));
                 until = idle.ended;
             }
             Entry::Chunk { run, chunk } => {
                 until = chunk.ended;
-                put(run, chunk, |run| &mut run.chunks);
+                add(run, chunk, |run| &mut run.chunks);
             }
             Entry::Empty { run, chunk } => {
                 until = chunk.ended;
-                put(run, chunk, |run| &mut run.empty);
+                add(run, chunk, |run| &mut run.empty);
             }
         });
-        let now = now.map(|now| since_when(now, until));
-        let now = now.filter(|now| log.idle.last().is_none_or(|last| last.ended <= now.began));
-        *told = until.max(now.map_or(*told, |now| now.ended));
-        log.idle.extend(now);
+        let open = open.map(|idle| with_start(idle, until));
+        let open = open.filter(|idle| log.idle.last().is_none_or(|last| last.ended <= idle.began));
+        *reported = until.max(open.map_or(*reported, |idle| idle.ended));
+        log.idle.extend(open);
         log.dropped = dropped + lost;
         log
     }
 
-    /// A frame begins, unless the engine marks its own. Says which it is; `None` if nothing is recorded.
+    /// Begins a frame, unless the engine marks frames, and returns the current frame's number. `None` if the timeline is off.
     pub(crate) fn begin_frame(&self) -> Option<u64> {
         self.is_on().then(|| {
             let now = self.now();
-            let mut book = self.book.lock();
-            book.mark(Marks::Renderer, Some(now));
-            book.current_frame()
+            let mut store = self.store.lock();
+            store.mark_frame(FrameSource::Renderer, Some(now));
+            store.current_frame()
         })
     }
 
-    /// A run of a schedule begins, of which `graph` tells what it is of.
+    /// Begins a run of the schedule that `graph` describes. `None` if the timeline is off.
     pub(crate) fn open_run(&self, in_background: bool, graph: impl FnOnce() -> Arc<Graph>) -> Option<OpenRun<'_>> {
         self.is_on().then(|| {
             let graph = graph();
             let began = self.now();
-            let (number, frame) = self.book.lock().open_run(began, in_background);
+            let (number, frame) = self.store.lock().open_run(began, in_background);
             OpenRun {
                 timeline: self,
                 reader: self.clock.reader(),
@@ -252,32 +256,32 @@ impl Timeline {
                 graph,
                 began,
                 in_background,
-                shared_from: OnceLock::new(),
+                parallel_from: OnceLock::new(),
                 dropped: AtomicU64::new(0),
-                how: Ended { failed: true, ..Ended::default() },
+                end: RunEnd { failed: true, ..RunEnd::default() },
             }
         })
     }
 
-    /// The worker has nothing to do from now on.
+    /// The worker becomes idle.
     ///
-    /// That it fell asleep is noted even while nothing is recorded: it may still sleep when something is.
+    /// That it falls asleep is noted even while the timeline is off, because it may still be asleep when the timeline is on.
     pub(crate) fn start_idle(&self, worker: usize, kind: IdleKind) {
-        let now = self.mark_if_on();
-        if now.is_some() || (RECORDS && kind == IdleKind::Asleep) {
-            self.lanes[worker].start_idle(kind, now);
+        let now = self.timestamp_if_on();
+        if now.is_some() || (CAN_RECORD && kind == IdleKind::Asleep) {
+            self.tracks[worker].start_idle(kind, now);
         }
     }
 
-    /// The worker has something to do.
+    /// The worker becomes busy.
     pub(crate) fn end_idle(&self, worker: usize) {
-        if RECORDS && self.lanes[worker].is_idle() {
-            self.lanes[worker].end_idle(self.mark_if_on());
+        if CAN_RECORD && self.tracks[worker].is_idle() {
+            self.tracks[worker].end_idle(self.timestamp_if_on());
         }
     }
 
-    fn mark_if_on(&self) -> Option<u64> {
-        self.is_on().then(|| self.clock.reader().in_order())
+    fn timestamp_if_on(&self) -> Option<u64> {
+        self.is_on().then(|| self.clock.reader().read_ordered())
     }
 }
 
@@ -287,7 +291,7 @@ impl fmt::Debug for Timeline {
     }
 }
 
-/// A span that has not ended: see [`Timeline::span`]. It is of the thread that began it, and stays there:
+/// An open span: see [`Timeline::span`]. It cannot leave the thread that began it:
 ///
 /// ```compile_fail
 /// let scheduler = drawloom::task::Scheduler::new(1).unwrap();
@@ -304,7 +308,7 @@ impl Drop for OpenSpan<'_> {
     fn drop(&mut self) {
         if let Some((name, frame, began)) = self.open.take() {
             let ended = self.timeline.now();
-            self.timeline.book.lock().add_span(name.into_owned(), frame, began..ended);
+            self.timeline.store.lock().add_span(name.into_owned(), frame, began..ended);
         }
     }
 }
@@ -312,72 +316,72 @@ impl Drop for OpenSpan<'_> {
 /// A run that is being recorded.
 pub(crate) struct OpenRun<'timeline> {
     timeline: &'timeline Timeline,
-    reader: Reader<'timeline>,
+    reader: ClockReader<'timeline>,
     number: u32,
     frame: u64,
     graph: Arc<Graph>,
     began: Duration,
     in_background: bool,
-    shared_from: OnceLock<Duration>,
-    /// How many of its chunks there was no room for.
+    parallel_from: OnceLock<Duration>,
+    /// How many of its chunks were dropped.
     dropped: AtomicU64,
-    how: Ended,
+    end: RunEnd,
 }
 
-/// How a run has ended.
+/// What is known of a run when it ends.
 #[derive(Default)]
-pub(crate) struct Ended {
+pub(crate) struct RunEnd {
     pub(crate) always_parallel: bool,
     pub(crate) failed: bool,
 }
 
 impl OpenRun<'_> {
-    /// A worker opens a process of the run, and begins with its chunks.
+    /// A worker opens a node of the run, and begins to run its chunks.
     #[inline]
-    pub(crate) fn open(&self, worker: usize, process: u32, stolen: bool) -> Lap<'_> {
-        self.lap(worker, process, stolen, None)
+    pub(crate) fn open(&self, worker: usize, node: u32, stolen: bool) -> ChunkTimer<'_> {
+        self.timer(worker, node, stolen, None)
     }
 
-    /// A worker joins those at a process of the run that was opened at that moment.
+    /// A worker joins the workers that run the chunks of a node. `opened` is the timestamp of when the node was opened.
     #[inline]
-    pub(crate) fn join(&self, worker: usize, process: u32, stolen: bool, opened: u64) -> Lap<'_> {
-        self.lap(worker, process, stolen, Some(opened))
+    pub(crate) fn join(&self, worker: usize, node: u32, stolen: bool, opened: u64) -> ChunkTimer<'_> {
+        self.timer(worker, node, stolen, Some(opened))
     }
 
-    /// Other workers than the calling thread can take part from now on.
-    pub(crate) fn let_others_in(&self) {
-        self.shared_from.get_or_init(|| self.timeline.now());
+    /// The run is parallel from now on.
+    pub(crate) fn start_parallel(&self) {
+        self.parallel_from.get_or_init(|| self.timeline.now());
     }
 
     #[inline]
-    fn lap(&self, worker: usize, process: u32, stolen: bool, opened: Option<u64>) -> Lap<'_> {
-        Lap::new(&self.timeline.lanes[worker], self.reader, [self.number, process], stolen, opened, &self.dropped)
+    fn timer(&self, worker: usize, node: u32, stolen: bool, opened: Option<u64>) -> ChunkTimer<'_> {
+        ChunkTimer::new(&self.timeline.tracks[worker], self.reader, [self.number, node], stolen, opened, &self.dropped)
     }
 
-    /// The run has ended. One that is dropped without this, as a panic passes through it, has failed.
-    pub(crate) fn end(mut self, how: Ended) {
-        self.how = how;
+    /// Ends the run. A run that is dropped without this call, because a panic unwinds through it, counts as failed.
+    pub(crate) fn end(mut self, end: RunEnd) {
+        self.end = end;
     }
 }
 
 impl Drop for OpenRun<'_> {
     fn drop(&mut self) {
-        let Ended { always_parallel, failed } = self.how;
+        let RunEnd { always_parallel, failed } = self.end;
         let run = Run {
             frame: self.frame,
             graph: Arc::clone(&self.graph),
-            workers: self.timeline.lanes.len(),
+            workers: self.timeline.tracks.len(),
             began: self.began,
             ended: self.timeline.now(),
-            shared_from: self.shared_from.take(),
+            shared_from: self.parallel_from.take(),
             always_parallel,
             in_background: self.in_background,
             failed,
-            // Relaxed: all who count are done.
+            // Relaxed: all workers that count are done.
             complete: self.dropped.load(Ordering::Relaxed) == 0,
             chunks: Vec::new(),
             empty: Vec::new(),
         };
-        self.timeline.book.lock().end_run(self.number, run);
+        self.timeline.store.lock().end_run(self.number, run);
     }
 }

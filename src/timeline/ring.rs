@@ -1,13 +1,13 @@
-//! A ring of events that one thread writes and another one takes out.
+//! A single-producer, single-consumer ring buffer of events.
 //!
-//! It never waits and never grows: an event for which there is no room is dropped and counted. Its memory is asked for when it
-//! is needed for the first time.
+//! It never waits and never grows: if it is full, an event is dropped and counted. Its memory is allocated when the timeline is
+//! first switched on.
 //!
 //! # Memory ordering
 //!
-//! An event's words are written relaxed, and `written` is stored after them with release; the reader acquires it before it
-//! reads them. The reader stores `taken` with release after it has read, and the writer acquires that before it writes over
-//! what was there. So no word is read while it is written, without anything but loads and stores on the way in.
+//! The writer stores an event's words relaxed, and then `written` with release. The reader acquires `written` before it reads the
+//! words. After reading, the reader stores `taken` with release, and the writer acquires `taken` before it overwrites the
+//! words. So no word is read while it is written, and the writer only needs loads and stores.
 
 use std::sync::OnceLock;
 
@@ -15,7 +15,7 @@ use crossbeam_utils::CachePadded;
 
 use crate::sync::{AtomicU64, AtomicUsize, Ordering};
 
-/// The words of an event.
+/// The number of words in an event.
 pub(super) const WORDS: usize = 6;
 
 pub(super) type Event = [u64; WORDS];
@@ -24,16 +24,16 @@ pub(super) struct Ring {
     /// A power of two.
     capacity: usize,
     words: OnceLock<Box<[AtomicU64]>>,
-    /// How many events were written. The writer alone changes it.
+    /// The number of events written so far. Only the writer changes it.
     written: CachePadded<AtomicUsize>,
-    /// How many events were taken out. The reader alone changes it.
+    /// The number of events read so far. Only the reader changes it.
     taken: CachePadded<AtomicUsize>,
-    /// How many events were dropped, and have not been told of.
+    /// The number of dropped events that no call of `drain` has returned yet.
     dropped: AtomicU64,
 }
 
 impl Ring {
-    /// Of room for so many events at least. It takes no memory yet, and drops everything.
+    /// A ring for at least `capacity` events. Until its memory is allocated, it drops all events.
     pub(super) fn new(capacity: usize) -> Self {
         Self {
             capacity: capacity.next_power_of_two(),
@@ -44,24 +44,24 @@ impl Ring {
         }
     }
 
-    /// Asks for its memory, unless it has it.
-    pub(super) fn make_room(&self) {
+    /// Allocates the memory, unless it is allocated.
+    pub(super) fn allocate(&self) {
         self.words.get_or_init(|| (0..self.capacity * WORDS).map(|_| AtomicU64::new(0)).collect());
     }
 
-    /// How much memory it has.
+    /// The size of the allocated memory.
     pub(super) fn bytes(&self) -> usize {
         self.words.get().map_or(0, |words| size_of_val(&**words))
     }
 
-    /// Writes an event, and says whether there was room. One thread at a time may do so, each after the one before.
+    /// Writes an event, and returns whether there was room. Calls must not overlap, and each must be ordered after the last.
     #[inline]
     pub(super) fn push(&self, event: Event) -> bool {
-        // Relaxed: it is the writer's own.
+        // Relaxed: only the writer changes it.
         let written = self.written.load(Ordering::Relaxed);
         let room = self.capacity - written.wrapping_sub(self.taken.load(Ordering::Acquire));
         let Some(words) = self.words.get().filter(|_| room > 0) else {
-            self.drop_one();
+            self.count_dropped();
             return false;
         };
         let start = (written & (self.capacity - 1)) * WORDS;
@@ -72,13 +72,12 @@ impl Ring {
         true
     }
 
-    /// Takes out all events that are there, the oldest first, and says how many were dropped since the last time. One thread at
-    /// a time may do so.
+    /// Takes out all events, the oldest first, and returns how many were dropped since the last call. Calls must not overlap.
     pub(super) fn drain(&self, mut take: impl FnMut(Event)) -> u64 {
         let dropped = self.dropped.swap(0, Ordering::Relaxed);
         let Some(words) = self.words.get() else { return dropped };
         let written = self.written.load(Ordering::Acquire);
-        // Relaxed: it is the reader's own.
+        // Relaxed: only the reader changes it.
         let mut taken = self.taken.load(Ordering::Relaxed);
         while taken != written {
             let start = (taken & (self.capacity - 1)) * WORDS;
@@ -94,8 +93,8 @@ impl Ring {
     }
 
     #[cold]
-    fn drop_one(&self) {
-        // Relaxed: it is a count, and hands nothing over.
+    fn count_dropped(&self) {
+        // Relaxed: the count hands nothing over.
         self.dropped.fetch_add(1, Ordering::Relaxed);
     }
 }
@@ -115,9 +114,9 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_comes_out_in_order_round_after_round() {
+    fn events_are_read_in_the_order_they_were_written() {
         let ring = Ring::new(4);
-        ring.make_room();
+        ring.allocate();
         for round in 0..10 {
             assert!((0..3).all(|step| ring.push(event(round * 3 + step))));
             assert_eq!(numbers(&ring), ((round * 3..round * 3 + 3).collect(), 0));
@@ -125,11 +124,11 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_dropped_and_counted_once() {
+    fn events_without_room_are_dropped_and_counted_once() {
         let ring = Ring::new(3);
         assert!(!ring.push(event(7)));
         assert_eq!(numbers(&ring), (vec![], 1), "there is no memory yet");
-        ring.make_room();
+        ring.allocate();
         assert_eq!((0..10).filter(|&number| ring.push(event(number))).count(), 4);
         assert_eq!(numbers(&ring), (vec![0, 1, 2, 3], 6));
         assert!(ring.push(event(10)));
@@ -149,10 +148,10 @@ mod loom_tests {
     }
 
     #[test]
-    fn an_event_is_taken_out_whole_or_not_at_all_and_none_is_lost_uncounted() {
+    fn an_event_is_read_whole_or_not_at_all_and_dropped_ones_are_counted() {
         model(|| {
             let ring = Arc::new(Ring::new(2));
-            ring.make_room();
+            ring.allocate();
             let writer = {
                 let ring = Arc::clone(&ring);
                 thread::spawn(move || (1..4).filter(|&number| !ring.push(event(number))).count() as u64)
@@ -168,18 +167,18 @@ mod loom_tests {
         });
     }
 
-    /// The ring of worker 0 is written by whichever thread calls the scheduler: one after another, handed on with the lock of the
-    /// caller's slot, while some thread takes events out.
+    /// Any thread that calls the scheduler writes to the ring of worker 0: one thread at a time, ordered by the lock of the caller
+    /// slot, while another thread reads.
     #[test]
-    fn one_thread_goes_on_where_another_stopped_writing() {
+    fn one_thread_continues_to_write_where_another_stopped() {
         model(|| {
             let ring = Arc::new(Ring::new(2));
-            ring.make_room();
-            let turn = Arc::new(Mutex::new(0));
+            ring.allocate();
+            let slot = Arc::new(Mutex::new(0));
             let write = |number: u64| {
-                let (ring, turn) = (Arc::clone(&ring), Arc::clone(&turn));
+                let (ring, slot) = (Arc::clone(&ring), Arc::clone(&slot));
                 move || {
-                    let mut written = turn.lock();
+                    let mut written = slot.lock();
                     ring.push(event(number));
                     *written += 1;
                 }
@@ -197,9 +196,9 @@ mod loom_tests {
             other.join().unwrap();
             let (mut taken, mut dropped) = reader.join().unwrap();
             dropped += ring.drain(|event| taken.push(event));
-            assert_eq!((*turn.lock(), dropped), (2, 0));
+            assert_eq!((*slot.lock(), dropped), (2, 0));
             taken.sort_unstable();
-            assert_eq!(taken, [event(1), event(2)], "none is lost, torn or written over");
+            assert_eq!(taken, [event(1), event(2)], "no event is lost, torn or overwritten");
         });
     }
 }

@@ -1,5 +1,5 @@
-//! The processor's own counter of time, where it has one that is fit for it: a reading takes half as long as one of the
-//! system's clock, which is the dearest part of recording a chunk.
+//! The processor's time-stamp counter, where it has a reliable one. Reading it takes half as long as reading the system's
+//! clock, which is the most expensive part of recording a chunk.
 
 #[cfg(all(target_arch = "x86_64", not(any(drawloom_loom, drawloom_shuttle, miri))))]
 mod counter {
@@ -8,8 +8,8 @@ mod counter {
         fs,
     };
 
-    /// Whether it goes at one pace whatever the processor does, and is the same on all of its cores.
-    pub(in crate::timeline) fn is_steady() -> bool {
+    /// Whether the counter runs at a constant rate and is synchronized between cores.
+    pub(in crate::timeline) fn is_reliable() -> bool {
         const HIGHEST_LEAF: u32 = 0x8000_0000;
         const POWER_LEAF: u32 = 0x8000_0007;
         const INVARIANT: u32 = 1 << 8;
@@ -17,24 +17,25 @@ mod counter {
         is_invariant && is_trusted_by_the_system()
     }
 
-    /// Linux watches whether the counters of all cores agree, and takes another clock if they do not.
+    /// Linux checks whether the counters of all cores agree, and uses another clock source if they do not.
     fn is_trusted_by_the_system() -> bool {
         const CURRENT: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
         cfg!(not(target_os = "linux")) || fs::read_to_string(CURRENT).is_ok_and(|name| name.trim() == "tsc")
     }
 
-    /// Reads it. What stands before this has begun, but may not have ended.
+    /// Reads the counter. Earlier instructions may not have completed.
     #[inline]
     pub(in crate::timeline) fn read() -> u64 {
-        // SAFETY: Every x86-64 processor has the instruction, and where a system forbids it to programs it is not used.
+        // SAFETY: The processor must have the instruction, and the system must allow it: every x86-64 processor has it, and
+        // where the system forbids it, `is_reliable` is false and the counter is not read.
         unsafe { _rdtsc() }
     }
 
-    /// Reads it when all that stands before this has ended: what another thread had read by the time that this one saw
-    /// its work is not later.
+    /// Reads the counter after all earlier instructions have completed, so the value is not less than what another thread read
+    /// before this thread saw that thread's work.
     #[inline]
-    pub(in crate::timeline) fn read_in_order() -> u64 {
-        // SAFETY: SSE2, which it belongs to, is part of x86-64.
+    pub(in crate::timeline) fn read_ordered() -> u64 {
+        // SAFETY: The processor must have SSE2, which is part of x86-64.
         unsafe { _mm_lfence() };
         read()
     }
@@ -42,7 +43,7 @@ mod counter {
 
 #[cfg(not(all(target_arch = "x86_64", not(any(drawloom_loom, drawloom_shuttle, miri)))))]
 mod counter {
-    pub(in crate::timeline) fn is_steady() -> bool {
+    pub(in crate::timeline) fn is_reliable() -> bool {
         false
     }
 
@@ -50,9 +51,9 @@ mod counter {
         0
     }
 
-    pub(in crate::timeline) fn read_in_order() -> u64 {
+    pub(in crate::timeline) fn read_ordered() -> u64 {
         0
     }
 }
 
-pub(super) use self::counter::{is_steady, read, read_in_order};
+pub(super) use self::counter::{is_reliable, read, read_ordered};

@@ -36,7 +36,7 @@ fn a_cycle_is_named_from_its_first_node_on() {
     graph.order(c, behind);
     let (mut graph, problem, text) = problem(graph);
     assert_eq!(problem, GraphProblem::Cycle { nodes: strings(&["a", "b", "c"]) });
-    assert_eq!(text, r#"nodes wait for each other in a circle: "a" before "b" before "c" before "a""#);
+    assert_eq!(text, r#"nodes wait for each other in a cycle: "a" before "b" before "c" before "a""#);
     assert_eq!(graph.remove(b), Some(1));
     assert_eq!(names(&graph.compile().expect("the circle is broken")), ["c", "behind", "a"]);
 }

@@ -11,7 +11,7 @@ mod sketch;
 use std::time::Duration;
 
 use crate::{
-    graph::{Flow, Sharing, Way},
+    graph::{ExecutionPolicy, RankedAdjacency, RunMode},
     task::Scheduler,
     timeline::{Log, Run},
 };
@@ -148,13 +148,13 @@ impl Replay {
     }
 
     fn share(&self, costs: &Costs, workers: usize) -> Outcome {
-        let mut flow = Flow::new(&costs.dependencies);
+        let mut adjacency = RankedAdjacency::new(&costs.dependencies);
         let replays = Replays::new(costs, &self.prices, workers);
         for _run in 0..RUNS_TO_LEARN {
-            let costs: Vec<u64> = replays.run(&flow).processes.iter().map(|span| span.end - span.start).collect();
-            flow.rank(&costs);
+            let costs: Vec<u64> = replays.run(&adjacency).processes.iter().map(|span| span.end - span.start).collect();
+            adjacency.rank(&costs);
         }
-        replays.run(&flow)
+        replays.run(&adjacency)
     }
 }
 
@@ -166,15 +166,15 @@ fn replayed(alone: bool, time: u64, busy: Vec<u64>) -> Replayed {
 /// Whether a schedule that takes so many nanoseconds on one thread, or on all workers, comes to be run by one.
 fn goes_alone(alone: u64, shared: u64, prices: &Prices) -> bool {
     let [alone, shared] = [alone, shared].map(Duration::from_nanos);
-    let mut sharing = Sharing::default();
+    let mut policy = ExecutionPolicy::default();
     let mut is_alone = false;
     for _run in 0..RUNS_TO_SETTLE {
-        let way = sharing.choose(prices.wake);
-        is_alone = matches!(way, Way::Alone { at_most } if at_most.is_none_or(|at_most| alone <= at_most));
-        match way {
-            Way::Alone { .. } if is_alone => sharing.went_alone(alone),
-            Way::Alone { .. } => sharing.gave_up(),
-            Way::Shared { is_measured } => sharing.was_shared(shared, is_measured.then_some(alone)),
+        let mode = policy.choose(prices.wake);
+        is_alone = matches!(mode, RunMode::Serial { limit } if limit.is_none_or(|limit| alone <= limit));
+        match mode {
+            RunMode::Serial { .. } if is_alone => policy.report_serial(alone),
+            RunMode::Serial { .. } => policy.report_exceeded(),
+            RunMode::Parallel { is_measured } => policy.report_parallel(shared, is_measured.then_some(alone)),
         }
     }
     is_alone

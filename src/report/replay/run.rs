@@ -4,7 +4,7 @@
 use std::{ops::Range, time::Duration};
 
 use crate::{
-    graph::Flow,
+    graph::RankedAdjacency,
     sync::Instant,
     task::{Priority, TicketSize, Tickets},
 };
@@ -41,14 +41,14 @@ impl<'replay> Replays<'replay> {
     }
 
     /// One run, which takes up processes as they are ranked.
-    pub(super) fn run(&self, flow: &Flow) -> Outcome {
+    pub(super) fn run(&self, adjacency: &RankedAdjacency) -> Outcome {
         let processes = self.costs.processes.len();
         let mut run = Run {
             replays: self,
-            flow,
+            adjacency,
             start: Instant::now(),
             crew: Crew::new(self.workers, self.prices, Action::Begin),
-            waits_for: (0..processes as u32).map(|process| flow.dependency_count(process)).collect(),
+            waits_for: (0..processes as u32).map(|process| adjacency.dependency_count(process)).collect(),
             chunks_done: vec![0; processes],
             open: processes,
             outcome: Outcome { time: 0, processes: vec![0..0; processes], busy: vec![0; self.workers] },
@@ -60,7 +60,7 @@ impl<'replay> Replays<'replay> {
 
 struct Run<'run> {
     replays: &'run Replays<'run>,
-    flow: &'run Flow,
+    adjacency: &'run RankedAdjacency,
     /// Tickets take real moments. Only what lies between them counts.
     start: Instant,
     crew: Crew<Token, Action>,
@@ -122,7 +122,7 @@ impl Run<'_> {
     /// How long that takes the worker, and what it does then: it looks for something if that is `None`.
     fn act(&mut self, action: Action, worker: usize) -> (u64, Option<Action>) {
         match action {
-            Action::Begin => self.hand_out(self.flow.roots().to_vec(), worker),
+            Action::Begin => self.hand_out(self.adjacency.roots().to_vec(), worker),
             Action::TakeUp(token) => self.take_up(token, worker),
             Action::Start { process, is_pinned } => self.start(process, is_pinned, worker),
             Action::TakeChunks { process, pace, finished } => self.take_chunks(process, pace, finished, worker),
@@ -213,7 +213,7 @@ impl Run<'_> {
         self.outcome.processes[process as usize].end = self.crew.now();
         self.open -= 1;
         let mut ready = Vec::new();
-        for &dependent in self.flow.dependents(process) {
+        for &dependent in self.adjacency.dependents(process) {
             let waits_for = &mut self.waits_for[dependent as usize];
             *waits_for -= 1;
             if *waits_for == 0 {
@@ -262,7 +262,7 @@ impl Run<'_> {
     }
 
     fn band(&self, process: u32) -> Priority {
-        if self.flow.is_urgent(process) { Priority::Urgent } else { Priority::Normal }
+        if self.adjacency.is_critical(process) { Priority::Urgent } else { Priority::Normal }
     }
 }
 
@@ -271,14 +271,14 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::sketch::any_sketch;
-    use super::{Costs, Flow, Prices, Replays};
+    use super::{Costs, Prices, RankedAdjacency, Replays};
 
     proptest! {
         #[test]
         fn a_process_starts_when_all_it_depends_on_has_ended(sketch in any_sketch(true), workers in 1..8_usize) {
             let costs = Costs::new(&sketch.run(&Prices::FREE), &Prices::FREE);
-            let flow = Flow::new(&costs.dependencies);
-            let outcome = Replays::new(&costs, &Prices::FREE, workers).run(&flow);
+            let adjacency = RankedAdjacency::new(&costs.dependencies);
+            let outcome = Replays::new(&costs, &Prices::FREE, workers).run(&adjacency);
             for (process, span) in sketch.processes.iter().zip(&outcome.processes) {
                 prop_assert!(span.start <= span.end && span.end <= outcome.time);
                 for &dependency in &process.dependencies {

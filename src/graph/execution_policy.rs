@@ -1,0 +1,215 @@
+//! The execution policy: whether a run is serial or parallel.
+//!
+//! Parallel execution costs wake-ups, and cache misses for every node that one worker makes ready and another runs. A frame of
+//! little work is faster on one thread. So each schedule keeps track of how long its serial and its parallel runs take, and
+//! chooses the shorter mode.
+
+use std::time::Duration;
+
+/// The measured runs of one schedule.
+#[derive(Debug, Default)]
+pub(crate) struct ExecutionPolicy {
+    /// Nanoseconds of a serial run: a moving average, or the work of the measured parallel runs.
+    serial: Option<f64>,
+    /// Nanoseconds of a parallel run, over the measured ones.
+    parallel: Option<f64>,
+    parallel_runs: u32,
+    /// The number of runs since the last measured one.
+    since_measured: u32,
+    is_serial: bool,
+    /// Rises with each serial run that exceeds its limit, and falls with each that does not.
+    exceeded: u32,
+}
+
+/// How a run is executed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum RunMode {
+    /// By the calling thread alone. A run that takes longer than the limit continues in parallel.
+    Serial { limit: Option<Duration> },
+    /// By all workers.
+    Parallel { is_measured: bool },
+}
+
+/// This many of the first parallel runs are measured, except for the very first, which warms the caches; and then one run in
+/// [`MEASURED_EVERY`].
+const FIRST_MEASURED: u32 = 4;
+const MEASURED_EVERY: u32 = 31;
+
+/// A serial schedule with more work than a wake-up runs in parallel once in this many runs, to check that serial execution is
+/// still faster. Each such run costs what the others save.
+const PARALLEL_EVERY: u32 = 128;
+
+/// How many serial runs within their limit cancel one that exceeded it. Two that exceed it with fewer runs between them are a
+/// sign that the frame's work has changed.
+const EXCEEDED_RUNS: u32 = 8;
+
+/// The weight of the latest run in a moving average, and the largest multiple of the average that it counts as: now and then
+/// the operating system preempts a run, which says nothing about the next one.
+const WEIGHT: f64 = 0.125;
+const OUTLIER: f64 = 2.0;
+
+/// Hysteresis: the current mode is kept until it takes this many times as long as the other one.
+const HYSTERESIS: f64 = 1.25;
+
+impl ExecutionPolicy {
+    /// Chooses the mode of the next run.
+    pub(crate) fn choose(&mut self, wake_up_cost: Duration) -> RunMode {
+        let is_unknown = self.serial.is_none() && self.parallel_runs == 0 && self.exceeded == 0;
+        if is_unknown {
+            // A run that takes less than a wake-up is worth no wake-up. Any other run loses no more time than one wake-up takes.
+            return RunMode::Serial { limit: Some(wake_up_cost) };
+        }
+        let wake_up_cost = wake_up_cost.as_nanos() as f64;
+        let limit = self.parallel.unwrap_or(0.0).max(wake_up_cost);
+        self.is_serial = match self.serial {
+            None => false,
+            Some(serial) if self.is_serial => serial <= limit * HYSTERESIS,
+            Some(serial) => serial * HYSTERESIS <= limit,
+        };
+        let is_due = self.serial.is_some_and(|serial| serial > wake_up_cost) && self.since_measured >= PARALLEL_EVERY;
+        if self.is_serial && !is_due {
+            return RunMode::Serial { limit: Some(Duration::from_nanos((limit * 2.0 * HYSTERESIS) as u64)) };
+        }
+        self.parallel()
+    }
+
+    /// The mode of the next run if it must be parallel.
+    pub(crate) fn parallel(&self) -> RunMode {
+        let is_one_of_the_first = (1..=FIRST_MEASURED).contains(&self.parallel_runs);
+        RunMode::Parallel { is_measured: is_one_of_the_first || self.since_measured >= MEASURED_EVERY - 1 }
+    }
+
+    /// Reports a serial run within its limit.
+    pub(crate) fn report_serial(&mut self, took: Duration) {
+        self.exceeded = self.exceeded.saturating_sub(1);
+        self.since_measured = self.since_measured.saturating_add(1);
+        average(&mut self.serial, took);
+    }
+
+    /// Reports a serial run that exceeded its limit and continued in parallel.
+    pub(crate) fn report_exceeded(&mut self) {
+        self.exceeded += EXCEEDED_RUNS;
+        if self.exceeded > EXCEEDED_RUNS {
+            // Keeping `exceeded` makes the next runs parallel and measured; a policy that knows nothing would start serially.
+            *self = Self { exceeded: EXCEEDED_RUNS, ..Self::default() };
+        }
+    }
+
+    /// Reports a parallel run. `work` is the time of all workers together, if the run was measured.
+    pub(crate) fn report_parallel(&mut self, took: Duration, work: Option<Duration>) {
+        self.parallel_runs = self.parallel_runs.saturating_add(1);
+        let Some(work) = work else {
+            self.since_measured = self.since_measured.saturating_add(1);
+            return;
+        };
+        let has_measured = self.since_measured < MEASURED_EVERY && self.parallel_runs > 2;
+        self.since_measured = 0;
+        // The same run estimates both modes: apart from the clock readings, a serial run takes as long as the work of all
+        // workers. The latest run counts most but not alone, because alternate frames may do different things.
+        for (known, latest) in [(&mut self.parallel, took), (&mut self.serial, work)] {
+            let latest = latest.as_nanos() as f64;
+            *known = Some(known.filter(|_| has_measured).map_or(latest, |known| (known + 3.0 * latest) / 4.0));
+        }
+    }
+}
+
+fn average(average: &mut Option<f64>, latest: Duration) {
+    let latest = latest.as_nanos() as f64;
+    *average = Some(match *average {
+        None => latest,
+        Some(average) => average + WEIGHT * (latest.min(average * OUTLIER) - average),
+    });
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::time::Duration;
+
+    use super::{ExecutionPolicy, RunMode};
+
+    const WAKE_UP_COST: Duration = Duration::from_micros(40);
+
+    /// Runs that take this many microseconds in each mode. Returns how many of the last ten were serial.
+    fn run(policy: &mut ExecutionPolicy, runs: usize, serial: u64, parallel: u64) -> usize {
+        let are_serial: Vec<bool> = (0..runs).map(|_| run_once(policy, serial, parallel)).collect();
+        are_serial.iter().rev().take(10).filter(|&&is_serial| is_serial).count()
+    }
+
+    fn run_once(policy: &mut ExecutionPolicy, serial: u64, parallel: u64) -> bool {
+        let [serial, parallel] = [serial, parallel].map(Duration::from_micros);
+        match policy.choose(WAKE_UP_COST) {
+            RunMode::Serial { limit } if limit.is_some_and(|limit| serial > limit) => policy.report_exceeded(),
+            RunMode::Serial { .. } => {
+                policy.report_serial(serial);
+                return true;
+            }
+            RunMode::Parallel { is_measured } => policy.report_parallel(parallel, is_measured.then_some(serial)),
+        }
+        false
+    }
+
+    #[test]
+    fn the_faster_mode_is_chosen() {
+        for (serial, parallel, serial_runs) in [(10, 30, 10), (35, 30, 0), (1700, 850, 0), (100, 500, 10)] {
+            assert_eq!(run(&mut ExecutionPolicy::default(), 100, serial, parallel), serial_runs, "{serial} {parallel}");
+        }
+    }
+
+    #[test]
+    fn growing_work_becomes_parallel_and_shrinking_work_serial() {
+        let mut policy = ExecutionPolicy::default();
+        assert_eq!(run(&mut policy, 100, 10, 30), 10);
+        assert_eq!(run(&mut policy, 20, 2_000, 1_000), 0);
+        assert_eq!(run(&mut policy, 150, 10, 30), 10);
+        // Too small a difference for a run to exceed its limit.
+        assert_eq!(run(&mut policy, 100, 70, 45), 0);
+    }
+
+    #[test]
+    fn a_slow_first_run_has_no_lasting_effect() {
+        let mut policy = ExecutionPolicy::default();
+        run(&mut policy, 1, 300_000, 300_000);
+        assert_eq!(run(&mut policy, 20, 25_000, 3_300), 0);
+    }
+
+    #[test]
+    fn one_outlier_does_not_change_the_mode() {
+        let mut policy = ExecutionPolicy::default();
+        assert_eq!(run(&mut policy, 100, 20, 60), 10);
+        run_once(&mut policy, 5_000, 2_500);
+        assert_eq!(run(&mut policy, 10, 20, 60), 10);
+    }
+
+    #[test]
+    fn parallel_runs_that_become_faster_are_noticed() {
+        let mut policy = ExecutionPolicy::default();
+        assert_eq!(run(&mut policy, 100, 400, 500), 10);
+        assert_eq!(run(&mut policy, 300, 400, 100), 0);
+    }
+
+    /// At a thousand frames a second, the counters saturate after 50 days.
+    #[test]
+    fn saturated_counters_do_not_overflow() {
+        let mut policy =
+            ExecutionPolicy { parallel_runs: u32::MAX, since_measured: u32::MAX, ..ExecutionPolicy::default() };
+        policy.report_parallel(WAKE_UP_COST, None);
+        policy.report_serial(WAKE_UP_COST);
+        assert_eq!((policy.parallel_runs, policy.since_measured), (u32::MAX, u32::MAX));
+        assert_eq!(policy.parallel(), RunMode::Parallel { is_measured: true });
+        assert_eq!(run(&mut policy, 100, 1_700, 850), 0);
+    }
+
+    #[test]
+    fn alternating_long_frames_are_noticed() {
+        let mut policy = ExecutionPolicy::default();
+        assert_eq!(run(&mut policy, 100, 10, 30), 10);
+        let exceeded = (0..100).filter(|_| {
+            let before = policy.exceeded;
+            run_once(&mut policy, 2_000, 1_000);
+            let has_exceeded = policy.exceeded > before;
+            run_once(&mut policy, 10, 30);
+            has_exceeded
+        });
+        assert!(exceeded.count() < 20);
+    }
+}
