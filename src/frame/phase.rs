@@ -338,7 +338,7 @@ impl FrameNode {
             Phase::Occlusion { view } => {
                 let occlusion = &tables.occlusion[view].occlusion;
                 let hides = |first, seen| occlusion.hidden(frame.request.scene, &tables.objects, first, seen);
-                tables.occlusion[view].hide(tables.visible[view].hide(range, hides));
+                tables.occlusion[view].hide(tables.visible[view].remove_hidden(range, hides));
             }
             Phase::Compact { view } => tables.visible[view].compact(),
             Phase::Fill { pass } => fill(frame, pass, range),

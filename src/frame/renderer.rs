@@ -284,7 +284,7 @@ fn statistics_of(
             kind: view.kind(),
             visible: tables.visible[index].count(),
             occluded: tables.occlusion[index].hidden(),
-            lights: request.lights[index].records().len(),
+            lights: request.lights[index].gpu_lights().len(),
             commands: 0,
             batches: 0,
             bundles: 0,

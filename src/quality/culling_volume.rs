@@ -1,16 +1,16 @@
 //! The bounding volumes that culling tests.
 
-/// What stands for an object when it is asked whether a view sees it: the smaller it is, the fewer objects are drawn that nobody
-/// sees, and the longer it takes to ask.
+/// The bounding volume of objects that is tested against view frustums. A tighter volume draws fewer invisible objects, and takes
+/// longer to test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum CullingVolume {
-    /// Everything is drawn.
+    /// No culling: everything is drawn.
     None,
-    /// The ball around it.
+    /// The bounding sphere.
     #[default]
     Sphere,
-    /// The box around it along the world's axes. An object whose bounds an engine made larger than its mesh has them as its box.
+    /// The axis-aligned bounding box. If an engine has set larger bounds than the mesh's, it is the box around those.
     Box,
-    /// The box around its mesh along its own axes.
+    /// The oriented bounding box, along the object's axes. As for [`CullingVolume::Box`], an engine's bounds replace it.
     OrientedBox,
 }

@@ -1,26 +1,26 @@
 //! Formats of the geometry buffer and of vertices.
 
-/// How normals are stored: octahedral (Cigolle et al. 2014), in numbers of so many bits.
+/// The format of normals in the geometry buffer: octahedral encoding (Cigolle et al. 2014) with this many bits per component.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum NormalFormat {
-    /// 2 bytes; up to 0.958° off.
+    /// 2 bytes; error up to 0.958°.
     Octahedral8,
-    /// 4 bytes; up to 0.238° off.
+    /// 4 bytes; error up to 0.238°.
     Octahedral10,
-    /// 4 bytes; up to 0.0039° off.
+    /// 4 bytes; error up to 0.0039°.
     Octahedral16,
-    /// 4 bytes; up to 0.119° off.
+    /// 4 bytes; error up to 0.119°.
     #[default]
     HalfFloat,
 }
 
 impl NormalFormat {
-    /// How far a normal can be off, in degrees.
+    /// The maximum error of a normal, in degrees.
     ///
-    /// If a coordinate of its point on the octahedron is off by h at most, the point is off by h·√6 along its face, and it is 1/√3
-    /// or more from the middle: so the normal is off by h·√18. Over n steps from −1 to 1, h is 1/n: there are 254, 1022 and 65,534,
-    /// so that 0 is one of them. For half floats it is 2⁻¹¹, because a device may cut them short; it is half of that where it rounds
-    /// to nearest. The rounding of f32 adds 0.0001° at most: seven roundings of a coordinate, by h·√18.
+    /// If the error of a coordinate on the octahedron is at most h, the error of the point along its face is at most h·√6. The point's
+    /// distance from the centre is at least 1/√3, so the error of the normal is at most h·√18. With n steps from −1 to 1, h is 1/n; n
+    /// is 254, 1022 or 65,534, so that 0 is representable. For half floats h is 2⁻¹¹, because a device may truncate; it is half of
+    /// that if the device rounds to nearest. The rounding of f32 adds at most 0.0001°: seven roundings of a coordinate, by h·√18.
     pub fn max_error_degrees(self) -> f64 {
         match self {
             Self::Octahedral8 => 0.958,
@@ -31,32 +31,32 @@ impl NormalFormat {
     }
 }
 
-/// How diffuse colours are stored.
+/// The format of diffuse colours in the geometry buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DiffuseFormat {
-    /// A byte a channel, sRGB encoded: half a step of 1/255 off, and up to a tenth more for how a device encodes it.
+    /// A byte per channel, sRGB encoded: an error of half a step of 1/255, and up to a tenth more for the device's encoding.
     #[default]
     Srgb8,
-    /// A half float a channel: 2⁻¹⁰ of the value off where a device cuts it short, 2⁻¹¹ where it rounds to nearest.
+    /// A half float per channel: an error of 2⁻¹⁰ of the value if a device truncates, 2⁻¹¹ if it rounds to nearest.
     HalfFloat,
 }
 
-/// How vertices lie in memory on the device.
+/// The format of vertices in device memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum VertexFormat {
-    /// 32 bytes: everything as floats.
+    /// 32 bytes: all attributes as floats.
     #[default]
     Full,
-    /// 20 bytes: places as floats, normals in a byte a coordinate, and texture coordinates as half floats. Normals are up to
-    /// 0.391° off, along the mesh's own axes. Texture coordinates are off by half a pixel of a texture of 1024 where they go from 0
-    /// to 1, and by more where a texture is repeated: see [`VertexFormat::max_uv_error`].
+    /// 20 bytes: positions as floats, normals with a byte per coordinate, and texture coordinates as half floats. The error of normals
+    /// is up to 0.391°, along the mesh's own axes. The error of texture coordinates is half a pixel of a texture of 1024 if they range
+    /// from 0 to 1, and larger if the texture repeats: see [`VertexFormat::max_uv_error`].
     Packed,
 }
 
 impl VertexFormat {
-    /// How far a normal can be off, in degrees, along the axes of its mesh.
+    /// The maximum error of a normal, in degrees, along the axes of its mesh.
     ///
-    /// In steps of 1/127 each coordinate is off by 1/254 at most, all three by √3/254, and that is the sine of the angle.
+    /// With steps of 1/127, the error of each coordinate is at most 1/254, and that of all three √3/254, which is the sine of the angle.
     pub fn max_normal_error_degrees(self) -> f64 {
         match self {
             Self::Full => 0.0,
@@ -64,17 +64,17 @@ impl VertexFormat {
         }
     }
 
-    /// How far a texture coordinate can be off, in widths or heights of the texture, in a mesh over which it repeats so many times:
-    /// the difference between its highest and its lowest coordinate.
+    /// The maximum error of a texture coordinate, in widths or heights of the texture. `repeats` is how often the texture repeats over the
+    /// mesh: the difference between the highest and the lowest coordinate.
     ///
-    /// Coordinates are counted from the whole number nearest the middle, so they are half of that and 1/2 from 0 at most. A half
-    /// float has 11 bits, and is off by 2⁻¹¹ of itself; it ends at 65,504, and what is beyond stands there.
+    /// Coordinates are relative to the integer nearest the middle of their range, so their magnitude is at most half of `repeats`, plus
+    /// 1/2. A half float has 11 bits and an error of 2⁻¹¹ of itself; coordinates beyond its maximum, 65,504, are clamped.
     pub fn max_uv_error(self, repeats: f64) -> f64 {
-        let farthest = repeats * 0.5 + 0.5;
+        let max_magnitude = repeats * 0.5 + 0.5;
         match self {
             Self::Full => 0.0,
-            Self::Packed if farthest <= 65_504.0 => farthest / 2048.0,
-            Self::Packed => farthest,
+            Self::Packed if max_magnitude <= 65_504.0 => max_magnitude / 2048.0,
+            Self::Packed => max_magnitude,
         }
     }
 }

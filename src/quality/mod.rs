@@ -1,4 +1,4 @@
-//! Every knob that trades accuracy for speed, in one place.
+//! All settings that trade accuracy for speed.
 
 mod culling_volume;
 mod depth_key;

@@ -1,23 +1,23 @@
-//! What quality cannot be.
+//! Errors of invalid quality settings.
 
-/// Why there can be no frames of a quality.
+/// Why a [`Quality`](super::Quality) is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QualityError {
-    /// A knob is out of its range.
+    /// A setting is out of range.
     #[error("quality: {knob} is {value}, and can be {range}")]
     OutOfRange {
-        /// The knob's name: of the field, and of its field.
+        /// The setting's field name, such as `shadows.side`.
         knob: &'static str,
-        /// What it is.
+        /// Its value.
         value: String,
-        /// What it can be.
+        /// The valid range.
         range: &'static str,
     },
-    /// Occlusion is asked for, and nothing stands for an object that could be hidden.
-    #[error("occlusion needs a culling volume: what has none is never hidden")]
+    /// Occlusion culling is enabled without a culling volume.
+    #[error("occlusion needs a culling volume: objects without one are never hidden")]
     OcclusionWithoutVolume,
-    /// Occlusion is asked for, and objects are not drawn where they are.
-    #[error("occlusion needs camera-relative transforms: absolute ones draw objects elsewhere than they are")]
+    /// Occlusion culling is enabled with absolute transforms.
+    #[error("occlusion needs camera-relative transforms: absolute ones draw objects at inaccurate positions")]
     OcclusionWithAbsoluteTransforms,
 }

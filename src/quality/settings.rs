@@ -1,14 +1,14 @@
-//! Every setting of a frame's accuracy.
+//! The quality of frames: accuracy settings and presets.
 
 use super::{
     CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, QualityError, ShadowQuality, ToneCurve,
     TransformPrecision, VertexFormat,
 };
 
-/// How accurate frames are, and so what they cost: all that a renderer may give up accuracy for.
+/// The settings that trade a frame's accuracy for speed.
 ///
-/// Three presets are a start: [`Quality::fast`], [`Quality::balanced`], which is the default, and [`Quality::exact`].
-/// `benches/examples/tradeoff` measures what each knob gives and takes on a scene of one's own.
+/// There are three presets: [`Quality::fast`], [`Quality::balanced`], which is the default, and [`Quality::exact`].
+/// `benches/examples/tradeoff` measures error and cost of each setting for a scene of your own.
 ///
 /// ```
 /// use drawloom::quality::{CullingVolume, Quality};
@@ -19,76 +19,76 @@ use super::{
 /// let wrong = Quality { culling: CullingVolume::None, ..quality };
 /// assert_eq!(
 ///     wrong.check().unwrap_err().to_string(),
-///     "occlusion needs a culling volume: what has none is never hidden",
+///     "occlusion needs a culling volume: objects without one are never hidden",
 /// );
 /// # Ok::<(), drawloom::quality::QualityError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// How precisely opaque objects of one mesh are drawn front to back: 1 to [`DepthKey::MAX_OPAQUE_BITS`] bits.
+    /// The depth precision of the front-to-back order of opaque objects of one mesh: 1 to [`DepthKey::MAX_OPAQUE_BITS`] bits.
     ///
-    /// Error: pairs drawn back to front, which cost overdraw and leave the picture as it is. Cost: none but that of the bits
-    /// to sort by.
+    /// Error: pairs drawn back to front, which cause overdraw but do not change the picture. Cost: only the additional bits to sort by.
     pub opaque_order: DepthKey,
-    /// How precisely blended objects are drawn back to front: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
+    /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
     ///
-    /// Error: pairs drawn in the wrong order, which are seen; none that are farther apart than [`DepthKey::step`]. Cost: a pass of
-    /// the sort for some nine bits.
+    /// Error: pairs drawn in the wrong order, which is visible; none farther apart than [`DepthKey::step`]. Cost: a radix sort pass for
+    /// some nine bits.
     pub blended_order: DepthKey,
-    /// What stands for an object when it is asked whether a view sees it.
+    /// The bounding volume for view frustum culling.
     ///
-    /// Error: objects drawn that nobody sees; never the other way round. So the picture stays as it is, but for what lies across or
-    /// beyond a far plane in perspective, which leaves out objects as a whole and by their volume, and for what absolute transforms draw
-    /// elsewhere than it is. Cost: some 2 ns an object and view; boxes add as much for those that a ball does not decide.
+    /// Error: invisible objects that are drawn; visible objects are never culled. So the picture does not change, with two exceptions:
+    /// objects at or beyond the far plane of a perspective view, which culls whole objects by their volume, and absolute transforms,
+    /// which draw objects at inaccurate positions. Cost: some 2 ns per object and view; boxes take as long again for objects that the
+    /// bounding sphere does not decide.
     pub culling: CullingVolume,
-    /// Whether what larger objects hide is left out, and in how coarse a picture that is found out: in squares of 1, 2, 4, 8 or
-    /// 16 pixels of the view's picture; `None` does not look. See S 9.6.
+    /// The tile size of occlusion culling, which removes objects that larger ones hide: 1, 2, 4, 8 or 16 pixels of the view's picture;
+    /// `None` disables it. See S 9.6.
     ///
-    /// Error: hidden objects that are drawn; never the other way round. Cost: a coarse depth buffer a view, on the CPU. A view in
-    /// which that has not paid for itself, on the CPU until the frame is recorded, is left without for a while. An engine's own shaders draw opaque objects whole and where
-    /// their meshes are; those of which they move or cut away a part have bounds other than their mesh's.
+    /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on the CPU. If it
+    /// takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for a while. It requires that an
+    /// engine's own shaders draw opaque objects exactly as their meshes are; objects that they move, or discard parts of, must have
+    /// bounds other than their mesh's.
     pub occlusion: Option<u32>,
-    /// How the geometry buffer holds normals.
+    /// The format of normals in the geometry buffer.
     ///
-    /// Error: degrees. Cost: bytes a pixel written once and read for every light that reaches it.
+    /// Error: degrees. Cost: bytes per pixel, written once and read for every light that reaches it.
     pub normals: NormalFormat,
-    /// How the geometry buffer holds diffuse colours.
+    /// The format of diffuse colours in the geometry buffer.
     ///
-    /// Error: steps of the colour. Cost: 4 or 8 bytes a pixel.
+    /// Error: steps of the colour. Cost: 4 or 8 bytes per pixel.
     pub diffuse: DiffuseFormat,
-    /// How vertices lie in memory on the device (S 9.6).
+    /// The format of vertices in device memory (S 9.6).
     ///
-    /// Error: degrees of the normal, and texels. Cost: 32 or 20 bytes a vertex. Meshes are uploaded again when it changes.
+    /// Error: degrees of the normal, and texels. Cost: 32 or 20 bytes per vertex. Meshes are uploaded again when it changes.
     pub vertices: VertexFormat,
-    /// Whether depth is drawn before the geometry buffer.
+    /// Whether a depth pre-pass precedes the geometry buffer.
     ///
-    /// Error: pixels of surfaces at exactly one depth, of which another may be seen; the others stay as they are. Cost: all vertices
-    /// once more, for each pixel's surface shaded once. It pays where pixels cost more than vertices.
+    /// Error: where surfaces have exactly the same depth, another one may be visible; all other pixels do not change. Cost: all vertices
+    /// are transformed twice, but each pixel is shaded only once. It is worth its cost if pixels cost more than vertices.
     pub depth_pre_pass: bool,
-    /// How shadow maps are drawn and read, by a [`Deferred`](crate::process::Deferred) pipeline.
+    /// The shadow map settings of a [`Deferred`](crate::process::Deferred) pipeline.
     pub shadows: ShadowQuality,
-    /// Where lights end: the illuminance (in the units of the scene's lights) below which one is cut off, at least 0. At 0 they
-    /// end at their own range.
+    /// The illuminance (in the units of the scene's lights) below which lights are cut off, at least 0. At 0, they end at their range.
     ///
-    /// Error: of the illuminance of one light at one place, at most 1.089 times this. A light of intensity I is drawn up to
-    /// r = √(I / cut-off), and windowed by (1 − (d/r)⁴)²: with s = d/r the difference from I/d² is the cut-off times 2s² − s⁶ up to
+    /// Error: at any point, the illuminance of each light differs by at most 1.089 times this. A light of intensity I is drawn up to
+    /// r = √(I / cut-off), and windowed by (1 − (d/r)⁴)². With s = d/r the difference from I/d² is the cut-off times 2s² − s⁶ up to
     /// s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. Cost: the pixels within the lights' reach.
     pub light_cut_off: f32,
-    /// How radiance becomes a picture.
+    /// The tone mapping curve.
     ///
-    /// Error: RMSE of the picture. Cost: five multiplications and a division a pixel and colour.
+    /// Error: RMSE of the picture. Cost: five multiplications and a division per pixel and channel.
     pub tone_curve: ToneCurve,
-    /// How an object's place in a view is worked out.
+    /// How positions are transformed to clip space.
     ///
-    /// Error: pixels. Cost: some ten integer operations a vertex. To change it makes new pipelines.
+    /// Error: pixels. Cost: some ten integer operations per vertex. Changing it creates new pipelines.
     pub transforms: TransformPrecision,
 }
 
 impl Quality {
-    /// The coarseness of [`Quality::occlusion`] that there is, in pixels.
+    /// The valid tile sizes of [`Quality::occlusion`], in pixels.
     pub const OCCLUSION_TILE_SIZES: [u32; 5] = [1, 2, 4, 8, 16];
 
-    /// For frames that must be cheap: what is given up is seen when looked for.
+    /// The fastest preset: errors are visible on inspection.
     pub fn fast() -> Self {
         Self {
             opaque_order: DepthKey { bits: 8, curve: DepthCurve::Logarithmic },
@@ -106,7 +106,7 @@ impl Quality {
         }
     }
 
-    /// For most: what is given up is below what is seen.
+    /// The default preset: errors are below what is visible.
     pub fn balanced() -> Self {
         Self {
             opaque_order: DepthKey { bits: 20, curve: DepthCurve::Logarithmic },
@@ -124,7 +124,7 @@ impl Quality {
         }
     }
 
-    /// For pictures to measure others by: what is still given up is below what a byte of the picture shows.
+    /// The reference preset: errors are below a step of the picture's 8-bit channels.
     pub fn exact() -> Self {
         Self {
             culling: CullingVolume::OrientedBox,
@@ -135,18 +135,18 @@ impl Quality {
         }
     }
 
-    /// Whether there can be frames of this quality.
+    /// Checks that all settings are valid.
     ///
     /// # Errors
-    /// If a knob is out of its range, or two of them do not go together: see [`QualityError`].
+    /// Returns a [`QualityError`] if a setting is out of range, or if two settings are incompatible.
     pub fn check(&self) -> Result<(), QualityError> {
         self.opaque_order.check("opaque_order", DepthKey::MAX_OPAQUE_BITS)?;
         self.blended_order.check("blended_order", DepthKey::MAX_BLENDED_BITS)?;
-        if let Some(square) = self.occlusion {
-            if !Self::OCCLUSION_TILE_SIZES.contains(&square) {
+        if let Some(tile_size) = self.occlusion {
+            if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
                 return Err(QualityError::OutOfRange {
                     knob: "occlusion",
-                    value: square.to_string(),
+                    value: tile_size.to_string(),
                     range: "1, 2, 4, 8 or 16 pixels",
                 });
             }
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_named() {
+    fn errors_name_the_invalid_setting() {
         let valid = Quality::exact();
         let shadows = valid.shadows;
         let order = |bits, curve| DepthKey { bits, curve };
@@ -209,9 +209,9 @@ mod tests {
             let is_named = matches!(&error, QualityError::OutOfRange { knob: named, .. } if *named == knob);
             assert!(is_named, "{knob}: {error}");
         }
-        let blind = Quality { occlusion: Some(8), culling: CullingVolume::None, ..valid };
-        assert_eq!(blind.check(), Err(QualityError::OcclusionWithoutVolume));
-        let elsewhere = Quality { occlusion: Some(8), transforms: TransformPrecision::Absolute, ..valid };
-        assert_eq!(elsewhere.check(), Err(QualityError::OcclusionWithAbsoluteTransforms));
+        let without_volume = Quality { occlusion: Some(8), culling: CullingVolume::None, ..valid };
+        assert_eq!(without_volume.check(), Err(QualityError::OcclusionWithoutVolume));
+        let absolute = Quality { occlusion: Some(8), transforms: TransformPrecision::Absolute, ..valid };
+        assert_eq!(absolute.check(), Err(QualityError::OcclusionWithAbsoluteTransforms));
     }
 }

@@ -1,36 +1,37 @@
-//! The knobs of shadow maps.
+//! Shadow map settings.
 
 use super::QualityError;
 
-/// How shadow maps are drawn and read.
+/// Shadow map settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowQuality {
-    /// Width and height of a map, 1 pixel or more.
+    /// The width and height of a map in pixels, at least 1.
     ///
-    /// Error: pixels of the picture that are lit and should not be, or the other way round: along a shadow's edge, as wide as a
-    /// pixel of the map. Cost: pixels drawn, and 4 bytes each.
+    /// Error: along shadow edges, pixels of the picture that are wrongly lit or wrongly in shadow, in a band as wide as a pixel of the
+    /// map. Cost: pixels drawn, and 4 bytes each.
     pub side: u32,
-    /// Shadows fade over 2·`filter` + 1 pixels of the map, 0 to [`ShadowQuality::MAX_FILTER`]; 0 still blends each pixel with its
-    /// neighbour. Cost: (2·`filter` + 2)² pixels of the map read for one of the picture.
+    /// The radius of percentage-closer filtering, 0 to [`ShadowQuality::MAX_FILTER`]: shadows fade over 2·`filter` + 1 pixels of the map;
+    /// 0 is bilinear filtering. Cost: (2·`filter` + 2)² pixels of the map are read for each pixel of the picture.
     pub filter: u32,
-    /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope ask
-    /// for, 0 or more. Less than 1 makes lit surfaces shadow themselves in stripes; more lets light through under objects.
+    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require, at least 0. Below 1, lit surfaces shadow
+    /// themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
-    /// Maps are drawn in every so many-th frame, 1 or more; and at once where lights with a map come or go, where there is another
-    /// quality or plan, or where a directional light's map is off what cameras see by then by a quarter of its radius, or a quarter smaller.
-    /// In between a light that has a map stays where it was with it, and ends where it did.
+    /// Maps are drawn every `interval` frames, at least 1. They are also drawn at once if a light with a map is added or removed, if the
+    /// quality or the plan changes, or if a directional light's map no longer fits what cameras see: if its centre is off by a quarter of
+    /// its radius, or its radius is a quarter too small. In between, a light with a map keeps its position and range.
     ///
-    /// Error: shadows are up to `interval` − 1 frames old, so those of what moves at v m/s lag by (`interval` − 1)·v·Δt metres. Cost:
+    /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` − 1)·v·Δt metres. Cost:
     /// the maps' share of a frame, divided by this.
     pub interval: u32,
-    /// Into what angle of a hemispherical light's map an edge is drawn straight at most, in degrees, above 0 and up to 90: longer
-    /// ones are halved. Straight, it is off by 38 pixels of a map of 1024 at 45°, 7.7 at 20°, 1.9 at 10°, 0.48 at 5° and 0.08 at
-    /// 2° (Brabec et al. 2002). Cost: each halving draws four triangles for one.
+    /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight line, above 0 and up
+    /// to 90: longer edges are subdivided. The error of a straight edge is 38 pixels of a map of 1024 at 45°, 7.7 at 20°, 1.9 at 10°, 0.48 at 5° and 0.08 at
+    /// 2° (Brabec et al. 2002). Cost: each
+    /// subdivision level multiplies triangles by four.
     pub widest_edge: f32,
 }
 
 impl ShadowQuality {
-    /// The widest [`ShadowQuality::filter`]: 100 pixels of the map are read for one of the picture.
+    /// The largest [`ShadowQuality::filter`]: it reads 100 pixels of the map for each pixel of the picture.
     pub const MAX_FILTER: u32 = 4;
 
     pub(super) fn check(&self) -> Result<(), QualityError> {

@@ -1,37 +1,37 @@
-//! A coarse depth buffer that never claims more than what is hidden for sure.
+//! A conservative coarse depth buffer for occlusion culling.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use super::silhouettes::{Silhouette, Silhouettes};
 
-/// How near the nearest things are that cover each tile of a picture as a whole, taken where they are farthest within the
-/// tile (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where
-/// theirs is by samples).
+/// For each tile of a picture, the least nearness within the tile of the nearest silhouettes that cover it entirely (after
+/// Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where theirs is by
+/// samples).
 ///
-/// A tile is covered if each of its cells lies between all lines of some [silhouette](Silhouettes): of a line only the cell's
-/// worst corner counts, and of a plane over the silhouette again its worst corner, since both are linear. So what is farther than
-/// the tile's number is hidden in all of the tile. Silhouettes that each cover some cells are taken together until they have
-/// all, and then as near as the farthest of them: those that are drawn nearest first are so as near as they can be.
+/// A tile is covered if each of its cells is inside all lines of some [silhouette](Silhouettes). Lines and planes are linear, so
+/// they are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is hidden in the whole tile.
+/// Silhouettes that cover some cells are merged until they cover all; the merged nearness is the least of theirs. Drawing
+/// silhouettes nearest first keeps it as great as possible.
 ///
-/// Strips may be drawn at the same time, and looked at when all are drawn.
+/// Different strips may be drawn at the same time. The buffer may be tested after all strips have been drawn.
 #[derive(Debug, Default)]
 pub struct CoarseDepth {
     /// A tile's width in pixels.
     tile_size: f64,
-    /// In cells.
+    /// A tile's width in cells.
     cells: usize,
-    /// Tiles to the right, and down.
+    /// The numbers of columns and rows of tiles.
     size: [usize; 2],
-    /// The nearness of each tile, as an f32's bits; 0 where nothing is.
+    /// The nearness of each tile as the bits of an f32; 0 if the tile is not covered.
     tiles: Vec<AtomicU32>,
-    /// The least nearness of each block of [`CoarseDepth::BLOCK`] by as many tiles.
+    /// The least nearness in each block of [`CoarseDepth::BLOCK`]² tiles.
     blocks: Vec<AtomicU32>,
-    /// For each tile, while it is drawn, a [`Layer`].
+    /// For each tile, the [`Layer`] that silhouettes are merged into while a strip is drawn.
     layers: Vec<AtomicU64>,
 }
 
-/// Some of a tile's cells, a bit each, and how near what covers them is at least.
+/// A mask of covered cells of a tile, and the least nearness of what covers them.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     cells: u32,
@@ -49,20 +49,20 @@ impl Layer {
         u64::from(self.cells) << 32 | u64::from(self.nearness.to_bits())
     }
 
-    /// Both together, as near as the farther one.
-    fn and(self, other: Self) -> Self {
+    /// Merges two layers.
+    fn merge(self, other: Self) -> Self {
         Self { cells: self.cells | other.cells, nearness: self.nearness.min(other.nearness) }
     }
 }
 
 impl CoarseDepth {
-    /// How many tiles a block is wide: what is as large as several is asked for blocks first. A strip is a row of blocks.
+    /// A block's width in tiles. Large rectangles are tested against blocks first. A strip is a row of blocks.
     pub const BLOCK: usize = 8;
 
-    /// Makes room for a picture in tiles of so many pixels. What is in them counts only when it has been drawn.
+    /// Resizes the buffer for a picture, with tiles of `tile_size` pixels. The contents are valid only after all strips have been drawn.
     pub fn reset(&mut self, picture: [u32; 2], tile_size: u32) {
         self.tile_size = f64::from(tile_size.max(1));
-        // A cell is a pixel wide at least.
+        // A cell is at least a pixel wide.
         self.cells = (tile_size.max(1) as usize).min(MAX_CELLS);
         self.size = picture.map(|pixels| pixels.div_ceil(tile_size.max(1)) as usize);
         let [columns, rows] = self.size;
@@ -76,16 +76,16 @@ impl CoarseDepth {
         self.size[1].div_ceil(Self::BLOCK)
     }
 
-    /// How many tiles there are to the right, and down.
+    /// The numbers of columns and rows of tiles.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    /// Draws a strip, whatever was there before. Strips that are drawn at the same time must not be the same.
+    /// Clears and draws a strip. One strip must not be drawn twice at the same time.
     pub fn draw(&self, strip: usize, silhouettes: &Silhouettes) {
         let [columns, rows] = self.size;
         let rows = strip * Self::BLOCK..rows.min((strip + 1) * Self::BLOCK);
-        // Whoever reads the tiles does so in a job that depends on this one, which orders the two.
+        // Relaxed: jobs that read the tiles depend on this job.
         for tile in rows.start * columns..rows.end * columns {
             self.tiles[tile].store(0, Ordering::Relaxed);
             self.layers[tile].store(Layer::EMPTY, Ordering::Relaxed);
@@ -121,14 +121,14 @@ impl CoarseDepth {
         }
     }
 
-    /// Which cells of a row of cells a silhouette covers.
+    /// The cells of a row of cells that a silhouette covers.
     fn covered_cells(&self, row: usize, silhouette: &Silhouette<'_>) -> Range<usize> {
         let width = self.tile_size / self.cells as f64;
         let half = width / 2.0;
         let y = row as f64 * width + half;
         let (mut first, mut last) = (0.0, self.size[0] as f64 * self.tile_size);
         for [right, down, offset, across] in silhouette.lines {
-            // At the cell's worst corner, by the place of its centre.
+            // The value at the cell's worst corner, as a function of its centre.
             let rest = down * y + offset - (right.abs() + down.abs()) * half;
             if *right > 0.0 {
                 first = f64::max(first, -rest * across);
@@ -138,22 +138,22 @@ impl CoarseDepth {
                 return 0..0;
             }
         }
-        // Centres of cells lie half a cell past whole ones.
+        // Cell centres are at half-integer multiples of the width.
         let first = ((first - half) / width).ceil().max(0.0);
         let end = ((last - half) / width).floor() + 1.0;
         if first < end { first as usize..(end as usize).min(self.size[0] * self.cells) } else { 0..0 }
     }
 
     fn draw_tile(&self, row: usize, column: usize, covered: &[Range<usize>], silhouette: &Silhouette<'_>) {
-        // Only one job draws this strip.
-        let place = row * self.size[0] + column;
-        let (tile, layer) = (&self.tiles[place], &self.layers[place]);
+        // Relaxed: only one job draws this strip.
+        let index = row * self.size[0] + column;
+        let (tile, layer) = (&self.tiles[index], &self.layers[index]);
         let behind = f32::from_bits(tile.load(Ordering::Relaxed));
         if f64::from(behind) >= silhouette.max_nearness {
             return;
         }
         let first = column * self.cells;
-        // The cells' own rectangle, so that a plane does not count where the silhouette has ended.
+        // The bounds of the covered cells: planes are evaluated only there, not beyond the silhouette.
         let (mut cells, mut low, mut high) = (0, [usize::MAX; 2], [0; 2]);
         for (line, range) in covered.iter().enumerate() {
             let [start, end] = [range.start, range.end].map(|cell| cell.saturating_sub(first).min(self.cells));
@@ -167,20 +167,20 @@ impl CoarseDepth {
             return;
         }
         let width = self.tile_size / self.cells as f64;
-        let middle = |axis: usize, tile: usize| {
+        let center = |axis: usize, tile: usize| {
             (tile * self.cells) as f64 * width + (low[axis] + high[axis]) as f64 * 0.5 * width
         };
         let half = |axis: usize| (high[axis] - low[axis]) as f64 * 0.5 * width;
-        let ([x, y], [half_x, half_y]) = ([middle(0, column), middle(1, row)], [half(0), half(1)]);
-        let (mut nearness, mut least_nearest) = (f64::INFINITY, f64::INFINITY);
+        let ([x, y], [half_x, half_y]) = ([center(0, column), center(1, row)], [half(0), half(1)]);
+        let (mut nearness, mut max_nearness) = (f64::INFINITY, f64::INFINITY);
         for [right, down, offset] in silhouette.planes {
-            let centre = right * x + down * y + offset;
-            let within = right.abs() * half_x + down.abs() * half_y;
-            nearness = nearness.min(centre - within);
-            least_nearest = least_nearest.min(centre + within);
+            let at_center = right * x + down * y + offset;
+            let variation = right.abs() * half_x + down.abs() * half_y;
+            nearness = nearness.min(at_center - variation);
+            max_nearness = max_nearness.min(at_center + variation);
         }
         let nearness = nearness as f32;
-        if least_nearest >= silhouette.nearest || nearness <= behind {
+        if max_nearness >= silhouette.opening_nearness || nearness <= behind {
             return;
         }
         let all = u32::MAX >> (u32::BITS as usize - self.cells * self.cells);
@@ -189,14 +189,14 @@ impl CoarseDepth {
             return;
         }
         let own = Layer { cells, nearness };
-        let known = Layer::from_bits(layer.load(Ordering::Relaxed));
-        // One that lies behind what covers all, or is empty, is of no use any more.
-        let both = if known.nearness > behind { known.and(own) } else { own };
-        if both.cells == all {
-            tile.store(both.nearness.to_bits(), Ordering::Relaxed);
+        let merged = Layer::from_bits(layer.load(Ordering::Relaxed));
+        // A layer that is empty or behind the tile's nearness is obsolete.
+        let merged = if merged.nearness > behind { merged.merge(own) } else { own };
+        if merged.cells == all {
+            tile.store(merged.nearness.to_bits(), Ordering::Relaxed);
             layer.store(Layer::EMPTY, Ordering::Relaxed);
         } else {
-            layer.store(both.bits(), Ordering::Relaxed);
+            layer.store(merged.bits(), Ordering::Relaxed);
         }
     }
 
@@ -210,29 +210,29 @@ impl CoarseDepth {
         &self.blocks[strip * count..][..count]
     }
 
-    /// How near what covers the tile at a place of the picture is; 0 where nothing does, and outside of the picture.
+    /// The nearness of the tile at a point of the picture; 0 if it is not covered, and outside the picture.
     pub fn nearness_at(&self, x: f64, y: f64) -> f32 {
         let [column, row] = [x, y].map(|pixel| (pixel / self.tile_size).floor());
         let [columns, rows] = self.size.map(|count| count as f64);
-        // No number is in any picture if it is none.
+        // The comparisons are false for NaN.
         if !(column >= 0.0 && row >= 0.0 && column < columns && row < rows) {
             return 0.0;
         }
         f32::from_bits(self.tiles[row as usize * self.size[0] + column as usize].load(Ordering::Relaxed))
     }
 
-    /// Whether all that lies in a rectangle of the picture and is nowhere nearer than `nearness` is hidden. `low` and `high` are
-    /// its corners in pixels; what of it is outside of the picture does not count, and if all of it is, the answer is `false`.
+    /// Whether a rectangle of the picture is hidden beyond `nearness`. `low` and `high` are its corners in pixels. The part outside the
+    /// picture is ignored; if the whole rectangle is outside, the result is `false`.
     pub fn hides(&self, low: [f64; 2], high: [f64; 2], nearness: f32) -> bool {
         let range = |axis: usize| {
             let count = self.size[axis] as f64;
             let [first, last] = [low[axis], high[axis]].map(|pixel| (pixel / self.tile_size).floor());
-            // Not a range where a number is none.
-            let is_in = first < count && last >= 0.0 && count > 0.0;
-            is_in.then(|| first.max(0.0) as usize..last.min(count - 1.0) as usize + 1)
+            // The comparisons are false for NaN.
+            let is_inside = first < count && last >= 0.0 && count > 0.0;
+            is_inside.then(|| first.max(0.0) as usize..last.min(count - 1.0) as usize + 1)
         };
         let (Some(columns), Some(rows)) = (range(0), range(1)) else { return false };
-        // Bits of numbers that are not negative are in the numbers' order.
+        // The bits of non-negative floats have the order of the floats.
         let nearness = nearness.max(0.0).to_bits();
         let covers = |tile: &AtomicU32| tile.load(Ordering::Relaxed) > nearness;
         let strips = rows.start / Self::BLOCK..(rows.end - 1) / Self::BLOCK + 1;
@@ -254,7 +254,7 @@ impl CoarseDepth {
     }
 }
 
-/// The most cells to a tile's side. A layer has room for 5.
+/// The maximum width of a tile in cells. A layer's mask has room for 5.
 const MAX_CELLS: usize = 4;
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -276,15 +276,15 @@ mod tests {
     }
 
     #[test]
-    fn only_squares_that_are_covered_as_a_whole_count() {
+    fn only_tiles_that_are_covered_entirely_count() {
         let mut silhouettes = Silhouettes::default();
         silhouettes.add(rectangle([8.0, 7.9], [31.9, 40.0]), 0.0, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
         let depth = drawn([64, 48], 8, &silhouettes);
         for row in 0..6 {
             for column in 0..8 {
                 let expected = if (1..3).contains(&column) && (1..5).contains(&row) { 0.5 } else { 0.0 };
-                let place = [column, row].map(|tile| f64::from(tile) * 8.0 + 4.0);
-                assert_eq!(depth.nearness_at(place[0], place[1]), expected, "{column} {row}");
+                let center = [column, row].map(|tile| f64::from(tile) * 8.0 + 4.0);
+                assert_eq!(depth.nearness_at(center[0], center[1]), expected, "{column} {row}");
             }
         }
         assert!(depth.hides([8.0, 8.0], [23.9, 39.9], 0.4));
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_margin_moves_a_silhouette_in() {
+    fn a_margin_shrinks_a_silhouette() {
         let count = |margin: f64| {
             let mut silhouettes = Silhouettes::default();
             silhouettes.add(rectangle([8.0, 8.0], [40.0, 40.0]), margin, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn silhouettes_cover_a_square_together() {
+    fn silhouettes_cover_a_tile_together() {
         let nearness_of = |parts: &[([f64; 2], f64)]| {
             let mut silhouettes = Silhouettes::default();
             for &([left, right], nearness) in parts {
@@ -319,20 +319,20 @@ mod tests {
         };
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)]), 0.4);
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.4), ([8.0, 17.0], 0.5)]), 0.4);
-        // A cell of four pixels that neither covers, and one that both do.
+        // A cell of four pixels that neither covers, and one that both cover.
         assert_eq!(nearness_of(&[([-1.0, 7.9], 0.5), ([7.9, 17.0], 0.4)]), 0.0);
         assert_eq!(nearness_of(&[([-1.0, 9.0], 0.5), ([7.0, 17.0], 0.4)]), 0.4);
-        // Before what covers all, and behind it.
+        // In front of a silhouette that covers the tile, and behind it.
         let whole = ([-1.0, 17.0], 0.45);
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), whole, ([8.0, 17.0], 0.4)]), 0.45);
         assert_eq!(nearness_of(&[whole, ([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.49)]), 0.49);
-        // What comes after all is covered may be nearer still.
+        // Nearer silhouettes after the tile is covered.
         let halves = [([-1.0, 8.0], 0.3), ([8.0, 17.0], 0.2), ([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)];
         assert_eq!(nearness_of(&halves), 0.4);
     }
 
     #[test]
-    fn what_has_no_area_or_no_numbers_is_left_out() {
+    fn silhouettes_without_area_or_with_nan_are_ignored() {
         let mut silhouettes = Silhouettes::default();
         let plane = [[0.0, 0.0, 0.5]];
         let line = [DVec2::ZERO, DVec2::ONE, DVec2::splat(7.0), DVec2::splat(7.0)];
@@ -350,9 +350,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Everything at once, against places of each tile and each silhouette looked at one by one.
+        /// Compares all tiles with points of each tile, tested against each silhouette.
         #[test]
-        fn no_place_is_farther_than_its_square_says(
+        fn no_point_is_farther_than_its_tile(
             shapes in prop::collection::vec(
                 (prop::collection::vec(prop::array::uniform2(-20.0..90.0_f64), 3..9), prop::array::uniform3(-0.01..0.01_f64)),
                 1..8,
@@ -370,15 +370,15 @@ mod tests {
             let nearest_at = |x: f64, y: f64| {
                 let mut nearest = 0.0;
                 for (corners, [right, down, further]) in &shapes {
-                    // Inside of a triangle of any three corners is inside of all of them.
-                    let place = DVec2::new(x, y);
+                    // A point is inside the hull if it is inside a triangle of any three corners.
+                    let point = DVec2::new(x, y);
                     let corners: Vec<_> = corners.iter().map(|&corner| DVec2::from(corner)).collect();
                     let mut triangles = corners.iter().enumerate().flat_map(|(index, &a)| {
                         let corners = &corners;
                         (0..index).flat_map(move |other| (0..other).map(move |third| [a, corners[other], corners[third]]))
                     });
                     let is_inside = triangles.any(|[a, b, c]| {
-                        let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
+                        let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(point - from));
                         sides.iter().all(|&side| side >= -1e-9) || sides.iter().all(|&side| side <= 1e-9)
                     });
                     if is_inside {

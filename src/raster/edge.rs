@@ -1,50 +1,50 @@
-//! A triangle's edge as a function over the picture (Pineda 1988), in exact integers.
+//! Edge functions (Pineda 1988) in exact integers.
 
 use std::ops::Range;
 
 use super::grid::{GridPoint, HALF_PIXEL, STEPS_PER_PIXEL};
 
-/// Tells on which side of an edge a pixel's middle lies: the function is twice the area, in square steps, of the
-/// triangle that the edge makes with it, and not below 0 on the inner side.
+/// The edge function of a triangle's edge: at a pixel's centre, twice the signed area, in square steps, of the triangle between the
+/// edge and that centre. It is not negative on the inner side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
-    /// At the middle of the picture's top left pixel.
-    at_first: i64,
-    /// How it changes to the next column.
+    /// The value at the centre of the picture's top left pixel.
+    at_first_pixel: i64,
+    /// The change to the next column.
     pub across: i64,
-    /// How it changes to the next row.
+    /// The change to the next row.
     down: i64,
-    /// The least value that is inside: of two triangles with a common edge, just one has the pixels on it. It is the
-    /// one for which it is a left edge, or a top edge that is level: the rule of Direct3D, Metal and Vulkan's devices.
-    least: i64,
+    /// The min_inside value that counts as inside, by the top-left rule of Direct3D, Metal and Vulkan's devices: of two triangles with a
+    /// common edge, pixels on it belong to the one for which it is a left edge or a horizontal top edge.
+    min_inside: i64,
 }
 
 impl Edge {
-    /// The edge of a triangle whose corners follow each other clockwise in the picture.
+    /// The edge from one corner of a clockwise triangle to the next.
     pub fn new(from: GridPoint, to: GridPoint) -> Self {
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
-        let is_inside = y < 0 || (y == 0 && x > 0);
+        let is_top_left = y < 0 || (y == 0 && x > 0);
         Self {
-            at_first: x * (HALF_PIXEL - from[1]) - y * (HALF_PIXEL - from[0]),
+            at_first_pixel: x * (HALF_PIXEL - from[1]) - y * (HALF_PIXEL - from[0]),
             across: -y * STEPS_PER_PIXEL,
             down: x * STEPS_PER_PIXEL,
-            least: i64::from(!is_inside),
+            min_inside: i64::from(!is_top_left),
         }
     }
 
-    /// Its value at a pixel's middle.
+    /// The value at a pixel's centre.
     pub fn at(&self, column: i64, row: i64) -> i64 {
-        self.at_first + self.across * column + self.down * row
+        self.at_first_pixel + self.across * column + self.down * row
     }
 
-    /// The columns of a row of which the middle is inside, as far as this edge goes, out of `columns`.
+    /// The part of `columns` whose centres in a row are on this edge's inner side.
     pub fn inside(&self, row: i64, columns: Range<i64>) -> Range<i64> {
-        let above_least = self.at(0, row) - self.least;
+        let above_min = self.at(0, row) - self.min_inside;
         if self.across > 0 {
-            columns.start.max(-above_least.div_euclid(self.across))..columns.end
+            columns.start.max(-above_min.div_euclid(self.across))..columns.end
         } else if self.across < 0 {
-            columns.start..columns.end.min(above_least.div_euclid(-self.across) + 1)
-        } else if above_least >= 0 {
+            columns.start..columns.end.min(above_min.div_euclid(-self.across) + 1)
+        } else if above_min >= 0 {
             columns
         } else {
             0..0

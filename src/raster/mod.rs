@@ -1,6 +1,6 @@
-//! A rasteriser for the CPU: what draws in software, and what finds out which objects others hide.
+//! A rasteriser for the CPU: the software backend and occlusion culling use it.
 //!
-//! It is written for any [`Real`] number: f32 is fast enough to look at, and f64 is what the others are measured by.
+//! It is generic over [`Real`] numbers: f32 for speed, f64 as the reference that other results are measured against.
 
 mod coarse_depth;
 mod convex;

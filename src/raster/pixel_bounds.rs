@@ -1,7 +1,6 @@
 //! Rectangles of pixels.
 
-/// A rectangle of pixels: the columns from `left` up to `right` and the rows from `top` up to `bottom`, half-open,
-/// counted from the picture's top left.
+/// A half-open rectangle of pixels: the columns `left..right` and the rows `top..bottom`, counted from the picture's top left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelBounds {
     /// The first column.
@@ -15,17 +14,17 @@ pub struct PixelBounds {
 }
 
 impl PixelBounds {
-    /// All of a picture: its width and height in pixels.
+    /// The bounds of a whole picture, given its width and height in pixels.
     pub fn of_picture([width, height]: [usize; 2]) -> Self {
         Self { left: 0, top: 0, right: width, bottom: height }
     }
 
-    /// Whether there is no pixel in it.
+    /// Whether the rectangle contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.left >= self.right || self.top >= self.bottom
     }
 
-    /// The pixels that are in both.
+    /// The pixels in both rectangles.
     pub fn intersection(&self, other: Self) -> Self {
         Self {
             left: self.left.max(other.left),

@@ -1,18 +1,18 @@
-//! Numbers to draw with.
+//! The numbers that the rasteriser is generic over.
 
 use std::fmt::Debug;
 
 use num_traits::{Float, NumAssign};
 
-/// A number to draw with: f32, or f64.
+/// A floating-point number: f32 or f64.
 pub trait Real: Float + NumAssign + Default + Debug + Send + Sync + 'static {
-    /// The nearest to `value`.
+    /// Rounds an f64 to the nearest value.
     fn of(value: f64) -> Self;
 
-    /// The nearest to `value`.
+    /// Rounds an integer to the nearest value.
     fn of_integer(value: i64) -> Self;
 
-    /// The same, or the nearest f64.
+    /// Converts to f64, without loss.
     fn as_f64(self) -> f64;
 }
 

@@ -1,32 +1,32 @@
-//! Leaves out the triangles of a mesh that would cover no pixel, before a device reads them (S 9.6).
+//! Culls the triangles of a mesh that cover no pixel, before a device reads them (S 9.6).
 
 use std::ops::AddAssign;
 
 use super::Vector4;
 use super::grid::{self, GridPoint, MAX_PICTURE_SIZE, Winding};
 
-/// How many triangles there were, and how many of them were left out, by the first reason that held.
+/// The numbers of tested and of culled triangles; a culled triangle counts for the first reason that applies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CulledTriangles {
-    /// Those looked at.
+    /// All tested triangles.
     pub triangles: usize,
-    /// Those of which two corners are at one place.
+    /// Two corners coincide.
     pub degenerate: usize,
-    /// Those beyond the near plane, the far plane or a side of the picture.
+    /// All corners are beyond the near plane, the far plane or a side of the picture.
     pub off_screen: usize,
-    /// Those wound the way that is left out.
+    /// The winding is the culled one.
     pub back_facing: usize,
-    /// Those between the middles of pixels.
+    /// No pixel centre is covered.
     pub zero_size: usize,
 }
 
 impl CulledTriangles {
-    /// Those left out.
+    /// The number of culled triangles.
     pub fn culled(&self) -> usize {
         self.degenerate + self.off_screen + self.back_facing + self.zero_size
     }
 
-    /// The share left out, from 0 to 1; 0 if there was no triangle.
+    /// The share of culled triangles, from 0 to 1; 0 if there are no triangles.
     pub fn share(&self) -> f64 {
         self.culled() as f64 / self.triangles.max(1) as f64
     }
@@ -42,51 +42,50 @@ impl AddAssign for CulledTriangles {
     }
 }
 
-/// A mesh's vertex, for [`cull_triangles`].
+/// A vertex for [`cull_triangles`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CullVertex {
-    /// Where it is in clip space, with reversed depth: what is seen has 0 ≤ z ≤ w. A device may have it elsewhere by 2⁻¹³ of
+    /// The clip-space position, with reversed depth: visible points have 0 ≤ z ≤ w. A device's position may differ by 2⁻¹³ of
     /// |x| + |y| + |z| + |w|.
     pub clip: Vector4<f64>,
-    /// Whether a device has it less than a 256th of a pixel from where that is in the picture, before it snaps it.
+    /// Whether a device's position in the picture, before snapping, differs by less than a 256th of a pixel.
     pub is_accurate: bool,
 }
 
-/// Appends to `remaining` the indices of the `triangles` that may cover a pixel of a `picture` of so many pixels to the
-/// right and down; in their order, three each. `corners` are the mesh's vertices. `culled`: the winding in the picture that is left out; that of a
-/// mirrored object is the other one.
+/// Appends to `remaining` the indices, three each and in order, of the `triangles` that may cover a pixel of a `picture` of that
+/// width and height in pixels. `vertices` are the mesh's vertices. `culled` is the winding to cull; for a mirrored object it is the
+/// other one.
 ///
-/// It never leaves out what a device would have drawn, although the device knows the places in f32 only:
+/// The result is conservative: no triangle that a device would draw is culled, although the device has positions in f32 only:
 ///
-/// - **Off-screen** is what has all three corners on the outer side of one plane. A corner is taken for outside only by
-///   more than 2⁻¹² of |x| + |y| + |z| + |w|. What a device makes of it may be that wrong: a sum of products in f32 is
-///   within some units of 2⁻²⁴ of the sum of their magnitudes, and these may be a thousand times those of the result.
-///   If all corners are outside of a plane, so are all points between them, in front of the camera and behind it.
-/// - **Degenerate** is what has two corners with the same four numbers: a device puts them at the same place as well.
-/// - **Back-facing** and **zero-size** are decided of corners that are [placed](CullVertex::is_accurate), after these are snapped to steps of a 256th of a pixel, in
-///   integers, and so that each corner may be a step off along both axes. This holds if a device's corner is less than
-///   a step away before it snaps it: the nearest integers of two numbers less than 1 apart are at most 1 apart. Drawn
-///   relative to the camera, corners are within 1e-3 pixels, a quarter of a step, unless they are nearer to the camera
-///   than their mesh is large. Twice the area, a×b + b×c + c×a, changes by dᵢ×(pᵢ₊₁ − pᵢ₊₂) for a corner that moves by
-///   dᵢ, at most by the opposite edge's extent along x plus that along y, and by dᵢ×dⱼ for two that do, at most 2 for
-///   each of the three pairs. So what is wound the wrong way by more than the extents of the edges + 6 is so on the
-///   device. What covers a pixel has its middle in the rectangle around its corners. So nothing is drawn of what has
-///   none in that rectangle, a step larger on each side. Neither is asked of a triangle that a device may clip, as
-///   parts of it could turn over: if a corner is not clearly within the near plane (with w ≤ 0 it is not), the far
-///   plane, and twice the width and height of the picture. It is within a far plane that is infinitely far away if z is
-///   the same at all three corners: then it is a constant, and the device's as well.
+/// - **Off-screen**: all three corners are on the outer side of one plane. A corner counts as outside only by more than 2⁻¹² of
+///   |x| + |y| + |z| + |w|. A device's error may be that large: a sum of products in f32 is within some units of 2⁻²⁴ of the sum of
+///   their magnitudes, and these may be a thousand times the result's. If all corners are outside a plane, so are all points
+///   between them, in front of the camera and behind it.
+/// - **Degenerate**: two corners have the same four coordinates, so they coincide on the device as well.
+/// - **Back-facing** and **zero-size** are decided only for [accurate](CullVertex::is_accurate) corners. They are snapped to steps of a
+///   256th of a pixel, and tested in integers such that each corner may be a step off along both axes. That suffices if a device's
+///   corner is less than a step away before it is snapped: the nearest integers of two numbers less than 1 apart are at most 1 apart.
+///   With camera-relative transforms, corners are within 1e-3 pixels, a quarter of a step, unless they are nearer to the camera than
+///   their mesh is large. Twice the area, a×b + b×c + c×a, changes by dᵢ×(pᵢ₊₁ − pᵢ₊₂) if one corner moves by dᵢ, at most by the
+///   opposite edge's extent along x plus that along y, and by dᵢ×dⱼ if two move, at most 2 for each of the three pairs. So if twice the
+///   area exceeds the extents of the edges + 6, the device finds the same winding. A covered pixel has its centre in the bounding
+///   rectangle of the corners. So nothing is drawn if that rectangle, enlarged by a step on each side, contains no pixel centre.
+///   Neither test applies to a triangle that a device may clip, because parts of it could turn over: that is, if a corner is not
+///   certainly inside the near plane (with w ≤ 0 it is not), the far plane, and twice the picture's width and height. All corners are
+///   inside a far plane at infinity if they have the same z: then z is a constant, on the device as well.
 ///
-/// So what has exactly no area after snapping is kept if its corners differ and its rectangle has a pixel's middle: a
-/// step farther, it has one. Triangles with an index beyond `corners`, or a corner that is not finite, are kept too: it is
-/// for who draws to refuse them.
+/// So a triangle whose area is exactly 0 after snapping is kept if its corners differ and a pixel centre is in its bounding rectangle:
+/// a step further, its area is not 0. Triangles with an index beyond `vertices`, or with a corner that is not finite, are kept, too: the
+/// caller decides whether to reject them.
 pub fn cull_triangles(
-    corners: &[CullVertex],
+    vertices: &[CullVertex],
     triangles: impl Iterator<Item = [u32; 3]>,
     picture: [usize; 2],
     culled: Option<Winding>,
     remaining: &mut Vec<u32>,
 ) -> CulledTriangles {
-    let corners: Vec<_> = corners.iter().map(|corner| Corner::new(corner, picture)).collect();
+    let corners: Vec<_> = vertices.iter().map(|vertex| Corner::new(vertex, picture)).collect();
     let corner = |index| corners.get(index as usize)?.as_ref();
     let mut counts = CulledTriangles::default();
     for triangle in triangles {
@@ -106,10 +105,10 @@ pub fn cull_triangles(
     counts
 }
 
-/// How far a device's clip space may be off: see [`cull_triangles`].
-const CLIP_MARGIN: f64 = 1.0 / 4096.0;
+/// The error that a device's clip-space positions may have: see [`cull_triangles`].
+const CLIP_TOLERANCE: f64 = 1.0 / 4096.0;
 
-/// The narrowest guard band of a device: Mesa's, which is twice as wide and as high as the picture.
+/// The smallest guard band of a device, Mesa's: twice the picture's width and height.
 const GUARD_BAND: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,30 +119,30 @@ enum Reason {
     ZeroSize,
 }
 
-/// What there is to know of a corner.
+/// A vertex prepared for the tests.
 struct Corner {
     clip: [f64; 4],
-    /// A bit for each plane of the picture's that it is clearly outside of.
+    /// A mask of the planes that it is certainly outside of.
     outside: u8,
     is_within_far_plane: bool,
-    /// Where it is in the picture, if no other plane clips a triangle because of it.
-    place: Option<GridPoint>,
+    /// Its snapped position, if it is accurate and no plane except the far plane can clip a triangle because of it.
+    snapped: Option<GridPoint>,
 }
 
 impl Corner {
-    /// None if it is not finite.
+    /// `None` if a coordinate is not finite.
     fn new(&CullVertex { clip, is_accurate }: &CullVertex, picture: [usize; 2]) -> Option<Self> {
         let [x, y, z, w] = clip.0;
-        // Of numbers so large that this is infinite nothing is decided: the comparisons below are false then.
-        let margin = CLIP_MARGIN * (x.abs() + y.abs() + z.abs() + w.abs());
+        // If this overflows to infinity, the comparisons below are false, so nothing is decided.
+        let margin = CLIP_TOLERANCE * (x.abs() + y.abs() + z.abs() + w.abs());
         let planes = [w - z, z, w - x, w + x, w - y, w + y];
         let outside = planes.iter().fold(0, |outside, &distance| outside << 1 | u8::from(distance < -margin));
         let band = GUARD_BAND * w - margin;
         let is_within = w > 0.0 && w - z > margin && x.abs() < band && y.abs() < band;
         let is_drawable = is_accurate && is_within && picture.iter().all(|&side| side <= MAX_PICTURE_SIZE);
-        let place = is_drawable.then(|| grid::snap(&clip, picture));
+        let snapped = is_drawable.then(|| grid::snap(&clip, picture));
         let is_finite = clip.0.iter().all(|number| number.is_finite());
-        is_finite.then_some(Self { clip: clip.0, outside, is_within_far_plane: z > margin, place })
+        is_finite.then_some(Self { clip: clip.0, outside, is_within_far_plane: z > margin, snapped })
     }
 }
 
@@ -159,29 +158,29 @@ fn reason([a, b, c]: [&Corner; 3], culled: Option<Winding>) -> Option<Reason> {
     if !corners.iter().all(|corner| corner.is_within_far_plane) && !is_constant(a.clip[2]) {
         return None;
     }
-    let places = [a.place?, b.place?, c.place?];
-    if is_surely(culled, places) {
+    let points = [a.snapped?, b.snapped?, c.snapped?];
+    if is_certainly_culled(culled, points) {
         Some(Reason::BackFacing)
-    } else if is_between_middles(places) {
+    } else if covers_no_center(points) {
         Some(Reason::ZeroSize)
     } else {
         None
     }
 }
 
-/// Whether it is wound the way that is left out, wherever within a step its corners are.
-fn is_surely(culled: Option<Winding>, places: [GridPoint; 3]) -> bool {
-    let area = grid::doubled_area(places);
-    let [a, b, c] = places;
+/// Whether the winding is the culled one, even if corners move by a step.
+fn is_certainly_culled(culled: Option<Winding>, points: [GridPoint; 3]) -> bool {
+    let area = grid::doubled_area(points);
+    let [a, b, c] = points;
     let extent = |from: GridPoint, to: GridPoint| (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
     let change = extent(a, b) + extent(b, c) + extent(c, a) + 6;
     area.abs() > change && culled == Winding::of_area(area)
 }
 
-/// Whether there is no pixel's middle in the rectangle around the corners, wherever within a step they are.
-fn is_between_middles(places: [GridPoint; 3]) -> bool {
+/// Whether no pixel centre is in the corners' bounding rectangle, even if they move by a step.
+fn covers_no_center(points: [GridPoint; 3]) -> bool {
     [0, 1].into_iter().any(|axis| {
-        let [a, b, c] = places.map(|place| place[axis]);
+        let [a, b, c] = points.map(|point| point[axis]);
         grid::pixel_centers(a.min(b).min(c) - 1, a.max(b).max(c) + 1).is_empty()
     })
 }

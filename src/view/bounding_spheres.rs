@@ -1,49 +1,49 @@
-//! Spheres around objects, laid out to be tested many at a time.
+//! Bounding spheres of objects as a structure of arrays, for SIMD culling.
 
 use glam::DVec3;
 
-/// Where an object is in the world.
+/// A bounding sphere in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
-    /// The centre of a sphere around it, in metres.
+    /// The centre in metres.
     pub center: DVec3,
-    /// The sphere's radius in metres.
+    /// The radius in metres.
     pub radius: f32,
 }
 
 impl BoundingSphere {
-    /// Seen by nobody.
-    pub const NOTHING: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
+    /// The sphere that no frustum intersects.
+    pub const EMPTY: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
 }
 
-/// The bounds of [`BoundingSpheres::COUNT`] objects, an array for each coordinate: what tests them reads no more than it needs, and
-/// several with one instruction.
+/// The bounding spheres of [`BoundingSpheres::COUNT`] objects, one array for each coordinate: a test loads only the coordinates
+/// that it needs, and tests several spheres with one instruction.
 #[derive(Clone, Debug)]
 pub struct BoundingSpheres {
-    /// In metres, in the world.
+    /// World-space x, y and z in metres.
     centers: [[f64; Self::COUNT]; 3],
     /// In metres.
     radii: [f32; Self::COUNT],
 }
 
 impl BoundingSpheres {
-    /// How many there are.
+    /// The number of spheres.
     pub const COUNT: usize = 256;
 
-    /// One of them.
+    /// Returns the sphere at `entry`.
     ///
     /// # Panics
-    /// If there is no such sphere.
+    /// If `entry` is not below [`BoundingSpheres::COUNT`].
     #[inline]
     pub fn get(&self, entry: usize) -> BoundingSphere {
         let [x, y, z] = &self.centers;
         BoundingSphere { center: DVec3::new(x[entry], y[entry], z[entry]), radius: self.radii[entry] }
     }
 
-    /// Changes one of them.
+    /// Replaces the sphere at `entry`.
     ///
     /// # Panics
-    /// If there is no such sphere.
+    /// If `entry` is not below [`BoundingSpheres::COUNT`].
     #[inline]
     pub fn set(&mut self, entry: usize, bounds: BoundingSphere) {
         for (coordinates, coordinate) in self.centers.iter_mut().zip(bounds.center.to_array()) {
@@ -52,20 +52,20 @@ impl BoundingSpheres {
         self.radii[entry] = bounds.radius;
     }
 
-    /// The centres' x, y and z, in metres in the world.
+    /// The centres' world-space x, y and z in metres.
     pub fn coordinates(&self) -> &[[f64; Self::COUNT]; 3] {
         &self.centers
     }
 
-    /// In metres.
+    /// The radii in metres.
     pub fn radii(&self) -> &[f32; Self::COUNT] {
         &self.radii
     }
 }
 
 impl Default for BoundingSpheres {
-    /// Those of objects that nobody sees.
+    /// All spheres are [`BoundingSphere::EMPTY`].
     fn default() -> Self {
-        Self { centers: [[0.0; Self::COUNT]; 3], radii: [BoundingSphere::NOTHING.radius; Self::COUNT] }
+        Self { centers: [[0.0; Self::COUNT]; 3], radii: [BoundingSphere::EMPTY.radius; Self::COUNT] }
     }
 }

@@ -1,40 +1,40 @@
-//! Positions that subtract exactly on any device.
+//! Fixed-point positions, whose difference is exact on any device.
 
 use glam::DVec3;
 
 /// A position in 64-bit fixed point, in steps of 2⁻³⁰ m (just below a nanometre).
 ///
-/// Devices have no f64, and f32 is off by metres far from the origin. The difference of two fixed-point positions is exact
-/// with 32-bit integers and a borrow; only that difference, which is small where it matters, is rounded to f32. So one
-/// table of positions serves every view, wherever in the world its camera is.
+/// Devices have no f64, and f32 is wrong by metres far from the origin. With 32-bit integers and a borrow, the difference of two
+/// fixed-point positions is exact; only that difference, which is small where it matters, is rounded to f32. So one table of
+/// positions serves every view, wherever its camera is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedPosition([i64; 3]);
 
 impl FixedPosition {
-    /// The farthest coordinate in metres: 2³², about 4.3 million kilometres. The difference of any two such positions fits
-    /// into 64 bits too.
-    pub const REACH: f64 = 4_294_967_296.0;
+    /// The largest coordinate in metres: 2³², about 4.3 million kilometres. The difference of any two positions also fits into
+    /// 64 bits.
+    pub const MAX_COORDINATE: f64 = 4_294_967_296.0;
 
     /// The world's origin.
     pub const ORIGIN: Self = Self([0; 3]);
 
     const STEPS_PER_METRE: f64 = 1_073_741_824.0;
 
-    /// The nearest fixed-point position; `None` where a coordinate is not finite or beyond [`FixedPosition::REACH`].
+    /// The nearest fixed-point position; `None` if a coordinate is not finite or beyond [`FixedPosition::MAX_COORDINATE`].
     pub fn new(position: DVec3) -> Option<Self> {
-        // No number is less than one that is none.
-        let within = position.abs().cmplt(DVec3::splat(Self::REACH)).all();
+        // The comparison is false for NaN.
+        let within = position.abs().cmplt(DVec3::splat(Self::MAX_COORDINATE)).all();
         within.then(|| {
             Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| (steps + 0.5_f64.copysign(steps)) as i64))
         })
     }
 
-    /// The position of these halves: see [`FixedPosition::halves`].
+    /// Joins the halves that [`FixedPosition::halves`] returns.
     pub fn from_halves(low: [u32; 3], high: [i32; 3]) -> Self {
         Self(std::array::from_fn(|axis| i64::from(high[axis]) << 32 | i64::from(low[axis])))
     }
 
-    /// The difference from another position in metres, rounded just as the shader rounds it.
+    /// The difference from another position in metres, rounded exactly as shaders round it.
     pub fn relative_to(self, other: Self) -> [f32; 3] {
         std::array::from_fn(|axis| {
             let steps = self.0[axis].wrapping_sub(other.0[axis]);
@@ -44,7 +44,7 @@ impl FixedPosition {
         })
     }
 
-    /// Lower and upper 32 bits of each coordinate.
+    /// The lower and the upper 32 bits of each coordinate.
     pub fn halves(self) -> ([u32; 3], [i32; 3]) {
         (self.0.map(|steps| steps as u32), self.0.map(|steps| (steps >> 32) as i32))
     }
@@ -56,7 +56,7 @@ mod tests {
 
     use super::*;
 
-    /// What the shader does, in the same 32-bit steps.
+    /// The shader's computation, in the same 32-bit steps.
     fn difference(object: FixedPosition, camera: FixedPosition) -> [f32; 3] {
         let ((low, high), (camera_low, camera_high)) = (object.halves(), camera.halves());
         std::array::from_fn(|axis| {
@@ -64,7 +64,7 @@ mod tests {
             let low = low[axis].wrapping_sub(camera_low[axis]);
             let high = high[axis].wrapping_sub(camera_high[axis]).wrapping_sub(borrow);
             let negative = high < 0;
-            // The magnitude first: the two halves of a small negative number are both large.
+            // Take the magnitude first: both halves of a small negative number are large.
             let carry = u32::from(low == 0);
             let magnitude_low = if negative { (!low).wrapping_add(1) } else { low };
             let magnitude_high = if negative { (!high as u32).wrapping_add(carry) } else { high as u32 };
@@ -75,32 +75,32 @@ mod tests {
 
     proptest! {
         #[test]
-        fn differences_are_as_exact_as_f32_can_say(
-            place in -4.29e9..4.29e9_f64, sign in prop::bool::ANY, exponent in -9.0..9.93_f64,
+        fn differences_are_exact_to_f32(
+            coordinate in -4.29e9..4.29e9_f64, sign in prop::bool::ANY, exponent in -9.0..9.93_f64,
         ) {
             let offset = if sign { 10_f64.powf(exponent) } else { -10_f64.powf(exponent) };
-            let other = (place + offset).clamp(-4.29e9, 4.29e9);
-            let (camera, object) = (DVec3::splat(place), DVec3::splat(other));
+            let other = (coordinate + offset).clamp(-4.29e9, 4.29e9);
+            let (camera, object) = (DVec3::splat(coordinate), DVec3::splat(other));
             let (camera, object) = (FixedPosition::new(camera).unwrap(), FixedPosition::new(object).unwrap());
             let found = difference(object, camera);
             let (low, high) = object.halves();
             prop_assert_eq!(FixedPosition::from_halves(low, high).relative_to(camera), found);
-            let exact = other - place;
+            let exact = other - coordinate;
             let bound = 2_f64.powi(-30) + exact.abs() * 2_f64.powi(-22);
             prop_assert!((f64::from(found[0]) - exact).abs() <= bound, "{} for {exact}", found[0]);
         }
     }
 
     #[test]
-    fn opposite_corners_of_the_world_are_as_far_apart_as_they_are() {
+    fn the_difference_of_opposite_world_corners_does_not_overflow() {
         let (one, other) = (DVec3::splat(-4.29e9), DVec3::splat(4.29e9));
         let found = difference(FixedPosition::new(other).unwrap(), FixedPosition::new(one).unwrap());
         assert!(found.iter().all(|&distance| (f64::from(distance) - 8.58e9).abs() < 1024.0), "{found:?}");
     }
 
     #[test]
-    fn what_cannot_be_held_is_refused() {
-        for bad in [f64::NAN, f64::INFINITY, FixedPosition::REACH, -1e300] {
+    fn unrepresentable_positions_are_rejected() {
+        for bad in [f64::NAN, f64::INFINITY, FixedPosition::MAX_COORDINATE, -1e300] {
             assert_eq!(FixedPosition::new(DVec3::new(0.0, bad, 0.0)), None);
         }
         assert!(FixedPosition::new(DVec3::splat(-4.29e9)).is_some());

@@ -1,4 +1,4 @@
-//! What a camera sees, as planes that never cull what it does see.
+//! The view frustum as planes, with conservative tests against bounding volumes.
 
 use std::array::from_fn;
 
@@ -7,52 +7,53 @@ use glam::{DVec3, Vec3};
 use super::BoundingSpheres;
 use crate::scene::{Camera, Projection, ViewKind};
 
-/// What a camera sees: a pyramid, a box or half a ball, within six planes.
+/// The volume that a camera sees, within six planes: a pyramid, a box or a hemisphere.
 ///
-/// The planes are relative to the camera, so that a place far from the world's origin costs no precision: the only
-/// subtraction of large numbers, centre − camera, is done in f64. Opposite planes share what they can: for a place c relative
-/// to the camera, forward·c tells how far along it is, and is all that the near and the far plane ask for; two opposite edges
-/// of the picture ask for across·c besides, and differ in its sign alone. That is 28 operations for six planes, and not 42.
+/// The planes are relative to the camera, so positions far from the world's origin lose no precision: the only subtraction of
+/// large numbers, centre − camera, is done in f64. Opposite planes share dot products: for a point c relative to the camera,
+/// forward·c suffices for the near and the far plane; a pair of opposite side planes also needs across·c, and the two differ
+/// only in its sign. That takes 28 operations for six planes instead of 42.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frustum {
     origin: DVec3,
-    /// Where the camera looks, of unit length.
+    /// The view direction, of unit length.
     forward: Vec3,
-    /// Those of the picture at its sides, and those above and below.
-    pub(super) edges: [Edges; 2],
-    /// What is at `forward · c + near ≥ 0` is not before the near plane; in metres, moved out.
+    /// The left and right planes, and the bottom and top planes.
+    pub(super) sides: [SidePlanes; 2],
+    /// A point c with `forward · c + near ≥ 0` is not before the near plane. In metres, with tolerance.
     pub(super) near: f32,
-    /// What is at `far − forward · c ≥ 0` is not beyond the far plane; in metres, moved out.
+    /// A point c with `far − forward · c ≥ 0` is not beyond the far plane. In metres, with tolerance.
     pub(super) far: f32,
-    /// `forward`, and the normals of the edges, two and two: towards the inside, of unit length.
+    /// `forward`, and the normals of the two pairs of side planes: inward, of unit length.
     pub(super) normals: [Vec3; 5],
 }
 
-/// Two opposite edges of the picture, relative to the camera. What is at `slope · (forward · c) + offset ≥ |across · c|` is
-/// between them.
+/// Two opposite side planes, relative to the camera. A point c with `slope · (forward · c) + offset ≥ |across · c|` lies between
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Edges {
-    /// At right angles to `forward`, and as long as the cosine of half the angle of view: 1 without perspective.
+pub(super) struct SidePlanes {
+    /// Perpendicular to `forward`. Its length is the cosine of half the field of view; 1 without perspective.
     across: Vec3,
-    /// The sine of half the angle of view: 0 without perspective.
+    /// The sine of half the field of view; 0 without perspective.
     slope: f32,
-    /// In metres, moved out.
+    /// In metres, with tolerance.
     offset: f32,
 }
 
-/// A place relative to the camera, as the planes ask for it.
+/// The dot products of a point c, relative to the camera, that all planes are evaluated from.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct CameraPoint {
     /// `forward · c`.
-    pub(super) along: f32,
-    /// `across · c` of both pairs of edges.
-    pub(super) aside: [f32; 2],
-    /// ‖c‖₁, of which [`ALLOWANCE`] is allowed for the rounding of the distances from all planes: see [`Frustum::intersects_sphere`].
-    pub(super) length: f32,
+    pub(super) forward: f32,
+    /// `across · c` for both pairs of side planes.
+    pub(super) across: [f32; 2],
+    /// ‖c‖₁. [`ROUNDING_TOLERANCE`] times this bounds the rounding error of the distance from any plane: see
+    /// [`Frustum::intersects_sphere`].
+    pub(super) norm: f32,
 }
 
 impl Frustum {
-    /// What `camera` sees.
+    /// The frustum of `camera`.
     pub fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
         let forward = orientation * DVec3::NEG_Z;
@@ -70,18 +71,18 @@ impl Frustum {
             Projection::Paraboloid => ([[0.0, 1.0]; 2], [f64::from(camera.far); 2]),
         };
         let near = match camera.projection {
-            // Into a shadow map, what is before the near plane casts its shadow too.
+            // Objects before the near plane of a shadow map cast shadows too.
             Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => f32::INFINITY,
-            // Who filters a shadow map at the disc's rim looks a few pixels past it.
-            Projection::Paraboloid => camera.far * PAST_THE_RIM,
+            // Filtering at the disc's rim reads a few texels beyond it.
+            Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,
             _ => -camera.near,
         };
         let axes = [DVec3::X, DVec3::Y].map(|axis| orientation * axis);
-        let edges = from_fn(|pair| {
+        let sides = from_fn(|pair| {
             let [sine, cosine] = sines_and_cosines[pair];
-            // Rounded up, so that a plane is rather too far out.
-            let offset = moved_out((offsets[pair] as f32).next_up());
-            Edges { across: (axes[pair] * cosine).as_vec3(), slope: sine as f32, offset }
+            // Rounded up, so that the plane errs outwards.
+            let offset = moved_outwards((offsets[pair] as f32).next_up());
+            SidePlanes { across: (axes[pair] * cosine).as_vec3(), slope: sine as f32, offset }
         });
         let normal = |pair: usize, sign: f64| {
             let [sine, cosine] = sines_and_cosines[pair];
@@ -90,68 +91,70 @@ impl Frustum {
         Self {
             origin: camera.position,
             forward: forward.as_vec3(),
-            edges,
-            near: moved_out(near),
-            far: moved_out(camera.far),
+            sides,
+            near: moved_outwards(near),
+            far: moved_outwards(camera.far),
             normals: [forward.as_vec3(), normal(0, 1.0), normal(0, -1.0), normal(1, 1.0), normal(1, -1.0)],
         }
     }
 
-    /// Whether any of a sphere may be seen: never `false` for one that is, sometimes `true` for one just outside.
+    /// Whether a sphere intersects the frustum. The test is conservative: never `false` for a sphere that does, sometimes `true`
+    /// for one just outside.
     ///
     /// With u = 2⁻²⁴, and N = ‖c‖₁ of the centre relative to the camera, to first order: forward·c carries five roundings (of
-    /// the normal, of the centre, of the product, and of two sums), so it is off by no more than 5uN; times the slope it is off
-    /// by 7u·slope·N. across·c is off by 5u·|across|·N. Their difference and its sum with the offset o add 2u(slope + |across|)N
-    /// and u|o|. Slope and |across| are sine and cosine of one angle, so the distance from an edge is off by no more than
-    /// (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that from the near or the far plane by 6uN + u|o|. 16u(N + r) are
-    /// allowed in the sphere's reach and 16u|o| in the offset, which leaves more than their own roundings take. Where numbers
-    /// are so small that they lose bits, what they lose is far below the smallest normal number, which is allowed as well.
-    /// The bound is made of magnitudes from before any cancellation.
+    /// the normal, of the centre, of the product, and of two sums), so its error is at most 5uN; times the slope, the error is
+    /// 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with the offset o add
+    /// 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the error of the distance from a
+    /// side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that from the near or the far plane 6uN + u|o|.
+    /// The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the offset, which also covers the tolerance's own
+    /// rounding. Subnormal numbers lose less than the smallest normal number, which the offset includes as well. The bound
+    /// consists of magnitudes from before any cancellation.
     ///
-    /// What is not a number is not seen. What is so far away that it overflows is.
+    /// NaN does not intersect. A centre so far away that it overflows does.
     #[inline]
     pub fn intersects_sphere(&self, center: DVec3, radius: f32) -> bool {
-        let place = self.place((center - self.origin).as_vec3().to_array());
-        self.nearest(place) >= -reach(radius, place)
+        let point = self.camera_point((center - self.origin).as_vec3().to_array());
+        self.signed_distance(point) >= -tolerant_radius(radius, point)
     }
 
-    /// The same for the [`Frustum::WORD`] spheres from `first` on: a bit each, from the lowest.
+    /// Tests the [`Frustum::WORD`] spheres from `first` on. Bit 0 of the mask is `first`.
     ///
     /// # Panics
-    /// If there are fewer.
+    /// If there are fewer than [`Frustum::WORD`] spheres from `first` on.
     pub fn intersects_spheres(&self, spheres: &BoundingSpheres, first: usize) -> u64 {
-        self.judge_each(spheres, first).seen
+        self.classify_spheres(spheres, first).intersecting
     }
 
-    /// How many spheres [`Frustum::intersects_spheres`] looks at.
+    /// The number of spheres that [`Frustum::intersects_spheres`] tests: one for each bit of its mask.
     pub const WORD: usize = 64;
 
-    /// As [`Frustum::intersects_spheres`], and which of them are inside as a whole: that costs a third more, but nothing where it is not
-    /// used.
+    /// Like [`Frustum::intersects_spheres`], and also finds the spheres that are entirely inside. That costs a third more; where
+    /// the caller ignores it, inlining removes it.
     #[inline(always)]
-    pub(super) fn judge_each(&self, spheres: &BoundingSpheres, first: usize) -> Judged {
+    pub(super) fn classify_spheres(&self, spheres: &BoundingSpheres, first: usize) -> Classified {
         let entries = first..first + Self::WORD;
         let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[entries.clone()].as_chunks().0);
         let radii = spheres.radii()[entries].as_chunks::<LANES>().0;
-        let mut judged = Judged { seen: 0, whole: 0 };
+        let mut classified = Classified { intersecting: 0, inside: 0 };
         for (group, (((x, y), z), radii)) in x.iter().zip(y).zip(z).zip(radii).enumerate() {
-            let [x, y, z] = self.relative([x, y, z]);
-            // One loop a step, over arrays of a fixed length: such loops become vector instructions.
-            let (mut nearest, mut reaches) = ([0.0; LANES], [0.0; LANES]);
+            let [x, y, z] = self.camera_relative([x, y, z]);
+            // Loops over arrays of a fixed length compile to vector instructions.
+            let (mut distances, mut radii_with_tolerance) = ([0.0; LANES], [0.0; LANES]);
             for lane in 0..LANES {
-                let place = self.place([x[lane], y[lane], z[lane]]);
-                nearest[lane] = self.nearest(place);
-                reaches[lane] = reach(radii[lane], place);
+                let point = self.camera_point([x[lane], y[lane], z[lane]]);
+                distances[lane] = self.signed_distance(point);
+                radii_with_tolerance[lane] = tolerant_radius(radii[lane], point);
             }
-            judged.seen |= bits(|lane| nearest[lane] >= -reaches[lane]) << (group * LANES);
-            judged.whole |= bits(|lane| nearest[lane] >= reaches[lane]) << (group * LANES);
+            classified.intersecting |=
+                lane_mask(|lane| distances[lane] >= -radii_with_tolerance[lane]) << (group * LANES);
+            classified.inside |= lane_mask(|lane| distances[lane] >= radii_with_tolerance[lane]) << (group * LANES);
         }
-        judged
+        classified
     }
 
-    /// Places in the world relative to the camera, in metres.
+    /// World-space positions relative to the camera, in metres.
     #[inline(always)]
-    pub(super) fn relative(&self, [x, y, z]: [&[f64; LANES]; 3]) -> [[f32; LANES]; 3] {
+    pub(super) fn camera_relative(&self, [x, y, z]: [&[f64; LANES]; 3]) -> [[f32; LANES]; 3] {
         let relative = |coordinates: &[f64; LANES], origin: f64| {
             let mut relative = [0.0; LANES];
             for lane in 0..LANES {
@@ -163,76 +166,76 @@ impl Frustum {
     }
 
     #[inline(always)]
-    pub(super) fn place(&self, [x, y, z]: [f32; 3]) -> Place {
+    pub(super) fn camera_point(&self, [x, y, z]: [f32; 3]) -> CameraPoint {
         let dot = |normal: Vec3| normal.x * x + normal.y * y + normal.z * z;
-        Place {
-            along: dot(self.forward),
-            aside: [dot(self.edges[0].across), dot(self.edges[1].across)],
-            length: x.abs() + y.abs() + z.abs(),
+        CameraPoint {
+            forward: dot(self.forward),
+            across: [dot(self.sides[0].across), dot(self.sides[1].across)],
+            norm: x.abs() + y.abs() + z.abs(),
         }
     }
 
-    /// How far a place is inside of the nearest plane, or outside of the farthest.
+    /// The min of a point's signed distances from all planes; positive inside.
     #[inline(always)]
-    fn nearest(&self, Place { along, aside, .. }: Place) -> f32 {
-        let between = |pair: usize| {
-            let edges = &self.edges[pair];
-            edges.slope * along - aside[pair].abs() + edges.offset
+    fn signed_distance(&self, CameraPoint { forward, across, .. }: CameraPoint) -> f32 {
+        let from_sides = |pair: usize| {
+            let planes = &self.sides[pair];
+            planes.slope * forward - across[pair].abs() + planes.offset
         };
-        let nearest = least(between(1), least(between(0), f32::MAX));
-        least(self.far - along, least(along + self.near, nearest))
+        let distance = min(from_sides(1), min(from_sides(0), f32::MAX));
+        min(self.far - forward, min(forward + self.near, distance))
     }
 }
 
-impl Edges {
-    /// How far a place is inside of each.
+impl SidePlanes {
+    /// A point's signed distances from both planes; positive inside.
     #[inline(always)]
-    pub(super) fn distances(&self, along: f32, aside: f32) -> [f32; 2] {
-        let middle = self.slope * along;
-        [middle + aside + self.offset, middle - aside + self.offset]
+    pub(super) fn distances(&self, forward: f32, across: f32) -> [f32; 2] {
+        let middle = self.slope * forward;
+        [middle + across + self.offset, middle - across + self.offset]
     }
 }
 
-/// How far a sphere reaches, with what is allowed for rounding.
+/// A sphere's radius with the tolerance for rounding.
 #[inline(always)]
-fn reach(radius: f32, place: Place) -> f32 {
-    radius + ALLOWANCE * (place.length + radius)
+fn tolerant_radius(radius: f32, point: CameraPoint) -> f32 {
+    radius + ROUNDING_TOLERANCE * (point.norm + radius)
 }
 
-/// What is known of some volumes: a bit each, from the lowest.
+/// How spheres lie relative to the frustum: a bit for each sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Judged {
-    /// Of which something may be seen.
-    pub(super) seen: u64,
-    /// Which are inside of all planes as a whole.
-    pub(super) whole: u64,
+pub(super) struct Classified {
+    /// Spheres that intersect the frustum or lie inside.
+    pub(super) intersecting: u64,
+    /// Spheres entirely inside all planes.
+    pub(super) inside: u64,
 }
 
-/// How many are tested together: what fits into the registers that every processor has.
+/// The number of volumes tested together: as many f32 as fit into the vector registers of any supported processor.
 pub(super) const LANES: usize = 8;
 
-/// The lesser of two; the second if the first is not a number. One instruction, which [`f32::min`] is not.
+/// The lesser of two numbers; the second if the first is NaN. Unlike [`f32::min`], it compiles to one instruction.
 #[inline(always)]
-pub(super) fn least(one: f32, other: f32) -> f32 {
+pub(super) fn min(one: f32, other: f32) -> f32 {
     if one < other { one } else { other }
 }
 
-/// What holds for which of them, from the lowest bit.
+/// A mask of the lanes for which a predicate holds.
 #[inline(always)]
-pub(super) fn bits(holds: impl Fn(usize) -> bool) -> u64 {
-    (0..LANES).fold(0, |bits, lane| bits | u64::from(holds(lane)) << lane)
+pub(super) fn lane_mask(predicate: impl Fn(usize) -> bool) -> u64 {
+    (0..LANES).fold(0, |mask, lane| mask | u64::from(predicate(lane)) << lane)
 }
 
-/// An offset with what is allowed for the rounding of itself, and for numbers too small to keep all their bits.
-fn moved_out(offset: f32) -> f32 {
-    offset + ALLOWANCE * offset.abs() + f32::MIN_POSITIVE
+/// An offset with the tolerance for its own rounding, and for subnormal numbers.
+fn moved_outwards(offset: f32) -> f32 {
+    offset + ROUNDING_TOLERANCE * offset.abs() + f32::MIN_POSITIVE
 }
 
-/// How far behind a paraboloid's camera is looked, as a share of its range.
-const PAST_THE_RIM: f32 = 0.05;
+/// How far a paraboloid view extends behind its camera, as a share of its range.
+const PARABOLOID_MARGIN: f32 = 0.05;
 
-/// 16 unit roundoffs, of 2⁻²⁴ each: see [`Frustum::intersects_sphere`].
-pub(super) const ALLOWANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
+/// 16 unit roundoffs of 2⁻²⁴ each: see [`Frustum::intersects_sphere`].
+pub(super) const ROUNDING_TOLERANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
@@ -242,7 +245,7 @@ mod tests {
     use super::*;
     use crate::view::BoundingSphere;
 
-    /// How far the sphere's centre is inside the nearest plane, in f64, from the camera's own definition.
+    /// The min distance of a point inside the camera's planes, in f64, from the camera's definition.
     fn depth_inside(camera: &Camera, center: DVec3) -> f64 {
         let local = camera.orientation.as_dquat().normalize().inverse() * (center - camera.position);
         let away = -local.z;
@@ -260,7 +263,7 @@ mod tests {
                 let near = if camera.kind == ViewKind::Shadow { f64::INFINITY } else { near };
                 [near, far, half * aspect - local.x.abs(), half - local.y.abs()]
             }
-            // The planes hold half a ball; what counts is that none of it is outside of them.
+            // The planes enclose a hemisphere; it suffices that no part of it is outside them.
             Projection::Paraboloid => [away, f64::from(camera.far) - local.length(), f64::INFINITY, f64::INFINITY],
         };
         distances.into_iter().fold(f64::INFINITY, f64::min)
@@ -268,7 +271,7 @@ mod tests {
 
     prop_compose! {
         fn any_camera()(
-            place in prop::array::uniform3(-1.0..1.0_f64),
+            position in prop::array::uniform3(-1.0..1.0_f64),
             exponent in 0.0..9.0_f64,
             axis in prop::array::uniform3(-1.0..1.0_f32),
             angle in 0.0..std::f32::consts::TAU,
@@ -279,7 +282,7 @@ mod tests {
             far_exponent in 0.001..6.0_f32,
             projection in 0_usize..4,
         ) -> Camera {
-            let mut camera = Camera::looking_at("any", DVec3::from(place) * 10_f64.powf(exponent), DVec3::ZERO);
+            let mut camera = Camera::looking_at("any", DVec3::from(position) * 10_f64.powf(exponent), DVec3::ZERO);
             camera.orientation = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
             camera.size = [width, height];
             camera.near = 10_f32.powf(near_exponent);
@@ -289,7 +292,7 @@ mod tests {
                 2 => Projection::Orthographic { height: degrees * camera.near },
                 _ => Projection::Paraboloid,
             };
-            // One perspective in two sees for ever.
+            // One perspective camera in two has an infinite far plane.
             if projection != 0 {
                 camera.far = camera.near * 10_f32.powf(far_exponent);
             }
@@ -301,9 +304,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-        /// Spheres are moved along the direction to the nearest plane until they all but touch it.
+        /// Each sphere almost touches the nearest plane.
         #[test]
-        fn a_sphere_that_is_seen_is_never_culled(
+        fn a_visible_sphere_is_never_culled(
             camera in any_camera(),
             direction in prop::array::uniform3(-1.0..1.0_f64),
             exponent in -3.0..7.0_f64,
@@ -320,7 +323,7 @@ mod tests {
         }
 
         #[test]
-        fn spheres_are_seen_together_as_each_by_itself(
+        fn testing_spheres_together_gives_the_same_result_as_one_by_one(
             camera in any_camera(),
             exponents in prop::collection::vec((-3.0..7.0_f64, -6.0..7.0_f32), BoundingSpheres::COUNT),
             turn in 0.0..1.0_f64,
@@ -333,7 +336,7 @@ mod tests {
                 let direction = DVec3::new(across * angle.cos(), height, across * angle.sin());
                 let center = camera.position + direction * 10_f64.powf(distance);
                 let bounds = match entry % 19 {
-                    0 => BoundingSphere::NOTHING,
+                    0 => BoundingSphere::EMPTY,
                     1 => BoundingSphere { center: DVec3::NAN, radius: 1.0 },
                     2 => BoundingSphere { center, radius: f32::INFINITY },
                     _ => BoundingSphere { center, radius: 10_f32.powf(radius) },
@@ -367,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_paraboloid_leaves_out_what_is_behind_it_and_beyond_its_range() {
+    fn a_paraboloid_culls_spheres_behind_it_and_beyond_its_range() {
         let camera = Camera {
             projection: Projection::Paraboloid,
             far: 10.0,
@@ -382,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_is_not_seen() {
+    fn nan_does_not_intersect() {
         let camera = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
         let frustum = Frustum::new(&camera);
         assert!(frustum.intersects_sphere(DVec3::NEG_Z * 5.0, 1.0));

@@ -1,35 +1,35 @@
-//! A light as shaders read it.
+//! The GPU layout of a light.
 
 use glam::{DVec3, Quat, Vec3};
 
 use super::RenderView;
 use crate::scene::{Light, Projection};
 
-/// A light as shaders read it, relative to one view's camera: `Light` in `drawloom.wgsl`.
+/// The GPU layout of a light, relative to one view's camera: `Light` in `drawloom.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuLight {
-    /// Where it is, relative to the camera, in metres; for a directional light, where its shadow map is seen from.
+    /// The position relative to the camera, in metres; for a directional light, the position of its shadow map's camera.
     pub position: Vec3,
     /// 0 directional, 1 point, 2 spot, 3 hemispherical.
     pub kind: u32,
-    /// The way it travels.
+    /// The direction in which the light travels.
     pub direction: Vec3,
-    /// Where it ends, in metres; for a directional light, where its shadow map does.
+    /// The light's range in metres; for a directional light, the far plane of its shadow map.
     pub range: f32,
-    /// At 1 m, or on a surface that faces a directional light.
+    /// The intensity; for a directional light, the illuminance of a surface that faces it.
     pub intensity: Vec3,
-    /// The cosine at which a spot light begins to fade.
+    /// The cosine of the angle at which a spot light begins to fade.
     pub cone_begin: f32,
-    /// The cosine at which a spot light is gone; 0 for a hemispherical one.
+    /// The cosine of the angle at which a spot light ends; 0 for a hemispherical light.
     pub cone_end: f32,
-    /// The layer of its shadow map; [`GpuLight::NO_SHADOW_MAP`] without one.
+    /// The layer of its shadow map, or [`GpuLight::NO_SHADOW_MAP`].
     pub shadow_layer: u32,
-    /// Half as wide as the shadow map: at 1 m for a spot light, in metres for a directional one.
+    /// Half the shadow map's extent: at a distance of 1 m for a spot light, in metres for a directional one.
     pub shadow_half: f32,
-    /// Where the shadow map begins, in metres.
+    /// The near plane of the shadow map, in metres.
     pub shadow_near: f32,
-    /// From the axes of the shadow map's camera to the world's.
+    /// Rotates from the axes of the shadow map's camera to world axes.
     pub shadow_orientation: Quat,
 }
 
@@ -37,10 +37,10 @@ impl GpuLight {
     /// The [`GpuLight::shadow_layer`] of a light without a shadow map.
     pub const NO_SHADOW_MAP: u32 = u32::MAX;
 
-    /// The record of `light` for a camera at `origin`, with the view that draws its shadow map if there is one.
+    /// The layout of `light` for a camera at `origin`. `shadow_map` is the view that draws its shadow map, if any.
     pub fn new(light: &Light, origin: DVec3, shadow_map: Option<&RenderView>) -> Self {
         let relative = |position: DVec3| (position - origin).as_vec3();
-        let mut record = Self {
+        let mut gpu_light = Self {
             kind: light.kind() as u32,
             shadow_layer: Self::NO_SHADOW_MAP,
             shadow_orientation: Quat::IDENTITY,
@@ -48,30 +48,30 @@ impl GpuLight {
         };
         match *light {
             Light::Directional { direction, illuminance, .. } => {
-                (record.direction, record.intensity) = (direction.normalize(), illuminance);
+                (gpu_light.direction, gpu_light.intensity) = (direction.normalize(), illuminance);
             }
             Light::Point { position, intensity, range } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
+                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
             }
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
-                record.direction = direction.normalize();
-                (record.cone_begin, record.cone_end) = (inner_angle.cos(), outer_angle.cos());
+                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
+                gpu_light.direction = direction.normalize();
+                (gpu_light.cone_begin, gpu_light.cone_end) = (inner_angle.cos(), outer_angle.cos());
             }
             Light::Hemispherical { position, direction, intensity, range, .. } => {
-                (record.position, record.intensity, record.range) = (relative(position), intensity, range);
-                record.direction = direction.normalize();
+                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
+                gpu_light.direction = direction.normalize();
             }
         }
         if let Some(map) = shadow_map {
-            record.shadow_layer = map.layer;
-            record.shadow_near = map.camera.near;
-            record.shadow_orientation = map.camera.orientation;
-            record.shadow_half = map.picture_axes()[1].length();
+            gpu_light.shadow_layer = map.layer;
+            gpu_light.shadow_near = map.camera.near;
+            gpu_light.shadow_orientation = map.camera.orientation;
+            gpu_light.shadow_half = map.picture_axes()[1].length();
             if let Projection::Orthographic { .. } = map.camera.projection {
-                (record.position, record.range) = (relative(map.camera.position), map.camera.far);
+                (gpu_light.position, gpu_light.range) = (relative(map.camera.position), map.camera.far);
             }
         }
-        record
+        gpu_light
     }
 }

@@ -1,22 +1,22 @@
-//! An object as shaders read it.
+//! The GPU layout of an object.
 
-/// An object as shaders read it. Its position is in fixed point, so that it can be taken relative to any view's camera
-/// exactly: one table serves all views, wherever they are.
+/// The GPU layout of an object: `Object` in `drawloom.wgsl`. The position is in fixed point, so its difference from any view's
+/// camera is exact, and one table serves all views.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuObject {
-    /// The lower halves of the position's three coordinates.
+    /// The lower halves of the position's coordinates.
     pub position_low: [u32; 3],
-    /// Its material's slot.
+    /// The material's slot.
     pub material: u32,
-    /// The upper halves of the position's three coordinates.
+    /// The upper halves of the position's coordinates.
     pub position_high: [i32; 3],
-    /// Keeps what follows at a multiple of 16 bytes, as WGSL wants it.
+    /// Aligns the next field to 16 bytes, as WGSL requires.
     pub padding: u32,
-    /// From object space to the world's axes: x, y, z, w.
+    /// The quaternion from object to world axes: x, y, z, w.
     pub orientation: [f32; 4],
-    /// Along the object's own axes.
+    /// The scale along the object's axes.
     pub scale: [f32; 3],
-    /// Its index.
+    /// The object's index in the scene.
     pub object: u32,
 }

@@ -1,41 +1,41 @@
-//! The lights that reach a view, as shaders read them.
+//! The lights that reach a view, in GPU layout.
 
 use std::ops::Range;
 
 use super::{GpuLight, RenderView};
 use crate::scene::{Light, LightKind, ViewKind};
 
-/// The lights that reach one view, those of one class beside each other: so that all of a class are one instanced draw.
+/// The lights that reach one view, grouped by class: each class is one instanced draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTable {
-    records: Vec<GpuLight>,
-    /// The class and the index of each light that reaches the view, on the way to its record.
+    gpu_lights: Vec<GpuLight>,
+    /// The class and the index among the frame's valid lights of each light that reaches the view.
     reaching: Vec<(usize, usize)>,
-    /// For each light, its shadow map's view.
-    maps: Vec<Option<usize>>,
+    /// For each valid light, the index of its shadow map's view.
+    shadow_views: Vec<Option<usize>>,
     /// By [`LightClass::index`].
     ranges: [Range<u32>; LightClass::COUNT],
 }
 
-/// What lights are drawn together.
+/// The lights that one instanced draw covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LightClass {
-    /// What kind they are.
+    /// Their kind.
     pub kind: LightKind,
-    /// Whether objects keep them from what is behind.
+    /// Whether they have shadow maps.
     pub shadowed: bool,
 }
 
 impl LightClass {
-    /// How many classes there can be: every [`LightClass::index`] is below it.
+    /// The number of classes: every [`LightClass::index`] is below it.
     pub const COUNT: usize = 2 * LightKind::ALL.len();
 
-    /// The class of a light. Without `shadows`, lights that cast some are as those that do not.
+    /// The class of a light. Without `shadows`, no light is shadowed.
     pub fn of(light: &Light, shadows: bool) -> Self {
         Self { kind: light.kind(), shadowed: shadows && light.casts_shadow() }
     }
 
-    /// All of them.
+    /// All classes.
     pub fn all() -> impl Iterator<Item = Self> {
         LightKind::ALL.into_iter().flat_map(|kind| [false, true].map(|shadowed| Self { kind, shadowed }))
     }
@@ -47,21 +47,21 @@ impl LightClass {
 }
 
 impl LightTable {
-    /// Fills in the lights that `view` may see the light of, in the order of the scene within each class. With `shadows`,
-    /// those that cast some are classes of their own, and have their map if one of `views` is it. A shadow map itself is lit
-    /// by nothing.
+    /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a class, lights
+    /// keep the order of the scene. With `shadows`, lights that cast shadows have classes of their own, and a shadow map if one of
+    /// `views` draws it. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
-        self.records.clear();
+        self.gpu_lights.clear();
         self.reaching.clear();
         self.ranges = Default::default();
         if view.kind() == ViewKind::Shadow {
             return;
         }
-        self.maps.clear();
-        self.maps.resize(if shadows { lights.len() } else { 0 }, None);
+        self.shadow_views.clear();
+        self.shadow_views.resize(if shadows { lights.len() } else { 0 }, None);
         for (index, map) in views.iter().enumerate() {
-            if let Some(place) = map.valid_light.and_then(|light| self.maps.get_mut(light)) {
-                *place = Some(index);
+            if let Some(shadow_view) = map.valid_light.and_then(|light| self.shadow_views.get_mut(light)) {
+                *shadow_view = Some(index);
             }
         }
         let mut counts = [0; LightClass::COUNT];
@@ -73,32 +73,33 @@ impl LightTable {
             }
         }
         let origin = view.camera.position;
-        // Scenes have lights of few classes, and the others are not worth a look at every light.
+        // Most classes are empty: iterate over all lights only for the others.
         for (class, _) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
-            let start = self.records.len() as u32;
+            let start = self.gpu_lights.len() as u32;
             let of_class = self.reaching.iter().filter(|(other, _)| *other == class);
-            let record = |&(_, light): &(usize, usize)| {
-                let map = self.maps.get(light).copied().flatten();
+            let gpu_light = |&(_, light): &(usize, usize)| {
+                let map = self.shadow_views.get(light).copied().flatten();
                 GpuLight::new(&lights[light], origin, map.map(|index| &views[index]))
             };
-            self.records.extend(of_class.map(record));
-            self.ranges[class] = start..self.records.len() as u32;
+            self.gpu_lights.extend(of_class.map(gpu_light));
+            self.ranges[class] = start..self.gpu_lights.len() as u32;
         }
     }
 
-    /// All of them.
-    pub fn records(&self) -> &[GpuLight] {
-        &self.records
+    /// All lights, ordered by class.
+    pub fn gpu_lights(&self) -> &[GpuLight] {
+        &self.gpu_lights
     }
 
-    /// Of each record in order: the light's index in the scene, and that of the view that draws its shadow map, if one does.
+    /// For each of [`LightTable::gpu_lights`]: its index among the frame's valid lights, and the index of the view that draws its
+    /// shadow map, if any.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         let of_class = |class: usize| self.reaching.iter().filter(move |(other, _)| *other == class);
         let lights = (0..LightClass::COUNT).flat_map(of_class);
-        lights.map(|&(_, light)| (light, self.maps.get(light).copied().flatten()))
+        lights.map(|&(_, light)| (light, self.shadow_views.get(light).copied().flatten()))
     }
 
-    /// Where those of a class are among them.
+    /// The range of a class within [`LightTable::gpu_lights`].
     pub fn range(&self, class: LightClass) -> Range<u32> {
         self.ranges[class.index()].clone()
     }
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_are_grouped_by_class_and_those_out_of_sight_left_out() {
+    fn lights_are_grouped_by_class_and_culled() {
         let view = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
         let lights = [spot(-3.0, true), point(-4.0), point(9.0), spot(-5.0, false), point(-6.0)];
         let map = RenderView {
@@ -143,13 +144,13 @@ mod tests {
         assert_eq!(class(LightKind::Spot, false), 2..3);
         assert_eq!(class(LightKind::Spot, true), 3..4);
         assert!(class(LightKind::Directional, false).is_empty() && class(LightKind::Hemispherical, true).is_empty());
-        let depths: Vec<_> = table.records().iter().map(|record| record.position.z).collect();
+        let depths: Vec<_> = table.gpu_lights().iter().map(|light| light.position.z).collect();
         assert_eq!(depths, [-4.0, -6.0, -5.0, -3.0]);
-        assert_eq!(table.records()[3].shadow_layer, 7);
+        assert_eq!(table.gpu_lights()[3].shadow_layer, 7);
     }
 
     #[test]
-    fn every_class_has_an_index_of_its_own() {
+    fn every_class_has_its_own_index() {
         let indices: Vec<_> = LightClass::all().map(LightClass::index).collect();
         assert_eq!(indices, (0..LightClass::COUNT).collect::<Vec<_>>());
     }

@@ -1,4 +1,7 @@
-//! Views: "everything is a camera" (M 10.4). What there is, worked out once a frame, and what of it each view sees.
+//! Views: "everything is a camera" (M 10.4). Tables that all views of a frame share, and culling for each view.
+//!
+//! An embedder uses [`ShadowMaps`], [`RenderView`] and [`RejectionReason`]; everything else is public for this repository's
+//! tests and benchmarks.
 
 mod bounding_boxes;
 mod bounding_spheres;

@@ -1,11 +1,11 @@
-//! What every view needs to know of every object, worked out once a frame.
+//! The table of a frame's objects, which all views share.
 
 use std::ops::Range;
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::frustum::Judged;
+use super::frustum::Classified;
 use super::{
     BoundingBoxes, BoundingSphere, BoundingSpheres, FixedPosition, Frustum, GpuObject, OrientedBox, RejectionReason,
     Rejections,
@@ -15,77 +15,79 @@ use crate::command::{Cull, DrawState};
 use crate::quality::CullingVolume;
 use crate::scene::{Material, Mesh, SceneRef, is_unit};
 
-/// The frame's objects: what is uploaded, where each is, and how each is drawn. Objects that cannot be drawn are counted
-/// and left out.
+/// The frame's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are rejected.
 ///
-/// They lie in blocks, each behind a lock of its own: jobs that fill different blocks never wait for each other, and one
-/// uncontended lock a block is a fraction of a nanosecond an object.
+/// Objects are in blocks, each with its own lock: jobs that fill different blocks never wait for each other, and one uncontended
+/// lock per block costs a fraction of a nanosecond per object.
 #[derive(Debug, Default)]
 pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
     rejections: Rejections,
     length: usize,
+    /// The culling volume from the next [`ObjectTable::reset`] on.
     culling: CullingVolume,
-    /// The volume that blocks have boxes for.
-    held: CullingVolume,
+    /// The culling volume that the blocks' boxes are for.
+    boxes_for: CullingVolume,
 }
 
-/// What the table holds of [`ObjectTable::BLOCK_SIZE`] objects; object `index` is at `index % BLOCK`.
+/// [`ObjectTable::BLOCK_SIZE`] objects of the table; object `index` is at `index % BLOCK_SIZE`.
 #[derive(Clone, Debug)]
 pub struct ObjectBlock {
-    /// What is uploaded.
+    /// The GPU layouts to upload.
     pub gpu_objects: [GpuObject; ObjectTable::BLOCK_SIZE],
-    /// Where they are.
+    /// The bounding spheres.
     pub spheres: BoundingSpheres,
-    /// The boxes around them, where the table is told to hold some.
+    /// The bounding boxes, if the culling volume is a box.
     pub boxes: Option<BoundingBoxes>,
-    /// How they are drawn.
+    /// The meshes, materials and states.
     pub draws: [ObjectDraw; ObjectTable::BLOCK_SIZE],
 }
 
 impl ObjectBlock {
-    /// Which of the objects `entries`, of one word of [`Frustum::WORD`], a view may see: a bit each, from the lowest. Never
-    /// left out is one that it does see; those that cannot be drawn are.
+    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of the objects that
+    /// a view may see; bit 0 is `entries.start`. The test is conservative: a visible object is never missing. Rejected objects
+    /// always are.
     ///
-    /// The sphere is asked for first, whatever volume it is: it tells of most objects whether they are outside or inside as a
-    /// whole, and only of the others the box is asked for.
+    /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only the others'
+    /// boxes are tested.
     ///
     /// # Panics
-    /// If there are no such objects, or none.
+    /// If `entries` is empty or not within the block.
     pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
-        let place = entries.start % Frustum::WORD;
-        let first = entries.start - place;
+        let offset = entries.start % Frustum::WORD;
+        let first = entries.start - offset;
         if volume == CullingVolume::None {
-            let drawn = |bits, (offset, &radius): (usize, &f32)| bits | u64::from(radius >= 0.0) << offset;
-            return self.spheres.radii()[entries].iter().enumerate().fold(0, drawn);
+            let is_valid = |mask, (bit, &radius): (usize, &f32)| mask | u64::from(radius >= 0.0) << bit;
+            return self.spheres.radii()[entries].iter().enumerate().fold(0, is_valid);
         }
-        if entries.len() < FEW {
-            let intersects_sphere = |entry: usize| {
+        if entries.len() < WORD_TEST_THRESHOLD {
+            let intersects = |entry: usize| {
                 let BoundingSphere { center, radius } = self.spheres.get(entry);
                 frustum.intersects_sphere(center, radius)
             };
-            let one = |bits, entry: usize| bits | u64::from(intersects_sphere(entry)) << (entry - entries.start);
-            return self.kept(frustum, first, entries.clone().fold(0, one) << place) >> place;
+            let test = |mask, entry: usize| mask | u64::from(intersects(entry)) << (entry - entries.start);
+            return self.test_boxes(frustum, first, entries.clone().fold(0, test) << offset) >> offset;
         }
         match &self.boxes {
-            None => frustum.intersects_spheres(&self.spheres, first) >> place,
+            None => frustum.intersects_spheres(&self.spheres, first) >> offset,
             Some(_) => {
-                let Judged { seen, whole } = frustum.judge_each(&self.spheres, first);
-                let asked = (u64::MAX >> (Frustum::WORD - entries.len())) << place;
-                (seen & whole | self.kept(frustum, first, seen & !whole & asked)) >> place
+                let Classified { intersecting, inside } = frustum.classify_spheres(&self.spheres, first);
+                let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
+                (intersecting & inside | self.test_boxes(frustum, first, intersecting & !inside & tested)) >> offset
             }
         }
     }
 
-    /// Those of the objects `asked` for, of the word from `first` on, of whose boxes any may be seen; all of them where there are
-    /// no boxes.
-    fn kept(&self, frustum: &Frustum, first: usize, asked: u64) -> u64 {
-        self.boxes.as_ref().map_or(asked, |boxes| frustum.intersects_boxes(&self.spheres, boxes, first, asked))
+    /// The `candidates`, in the word from `first` on, whose boxes intersect the frustum; all of them if there are no boxes.
+    fn test_boxes(&self, frustum: &Frustum, first: usize, candidates: u64) -> u64 {
+        self.boxes
+            .as_ref()
+            .map_or(candidates, |boxes| frustum.intersects_boxes(&self.spheres, boxes, first, candidates))
     }
 }
 
-/// Fewer objects than these are tested one by one: it takes less time than to test a whole word of them.
-const FEW: usize = 12;
+/// Fewer objects than this are tested one by one, which takes less time than testing a whole word.
+const WORD_TEST_THRESHOLD: usize = 12;
 
 impl Default for ObjectBlock {
     fn default() -> Self {
@@ -102,51 +104,49 @@ impl ObjectTable {
     /// Objects in a block.
     pub const BLOCK_SIZE: usize = BoundingSpheres::COUNT;
 
-    /// Says what stands for objects when views are asked for them, from the next [`ObjectTable::reset`] on; spheres unless it is
-    /// said otherwise.
+    /// Sets the bounding volume that culling tests, from the next [`ObjectTable::reset`] on. The default is spheres.
     pub fn configure(&mut self, volume: CullingVolume) {
         self.culling = volume;
     }
 
-    /// Makes room for `objects` objects.
+    /// Resizes the table for `objects` objects, and clears its rejections.
     pub fn reset(&mut self, objects: usize) {
         self.length = objects;
-        let before = self.blocks.len();
-        let blocks = self.block_count().max(before);
+        let old_count = self.blocks.len();
+        let blocks = self.block_count().max(old_count);
         self.blocks.resize_with(blocks, RwLock::default);
-        // Blocks are only touched where something is to change.
-        let right = if self.held == self.culling { before } else { 0 };
-        for block in &mut self.blocks[right..] {
+        // Blocks whose boxes are already right stay untouched.
+        let up_to_date = if self.boxes_for == self.culling { old_count } else { 0 };
+        for block in &mut self.blocks[up_to_date..] {
             block.get_mut().boxes = BoundingBoxes::new(self.culling);
         }
-        self.held = self.culling;
-        // What lies behind the last object is tested with it, and is not to be seen.
+        self.boxes_for = self.culling;
+        // Entries after the last object are tested with it, and must not be visible.
         if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK_SIZE) {
             let spheres = &mut last.get_mut().spheres;
-            (objects % Self::BLOCK_SIZE..Self::BLOCK_SIZE)
-                .for_each(|entry| spheres.set(entry, BoundingSphere::NOTHING));
+            (objects % Self::BLOCK_SIZE..Self::BLOCK_SIZE).for_each(|entry| spheres.set(entry, BoundingSphere::EMPTY));
         }
         self.rejections = Rejections::default();
     }
 
-    /// Fills in the objects of `range`.
+    /// Fills in the objects in `range`.
     pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
         for (index, part) in block_ranges(range, Self::BLOCK_SIZE) {
             let mut block = self.blocks[index].write();
             let ObjectBlock { gpu_objects, spheres, boxes, draws } = &mut **block;
             for object in part {
                 let entry = object % Self::BLOCK_SIZE;
-                match describe(scene, object) {
-                    Ok((record, bounds, draw)) => {
-                        gpu_objects[entry] = record;
+                match entry_of(scene, object) {
+                    Ok((gpu_object, bounds, draw)) => {
+                        gpu_objects[entry] = gpu_object;
                         spheres.set(entry, bounds);
                         if let Some(boxes) = boxes {
-                            boxes.set(entry, &box_of(scene, object, bounds));
+                            boxes.set(entry, &bounding_box(scene, object, bounds));
                         }
                         draws[entry] = draw;
                     }
                     Err(reason) => {
-                        spheres.set(entry, BoundingSphere::NOTHING);
+                        spheres.set(entry, BoundingSphere::EMPTY);
                         self.rejections.count(reason, object);
                     }
                 }
@@ -159,7 +159,7 @@ impl ObjectTable {
         self.length
     }
 
-    /// Whether there is none.
+    /// Whether there are no objects.
     pub fn is_empty(&self) -> bool {
         self.length == 0
     }
@@ -169,38 +169,38 @@ impl ObjectTable {
         self.length.div_ceil(Self::BLOCK_SIZE)
     }
 
-    /// What is uploaded, 64 bytes an object: the first object of a block, and the gpu_objects of all of them.
+    /// The first object of a block, and the GPU layouts of all its objects, 64 bytes each.
     ///
     /// # Panics
-    /// If there is no such block.
+    /// If `block` is not below [`ObjectTable::block_count`].
     pub fn gpu_objects(&self, block: usize) -> (usize, MappedRwLockReadGuard<'_, [GpuObject]>) {
         let first = block * Self::BLOCK_SIZE;
         let count = (self.length - first).min(Self::BLOCK_SIZE);
         (first, RwLockReadGuard::map(self.block(block), |block| &block.gpu_objects[..count]))
     }
 
-    /// All there is of a block of objects.
+    /// A block of objects.
     ///
     /// # Panics
-    /// If there is no such block.
+    /// If `index` is not below [`ObjectTable::block_count`].
     pub fn block(&self, index: usize) -> RwLockReadGuard<'_, Box<ObjectBlock>> {
         self.blocks[index].read()
     }
 
-    /// What was left out, and why.
+    /// The objects that were rejected.
     pub fn rejections(&self) -> &Rejections {
         &self.rejections
     }
 }
 
-/// How an object is drawn, as slots and state.
+/// How an object is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectDraw {
-    /// Its mesh's slot.
+    /// The mesh's slot.
     pub mesh: u32,
-    /// Its material's slot.
+    /// The material's slot.
     pub material: u32,
-    /// Its fixed-function state.
+    /// The fixed-function state.
     pub state: DrawState,
 }
 
@@ -210,59 +210,59 @@ impl Default for ObjectDraw {
     }
 }
 
-fn describe(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, BoundingSphere, ObjectDraw), RejectionReason> {
-    let (position, scale, turn) = (scene.positions[object], scene.scales[object], scene.orientations[object]);
+fn entry_of(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, BoundingSphere, ObjectDraw), RejectionReason> {
+    let (position, scale, orientation) = (scene.positions[object], scene.scales[object], scene.orientations[object]);
     let Some(fixed) = FixedPosition::new(position) else {
         let is_valid = scene.transform_is_valid(object);
         return Err(if is_valid { RejectionReason::OutOfReach } else { RejectionReason::InvalidTransform });
     };
-    if !(scale.is_finite() && is_unit(turn.length_squared())) {
+    if !(scale.is_finite() && is_unit(orientation.length_squared())) {
         return Err(RejectionReason::InvalidTransform);
     }
-    let orientation = normalized(turn);
+    let orientation = normalized(orientation);
     let mesh = scene.assets.get(scene.meshes[object]).map_err(|_| RejectionReason::StaleMesh)?;
     let material = scene.assets.get(scene.materials[object]).map_err(|_| RejectionReason::StaleMaterial)?;
 
     let bounds = scene.bounds[object];
     let offset = orientation * (scale * bounds.center);
     let center = position + offset.as_dvec3();
-    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + misplaced(center, offset) as f32;
-    // An offset that is not finite makes a radius that is none either.
-    if !(bounds.radius >= 0.0 && radius <= LARGEST) {
+    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + position_error(center, offset) as f32;
+    // An offset that is not finite makes the radius NaN or infinite.
+    if !(bounds.radius >= 0.0 && radius <= MAX_RADIUS) {
         return Err(RejectionReason::InvalidBounds);
     }
 
-    let slots = (scene.meshes[object].index(), scene.materials[object].index());
+    let (mesh_slot, material_slot) = (scene.meshes[object].index(), scene.materials[object].index());
     let (position_low, position_high) = fixed.halves();
-    let record = GpuObject {
+    let gpu_object = GpuObject {
         position_low,
-        material: slots.1,
+        material: material_slot,
         position_high,
         padding: 0,
         orientation: orientation.to_array(),
         scale: scale.to_array(),
         object: object as u32,
     };
-    let draw = ObjectDraw { mesh: slots.0, material: slots.1, state: state_of(mesh, material, scale) };
-    Ok((record, BoundingSphere { center, radius }, draw))
+    let draw = ObjectDraw { mesh: mesh_slot, material: material_slot, state: draw_state(mesh, material, scale) };
+    Ok((gpu_object, BoundingSphere { center, radius }, draw))
 }
 
-/// How far an object's centre may be from where it is drawn, in metres.
+/// An upper bound of the distance in metres between an object's computed centre and where devices draw it.
 ///
-/// The offset is turned in f32: some 40 roundings of 2⁻²⁴ at most (thirteen of the orientation's length and direction and of the
+/// The offset is rotated in f32: at most some 40 roundings of 2⁻²⁴ (thirteen of the orientation's length and direction and of the
 /// scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length; 2⁻¹⁸ is 64 of them.
-/// Each coordinate of the centre, in f64, is off by half a step, 2⁻⁵³ of it. And where the object is drawn relative to a camera is
-/// off by half a step of fixed point for each of the two, 2⁻³⁰ m a coordinate. √3 times as much in space is less than twice.
+/// The error of each coordinate of the centre, in f64, is half a step, 2⁻⁵³ of it. The error of the drawn position relative to a
+/// camera is half a fixed-point step for each of the two, 2⁻³⁰ m per coordinate. √3 times as much in space is less than twice.
 #[inline]
-fn misplaced(center: DVec3, offset: Vec3) -> f64 {
+fn position_error(center: DVec3, offset: Vec3) -> f64 {
     let turned = f64::from(offset.abs().element_sum()) * 2_f64.powi(-18);
     turned + center.abs().max_element() * 2_f64.powi(-52) + 2_f64.powi(-29)
 }
 
-/// The box around an object's mesh, or around its sphere where the engine gave it other bounds than its mesh has.
+/// The box around an object's mesh, or around its bounding sphere if the engine's bounds differ from the mesh's.
 ///
-/// What is rounded in f64 is far below what [`misplaced`] and [`Frustum::intersects_boxes`] allow.
-fn box_of(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> OrientedBox {
+/// Rounding in f64 is far below the tolerances of [`position_error`] and [`Frustum::intersects_boxes`].
+fn bounding_box(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> OrientedBox {
     let bounds = scene.bounds[object];
     let mesh = scene.assets.get(scene.meshes[object]).ok().filter(|mesh| mesh.bounds() == bounds);
     let Some(mesh) = mesh else {
@@ -273,32 +273,31 @@ fn box_of(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> Orient
     let center = bounds.center.as_dvec3();
     let scale = scene.scales[object];
     let half = (high - center).max(center - low) * scale.abs().as_dvec3();
-    let turn = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
+    let rotation = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
     let offset = scale * bounds.center;
     OrientedBox {
-        half_axes: [turn.x_axis * half.x, turn.y_axis * half.y, turn.z_axis * half.z],
-        // Turning it changes no coordinate by more than its length.
-        margin: misplaced(sphere.center, offset),
+        half_axes: [rotation.x_axis * half.x, rotation.y_axis * half.y, rotation.z_axis * half.z],
+        // A rotation changes no coordinate by more than the vector's length.
+        margin: position_error(sphere.center, offset),
     }
 }
 
-/// The largest radius in metres of an object in the world. What is larger leaves the range of f32 on its way to clip space: where
-/// the field of view is the narrowest there is, a place is multiplied by some 1e6, and by a hundred more where a picture is that
-/// much higher than wide.
-const LARGEST: f32 = 1e30;
+/// The largest radius in metres of an object in the world. Larger ones exceed the range of f32 on the way to clip space: the
+/// narrowest field of view multiplies positions by some 1e6, and a tall picture by a hundred more.
+const MAX_RADIUS: f32 = 1e30;
 
-/// The same rotation at unit length, of one that has drifted from it as little as [`is_unit`] allows.
+/// Normalizes a quaternion whose length differs from 1 by no more than [`is_unit`] allows.
 ///
-/// Two steps of Newton's method for 1/√x from 1: of an error e in the square of the length they leave less than e⁴, which is
-/// below what an f32 can say, and they take a fraction of the time of a root and a division. In f64, since a length that is off by
-/// one rounding moves what is turned by four.
+/// Two steps of Newton's method for 1/√x, starting at 1, reduce an error e of the squared length to less than e⁴, which is below
+/// f32's precision, and take a fraction of the time of a square root and a division. They run in f64, because an error of one
+/// rounding in the length moves rotated vectors by four.
 #[inline]
-fn normalized(turn: Quat) -> Quat {
-    let closer = |turn: DQuat| turn * (1.5 - 0.5 * turn.length_squared());
-    closer(closer(turn.as_dquat())).as_quat()
+fn normalized(orientation: Quat) -> Quat {
+    let newton_step = |q: DQuat| q * (1.5 - 0.5 * q.length_squared());
+    newton_step(newton_step(orientation.as_dquat())).as_quat()
 }
 
-fn state_of(mesh: &Mesh, material: &Material, scale: glam::Vec3) -> DrawState {
+fn draw_state(mesh: &Mesh, material: &Material, scale: Vec3) -> DrawState {
     let mirrored = scale.is_negative_bitmask().count_ones() % 2 == 1;
     let cull = match (material.double_sided, mirrored) {
         (true, _) => Cull::Nothing,

@@ -1,80 +1,80 @@
-//! What a frame left out or could not draw as asked, counted and told.
+//! Counts what a frame leaves out or does not draw as requested.
 
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use parking_lot::Mutex;
 
-/// Counts what a frame leaves out or cannot draw as asked. Any number of jobs may count at once.
+/// Counts what a frame leaves out or does not draw as requested. Any number of jobs may count at the same time.
 #[derive(Debug, Default)]
 pub struct Rejections {
-    by_reason: [Rejected; RejectionReason::ALL.len()],
-    /// What was counted by [`Rejections::count_once`].
-    counted: Mutex<HashSet<(RejectionReason, usize)>>,
+    by_reason: [RejectionCount; RejectionReason::ALL.len()],
+    /// What [`Rejections::count_once`] has counted.
+    counted_once: Mutex<HashSet<(RejectionReason, usize)>>,
 }
 
 impl Rejections {
-    /// Counts one object, light or material for a reason that may be found more than once in a frame.
+    /// Counts an object, light or material once, however often a frame rejects it for this reason.
     pub fn count_once(&self, reason: RejectionReason, index: usize) {
-        if self.counted.lock().insert((reason, index)) {
+        if self.counted_once.lock().insert((reason, index)) {
             self.count(reason, index);
         }
     }
 
-    /// Counts one object, light or material.
+    /// Counts an object, light or material.
     pub fn count(&self, reason: RejectionReason, index: usize) {
         self.by_reason[reason as usize].count(index);
     }
 
-    /// What was counted, one entry a reason.
+    /// The rejections, one for each reason that occurred.
     pub fn list(&self) -> Vec<Rejection> {
-        let counted = RejectionReason::ALL.into_iter().zip(&self.by_reason).map(|(reason, rejected)| Rejection {
+        let rejections = RejectionReason::ALL.into_iter().zip(&self.by_reason).map(|(reason, counts)| Rejection {
             reason,
-            count: rejected.count.load(Ordering::Relaxed) as usize,
-            first: rejected.first.load(Ordering::Relaxed) as usize,
+            count: counts.count.load(Ordering::Relaxed) as usize,
+            first: counts.first.load(Ordering::Relaxed) as usize,
         });
-        counted.filter(|rejection| rejection.count > 0).collect()
+        rejections.filter(|rejection| rejection.count > 0).collect()
     }
 }
 
-/// Objects or lights that a frame left out or could not draw as asked.
+/// Objects, lights or materials that a frame rejected for one reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejection {
-    /// Why.
+    /// The reason.
     pub reason: RejectionReason,
-    /// How many.
+    /// The number of them.
     pub count: usize,
-    /// The lowest index among them.
+    /// The lowest of their indices.
     pub first: usize,
 }
 
-/// Why something was left out of a frame, or is not drawn as asked.
+/// Why a frame leaves something out, or does not draw it as requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum RejectionReason {
-    /// An object's position, orientation or scale is not finite, or its orientation is no rotation.
+    /// An object's position, orientation or scale is not finite, or its orientation is not a unit quaternion.
     InvalidTransform,
     /// An object's bounds are not finite or negative, or too large once scaled.
     InvalidBounds,
-    /// An object is farther from the world's origin than [`FixedPosition::REACH`](super::FixedPosition::REACH).
+    /// An object is farther from the world's origin than [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     OutOfReach,
     /// An object's mesh was removed.
     StaleMesh,
     /// An object's material was removed.
     StaleMaterial,
     /// An object's edges are too long for the paraboloid shadow map that sees it: longer than
-    /// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge) allows, as often as they are halved. It is drawn all
-    /// the same.
+    /// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge) allows, even at the highest subdivision level. It is
+    /// drawn nevertheless.
     CoarseEdges,
-    /// A light gives no light: its intensity is 0.
+    /// A light's intensity is 0.
     DarkLight,
-    /// A light is farther from the world's origin than [`FixedPosition::REACH`](super::FixedPosition::REACH).
+    /// A light is farther from the world's origin than [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     LightOutOfReach,
-    /// A light has an intensity, a place, a direction, a range or angles that cannot be.
+    /// A light's intensity, position, direction, range or angles are invalid.
     InvalidLight,
-    /// A material's texture was removed; the plain colour stands in.
+    /// A material's texture was removed; the material's plain colour is used.
     StaleTexture,
-    /// The device has no room for a texture; the plain colour stands in.
+    /// A texture exceeds the device's limits; the material's plain colour is used.
     TextureLimit,
 }
 
@@ -93,7 +93,7 @@ impl RejectionReason {
         Self::TextureLimit,
     ];
 
-    /// As reports print it.
+    /// The description that reports print.
     pub fn name(self) -> &'static str {
         match self {
             Self::InvalidTransform => "object with an invalid transform",
@@ -111,22 +111,22 @@ impl RejectionReason {
     }
 }
 
-/// A count, and the lowest index counted: the same whichever worker came first.
+/// A count and the lowest index counted: independent of the order in which workers count.
 #[derive(Debug)]
-struct Rejected {
+struct RejectionCount {
     count: AtomicU32,
     first: AtomicU32,
 }
 
-impl Default for Rejected {
+impl Default for RejectionCount {
     fn default() -> Self {
         Self { count: AtomicU32::new(0), first: AtomicU32::new(u32::MAX) }
     }
 }
 
-impl Rejected {
+impl RejectionCount {
     fn count(&self, index: usize) {
-        // Read only when the frame's jobs have ended, which orders everything.
+        // Relaxed: the counts are read after the frame's jobs have ended.
         self.count.fetch_add(1, Ordering::Relaxed);
         self.first.fetch_min(u32::try_from(index).unwrap_or(u32::MAX), Ordering::Relaxed);
     }

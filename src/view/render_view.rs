@@ -1,24 +1,24 @@
-//! One camera's trip through the frame.
+//! A camera's view within a frame.
 
 use glam::{DMat4, DVec4, Mat4, Vec3};
 
 use super::Frustum;
 use crate::scene::{Camera, Projection, ViewKind};
 
-/// A camera, what it sees, and what kind of picture it makes (M listing 10.4). Its targets and its queue are kept by the
-/// backend under the view's index.
+/// A camera's rendering of the scene within a frame (M listing 10.4). The backend keeps its targets and its view queue under the
+/// view's index.
 #[derive(Clone, Debug)]
 pub struct RenderView {
     /// The camera.
     pub camera: Camera,
-    /// What it sees.
+    /// The camera's frustum.
     pub frustum: Frustum,
-    /// The light whose shadow map it draws, by its index in the scene.
+    /// The light whose shadow map the view draws: its index among the frame's valid lights.
     pub valid_light: Option<usize>,
-    /// Which layer it draws of the targets that all views of its kind share.
+    /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
-    /// Whether its targets keep what the frame before had in them. Then no process draws in it, and it is here for those that
-    /// read them: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
+    /// Whether its targets still hold an earlier frame's shadow map. Then no render process draws into it, but others read its
+    /// targets: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
     pub is_cached: bool,
 }
 
@@ -28,25 +28,25 @@ impl RenderView {
         Self { camera: camera.clone(), frustum: Frustum::new(camera), valid_light: None, layer: 0, is_cached: false }
     }
 
-    /// What it is called in reports: the camera's name.
+    /// The camera's name, which reports use.
     pub fn name(&self) -> &str {
         &self.camera.name
     }
 
-    /// What its picture is for.
+    /// The kind of picture that it draws.
     pub fn kind(&self) -> ViewKind {
         self.camera.kind
     }
 
-    /// From world axes relative to the camera to clip space: reversed depth, 1 at the near plane, and 0 at the far plane or, in
-    /// perspective, infinitely far away. For a paraboloid, which no matrix makes, to the camera's own axes.
+    /// From world axes relative to the camera to clip space. Depth is reversed: 1 at the near plane, and 0 at the far plane or, in
+    /// perspective, at infinity. No matrix projects onto a paraboloid; there the matrix leads to camera axes.
     ///
-    /// It is worked out in f64 and rounded once: each of its numbers is off by half a unit in its last place.
+    /// It is computed in f64 and rounded once: the error of each element is at most half a unit in the last place.
     pub fn clip_from_relative(&self) -> Mat4 {
         self.precise_clip_from_relative().as_mat4()
     }
 
-    /// The same before it is rounded.
+    /// [`RenderView::clip_from_relative`] before rounding.
     pub(crate) fn precise_clip_from_relative(&self) -> DMat4 {
         let camera = &self.camera;
         let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
@@ -68,9 +68,9 @@ impl RenderView {
         projection * DMat4::from_quat(camera.orientation.as_dquat().normalize().inverse())
     }
 
-    /// The axes of the picture in the world: right and up, each as long as half the picture (in perspective, at a distance of
-    /// 1), and forward. A pixel at (x, y) in clip space sees along x·right + y·up + forward in perspective, and along forward
-    /// from x·right + y·up without.
+    /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance of 1), and
+    /// forward. The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in perspective; otherwise it
+    /// starts at x·right + y·up and has the direction forward.
     pub fn picture_axes(&self) -> [Vec3; 3] {
         let half = match self.camera.projection {
             Projection::Perspective { field_of_view } => (field_of_view * 0.5).tan(),
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn orthographic_depth_is_even_from_one_to_nothing() {
+    fn orthographic_depth_falls_linearly_from_one_to_zero() {
         let camera = Camera {
             projection: Projection::Orthographic { height: 8.0 },
             near: 2.0,

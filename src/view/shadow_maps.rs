@@ -1,33 +1,33 @@
-//! Shadow maps: what a light sees is a view like any other (M 10.4, L 4.2.2).
+//! Shadow maps: a light's view is a view like any other (M 10.4, L 4.2.2).
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
 use super::FixedPosition;
 use crate::scene::{Camera, Light, Projection, ViewKind};
 
-/// How shadow maps are drawn and read. The maps of all lights are as large, and are the layers of one texture.
+/// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
-    /// Width and height of a map in pixels. At a distance of d metres a pixel is about 4·d/side metres wide for a hemispherical
-    /// light, 2·d·tan(angle)/side for a spot light, and as wide as the ball around what main cameras see is over `side` for a
-    /// directional one: at 60° and 16:9 some 2.3·`max_distance`/side.
+    /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a hemispherical
+    /// light, and 2·d·tan(angle)/side for a spot light. For a directional light it is as wide as the diameter of the sphere around
+    /// what main cameras see, divided by `side`: at 60° and 16:9 some 2.3·`max_distance`/side.
     pub side: u32,
-    /// How much of the main cameras' view a directional light's map covers, in metres from the camera, up to 1,000 km. Beyond
-    /// that, objects are lit. There is one map for all main cameras: the farther they are apart, the coarser it is.
+    /// The distance from the main cameras, in metres, up to which a directional light's map covers their views; at most 1,000 km.
+    /// Beyond it, nothing is in shadow. There is one map for all main cameras: the farther they are apart, the coarser it is.
     pub max_distance: f32,
-    /// How far a shadow is moved off the surface that casts it, as a multiple of what a pixel's width and the surface's slope
-    /// ask for. Less than 1 makes lit surfaces shadow themselves in stripes; more lets light through under objects.
+    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require. Below 1, lit surfaces shadow
+    /// themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
-    /// Shadows fade over 2·`filter` + 1 pixels of the map; 0 still blends each pixel with its neighbour. At most
+    /// The radius of percentage-closer filtering: shadows fade over 2·`filter` + 1 pixels of the map; 0 is bilinear filtering. At most
     /// [`ShadowMaps::MAX_FILTER`].
     pub filter: u32,
 }
 
 impl ShadowMaps {
-    /// The widest [`ShadowMaps::filter`]: 100 pixels of the map are read for one of the picture.
+    /// The largest [`ShadowMaps::filter`]: it reads 100 pixels of the map for each pixel of the picture.
     pub const MAX_FILTER: u32 = 4;
 
-    /// Says what is wrong with them, if anything.
+    /// Describes the first invalid setting, if any.
     pub(crate) fn problem(&self) -> Option<&'static str> {
         if self.side == 0 {
             Some("a side of 0 pixels")
@@ -36,35 +36,36 @@ impl ShadowMaps {
         } else if !(self.bias >= 0.0 && self.bias.is_finite()) {
             Some("a bias that is negative or not finite")
         } else if self.filter > Self::MAX_FILTER {
-            Some("a filter wider than there is")
+            Some("a filter above ShadowMaps::MAX_FILTER")
         } else {
             None
         }
     }
 
-    /// The camera that sees what `light` lights: a perspective one for a spot light, an orthographic one around what the main
-    /// cameras among `cameras` see for a directional light, a paraboloid for a hemispherical one. `None` for a light that
-    /// casts no shadow, and for a directional one where no main camera looks, or whose map would be out of reach.
+    /// The camera of a light's shadow map: a perspective camera for a spot light, a paraboloid for a hemispherical light, and for a
+    /// directional light an orthographic camera around what the main cameras among `cameras` see. `None` for a light that casts no
+    /// shadow, and for a directional light if there is no main camera or if the map's camera would be beyond
+    /// [`FixedPosition::MAX_COORDINATE`].
     pub fn camera(&self, name: String, light: &Light, cameras: &[Camera]) -> Option<Camera> {
         if !light.casts_shadow() {
             return None;
         }
-        let (position, direction, projection, reach) = match *light {
+        let (position, direction, projection, [near, far]) = match *light {
             Light::Point { .. } => return None,
             Light::Spot { position, direction, range, outer_angle, .. } => {
-                let field_of_view = (2.0 * outer_angle).min(WIDEST_SPOT);
-                (position, direction, Projection::Perspective { field_of_view }, [range * NEAREST, range])
+                let field_of_view = (2.0 * outer_angle).min(MAX_SPOT_FIELD_OF_VIEW);
+                (position, direction, Projection::Perspective { field_of_view }, [range * NEAR_PLANE_SHARE, range])
             }
             Light::Hemispherical { position, direction, range, .. } => {
-                (position, direction, Projection::Paraboloid, [range * NEAREST, range])
+                (position, direction, Projection::Paraboloid, [range * NEAR_PLANE_SHARE, range])
             }
             Light::Directional { direction, .. } => {
-                let (center, radius) = self.seen_by(cameras)?;
-                // A pixel more on every side makes up for the snapping.
+                let (center, radius) = self.visible_sphere(cameras)?;
+                // Snapping moves the map by less than a pixel, so it is a pixel larger on every side.
                 let radius = radius * (1.0 + 4.0 / f64::from(self.side));
                 let orientation = looking_along(direction);
-                let center = self.snapped(center, radius, orientation.as_dquat().normalize());
-                let height = radius * (TOWARDS_THE_SUN + 2.0);
+                let center = self.snapped_to_texels(center, radius, orientation.as_dquat().normalize());
+                let height = radius * (CASTER_DISTANCE + 2.0);
                 let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * height;
                 FixedPosition::new(position)?;
                 let (radius, height) = (radius as f32, height as f32);
@@ -76,47 +77,47 @@ impl ShadowMaps {
             position,
             orientation: looking_along(direction),
             projection,
-            near: reach[0].max(f32::MIN_POSITIVE),
-            far: reach[1].max(f32::MIN_POSITIVE * 2.0),
+            near: near.max(f32::MIN_POSITIVE),
+            far: far.max(f32::MIN_POSITIVE * 2.0),
             size: [self.side; 2],
             kind: ViewKind::Shadow,
         })
     }
 
-    /// A ball around all that main cameras see within the reach: it stays as large when a camera turns.
-    fn seen_by(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
+    /// A sphere around all that main cameras see within the maximum distance. Its size does not change when a camera turns.
+    fn visible_sphere(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
         let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
         main.map(|camera| {
-            let reach = f64::from(self.max_distance.min(camera.far));
+            let far = f64::from(self.max_distance.min(camera.far));
             let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
             let aspect = f64::from(camera.aspect());
             match camera.projection {
                 Projection::Perspective { field_of_view } => {
                     let up = (f64::from(field_of_view) * 0.5).tan();
-                    // The ball through the camera and the far corners; where those are wider than that, around them.
+                    // The sphere through the camera and the far corners, or around the far corners if it is larger.
                     let spread = up * up * (1.0 + aspect * aspect);
-                    let along = if spread < 1.0 { reach * (1.0 + spread) * 0.5 } else { reach };
-                    let radius = if spread < 1.0 { along } else { reach * spread.sqrt() };
+                    let along = if spread < 1.0 { far * (1.0 + spread) * 0.5 } else { far };
+                    let radius = if spread < 1.0 { along } else { far * spread.sqrt() };
                     (camera.position + forward * along, radius)
                 }
                 Projection::Orthographic { height } => {
                     let half = f64::from(height) * 0.5;
-                    let radius = (half * half * (1.0 + aspect * aspect) + reach * reach * 0.25).sqrt();
-                    (camera.position + forward * (reach * 0.5), radius)
+                    let radius = (half * half * (1.0 + aspect * aspect) + far * far * 0.25).sqrt();
+                    (camera.position + forward * (far * 0.5), radius)
                 }
-                Projection::Paraboloid => (camera.position, reach),
+                Projection::Paraboloid => (camera.position, far),
             }
         })
-        .reduce(around_both)
+        .reduce(enclosing_sphere)
     }
 
-    /// Moved by less than a pixel, so that the map's pixels lie at the same places of the world from frame to frame, and
+    /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to frame and
     /// shadows do not crawl when the camera moves.
-    fn snapped(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
+    fn snapped_to_texels(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
         let pixel = 2.0 * radius / f64::from(self.side);
         let local = orientation.inverse() * center;
-        let whole = |value: f64| (value / pixel).floor() * pixel;
-        orientation * DVec3::new(whole(local.x), whole(local.y), local.z)
+        let snap = |value: f64| (value / pixel).floor() * pixel;
+        orientation * DVec3::new(snap(local.x), snap(local.y), local.z)
     }
 }
 
@@ -126,24 +127,24 @@ impl Default for ShadowMaps {
     }
 }
 
-/// Where a light's map begins, as a share of its range.
-const NEAREST: f32 = 1e-5;
+/// The near plane of a light's map, as a share of its range.
+const NEAR_PLANE_SHARE: f32 = 1e-5;
 
-/// How far before what is seen a directional light's map begins, in radii of that. A triangle with a corner even before it is
-/// drawn at a slope that it has not, since that corner is moved. The farther it is, the more f32 rounds: here to within a
-/// hundredth of a pixel of 1024.
-const TOWARDS_THE_SUN: f64 = 16.0;
+/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. A triangle that crosses
+/// the near plane is drawn with a wrong slope, since depth is clamped there. The larger the distance, the more f32 rounds: here to
+/// within a hundredth of a pixel of 1024.
+const CASTER_DISTANCE: f64 = 16.0;
 
-/// In radians. Towards 180° the middle of a perspective picture shrinks to nothing.
-const WIDEST_SPOT: f32 = 2.967;
+/// In radians. Towards 180°, the centre of a perspective picture shrinks to nothing.
+const MAX_SPOT_FIELD_OF_VIEW: f32 = 2.967;
 
-/// A camera's orientation that looks along `direction`.
+/// The orientation of a camera that looks along `direction`.
 fn looking_along(direction: Vec3) -> Quat {
     Camera::looking_at("", DVec3::ZERO, direction.as_dvec3()).orientation
 }
 
-/// The smallest ball around two.
-fn around_both((one, one_radius): (DVec3, f64), (other, other_radius): (DVec3, f64)) -> (DVec3, f64) {
+/// The smallest sphere around two spheres.
+fn enclosing_sphere((one, one_radius): (DVec3, f64), (other, other_radius): (DVec3, f64)) -> (DVec3, f64) {
     let distance = one.distance(other);
     if distance + other_radius <= one_radius {
         (one, one_radius)
@@ -169,27 +170,27 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a main camera sees within the reach lies in the sun's map, and before its far plane.
+        /// All that a main camera sees within the maximum distance is in the sun's map, and before its far plane.
         #[test]
         fn a_directional_map_covers_what_main_cameras_see(
-            places in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
+            placements in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
             pixel in prop::array::uniform2(-1.0..1.0_f32),
             share in 0.0..1.0_f32,
         ) {
             let maps = ShadowMaps::default();
-            let cameras: Vec<_> = places
+            let cameras: Vec<_> = placements
                 .into_iter()
-                .map(|(place, degrees)| Camera {
+                .map(|(position, degrees)| Camera {
                     projection: Projection::Perspective { field_of_view: degrees.to_radians() },
-                    ..Camera::looking_at("main", DVec3::from(place), DVec3::ZERO)
+                    ..Camera::looking_at("main", DVec3::from(position), DVec3::ZERO)
                 })
                 .collect();
             let map = RenderView::new(&maps.camera("sun".into(), &sun(), &cameras).unwrap());
             for camera in &cameras {
                 let [right, up, forward] = RenderView::new(camera).picture_axes();
                 let seen = (right * pixel[0] + up * pixel[1] + forward) * (share * maps.max_distance);
-                let place = camera.position + seen.as_dvec3() - map.camera.position;
-                let clip = map.clip_from_relative() * place.as_vec3().extend(1.0);
+                let point = camera.position + seen.as_dvec3() - map.camera.position;
+                let clip = map.clip_from_relative() * point.as_vec3().extend(1.0);
                 prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 + 1e-4, "{clip}");
                 prop_assert!((-1e-4..=1.0 + 1e-4).contains(&clip.z), "{clip}");
             }
@@ -213,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn who_casts_no_shadow_has_no_map() {
+    fn a_light_that_casts_no_shadow_has_no_map() {
         let maps = ShadowMaps::default();
         let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
         let map = |light: Light, cameras: &[Camera]| maps.camera("map".into(), &light, cameras);

@@ -1,4 +1,4 @@
-//! Which of an object's triangles a view can show.
+//! Culls an object's triangles for a view.
 
 use std::ops::Range;
 
@@ -9,18 +9,19 @@ use crate::raster::{CullVertex, CulledTriangles, Vector, Winding, cull_triangles
 use crate::scene::{Projection, SceneRef, Vertex, ViewKind};
 
 impl RenderView {
-    /// Looks at each triangle of an object, and appends the indices of those that a device could draw a pixel of to `remaining`: frames
-    /// do so for meshes that [ask for it](crate::scene::Mesh::with_triangles_culled). What is left out faces away, lies outside of the
-    /// picture, covers no pixel's middle or is no triangle, "up to 70%" of them (S 9.6). It pays where a device has more to do for a
-    /// vertex than the 20 to 40 ns that this takes a triangle. Nothing is left out where
-    /// [a matrix alone does not say](RenderView::can_cull_triangles) what is seen, nor because of corners of which f32 does not say to a 256th
-    /// of a pixel where they are, unless all of a triangle's lie beyond one side of the picture: of a mesh that is far larger than it is far
-    /// away, say. Places are those of camera-relative transforms.
+    /// Culls the triangles of an object, and appends the indices of those that may cover a pixel to `remaining`. Frames do so for
+    /// meshes that [request it](crate::scene::Mesh::with_triangles_culled). Triangles are culled if they are back-facing, outside the
+    /// picture, degenerate, or cover no pixel centre: "up to 70%" of them (S 9.6). It is worth its time if a device spends more on a
+    /// vertex than the 20 to 40 ns that this takes per triangle.
     ///
-    /// An object that cannot be drawn has no triangle.
+    /// Nothing is culled in views where [a matrix alone does not decide](RenderView::can_cull_triangles) what is visible. A triangle
+    /// with a corner whose position f32 does not determine to a 256th of a pixel, as of a mesh that is far larger than its distance, is
+    /// culled only if all its corners are beyond one side of the picture. Positions are those of camera-relative transforms.
+    ///
+    /// An object that cannot be drawn has no triangles.
     ///
     /// # Panics
-    /// If there is no such object.
+    /// If `object` is not in the scene.
     pub fn cull_triangles(&self, scene: &SceneRef<'_>, object: usize, remaining: &mut Vec<u32>) -> CulledTriangles {
         let mesh = scene.assets.get(scene.meshes[object]);
         mesh.map_or_else(
@@ -29,8 +30,8 @@ impl RenderView {
         )
     }
 
-    /// Whether what it sees of a triangle follows from a matrix: not so in a paraboloid's view, nor in a shadow's in which what is too near
-    /// is drawn.
+    /// Whether a matrix alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow map whose depth is
+    /// clamped at the near plane.
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
             Projection::Perspective { .. } => true,
@@ -39,10 +40,10 @@ impl RenderView {
         }
     }
 
-    /// The same of some of the mesh's triangles, by their number.
+    /// [`RenderView::cull_triangles`] for a range of the mesh's triangles.
     ///
     /// # Panics
-    /// If there is no such object, or there are not as many triangles.
+    /// If `object` is not in the scene, or the range exceeds the mesh's triangles.
     pub(crate) fn cull_triangle_range(
         &self,
         scene: &SceneRef<'_>,
@@ -66,11 +67,11 @@ impl RenderView {
         let clip_from_relative = self.precise_clip_from_relative();
         let (scale, orientation) = (scene.scales[object].as_dvec3(), scene.orientations[object].as_dquat().normalize());
         let origin = scene.positions[object] - self.camera.position;
-        let corner_of = |vertex: &Vertex| {
+        let transform = |vertex: &Vertex| {
             let local = Vec3::from(vertex.position).as_dvec3() * scale;
             let clip = clip_from_relative * (origin + orientation * local).extend(1.0);
-            let slack = origin.length() * OF_DISTANCE + local.length() * OF_SIZE + STEP;
-            corner_within(slack, clip, &clip_from_relative, self.camera.size)
+            let error = origin.length() * ERROR_PER_DISTANCE + local.length() * ERROR_PER_SIZE + FIXED_POINT_ERROR;
+            cull_vertex(error, clip, &clip_from_relative, self.camera.size)
         };
         let is_mirrored = scene.scales[object].is_negative_bitmask().count_ones() % 2 == 1;
         let culled = match (material.double_sided, is_mirrored) {
@@ -80,18 +81,18 @@ impl RenderView {
         };
         let size = self.camera.size.map(|side| side as usize);
         let start = remaining.len();
-        // Triangles that follow one another share most of their vertices, which then lie close together.
+        // Consecutive triangles usually share vertices that are close together: transform the range of vertices once.
         let first = corners().flatten().min().unwrap_or(0);
         let end = corners().flatten().max().map_or(0, |last| last + 1);
         if (end - first) as usize <= count * 3 {
-            let window: Vec<_> = mesh.vertices()[first as usize..end as usize].iter().map(corner_of).collect();
-            let moved = corners().map(|triangle| triangle.map(|corner| corner - first));
-            let counts = cull_triangles(&window, moved, size, culled, remaining);
+            let window: Vec<_> = mesh.vertices()[first as usize..end as usize].iter().map(transform).collect();
+            let rebased = corners().map(|triangle| triangle.map(|corner| corner - first));
+            let counts = cull_triangles(&window, rebased, size, culled, remaining);
             remaining[start..].iter_mut().for_each(|corner| *corner += first);
             counts
         } else {
             let all: Vec<_> = corners().flatten().collect();
-            let window: Vec<_> = all.iter().map(|&corner| corner_of(&mesh.vertices()[corner as usize])).collect();
+            let window: Vec<_> = all.iter().map(|&corner| transform(&mesh.vertices()[corner as usize])).collect();
             let numbered = (0..count as u32).map(|triangle| [0, 1, 2].map(|corner| triangle * 3 + corner));
             let counts = cull_triangles(&window, numbered, size, culled, remaining);
             remaining[start..].iter_mut().for_each(|corner| *corner = all[*corner as usize]);
@@ -100,36 +101,38 @@ impl RenderView {
     }
 }
 
-/// How far from its place a device may draw a vertex, as a share of its object's distance: 8 unit roundoffs of f32. The difference of the
-/// two places is rounded once, its sum with the vertex once, and the matrix takes five, its own entries' among them.
-const OF_DISTANCE: f64 = 1.0 / 2_097_152.0;
+/// A device's position error of a vertex, as a share of its object's distance: 8 unit roundoffs of f32. The difference of the two
+/// positions is rounded once, its sum with the vertex once, and the matrix takes five, including those of its own elements.
+const ERROR_PER_DISTANCE: f64 = 1.0 / 2_097_152.0;
 
-/// The same, as a share of its distance from its object's origin: 16 unit roundoffs, of which scaling and turning take 8.
-const OF_SIZE: f64 = 1.0 / 1_048_576.0;
+/// A device's position error of a vertex, as a share of its distance from its object's origin: 16 unit roundoffs, of which scaling
+/// and rotating take 8.
+const ERROR_PER_SIZE: f64 = 1.0 / 1_048_576.0;
 
 /// Twice a step of a [`FixedPosition`](super::FixedPosition), in metres.
-const STEP: f64 = 2.0 / 1_073_741_824.0;
+const FIXED_POINT_ERROR: f64 = 2.0 / 1_073_741_824.0;
 
-/// The share of |x| + |y| + |z| + |w| by which [`CullVertex::clip`] may be wrong.
-const OF_CLIP: f64 = 1.0 / 8192.0;
+/// The error that [`CullVertex::clip`] may have, as a share of |x| + |y| + |z| + |w|.
+const CLIP_TOLERANCE: f64 = 1.0 / 8192.0;
 
-/// A corner that a device may draw `slack` metres away. In the picture it moves by as much as its distance from the middle does in x and
-/// y, and by its w; the viewport's three roundings are as large as the picture is wide. What may be anywhere is no number, and keeps its
-/// triangles.
-fn corner_within(slack: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 2]) -> CullVertex {
+/// A vertex that a device may draw up to `error` metres away. In the picture it moves by the errors of x and y, and by that of w times
+/// its distance from the centre; the viewport's three roundings are proportional to the picture's size. A vertex whose error exceeds
+/// the tolerance becomes NaN, so that its triangles are kept.
+fn cull_vertex(error: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 2]) -> CullVertex {
     let rows = clip_from_relative.transpose();
-    let reach = |row: DVec4| row.truncate().length() * slack;
-    let [in_x, in_y, in_z, in_w] = [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis].map(reach);
-    let may_be_wrong = OF_CLIP * clip.abs().element_sum();
-    if [in_x, in_y, in_z, in_w].iter().any(|&reach| reach > may_be_wrong) {
+    let error_along = |row: DVec4| row.truncate().length() * error;
+    let [in_x, in_y, in_z, in_w] = [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis].map(error_along);
+    let tolerance = CLIP_TOLERANCE * clip.abs().element_sum();
+    if [in_x, in_y, in_z, in_w].iter().any(|&error| error > tolerance) {
         return CullVertex { clip: Vector([f64::NAN; 4]), is_accurate: false };
     }
-    let stays = |place: f64, reach: f64, side: u32| {
+    let moves_less_than_a_step = |coordinate: f64, error: f64, side: u32| {
         let steps = f64::from(side) * 256.0;
-        let moved = (reach + (place / clip.w).abs() * in_w) / (clip.w - in_w) * 0.5 * steps;
+        let moved = (error + (coordinate / clip.w).abs() * in_w) / (clip.w - in_w) * 0.5 * steps;
         moved + 3.0 * steps * f64::from(f32::EPSILON) * 0.5 < 1.0
     };
-    let is_accurate = clip.w > in_w && stays(clip.x, in_x, size[0]) && stays(clip.y, in_y, size[1]);
+    let is_accurate =
+        clip.w > in_w && moves_less_than_a_step(clip.x, in_x, size[0]) && moves_less_than_a_step(clip.y, in_y, size[1]);
     CullVertex { clip: Vector(clip.to_array()), is_accurate }
 }
 
@@ -143,9 +146,9 @@ mod tests {
     use crate::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology};
 
     proptest! {
-        /// As a device has it: everything in f32, from the difference of the places on.
+        /// Computed as on a device: all in f32, from the difference of the positions on.
         #[test]
-        fn a_device_is_where_it_is_said_to_be(
+        fn a_device_draws_within_the_error(
             origin in prop::array::uniform3(-1.0..1.0_f64), distance in -1.0..4.0_f64,
             local in prop::array::uniform3(-1.0..1.0_f64), size in -2.0..4.0_f64,
             degrees in 0.1..170.0_f32, turn in prop::array::uniform3(-3.0..3.0_f32),
@@ -160,24 +163,24 @@ mod tests {
             let local = (DVec3::from(local) * 10_f64.powf(size)).as_vec3();
             let spin = glam::Quat::from_rotation_y(turn[0]);
             let clip = exact_matrix * (origin + spin.as_dquat() * local.as_dvec3()).extend(1.0);
-            let slack = origin.length() * OF_DISTANCE + f64::from(local.length()) * OF_SIZE + STEP;
+            let error = origin.length() * ERROR_PER_DISTANCE + f64::from(local.length()) * ERROR_PER_SIZE + FIXED_POINT_ERROR;
             let by_device: Vec4 = matrix * (origin.as_vec3() + spin * local).extend(1.0);
             let by_device = by_device.as_dvec4();
-            let corner = corner_within(slack, clip, &exact_matrix, camera.size);
+            let corner = cull_vertex(error, clip, &exact_matrix, camera.size);
             if corner.clip[0].is_finite() {
-                let off = (by_device - clip).abs().max_element();
-                prop_assert!(off <= OF_CLIP * clip.abs().element_sum(), "{off}");
+                let difference = (by_device - clip).abs().max_element();
+                prop_assert!(difference <= CLIP_TOLERANCE * clip.abs().element_sum(), "{difference}");
             }
             for (axis, side) in [(0, 1920.0), (1, 1080.0)] {
-                let off = (by_device[axis] / by_device.w - clip[axis] / clip.w).abs() * side * 0.5 * 256.0;
+                let difference = (by_device[axis] / by_device.w - clip[axis] / clip.w).abs() * side * 0.5 * 256.0;
                 let viewport = 3.0 * side * 256.0 * f64::from(f32::EPSILON) * 0.5;
-                prop_assert!(!corner.is_accurate || off < 1.0 - viewport, "{off}");
+                prop_assert!(!corner.is_accurate || difference < 1.0 - viewport, "{difference}");
             }
         }
     }
 
     #[test]
-    fn most_triangles_of_a_scene_are_left_out_at_any_size_and_the_rest_kept() {
+    fn most_triangles_of_a_scene_are_culled_at_any_picture_size() {
         let scene = demo::colonnade().unwrap();
         for size in [[960, 540], [1920, 1080], [3840, 2160]] {
             let view = RenderView::new(&Camera { size, ..scene.cameras[0].clone() });
@@ -189,7 +192,7 @@ mod tests {
                 assert_eq!(remaining.len() / 3 + culled.culled(), culled.triangles);
                 total += culled;
             }
-            // The larger the picture, the fewer triangles lie between its pixels.
+            // The larger the picture, the fewer triangles cover no pixel centre.
             let visible = total.triangles - total.off_screen - total.zero_size;
             assert!(
                 total.back_facing * 5 > visible * 2 && total.off_screen > 0 && total.zero_size > 0,
@@ -200,12 +203,12 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_behind_the_camera_is_left_out() {
+    fn triangles_behind_the_camera_are_culled() {
         let mut scene = Scene::new();
         // A floor of 40 m around the camera, in squares of 1 m.
-        let place = |index: u32| [(index % 41) as f32 - 20.0, 0.0, (index / 41) as f32 - 20.0];
+        let position = |index: u32| [(index % 41) as f32 - 20.0, 0.0, (index / 41) as f32 - 20.0];
         let vertices =
-            (0..41 * 41).map(|index| Vertex { position: place(index), normal: [0.0, 1.0, 0.0], uv: [0.0; 2] });
+            (0..41 * 41).map(|index| Vertex { position: position(index), normal: [0.0, 1.0, 0.0], uv: [0.0; 2] });
         let squares = (0..40 * 40).map(|square| square / 40 * 41 + square % 40);
         let corners = squares.flat_map(|low| [low, low + 41, low + 1, low + 1, low + 41, low + 42]);
         let floor = Mesh::new("floor", Topology::TriangleList, vertices.collect(), corners.collect()).unwrap();
@@ -217,16 +220,16 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_the_whole_wherever_vertices_lie() {
+    fn culling_ranges_gives_the_same_result_as_culling_all() {
         let mut scene = demo::colonnade().unwrap();
         let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
         for scattered in [false, true] {
             for (handle, mesh) in &meshes {
-                // Half of its triangles have their corners at the far end of a large array.
+                // Half of the corners refer to the far end of a large vertex array.
                 let count = mesh.vertices().len() as u32;
                 let vertices = mesh.vertices().repeat(if scattered { 40 } else { 1 });
-                let far = |place: usize| if scattered && place % 2 == 1 { count * 39 } else { 0 };
-                let indices = mesh.triangles().flatten().enumerate().map(|(place, corner)| corner + far(place));
+                let offset = |index: usize| if scattered && index % 2 == 1 { count * 39 } else { 0 };
+                let indices = mesh.triangles().flatten().enumerate().map(|(index, corner)| corner + offset(index));
                 let mesh = Mesh::new("parts", Topology::TriangleList, vertices, indices.collect()).unwrap();
                 scene.replace(*handle, mesh).unwrap();
             }
@@ -253,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn what_faces_away_is_left_out_in_either_projection() {
+    fn back_facing_triangles_are_culled_in_perspective_and_orthographic_views() {
         let scene = demo::colonnade().unwrap();
         let scene = scene.as_scene_ref();
         let center = scene.positions[0];

@@ -163,7 +163,7 @@ fn check_one(studio: &mut Studio, stand: &Stand, expected: Expected, has_witness
 
 /// How far places may be from the origin.
 fn is_within_reach(number: f64) -> bool {
-    number.abs() < drawloom::view::FixedPosition::REACH
+    number.abs() < drawloom::view::FixedPosition::MAX_COORDINATE
 }
 
 fn objects(studio: &mut Studio) -> Result<(), Failed> {

@@ -113,7 +113,7 @@ fn signs_anywhere(studio: &mut Studio) -> Result<(), Failed> {
 
 fn out_of_reach(studio: &mut Studio) -> Result<(), Failed> {
     let whole = Signs::new(camera(SIZE), [Sign::before(&camera(SIZE), 5.0, 2.0)])?;
-    for far in [FixedPosition::REACH, -FixedPosition::REACH, 1e10, -1e300, f64::MAX] {
+    for far in [FixedPosition::MAX_COORDINATE, -FixedPosition::MAX_COORDINATE, 1e10, -1e300, f64::MAX] {
         let signs = Signs::new(Camera { position: DVec3::Y * far, ..camera(SIZE) }, [])?;
         match studio.refusal(&signs.scene.as_scene_ref())? {
             FrameError::Backend(BackendError::ViewOutOfReach { view }) if view == "main" => {}
@@ -132,7 +132,7 @@ fn out_of_reach(studio: &mut Studio) -> Result<(), Failed> {
         signs.compare(&drawn, 1)?;
         whole.expect(studio, "the frame after", 1)?;
     }
-    let within = Camera { position: DVec3::splat(FixedPosition::REACH.next_down()), ..camera(SIZE) };
+    let within = Camera { position: DVec3::splat(FixedPosition::MAX_COORDINATE.next_down()), ..camera(SIZE) };
     let sign = Sign { position: within.position - DVec3::new(0.1, 1.5, 3.0), ..Sign::before(&within, 5.0, 3.0) };
     Signs::new(within, [sign])?.expect(studio, "just within reach", 1)
 }

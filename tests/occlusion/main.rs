@@ -35,7 +35,7 @@ fn occlusion(scene: &SceneRef<'_>, side: u32) -> (Vec<bool>, Vec<bool>) {
     occlusion.reset(&view, side);
     occlusion.select_occluders(scene, &table, &visible, &meshes, |draw| draw.state.blend() == Blend::None);
     (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
-    let hidden = visible.hide(0..count, |first, seen| occlusion.hidden(scene, &table, first, seen));
+    let hidden = visible.remove_hidden(0..count, |first, seen| occlusion.hidden(scene, &table, first, seen));
     let left: Vec<bool> = bits(&visible);
     let hidden_ones: Vec<bool> = seen.iter().zip(&left).map(|(&seen, &left)| seen && !left).collect();
     assert_eq!(hidden, hidden_ones.iter().filter(|&&hidden| hidden).count());

@@ -109,7 +109,7 @@ impl<'a> Sight<'a> {
             let chosen = Instant::now();
             (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
             let drawn = Instant::now();
-            visible.hide(0..count, |first, seen| occlusion.hidden(scene, table, first, seen));
+            visible.remove_hidden(0..count, |first, seen| occlusion.hidden(scene, table, first, seen));
             let spans = [chosen - start, drawn - chosen, drawn.elapsed()];
             times.iter_mut().zip(spans).for_each(|(times, span)| times.push(span.as_secs_f64()));
         }

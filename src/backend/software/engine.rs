@@ -96,7 +96,7 @@ pub(super) fn twins_of(request: &FrameRequest<'_>) -> Result<Vec<Twin>, BackendE
 fn view_state<R: Number>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
     let (view, lights, scene) = (&request.views[index], &request.lights[index], request.scene);
     let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
-    let record = GpuView::new(view, scene, lights.records().len()).ok_or_else(out_of_reach)?;
+    let record = GpuView::new(view, scene, lights.gpu_lights().len()).ok_or_else(out_of_reach)?;
     let exact = view.camera.position;
     let camera = CameraPlace {
         exact,
@@ -107,7 +107,7 @@ fn view_state<R: Number>(request: &FrameRequest<'_>, index: usize) -> Result<Vie
         R::light(record, &scene.lights[light], &camera, map.map(|map| &request.views[map]))
     };
     let values = R::view(view, &record, scene);
-    Ok(ViewState { values, lights: lights.records().iter().zip(lights.sources()).map(light).collect(), camera })
+    Ok(ViewState { values, lights: lights.gpu_lights().iter().zip(lights.sources()).map(light).collect(), camera })
 }
 
 /// # Errors

@@ -93,5 +93,5 @@ impl<R: Number> ObjectPass<'_, R> {
 fn pixel_of<R: Number, const V: usize>(triangle: &Triangle<R, V>, place: [usize; 2], material: u32) -> ObjectPixel<R> {
     let found = triangle.interpolate(place);
     let all = |numbers: [R; V]| std::array::from_fn(|index| numbers.get(index).copied().unwrap_or_default());
-    ObjectPixel { place, varyings: all(found.value), across: all(found.across), down: all(found.down), material }
+    ObjectPixel { place, varyings: all(found.value), across: all(found.dpdx), down: all(found.dpdy), material }
 }

@@ -101,7 +101,7 @@ impl FrameBuffers {
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
         let object_bytes = objects * size_of::<GpuObject>();
-        let longest = request.lights.iter().map(|lights| size_of_val(lights.records())).max().unwrap_or(0);
+        let longest = request.lights.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
         for bytes in [object_bytes, objects * 4, longest] {
             check_storage(device, bytes)?;
         }
@@ -267,9 +267,9 @@ impl Buffers {
         for (view, lights) in request.lights.iter().enumerate() {
             let before = self.key.light_ranges.get(view).map_or(0, |(_, length)| *length);
             // A view that no light reaches reads nothing there, but its layout has the binding.
-            let room = roomy(before, size_of_val(lights.records()), most);
+            let room = roomy(before, size_of_val(lights.gpu_lights()), most);
             let start = bytes.len();
-            bytes.extend_from_slice(bytemuck::cast_slice(lights.records()));
+            bytes.extend_from_slice(bytemuck::cast_slice(lights.gpu_lights()));
             bytes.resize(start + room, 0);
             ranges.push((start, room));
         }
@@ -302,7 +302,7 @@ impl Buffers {
 /// If a camera is out of reach.
 fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
     for (view, lights) in request.views.iter().zip(request.lights) {
-        let record = GpuView::new(view, request.scene, lights.records().len())
+        let record = GpuView::new(view, request.scene, lights.gpu_lights().len())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
         append_aligned(bytes, bytemuck::bytes_of(&record));
     }

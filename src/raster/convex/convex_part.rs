@@ -4,33 +4,32 @@ use glam::DVec3;
 
 use super::Plane;
 
-/// A part of a mesh that is convex: a closed body, or a flat piece of surface. In object space, in metres.
+/// A convex part of a mesh: a closed body or a flat polygon. In object space, in metres.
 ///
-/// Its picture is all that lies between the pictures of its points, and what is behind that and behind its faces cannot be seen.
+/// Its projection is the convex hull of its projected points. Whatever is within that and behind its faces is hidden.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexPart {
-    /// Its corners; some may lie between others.
+    /// The vertices; some may lie between others.
     pub points: Vec<DVec3>,
-    /// Pairs of points between which the part reaches; those along its rim are among them.
+    /// Pairs of connected points, including all edges of any projection's outline.
     pub edges: Vec<[u32; 2]>,
-    /// Its faces: all of them of a body, and one of a flat piece.
+    /// The planes of a body's faces, or the plane of a polygon.
     pub faces: Vec<Plane>,
-    /// Whether it is a body. A flat piece that is not drawn from behind hides nothing from there.
+    /// Whether it is a closed body. A polygon whose back faces are culled hides nothing when seen from behind.
     pub is_closed: bool,
-    /// How far the mesh is from what is described here, in metres: no point of its rim, seen from wherever, and no point of a
-    /// face is farther from its place than this.
+    /// A bound of the distance in metres between the part and the mesh: of any point of a face, and of any projection's outline.
     pub slack: f64,
-    /// How large it is, in square metres: what it is ranked by.
+    /// The surface area in square metres, by which parts are ranked.
     pub area: f64,
 }
 
 impl ConvexPart {
-    /// The most that a mesh has.
+    /// The maximum number of parts of a mesh.
     pub const MAX_PARTS: usize = 64;
-    /// Meshes of more triangles have none: what hides much is simple.
+    /// Meshes with more triangles have no parts: good occluders are simple.
     pub const MAX_TRIANGLES: usize = 4096;
-    /// The most faces of one.
+    /// The maximum number of faces of a body.
     pub const MAX_FACES: usize = 64;
-    /// The most corners of a flat one.
+    /// The maximum number of corners of a polygon.
     pub const MAX_CORNERS: usize = 64;
 }

@@ -7,37 +7,37 @@ use super::welded_mesh::WeldedMesh;
 use crate::scene::Mesh;
 
 impl ConvexPart {
-    /// The convex parts of a mesh, the largest first: each of its pieces that is a closed convex body is one, and flat surfaces
-    /// of the others are cut into convex ones. Parts that are small beside the largest are left out.
+    /// Decomposes a mesh into convex parts, the largest first. A connected component that is a closed convex body is one part; the
+    /// flat surfaces of other components are divided into convex polygons. Parts much smaller than the largest are omitted.
     ///
-    /// Vertices are places rounded to f32, so what was flat or convex is no longer quite so. Up to 16 unit roundoffs of 2⁻²⁴
-    /// of the mesh's farthest coordinate count as flat; [`ConvexPart::slack`] says what it really was.
-    pub fn of(mesh: &Mesh) -> Vec<Self> {
+    /// Vertices are rounded to f32, so surfaces are not exactly flat or convex. The tolerance is 16 unit roundoffs of 2⁻²⁴ of the
+    /// mesh's largest coordinate; [`ConvexPart::slack`] is the actual deviation.
+    pub fn decompose(mesh: &Mesh) -> Vec<Self> {
         if mesh.triangle_count() > Self::MAX_TRIANGLES {
             return Vec::new();
         }
         let welded = WeldedMesh::new(mesh);
-        let farthest = welded.places.iter().map(|place| place.abs().max_element()).fold(0.0, f64::max);
-        let tolerance = farthest * TOLERANCE;
+        let max_coordinate = welded.points.iter().map(|point| point.abs().max_element()).fold(0.0, f64::max);
+        let tolerance = max_coordinate * TOLERANCE;
         let mut parts = Vec::new();
-        for piece in welded.pieces() {
-            match closed_body(&welded, &piece, tolerance) {
+        for component in welded.components() {
+            match closed_body(&welded, &component, tolerance) {
                 Some(part) => parts.push(part),
-                None => flat_polygons(&welded, &piece, tolerance, &mut parts),
+                None => flat_polygons(&welded, &component, tolerance, &mut parts),
             }
         }
         parts.sort_by(|one, other| other.area.total_cmp(&one.area));
-        let least = parts.first().map_or(0.0, |largest| largest.area * MIN_AREA_SHARE);
-        parts.retain(|part| part.area > least);
+        let min_area = parts.first().map_or(0.0, |largest| largest.area * MIN_AREA_SHARE);
+        parts.retain(|part| part.area > min_area);
         parts.truncate(Self::MAX_PARTS);
         parts
     }
 }
 
-/// 16 unit roundoffs of f32: a rotation that was worked into a mesh's vertices leaves no more.
+/// 16 unit roundoffs of f32: rotating a mesh's vertices in f32 causes no larger errors.
 const TOLERANCE: f64 = 1.0 / 1_048_576.0;
 
-/// A part of less than this share of the largest one's area hides little that the others do not.
+/// Parts with an area below this share of the largest part's hide little that others do not hide.
 const MIN_AREA_SHARE: f64 = 1.0 / 256.0;
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -48,27 +48,27 @@ mod tests {
     use crate::raster::Plane;
     use crate::scene::{Topology, Vertex};
 
-    fn mesh(places: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
-        let vertex = |place: &Vec3| Vertex { position: place.to_array(), ..Vertex::default() };
-        let vertices = places.iter().map(vertex).collect();
+    fn mesh(points: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
+        let vertex = |point: &Vec3| Vertex { position: point.to_array(), ..Vertex::default() };
+        let vertices = points.iter().map(vertex).collect();
         Mesh::new("shape", Topology::TriangleList, vertices, triangles.iter().flatten().copied().collect()).unwrap()
     }
 
-    /// The corners of a box and its triangles, which face outwards.
+    /// The corners and the outward-facing triangles of a box.
     fn box_of(half: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let sign = |corner: u32, axis: u32| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-        let places = (0..8).map(|corner| half * Vec3::new(sign(corner, 0), sign(corner, 1), sign(corner, 2))).collect();
+        let points = (0..8).map(|corner| half * Vec3::new(sign(corner, 0), sign(corner, 1), sign(corner, 2))).collect();
         let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        (places, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+        (points, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
     }
 
     #[test]
-    fn a_box_is_one_body_of_six_faces_however_it_is_turned() {
+    fn a_box_in_any_orientation_is_one_body_with_six_faces() {
         for turns in 0..20 {
             let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), turns as f32 * 0.7);
-            let (places, triangles) = box_of(Vec3::new(3.0, 0.2, 40.0));
-            let places: Vec<_> = places.into_iter().map(|place| turn * place + Vec3::new(7.0, -3.0, 1.0)).collect();
-            let parts = ConvexPart::of(&mesh(&places, &triangles));
+            let (points, triangles) = box_of(Vec3::new(3.0, 0.2, 40.0));
+            let points: Vec<_> = points.into_iter().map(|point| turn * point + Vec3::new(7.0, -3.0, 1.0)).collect();
+            let parts = ConvexPart::decompose(&mesh(&points, &triangles));
             let [part] = parts.as_slice() else { panic!("{} parts after {turns} turns", parts.len()) };
             assert!(part.is_closed && part.faces.len() == 6 && part.points.len() == 8, "{part:?}");
             assert!(part.slack < 1e-4 && (turns > 0 || part.slack == 0.0), "{}", part.slack);
@@ -82,17 +82,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_convex_body_is_cut_into_flat_pieces() {
-        // A box without its lid, one turned inside out, and one with a dent.
-        let (places, triangles) = box_of(Vec3::ONE);
-        let open = ConvexPart::of(&mesh(&places, &triangles[..10]));
+    fn other_surfaces_are_divided_into_flat_polygons() {
+        // A box without its lid, a box turned inside out, and one with a dent.
+        let (points, triangles) = box_of(Vec3::ONE);
+        let open = ConvexPart::decompose(&mesh(&points, &triangles[..10]));
         assert_eq!(open.len(), 5);
         let inverted: Vec<_> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
-        let inverted = ConvexPart::of(&mesh(&places, &inverted));
+        let inverted = ConvexPart::decompose(&mesh(&points, &inverted));
         assert_eq!(inverted.len(), 6);
-        let mut dented = places.clone();
+        let mut dented = points.clone();
         dented[7] = Vec3::splat(0.2);
-        let dented = ConvexPart::of(&mesh(&dented, &triangles));
+        let dented = ConvexPart::decompose(&mesh(&dented, &triangles));
         for part in open.iter().chain(&inverted).chain(&dented) {
             assert!(!part.is_closed && part.faces.len() == 1, "{part:?}");
         }
@@ -101,24 +101,24 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_a_mesh_are_parts_of_their_own_the_largest_first() {
-        let (mut places, mut triangles) = box_of(Vec3::ONE);
+    fn components_of_a_mesh_are_separate_parts_in_order_of_size() {
+        let (mut points, mut triangles) = box_of(Vec3::ONE);
         let (larger, more) = box_of(Vec3::splat(2.0));
         triangles.extend(more.iter().map(|triangle| triangle.map(|corner| corner + 8)));
-        places.extend(larger.iter().map(|&place| place + Vec3::X * 9.0));
+        points.extend(larger.iter().map(|&point| point + Vec3::X * 9.0));
         let (tiny, more) = box_of(Vec3::splat(0.01));
         triangles.extend(more.iter().map(|triangle| triangle.map(|corner| corner + 16)));
-        places.extend(tiny.iter().map(|&place| place - Vec3::X * 9.0));
-        let parts = ConvexPart::of(&mesh(&places, &triangles));
+        points.extend(tiny.iter().map(|&point| point - Vec3::X * 9.0));
+        let parts = ConvexPart::decompose(&mesh(&points, &triangles));
         let areas: Vec<_> = parts.iter().map(|part| part.area).collect();
         assert_eq!(areas, [96.0, 24.0]);
     }
 
-    /// An L of six triangles on a grid: its parts cover it once, and none is larger than what is there.
+    /// The parts of an L of six triangles on a grid cover it exactly once.
     #[test]
-    fn flat_pieces_cover_their_surface_once() {
+    fn flat_polygons_cover_their_surface_once() {
         let at = |x: f32, y: f32| Vec3::new(x, y, 3.0);
-        let places = [
+        let points = [
             at(0.0, 0.0),
             at(1.0, 0.0),
             at(2.0, 0.0),
@@ -129,7 +129,7 @@ mod tests {
             at(1.0, 2.0),
         ];
         let triangles = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7], [3, 7, 6]];
-        let parts = ConvexPart::of(&mesh(&places, &triangles));
+        let parts = ConvexPart::decompose(&mesh(&points, &triangles));
         assert_eq!(parts.iter().map(|part| part.area).sum::<f64>(), 3.0);
         assert_eq!(parts[0].area, 2.0);
         for part in &parts {
@@ -140,16 +140,16 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_area_or_too_many_faces_is_no_part() {
+    fn surfaces_without_area_and_bodies_with_too_many_faces_are_not_parts() {
         let line = [Vec3::ZERO, Vec3::X, Vec3::X * 2.0];
-        assert_eq!(ConvexPart::of(&mesh(&line, &[[0, 1, 2]])), []);
-        assert_eq!(ConvexPart::of(&mesh(&[Vec3::ONE; 3], &[[0, 1, 2]])), []);
-        // A ball of 20 times 20 faces, which would have to be looked at for every square it covers.
+        assert_eq!(ConvexPart::decompose(&mesh(&line, &[[0, 1, 2]])), []);
+        assert_eq!(ConvexPart::decompose(&mesh(&[Vec3::ONE; 3], &[[0, 1, 2]])), []);
+        // A sphere of 20 times 20 faces, all of which would be evaluated for every tile that it covers.
         let ring = |row: u32, step: u32| {
             let (height, turn) = (row as f32 / 20.0 * std::f32::consts::PI, step as f32 / 20.0 * std::f32::consts::TAU);
             Vec3::new(height.sin() * turn.cos(), height.cos(), height.sin() * turn.sin())
         };
-        let places: Vec<_> = (0..=20).flat_map(|row| (0..20).map(move |step| ring(row, step))).collect();
+        let points: Vec<_> = (0..=20).flat_map(|row| (0..20).map(move |step| ring(row, step))).collect();
         let at = |row: u32, step: u32| row * 20 + step % 20;
         let faces = (0..20).flat_map(|row| {
             (0..20).flat_map(move |step| {
@@ -157,7 +157,7 @@ mod tests {
                 [[a, b, c], [a, c, d]]
             })
         });
-        let parts = ConvexPart::of(&mesh(&places, &faces.collect::<Vec<_>>()));
+        let parts = ConvexPart::decompose(&mesh(&points, &faces.collect::<Vec<_>>()));
         assert!(parts.iter().all(|part| part.points.len() <= 4 && !part.is_closed), "{}", parts.len());
     }
 }

@@ -1,19 +1,19 @@
-//! Flat convex pieces of a surface.
+//! Flat convex polygons of a surface.
 
 use glam::DVec3;
 
 use super::welded_mesh::{WeldedMesh, edges};
 use super::{ConvexPart, Plane};
 
-/// Joins triangles that lie in one plane into convex polygons, as large as come about by taking away the longest edges between
-/// them first (after Hertel and Mehlhorn, "Fast triangulation of the plane with respect to simple polygons", 1985).
+/// Merges coplanar triangles into convex polygons by removing shared edges, the longest first (after Hertel and Mehlhorn, "Fast
+/// triangulation of the plane with respect to simple polygons", 1985).
 ///
-/// Triangles that are wound alike and whose edges cancel but for those of a convex loop cover what the loop encloses just once,
-/// so from the side that is seen every ray through the polygon meets one of them. That still holds where each corner is a little
-/// off its place, but for rays that pass the loop within as much.
-pub(super) fn flat_polygons(welded: &WeldedMesh, piece: &[u32], tolerance: f64, parts: &mut Vec<ConvexPart>) {
+/// Triangles of one winding whose edges cancel except for those of a convex loop cover the loop's interior exactly once, so every ray
+/// through the polygon from the front meets one of them. If corners deviate from the plane a little, this holds for all rays but those
+/// within that deviation of the loop.
+pub(super) fn flat_polygons(welded: &WeldedMesh, component: &[u32], tolerance: f64, parts: &mut Vec<ConvexPart>) {
     let mut pool = Pool { welded, tolerance, polygons: Vec::new(), owners: vec![0; welded.triangles.len()] };
-    for &triangle in piece {
+    for &triangle in component {
         pool.owners[triangle as usize] = pool.polygons.len();
         let corners = welded.triangles[triangle as usize].to_vec();
         let area = welded.areas[triangle as usize];
@@ -21,21 +21,21 @@ pub(super) fn flat_polygons(welded: &WeldedMesh, piece: &[u32], tolerance: f64, 
             Polygon { corners, face: welded.faces[triangle as usize], slack: 0.0, area, triangles: vec![triangle] };
         pool.polygons.push(Some(polygon));
     }
-    let mut between = Vec::new();
-    for &triangle in piece {
+    let mut shared_edges = Vec::new();
+    for &triangle in component {
         for edge in edges(welded.triangles[triangle as usize]) {
             if let Some(other) = welded.neighbour(edge).filter(|_| edge[0] < edge[1]) {
-                let [from, to] = edge.map(|place| welded.places[place as usize]);
-                between.push((from.distance_squared(to), edge, triangle, other));
+                let [from, to] = edge.map(|index| welded.points[index as usize]);
+                shared_edges.push((from.distance_squared(to), edge, triangle, other));
             }
         }
     }
-    between.sort_by(|(one, edge, ..), (other, other_edge, ..)| other.total_cmp(one).then(edge.cmp(other_edge)));
-    for (_, edge, triangle, other) in between {
-        pool.join(edge, pool.owners[triangle as usize], pool.owners[other as usize]);
+    shared_edges.sort_by(|(one, edge, ..), (other, other_edge, ..)| other.total_cmp(one).then(edge.cmp(other_edge)));
+    for (_, edge, triangle, other) in shared_edges {
+        pool.merge(edge, pool.owners[triangle as usize], pool.owners[other as usize]);
     }
     for polygon in pool.polygons.into_iter().flatten() {
-        let points: Vec<_> = polygon.corners.iter().map(|&place| welded.places[place as usize]).collect();
+        let points: Vec<_> = polygon.corners.iter().map(|&index| welded.points[index as usize]).collect();
         let count = points.len() as u32;
         parts.push(ConvexPart {
             points,
@@ -48,28 +48,29 @@ pub(super) fn flat_polygons(welded: &WeldedMesh, piece: &[u32], tolerance: f64, 
     }
 }
 
+/// The polygons during merging.
 struct Pool<'a> {
     welded: &'a WeldedMesh,
     tolerance: f64,
-    /// `None` for those that have become part of another.
+    /// `None` for those that were merged into another.
     polygons: Vec<Option<Polygon>>,
-    /// Which polygon each triangle is in.
+    /// The index of each triangle's polygon.
     owners: Vec<usize>,
 }
 
 struct Polygon {
-    /// Counter-clockwise seen from the side that is seen.
+    /// Indices of points, counter-clockwise seen from the front.
     corners: Vec<u32>,
     face: Plane,
-    /// How far its corners are from a convex loop in the face's plane.
+    /// A bound of the corners' distance from a convex loop in the face's plane.
     slack: f64,
     area: f64,
     triangles: Vec<u32>,
 }
 
 impl Pool<'_> {
-    /// Makes one of two polygons that share an edge, which is the first one's in this direction, if that is convex and flat.
-    fn join(&mut self, edge: [u32; 2], first: usize, second: usize) {
+    /// Merges two polygons that share an edge, given in the first one's direction, if the result is convex and flat.
+    fn merge(&mut self, edge: [u32; 2], first: usize, second: usize) {
         if first == second {
             return;
         }
@@ -77,7 +78,7 @@ impl Pool<'_> {
         if one.face.normal.dot(other.face.normal) < 0.5 {
             return;
         }
-        let Some(corners) = joined(&one.corners, &other.corners, edge) else { return };
+        let Some(corners) = merged_loop(&one.corners, &other.corners, edge) else { return };
         let face = if one.area >= other.area { one.face } else { other.face };
         let Some(slack) = self.slack(&corners, &face) else { return };
         let (Some(one), Some(other)) = (self.polygons[first].take(), self.polygons[second].take()) else { return };
@@ -86,45 +87,45 @@ impl Pool<'_> {
         self.polygons[first] = Some(Polygon { corners, face, slack, area: one.area + other.area, triangles });
     }
 
-    /// How far a loop's corners are from a convex one in the plane; `None` where that is beyond the tolerance.
+    /// A bound of the corners' distance from a convex loop in a plane; `None` if it exceeds the tolerance.
     fn slack(&self, corners: &[u32], face: &Plane) -> Option<f64> {
-        let places: Vec<DVec3> = corners.iter().map(|&place| self.welded.places[place as usize]).collect();
-        let off_plane = places.iter().map(|&place| face.signed_distance(place).abs()).fold(0.0, f64::max);
+        let points: Vec<DVec3> = corners.iter().map(|&index| self.welded.points[index as usize]).collect();
+        let off_plane = points.iter().map(|&point| face.signed_distance(point).abs()).fold(0.0, f64::max);
         let mut off_loop: f64 = 0.0;
-        for (&from, &to) in places.iter().zip(places.iter().cycle().skip(1)) {
+        for (&from, &to) in points.iter().zip(points.iter().cycle().skip(1)) {
             let outwards = (to - from).cross(face.normal).try_normalize()?;
-            off_loop = places.iter().map(|&place| outwards.dot(place - from)).fold(off_loop, f64::max);
+            off_loop = points.iter().map(|&point| outwards.dot(point - from)).fold(off_loop, f64::max);
         }
-        let off = off_plane.max(off_loop);
-        (off <= self.tolerance).then_some(off * 2.0)
+        let deviation = off_plane.max(off_loop);
+        (deviation <= self.tolerance).then_some(deviation * 2.0)
     }
 }
 
-/// The loop around both of two loops with an edge in common, without what of it runs there and back; `None` where a corner is
-/// in it twice, or where it has too many.
-fn joined(one: &[u32], other: &[u32], [from, to]: [u32; 2]) -> Option<Vec<u32>> {
+/// Merges two loops with a common edge, and removes spikes (edges traversed back and forth). `None` if a corner occurs twice, or if there
+/// are too many corners.
+fn merged_loop(one: &[u32], other: &[u32], [from, to]: [u32; 2]) -> Option<Vec<u32>> {
     let starting_at = |corners: &[u32], first: u32| {
-        let place = corners.iter().position(|&corner| corner == first)?;
-        Some([&corners[place..], &corners[..place]].concat())
+        let start = corners.iter().position(|&corner| corner == first)?;
+        Some([&corners[start..], &corners[..start]].concat())
     };
-    // From the edge's end around to its start, and on by way of the other loop, which has the edge the other way round.
+    // The first loop from the edge's end to its start, then the second loop, which has the edge in the opposite direction.
     let mut corners = starting_at(one, to)?;
-    let way = starting_at(other, from)?;
-    if corners.last() != Some(&from) || way.last() != Some(&to) {
+    let second = starting_at(other, from)?;
+    if corners.last() != Some(&from) || second.last() != Some(&to) {
         return None;
     }
-    corners.extend_from_slice(&way[1..way.len() - 1]);
-    let mut place = 0;
-    while corners.len() > 3 && place < corners.len() {
+    corners.extend_from_slice(&second[1..second.len() - 1]);
+    let mut index = 0;
+    while corners.len() > 3 && index < corners.len() {
         let count = corners.len();
-        let [before, after] = [(place + count - 1) % count, (place + 1) % count];
+        let [before, after] = [(index + count - 1) % count, (index + 1) % count];
         if corners[before] == corners[after] {
-            // The corner is the end of a way there and back; so may be the one before it, then.
-            corners.remove(place.max(after));
-            corners.remove(place.min(after));
-            place = 0;
+            // This corner is the tip of a spike; after its removal, the previous corner may be one, too.
+            corners.remove(index.max(after));
+            corners.remove(index.min(after));
+            index = 0;
         } else {
-            place += 1;
+            index += 1;
         }
     }
     let mut sorted = corners.clone();

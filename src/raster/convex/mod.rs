@@ -1,4 +1,4 @@
-//! Convex parts of meshes: what is behind one and within its projection is hidden, and the projection is convex too.
+//! Convex parts of meshes, which occlusion culling uses as occluders: the projection of a convex part is convex.
 
 mod convex_part;
 mod plane;

@@ -1,19 +1,19 @@
-//! Planes.
+//! Oriented planes.
 
 use glam::DVec3;
 
-/// A plane with an outer side: what is inside is at `normal · place ≤ offset`.
+/// An oriented plane: points with `normal · point ≤ offset` are inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Outwards, of unit length.
+    /// The outward unit normal.
     pub normal: DVec3,
-    /// In metres.
+    /// The distance from the origin along the normal, in metres.
     pub offset: f64,
 }
 
 impl Plane {
-    /// How far a place is outside, in metres; negative inside.
-    pub fn signed_distance(&self, place: DVec3) -> f64 {
-        self.normal.dot(place) - self.offset
+    /// The distance of a point in metres; negative inside.
+    pub fn signed_distance(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) - self.offset
     }
 }

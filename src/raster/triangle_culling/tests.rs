@@ -10,7 +10,7 @@ const WINDINGS: [Option<Winding>; 3] = [None, Some(Winding::Clockwise), Some(Win
 
 proptest! {
     #[test]
-    fn what_is_left_out_covers_no_pixel(
+    fn a_culled_triangle_covers_no_pixel(
         corners in prop::collection::vec(any_corner(), 3..24),
         indices in prop::collection::vec(prop::array::uniform3(0..24_u32), 1..40),
         mirrored: bool,
@@ -21,21 +21,21 @@ proptest! {
         for culled in WINDINGS {
             let (kept, counts) = cull(&clip, &triangles, culled);
             let mut next = kept.as_chunks::<3>().0.iter().peekable();
-            let mut left_out = 0;
+            let mut culled_count = 0;
             for triangle in &triangles {
                 if next.next_if_eq(&triangle).is_none() {
-                    left_out += 1;
+                    culled_count += 1;
                     let corners = triangle.map(|index| clip[index as usize]);
                     prop_assert!(!covers_any::<f64>(corners, culled), "{:?}", corners);
                     prop_assert!(!covers_any::<f32>(corners, culled), "{:?}", corners);
                 }
             }
-            prop_assert_eq!((left_out, triangles.len()), (counts.culled(), counts.triangles));
+            prop_assert_eq!((culled_count, triangles.len()), (counts.culled(), counts.triangles));
         }
     }
 
     #[test]
-    fn what_is_not_finite_is_kept(
+    fn a_triangle_that_is_not_finite_is_kept(
         number in prop::sample::select(vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY]),
         axis in 0..4_usize,
     ) {
@@ -47,38 +47,39 @@ proptest! {
     }
 }
 
-/// Two million in release. Each is decided by every way to move its corners by a step along each axis, in i128.
+/// Two million in release builds. The expected result tries all ways to move the corners by a step along each axis, in i128.
 #[test]
-fn no_sliver_is_left_out_that_could_be_drawn() {
+fn no_sliver_that_a_device_may_draw_is_culled() {
     let slivers = if cfg!(debug_assertions) { 100_000 } else { 2_000_000 };
     let mut random = Random(7);
     let mut counts = CulledTriangles::default();
     for _ in 0..slivers {
-        let places = random.sliver();
-        let clip = places.map(corner_at);
+        let points = random.sliver();
+        let clip = points.map(corner_at);
         let (kept, count) = cull(&clip, &[[0, 1, 2]], Some(Winding::Clockwise));
         counts += count;
         if kept.is_empty() {
             let moved = (0..64).map(|moves: i64| {
                 [0, 1, 2]
-                    .map(|corner| [0, 1].map(|axis| places[corner][axis] + (moves >> (2 * corner + axis) & 1) * 2 - 1))
+                    .map(|corner| [0, 1].map(|axis| points[corner][axis] + (moves >> (2 * corner + axis) & 1) * 2 - 1))
             });
-            let is_back = moved.clone().all(|places| exact_area(places) > 0);
-            let [a, b, c] = places;
-            assert!(is_back || has_no_middle(places) || a == b || b == c || c == a, "{places:?}");
+            let is_back = moved.clone().all(|points| exact_area(points) > 0);
+            let [a, b, c] = points;
+            assert!(is_back || has_no_center(points) || a == b || b == c || c == a, "{points:?}");
         }
     }
-    // Neither test is one that nothing passes, and neither one that everything does.
+    // Each outcome occurs often enough to test it.
     let each = [counts.back_facing, counts.zero_size, slivers - counts.culled()];
     assert!(each.iter().all(|&count| count > slivers / 100), "{counts:?}");
 }
 
 #[test]
 fn each_reason_is_counted() {
-    let places = [[40, 40], [40, 80], [80, 40], [42, 41], [42, 44], [44, 41]];
-    let mut clip: Vec<_> = places.map(|place| corner_at(place.map(|number| number * STEPS_PER_PIXEL / 2))).into();
+    let points = [[40, 40], [40, 80], [80, 40], [42, 41], [42, 44], [44, 41]];
+    let mut clip: Vec<_> =
+        points.map(|point| corner_at(point.map(|coordinate| coordinate * STEPS_PER_PIXEL / 2))).into();
     clip.extend([[3.0, 0.0, 0.5, 1.0], [9.0, 0.3, 0.5, 1.0], [2.0, -5.0, 0.5, 1.0]].map(Vector));
-    // Beside the camera plane, and behind it.
+    // Next to the camera plane, and behind it.
     clip.extend([[0.0, 0.0, 0.5, 0.1], [1.0, 0.0, 0.5, -1.0], [0.0, 1.0, 0.5, -2.0]].map(Vector));
     clip.extend([[600, 600], [610, 603], [605, 700]].map(corner_at));
     let triangles = [
@@ -104,7 +105,7 @@ fn each_reason_is_counted() {
 }
 
 #[test]
-fn what_may_be_clipped_is_kept() {
+fn a_triangle_that_a_device_may_clip_is_kept() {
     let back_facing = [[0.0, 0.0, 0.5, 1.0], [0.0, 0.5, 0.4, 1.0], [0.5, 0.0, 0.3, 1.0]];
     let count = |corner: [f64; 4]| {
         let clip = [Vector(back_facing[0]), Vector(back_facing[1]), Vector(corner)];
@@ -117,17 +118,17 @@ fn what_may_be_clipped_is_kept() {
 }
 
 #[test]
-fn most_of_what_cannot_be_seen_of_a_ball_is_left_out() {
-    // A ball half in the picture, 500 m away, with a far plane infinitely far away, and one within it.
+fn most_invisible_triangles_of_a_sphere_are_culled() {
+    // A sphere half inside the picture, 500 m away, with a far plane at infinity and with a finite one.
     let perspective = |[x, y, z]: [f64; 3]| [x * 2.0, y * 4.0, 0.05, -z];
     let orthographic = |[x, y, z]: [f64; 3]| [x * 0.004, y * 0.008, 1.0 + z * 0.001, 1.0];
     for projection in [perspective, orthographic] {
-        let ball = |ring: i32, segment: i32| {
+        let vertex = |ring: i32, segment: i32| {
             let turn = DQuat::from_rotation_y(f64::from(segment) * 0.1) * DQuat::from_rotation_x(f64::from(ring) * 0.1);
             turn * DVec3::NEG_Y * 100.0 + DVec3::new(250.0, 0.0, -500.0)
         };
-        let places = (0..=31).flat_map(|ring| (0..=63).map(move |segment| ball(ring, segment)));
-        let clip: Vec<_> = places.map(|place| Vector(projection(place.to_array()))).collect();
+        let points = (0..=31).flat_map(|ring| (0..=63).map(move |segment| vertex(ring, segment)));
+        let clip: Vec<_> = points.map(|point| Vector(projection(point.to_array()))).collect();
         let quads = (0..31).flat_map(|ring| (0..63).map(move |segment| ring * 64 + segment));
         let triangles: Vec<_> =
             quads.flat_map(|low| [[low, low + 1, low + 64], [low + 1, low + 65, low + 64]]).collect();
@@ -157,26 +158,26 @@ fn covers_any<R: Real>(corners: [Vector4<f64>; 3], culled: Option<Winding>) -> b
     covers
 }
 
-fn exact_area(places: [GridPoint; 3]) -> i128 {
-    let [a, b, c] = places.map(|place| place.map(i128::from));
+fn exact_area(points: [GridPoint; 3]) -> i128 {
+    let [a, b, c] = points.map(|point| point.map(i128::from));
     a[0] * b[1] - b[0] * a[1] + b[0] * c[1] - c[0] * b[1] + c[0] * a[1] - a[0] * c[1]
 }
 
-fn has_no_middle(places: [GridPoint; 3]) -> bool {
+fn has_no_center(points: [GridPoint; 3]) -> bool {
     (0..2).any(|axis| {
-        let along = places.map(|place| place[axis]);
-        let (low, high) = (along.into_iter().min().unwrap() - 1, along.into_iter().max().unwrap() + 1);
-        (low..=high).all(|place| place.rem_euclid(STEPS_PER_PIXEL) != HALF_PIXEL)
+        let coordinates = points.map(|point| point[axis]);
+        let (low, high) = (coordinates.into_iter().min().unwrap() - 1, coordinates.into_iter().max().unwrap() + 1);
+        (low..=high).all(|coordinate| coordinate.rem_euclid(STEPS_PER_PIXEL) != HALF_PIXEL)
     })
 }
 
-/// A corner that is just at this place of the picture.
-fn corner_at(place: GridPoint) -> Vector4<f64> {
-    let [x, y] = [0, 1].map(|axis| place[axis] as f64 / (PICTURE[axis] as f64 * STEPS_PER_PIXEL as f64 / 2.0));
+/// A corner exactly at a point of the grid.
+fn corner_at(point: GridPoint) -> Vector4<f64> {
+    let [x, y] = [0, 1].map(|axis| point[axis] as f64 / (PICTURE[axis] as f64 * STEPS_PER_PIXEL as f64 / 2.0));
     Vector([x - 1.0, 1.0 - y, 0.5, 1.0])
 }
 
-/// Corners in and around the picture, many of them in a heap of a few pixels, many on a line, and some behind the camera.
+/// Corners in and around the picture: many within a few pixels, many on a line, and some behind the camera.
 fn any_corner() -> impl Strategy<Value = Vector4<f64>> {
     let along = prop_oneof![
         -1.5..1.5_f64,
@@ -192,7 +193,7 @@ fn any_corner() -> impl Strategy<Value = Vector4<f64>> {
     })
 }
 
-/// Numbers that look random (Vigna's SplitMix64).
+/// A pseudo-random generator (Vigna's SplitMix64).
 struct Random(u64);
 
 impl Random {
@@ -203,7 +204,7 @@ impl Random {
         ((mixed ^ mixed >> 31) % end as u64) as i64
     }
 
-    /// Two corners up to 2000 steps apart, or 6, and one within a few steps of the line between them.
+    /// Two corners up to 2000 or up to 6 steps apart, and one within a few steps of the line between them.
     fn sliver(&mut self) -> [GridPoint; 3] {
         let reach = if self.below(2) == 0 { 2000 } else { 6 };
         let from = [0, 1].map(|axis| self.below(PICTURE[axis] as i64 * STEPS_PER_PIXEL));

@@ -1,19 +1,19 @@
-//! The convex parts of every mesh, worked out once.
+//! The convex parts of all meshes.
 
 use crate::raster::ConvexPart;
 use crate::scene::Assets;
 
-/// The [convex parts](ConvexPart) of a collection's meshes, worked out when a mesh comes or changes.
+/// The [convex parts](ConvexPart) of a collection's meshes, computed when a mesh is added or changes.
 #[derive(Debug, Default)]
 pub struct OccluderMeshes {
-    /// Whose meshes they are, and as of when.
+    /// The identity and the revision of the collection at the last [`OccluderMeshes::sync`].
     synced: Option<(u64, u64)>,
-    /// For each slot: the mesh's revision, and its parts.
+    /// For each slot, the mesh's revision and its parts.
     parts: Vec<(u64, Vec<ConvexPart>)>,
 }
 
 impl OccluderMeshes {
-    /// Takes in what has changed.
+    /// Updates the parts of meshes that have changed.
     pub fn sync(&mut self, assets: &Assets) {
         let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
         if self.synced == Some((identity, revision)) {
@@ -27,13 +27,13 @@ impl OccluderMeshes {
         for (slot, parts) in (0..).zip(&mut self.parts) {
             match assets.meshes.revised_at(slot) {
                 Some((revision, _)) if parts.0 == revision => {}
-                Some((revision, mesh)) => *parts = (revision, ConvexPart::of(mesh)),
+                Some((revision, mesh)) => *parts = (revision, ConvexPart::decompose(mesh)),
                 None => *parts = (0, Vec::new()),
             }
         }
     }
 
-    /// Those of the mesh in a slot, the largest first; none where there is no mesh.
+    /// The parts of the mesh in a slot, the largest first; none if there is no mesh.
     pub fn parts(&self, slot: u32) -> &[ConvexPart] {
         self.parts.get(slot as usize).map_or(&[], |(_, parts)| parts)
     }
