@@ -1,7 +1,7 @@
 //! The bounding volumes that culling tests.
 
-/// The bounding volume of objects that is tested against view frustums. A tighter volume draws fewer invisible objects, and takes
-/// longer to test.
+/// The bounding volume of objects that is tested against view frustums. A tighter volume draws fewer invisible objects,
+/// and takes longer to test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum CullingVolume {
     /// No culling: everything is drawn.

@@ -19,9 +19,9 @@ pub enum DepthCurve {
         /// In metres, above 0 and finite.
         far: f32,
     },
-    /// By the bits of the f32, from the view's near plane to its far plane: each doubling of the distance has the same number of codes,
-    /// uniform in between. Nearer and farther distances are clamped. With a far plane at infinity, codes cover all distances up to
-    /// 2¹²⁸ m.
+    /// By the bits of the f32, from the view's near plane to its far plane: each doubling of the distance has the same
+    /// number of codes, uniform in between. Nearer and farther distances are clamped. With a far plane at infinity,
+    /// codes cover all distances up to 2¹²⁸ m.
     Logarithmic,
 }
 
@@ -35,27 +35,32 @@ impl DepthKey {
     /// The whole f32: distances that differ in f32 are never in the wrong order.
     pub const EXACT: Self = Self { bits: Self::MAX_BLENDED_BITS, curve: DepthCurve::Logarithmic };
 
-    /// Quantizes a distance along the view's axis, in metres, for a view from `near` to `far`. Codes grow with the distance. A code is in
-    /// the upper [`DepthKey::bits`] of the 32 bits; the others are 0, so shorter keys leave fewer bits to sort by.
+    /// Quantizes a distance along the view's axis, in metres, for a view from `near` to `far`. Codes grow with the
+    /// distance. A code is in the upper [`DepthKey::bits`] of the 32 bits; the others are 0, so shorter keys leave
+    /// fewer bits to sort by.
     ///
-    /// NaN counts as nearest. With 32 bits, which also order distances behind the camera, it counts as beyond the infinity of its sign.
+    /// NaN counts as nearest. With 32 bits, which also order distances behind the camera, it counts as beyond the
+    /// infinity of its sign.
     pub fn quantize(self, depth: f32, near: f32, far: f32) -> u32 {
         self.quantizer(near, far).quantize(depth)
     }
 
-    /// The quantization step at `distance`: the maximum difference in metres between two distances in the wrong order, the farther being
-    /// at `distance`, in a view from `near` to `far`, if both are within the curve's range. Infinite if `distance` is out of that range.
+    /// The quantization step at `distance`: the maximum difference in metres between two distances in the wrong order,
+    /// the farther being at `distance`, in a view from `near` to `far`, if both are within the curve's range. Infinite
+    /// if `distance` is out of that range.
     ///
-    /// Codes never decrease as the distance grows, so two distances can be in the wrong order only if they have the same code.
+    /// Codes never decrease as the distance grows, so two distances can be in the wrong order only if they have the
+    /// same code.
     ///
-    /// Linear: a code's interval is `far` / 2ᵇ wide. Rounding in f64 adds at most 2⁻⁵³ of each of two codes below 2³¹, less than 2⁻²⁰
-    /// of the width.
+    /// Linear: a code's interval is `far` / 2ᵇ wide. Rounding in f64 adds at most 2⁻⁵³ of each of two codes below 2³¹,
+    /// less than 2⁻²⁰ of the width.
     ///
-    /// Logarithmic: with S floats from near to far, a code's interval contains S / 2ᵇ of them. Two floats that many apart differ by at
-    /// most as many units in the last place of the greater one, each at most 2⁻²³ of it. S has 2²³ floats for each doubling, and from m to
-    /// m + 1 times a power of two (1 ≤ m ≤ 2) up to 0.0861 more than log₂ gives, so the step is at most
-    /// (log₂(far / near) + 0.0862) / 2ᵇ of the distance; a far plane at infinity counts as one at 2¹²⁸ m. If S is at most 2ᵇ, every
-    /// float has its own code, and the step is 0. Rounding S adds less than 2⁻³⁰.
+    /// Logarithmic: with S floats from near to far, a code's interval contains S / 2ᵇ of them. Two floats that many
+    /// apart differ by at most as many units in the last place of the greater one, each at most 2⁻²³ of it. S has 2²³
+    /// floats for each doubling, and from m to m + 1 times a power of two (1 ≤ m ≤ 2) up to 0.0861 more than log₂
+    /// gives, so the step is at most (log₂(far / near) + 0.0862) / 2ᵇ of the distance; a far plane at infinity counts
+    /// as one at 2¹²⁸ m. If S is at most 2ᵇ, every float has its own code, and the step is 0. Rounding S adds less than
+    /// 2⁻³⁰.
     ///
     /// With 32 bits the step is 0, whatever the curve.
     pub fn step(self, distance: f32, near: f32, far: f32) -> f64 {

@@ -25,29 +25,31 @@ use super::{
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// The depth precision of the front-to-back order of opaque objects of one mesh: 1 to [`DepthKey::MAX_OPAQUE_BITS`] bits.
+    /// The depth precision of the front-to-back order of opaque objects of one mesh: 1 to [`DepthKey::MAX_OPAQUE_BITS`]
+    /// bits.
     ///
-    /// Error: pairs drawn back to front, which cause overdraw but do not change the picture. Cost: only the additional bits to sort by.
+    /// Error: pairs drawn back to front, which cause overdraw but do not change the picture. Cost: only the additional
+    /// bits to sort by.
     pub opaque_order: DepthKey,
     /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
     ///
-    /// Error: pairs drawn in the wrong order, which is visible; none farther apart than [`DepthKey::step`]. Cost: a radix sort pass for
-    /// some nine bits.
+    /// Error: pairs drawn in the wrong order, which is visible; none farther apart than [`DepthKey::step`]. Cost: a
+    /// radix sort pass for some nine bits.
     pub blended_order: DepthKey,
     /// The bounding volume for view frustum culling.
     ///
-    /// Error: invisible objects that are drawn; visible objects are never culled. So the picture does not change, with two exceptions:
-    /// objects at or beyond the far plane of a perspective view, which culls whole objects by their volume, and absolute transforms,
-    /// which draw objects at inaccurate positions. Cost: some 2 ns per object and view; boxes take as long again for objects that the
-    /// bounding sphere does not decide.
+    /// Error: invisible objects that are drawn; visible objects are never culled. So the picture does not change, with
+    /// two exceptions: objects at or beyond the far plane of a perspective view, which culls whole objects by their
+    /// volume, and absolute transforms, which draw objects at inaccurate positions. Cost: some 2 ns per object and
+    /// view; boxes take as long again for objects that the bounding sphere does not decide.
     pub culling: CullingVolume,
-    /// The tile size of occlusion culling, which removes objects that larger ones hide: 1, 2, 4, 8 or 16 pixels of the view's picture;
-    /// `None` disables it. See S 9.6.
+    /// The tile size of occlusion culling, which removes objects that larger ones hide: 1, 2, 4, 8 or 16 pixels of the
+    /// view's picture; `None` disables it. See S 9.6.
     ///
-    /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on the CPU. If it
-    /// takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for a while. It requires that an
-    /// engine's own shaders draw opaque objects exactly as their meshes are; objects that they move, or discard parts of, must have
-    /// bounds other than their mesh's.
+    /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
+    /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
+    /// a while. It requires that an engine's own shaders draw opaque objects exactly as their meshes are; objects that
+    /// they move, or discard parts of, must have bounds other than their mesh's.
     pub occlusion: Option<u32>,
     /// The format of normals in the geometry buffer.
     ///
@@ -59,20 +61,24 @@ pub struct Quality {
     pub diffuse: DiffuseFormat,
     /// The format of vertices in device memory (S 9.6).
     ///
-    /// Error: degrees of the normal, and texels. Cost: 32 or 20 bytes per vertex. Meshes are uploaded again when it changes.
+    /// Error: degrees of the normal, and texels. Cost: 32 or 20 bytes per vertex. Meshes are uploaded again when it
+    /// changes.
     pub vertices: VertexFormat,
     /// Whether a depth pre-pass precedes the geometry buffer.
     ///
-    /// Error: where surfaces have exactly the same depth, another one may be visible; all other pixels do not change. Cost: all vertices
-    /// are transformed twice, but each pixel is shaded only once. It is worth its cost if pixels cost more than vertices.
+    /// Error: where surfaces have exactly the same depth, another one may be visible; all other pixels do not change.
+    /// Cost: all vertices are transformed twice, but each pixel is shaded only once. It is worth its cost if pixels
+    /// cost more than vertices.
     pub depth_pre_pass: bool,
     /// The shadow map settings of a [`Deferred`](crate::process::Deferred) pipeline.
     pub shadows: ShadowQuality,
-    /// The illuminance (in the units of the scene's lights) below which lights are cut off, at least 0. At 0, they end at their range.
+    /// The illuminance (in the units of the scene's lights) below which lights are cut off, at least 0. At 0, they end
+    /// at their range.
     ///
-    /// Error: at any point, the illuminance of each light differs by at most 1.089 times this. A light of intensity I is drawn up to
-    /// r = √(I / cut-off), and windowed by (1 − (d/r)⁴)². With s = d/r the difference from I/d² is the cut-off times 2s² − s⁶ up to
-    /// s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. Cost: the pixels within the lights' reach.
+    /// Error: at any point, the illuminance of each light differs by at most 1.089 times this. A light of intensity I
+    /// is drawn up to r = √(I / cut-off), and windowed by (1 − (d/r)⁴)². With s = d/r the difference from I/d² is the
+    /// cut-off times 2s² − s⁶ up to s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. Cost: the
+    /// pixels within the lights' reach.
     pub light_cut_off: f32,
     /// The tone mapping curve.
     ///

@@ -7,26 +7,28 @@ use super::QualityError;
 pub struct ShadowQuality {
     /// The width and height of a map in pixels, at least 1.
     ///
-    /// Error: along shadow edges, pixels of the picture that are wrongly lit or wrongly in shadow, in a band as wide as a pixel of the
-    /// map. Cost: pixels drawn, and 4 bytes each.
+    /// Error: along shadow edges, pixels of the picture that are wrongly lit or wrongly in shadow, in a band as wide as
+    /// a pixel of the map. Cost: pixels drawn, and 4 bytes each.
     pub side: u32,
-    /// The radius of percentage-closer filtering, 0 to [`ShadowQuality::MAX_FILTER`]: shadows fade over 2·`filter` + 1 pixels of the map;
-    /// 0 is bilinear filtering. Cost: (2·`filter` + 2)² pixels of the map are read for each pixel of the picture.
+    /// The radius of percentage-closer filtering, 0 to [`ShadowQuality::MAX_FILTER`]: shadows fade over 2·`filter` + 1
+    /// pixels of the map; 0 is bilinear filtering. Cost: (2·`filter` + 2)² pixels of the map are read for each pixel of
+    /// the picture.
     pub filter: u32,
-    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require, at least 0. Below 1, lit surfaces shadow
-    /// themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
+    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require, at least 0. Below 1, lit
+    /// surfaces shadow themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
-    /// Maps are drawn every `interval` frames, at least 1. They are also drawn at once if a light with a map is added or removed, if the
-    /// quality or the plan changes, or if a directional light's map no longer fits what cameras see: if its centre is off by a quarter of
-    /// its radius, or its radius is a quarter too small. In between, a light with a map keeps its position and range.
+    /// Maps are drawn every `interval` frames, at least 1. They are also drawn at once if a light with a map is added
+    /// or removed, if the quality or the plan changes, or if a directional light's map no longer fits what cameras see:
+    /// if its centre is off by a quarter of its radius, or its radius is a quarter too small. In between, a light with
+    /// a map keeps its position and range.
     ///
-    /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` − 1)·v·Δt metres. Cost:
-    /// the maps' share of a frame, divided by this.
+    /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` −
+    /// 1)·v·Δt metres. Cost: the maps' share of a frame, divided by this.
     pub interval: u32,
-    /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight line, above 0 and up
-    /// to 90: longer edges are subdivided. The error of a straight edge is 38 pixels of a map of 1024 at 45°, 7.7 at 20°, 1.9 at 10°, 0.48 at 5° and 0.08 at
-    /// 2° (Brabec et al. 2002). Cost: each
-    /// subdivision level multiplies triangles by four.
+    /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight
+    /// line, above 0 and up to 90: longer edges are subdivided. The error of a straight edge is 38 pixels of a map of
+    /// 1024 at 45°, 7.7 at 20°, 1.9 at 10°, 0.48 at 5° and 0.08 at 2° (Brabec et al. 2002). Cost: each subdivision
+    /// level multiplies triangles by four.
     pub widest_edge: f32,
 }
 

@@ -18,8 +18,8 @@ pub(super) enum Overlap {
     Across,
 }
 
-/// The guard band's size as a multiple of the picture's: triangles beyond the picture's edges are clipped only where they exceed
-/// the guard band. In the largest picture it ends 2²⁷ steps away, within
+/// The guard band's size as a multiple of the picture's: triangles beyond the picture's edges are clipped only where
+/// they exceed the guard band. In the largest picture it ends 2²⁷ steps away, within
 /// [`MAX_COORDINATE`](super::grid::MAX_COORDINATE).
 const GUARD_BAND: f64 = 64.0;
 
@@ -42,7 +42,8 @@ pub(super) fn classify<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3])
 
 /// The part of a triangle within the near plane, the far plane and the guard band: the corners of a polygon.
 ///
-/// An intersection does not depend on the edge's direction, so two triangles with a common edge are clipped at bit-identical points.
+/// An intersection does not depend on the edge's direction, so two triangles with a common edge are clipped at
+/// bit-identical points.
 pub(super) fn clip<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> Vec<ClipCorner<R, V>> {
     let mut polygon = corners.to_vec();
     let mut clipped = Vec::with_capacity(3 + PLANES);
@@ -71,7 +72,8 @@ fn outside_planes<R: Real>(clip: &Vector4<R>, band: f64) -> u32 {
     distances(clip, band).iter().fold(0, |planes, &distance| planes << 1 | u32::from(distance < R::zero()))
 }
 
-/// A point's distances inside all planes, the side planes scaled by `band`. The signs are exact, because `band` is a power of 2.
+/// A point's distances inside all planes, the side planes scaled by `band`. The signs are exact, because `band` is a
+/// power of 2.
 fn distances<R: Real>(clip: &Vector4<R>, band: f64) -> [R; PLANES] {
     let [x, y, z, w] = clip.0;
     let [x, y] = [x, y].map(|coordinate| coordinate * R::of(1.0 / band));

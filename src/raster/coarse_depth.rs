@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use super::silhouettes::{Silhouette, Silhouettes};
 
-/// For each tile of a picture, the least nearness within the tile of the nearest silhouettes that cover it entirely (after
-/// Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area, where theirs is by
-/// samples).
+/// For each tile of a picture, the least nearness within the tile of the nearest silhouettes that cover it entirely
+/// (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area,
+/// where theirs is by samples).
 ///
-/// A tile is covered if each of its cells is inside all lines of some [silhouette](Silhouettes). Lines and planes are linear, so
-/// they are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is hidden in the whole tile.
-/// Silhouettes that cover some cells are merged until they cover all; the merged nearness is the least of theirs. Drawing
-/// silhouettes nearest first keeps it as great as possible.
+/// A tile is covered if each of its cells is inside all lines of some [silhouette](Silhouettes). Lines and planes are
+/// linear, so they are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is
+/// hidden in the whole tile. Silhouettes that cover some cells are merged until they cover all; the merged nearness is
+/// the least of theirs. Drawing silhouettes nearest first keeps it as great as possible.
 ///
 /// Different strips may be drawn at the same time. The buffer may be tested after all strips have been drawn.
 #[derive(Debug, Default)]
@@ -59,7 +59,8 @@ impl CoarseDepth {
     /// A block's width in tiles. Large rectangles are tested against blocks first. A strip is a row of blocks.
     pub const BLOCK: usize = 8;
 
-    /// Resizes the buffer for a picture, with tiles of `tile_size` pixels. The contents are valid only after all strips have been drawn.
+    /// Resizes the buffer for a picture, with tiles of `tile_size` pixels. The contents are valid only after all strips
+    /// have been drawn.
     pub fn reset(&mut self, picture: [u32; 2], tile_size: u32) {
         self.tile_size = f64::from(tile_size.max(1));
         // A cell is at least a pixel wide.
@@ -221,8 +222,8 @@ impl CoarseDepth {
         f32::from_bits(self.tiles[row as usize * self.size[0] + column as usize].load(Ordering::Relaxed))
     }
 
-    /// Whether a rectangle of the picture is hidden beyond `nearness`. `low` and `high` are its corners in pixels. The part outside the
-    /// picture is ignored; if the whole rectangle is outside, the result is `false`.
+    /// Whether a rectangle of the picture is hidden beyond `nearness`. `low` and `high` are its corners in pixels. The
+    /// part outside the picture is ignored; if the whole rectangle is outside, the result is `false`.
     pub fn hides(&self, low: [f64; 2], high: [f64; 2], nearness: f32) -> bool {
         let range = |axis: usize| {
             let count = self.size[axis] as f64;

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::grid::{GridPoint, HALF_PIXEL, STEPS_PER_PIXEL};
 
-/// The edge function of a triangle's edge: at a pixel's centre, twice the signed area, in square steps, of the triangle between the
-/// edge and that centre. It is not negative on the inner side.
+/// The edge function of a triangle's edge: at a pixel's centre, twice the signed area, in square steps, of the triangle
+/// between the edge and that centre. It is not negative on the inner side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
     /// The value at the centre of the picture's top left pixel.
@@ -14,8 +14,9 @@ pub(super) struct Edge {
     pub across: i64,
     /// The change to the next row.
     down: i64,
-    /// The min_inside value that counts as inside, by the top-left rule of Direct3D, Metal and Vulkan's devices: of two triangles with a
-    /// common edge, pixels on it belong to the one for which it is a left edge or a horizontal top edge.
+    /// The min_inside value that counts as inside, by the top-left rule of Direct3D, Metal and Vulkan's devices: of two
+    /// triangles with a common edge, pixels on it belong to the one for which it is a left edge or a horizontal top
+    /// edge.
     min_inside: i64,
 }
 

@@ -27,8 +27,8 @@ impl Winding {
     }
 }
 
-/// A point of the grid: steps to the right and down from the picture's top left. A pixel has [`STEPS_PER_PIXEL`], as Direct3D 11
-/// requires and most other devices have (8 bits of sub-pixel precision).
+/// A point of the grid: steps to the right and down from the picture's top left. A pixel has [`STEPS_PER_PIXEL`], as
+/// Direct3D 11 requires and most other devices have (8 bits of sub-pixel precision).
 pub(super) type GridPoint = [i64; 2];
 
 /// The number of steps across a pixel.
@@ -37,8 +37,8 @@ pub(super) const STEPS_PER_PIXEL: i64 = 256;
 /// The number of steps from a pixel's edge to its centre, where it is sampled.
 pub(super) const HALF_PIXEL: i64 = STEPS_PER_PIXEL / 2;
 
-/// The maximum absolute coordinate of a point: the difference of two is at most 2²⁹, a product of two differences 2⁵⁸, and a
-/// difference of such products 2⁵⁹, which fits into an i64.
+/// The maximum absolute coordinate of a point: the difference of two is at most 2²⁹, a product of two differences 2⁵⁸,
+/// and a difference of such products 2⁵⁹, which fits into an i64.
 pub(super) const MAX_COORDINATE: i64 = 1 << 28;
 
 /// Snaps a clip-space position to the grid of a picture, given in pixels. Requires w > 0 and finite coordinates.

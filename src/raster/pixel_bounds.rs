@@ -1,6 +1,7 @@
 //! Rectangles of pixels.
 
-/// A half-open rectangle of pixels: the columns `left..right` and the rows `top..bottom`, counted from the picture's top left.
+/// A half-open rectangle of pixels: the columns `left..right` and the rows `top..bottom`, counted from the picture's
+/// top left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelBounds {
     /// The first column.

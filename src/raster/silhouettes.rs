@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-/// Convex polygons in the picture with bounds of their nearness: the lines of their edges and the planes of their faces, in one array
-/// each for all silhouettes.
+/// Convex polygons in the picture with bounds of their nearness: the lines of their edges and the planes of their
+/// faces, in one array each for all silhouettes.
 ///
 /// Nearness is any measure that grows towards the camera and is linear in the picture for a flat face, as 1 ÷ depth is in
 /// perspective. Points are in pixels, x to the right and y down.
@@ -63,9 +63,10 @@ impl Silhouettes {
         self.shapes.is_empty()
     }
 
-    /// Adds the convex hull of `corners`, shrunk by `margin` pixels. At each point its nearness is the least of those of `planes`. A
-    /// plane is its change per pixel to the right, its change per pixel down, and its value at the picture's origin. Where all
-    /// planes are nearer than `opening_nearness`, nothing is covered. Nothing is nearer than `max_nearness`.
+    /// Adds the convex hull of `corners`, shrunk by `margin` pixels. At each point its nearness is the least of those
+    /// of `planes`. A plane is its change per pixel to the right, its change per pixel down, and its value at the
+    /// picture's origin. Where all planes are nearer than `opening_nearness`, nothing is covered. Nothing is nearer
+    /// than `max_nearness`.
     ///
     /// Silhouettes without area or planes, or with numbers that are not finite, are ignored.
     pub fn add(
@@ -113,8 +114,8 @@ impl Silhouettes {
 
 /// The convex hull, counter-clockwise with y up (Andrew's monotone chain, 1979).
 ///
-/// Rounding may omit a corner that almost lies between its neighbours, or keep one just inside the hull. In either case, a point
-/// inside the lines of all edges is inside the polygon.
+/// Rounding may omit a corner that almost lies between its neighbours, or keep one just inside the hull. In either
+/// case, a point inside the lines of all edges is inside the polygon.
 fn convex_hull(corners: &mut Vec<DVec2>, hull: &mut Vec<DVec2>) {
     corners.sort_unstable_by(|one, other| one.x.total_cmp(&other.x).then(one.y.total_cmp(&other.y)));
     corners.dedup();

@@ -9,9 +9,9 @@ use super::{PixelBounds, Real, Vector4};
 
 /// A triangle set up for a picture of some size, with `V` varyings.
 ///
-/// It covers exactly the pixels that it covers on a device: corners are snapped to a 256th of a pixel, and a pixel is covered if its
-/// centre is inside, or on a top or left edge. Coverage is computed in exact integers, so triangles with a common edge leave no gap
-/// between them and overlap in no pixel.
+/// It covers exactly the pixels that it covers on a device: corners are snapped to a 256th of a pixel, and a pixel is
+/// covered if its centre is inside, or on a top or left edge. Coverage is computed in exact integers, so triangles with
+/// a common edge leave no gap between them and overlap in no pixel.
 #[derive(Clone, Debug)]
 pub struct Triangle<R, const V: usize> {
     /// Clockwise in the picture; edge `i` is opposite corner `i`.
@@ -39,11 +39,12 @@ pub struct Interpolated<R, const V: usize> {
 }
 
 impl<R: Real, const V: usize> Triangle<R, V> {
-    /// Sets up a triangle, given by its corners' clip-space positions and varyings, for a `picture` of that width and height in pixels,
-    /// and appends it to `triangles`: several triangles if it is clipped, none if it covers no pixel. `culled` is the winding to cull.
+    /// Sets up a triangle, given by its corners' clip-space positions and varyings, for a `picture` of that width and
+    /// height in pixels, and appends it to `triangles`: several triangles if it is clipped, none if it covers no pixel.
+    /// `culled` is the winding to cull.
     ///
-    /// Depth is reversed: visible points have 0 ≤ z ≤ w. The far plane is at z = 0, may be at infinity, and clips, as in wgpu. Nothing
-    /// is appended if a corner is not finite, or if the picture is larger than [`MAX_PICTURE_SIZE`].
+    /// Depth is reversed: visible points have 0 ≤ z ≤ w. The far plane is at z = 0, may be at infinity, and clips, as
+    /// in wgpu. Nothing is appended if a corner is not finite, or if the picture is larger than [`MAX_PICTURE_SIZE`].
     pub fn set_up(
         corners: &[(Vector4<R>, [R; V]); 3],
         picture: [usize; 2],
@@ -69,14 +70,14 @@ impl<R: Real, const V: usize> Triangle<R, V> {
         self.bounds
     }
 
-    /// Calls `visit` with the column and row, and the depth, of each covered pixel within some bounds: row by row from the top, each
-    /// from left to right.
+    /// Calls `visit` with the column and row, and the depth, of each covered pixel within some bounds: row by row from
+    /// the top, each from left to right.
     ///
-    /// Depth is z ÷ w, linear in the picture. It is bit-identical for any bounds, lies between the depths of the nearest and the
-    /// farthest corner, and differs by at most 8 unit roundoffs (2⁻²⁴ of it each, in f32) from the exact interpolation between the
-    /// snapped corners: it is the sum of each corner's depth times its barycentric weight, where no term is negative, so no error
-    /// grows by cancellation. A weight is an exact integer rounded once (1 unit), the product (1), two sums (2), 1 ÷ area (2), and the
-    /// product with it (1).
+    /// Depth is z ÷ w, linear in the picture. It is bit-identical for any bounds, lies between the depths of the
+    /// nearest and the farthest corner, and differs by at most 8 unit roundoffs (2⁻²⁴ of it each, in f32) from the
+    /// exact interpolation between the snapped corners: it is the sum of each corner's depth times its barycentric
+    /// weight, where no term is negative, so no error grows by cancellation. A weight is an exact integer rounded once
+    /// (1 unit), the product (1), two sums (2), 1 ÷ area (2), and the product with it (1).
     pub fn rasterize(&self, within: PixelBounds, mut visit: impl FnMut([usize; 2], R)) {
         let bounds = self.bounds.intersection(within);
         for row in bounds.top..bounds.bottom {
@@ -92,9 +93,9 @@ impl<R: Real, const V: usize> Triangle<R, V> {
 
     /// The varyings at a pixel's centre, interpolated with perspective correction, and their derivatives.
     ///
-    /// The derivatives are a device's fine derivatives: the differences between the two columns, and the two rows, of the pixel's
-    /// 2 × 2 quad, which starts at an even column and row. As on a device, pixels of the quad outside the triangle are
-    /// extrapolated. Where extrapolation would lead behind the camera, the derivative is 0.
+    /// The derivatives are a device's fine derivatives: the differences between the two columns, and the two rows, of
+    /// the pixel's 2 × 2 quad, which starts at an even column and row. As on a device, pixels of the quad outside the
+    /// triangle are extrapolated. Where extrapolation would lead behind the camera, the derivative is 0.
     pub fn interpolate(&self, pixel: [usize; 2]) -> Interpolated<R, V> {
         let [column, row] = pixel.map(|coordinate| coordinate as i64);
         let here = self.weights([column, row]).unwrap_or_else(|| self.linear_weights([column, row]));

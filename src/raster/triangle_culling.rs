@@ -45,39 +45,43 @@ impl AddAssign for CulledTriangles {
 /// A vertex for [`cull_triangles`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CullVertex {
-    /// The clip-space position, with reversed depth: visible points have 0 ≤ z ≤ w. A device's position may differ by 2⁻¹³ of
+    /// The clip-space position, with reversed depth: visible points have 0 ≤ z ≤ w. A device's position may differ by
+    /// 2⁻¹³ of
     /// |x| + |y| + |z| + |w|.
     pub clip: Vector4<f64>,
     /// Whether a device's position in the picture, before snapping, differs by less than a 256th of a pixel.
     pub is_accurate: bool,
 }
 
-/// Appends to `remaining` the indices, three each and in order, of the `triangles` that may cover a pixel of a `picture` of that
-/// width and height in pixels. `vertices` are the mesh's vertices. `culled` is the winding to cull; for a mirrored object it is the
-/// other one.
+/// Appends to `remaining` the indices, three each and in order, of the `triangles` that may cover a pixel of a
+/// `picture` of that width and height in pixels. `vertices` are the mesh's vertices. `culled` is the winding to cull;
+/// for a mirrored object it is the other one.
 ///
-/// The result is conservative: no triangle that a device would draw is culled, although the device has positions in f32 only:
+/// The result is conservative: no triangle that a device would draw is culled, although the device has positions in f32
+/// only:
 ///
-/// - **Off-screen**: all three corners are on the outer side of one plane. A corner counts as outside only by more than 2⁻¹² of
-///   |x| + |y| + |z| + |w|. A device's error may be that large: a sum of products in f32 is within some units of 2⁻²⁴ of the sum of
-///   their magnitudes, and these may be a thousand times the result's. If all corners are outside a plane, so are all points
-///   between them, in front of the camera and behind it.
+/// - **Off-screen**: all three corners are on the outer side of one plane. A corner counts as outside only by more than
+///   2⁻¹² of |x| + |y| + |z| + |w|. A device's error may be that large: a sum of products in f32 is within some units
+///   of 2⁻²⁴ of the sum of their magnitudes, and these may be a thousand times the result's. If all corners are outside
+///   a plane, so are all points between them, in front of the camera and behind it.
 /// - **Degenerate**: two corners have the same four coordinates, so they coincide on the device as well.
-/// - **Back-facing** and **zero-size** are decided only for [accurate](CullVertex::is_accurate) corners. They are snapped to steps of a
-///   256th of a pixel, and tested in integers such that each corner may be a step off along both axes. That suffices if a device's
-///   corner is less than a step away before it is snapped: the nearest integers of two numbers less than 1 apart are at most 1 apart.
-///   With camera-relative transforms, corners are within 1e-3 pixels, a quarter of a step, unless they are nearer to the camera than
-///   their mesh is large. Twice the area, a×b + b×c + c×a, changes by dᵢ×(pᵢ₊₁ − pᵢ₊₂) if one corner moves by dᵢ, at most by the
-///   opposite edge's extent along x plus that along y, and by dᵢ×dⱼ if two move, at most 2 for each of the three pairs. So if twice the
-///   area exceeds the extents of the edges + 6, the device finds the same winding. A covered pixel has its centre in the bounding
-///   rectangle of the corners. So nothing is drawn if that rectangle, enlarged by a step on each side, contains no pixel centre.
-///   Neither test applies to a triangle that a device may clip, because parts of it could turn over: that is, if a corner is not
-///   certainly inside the near plane (with w ≤ 0 it is not), the far plane, and twice the picture's width and height. All corners are
-///   inside a far plane at infinity if they have the same z: then z is a constant, on the device as well.
+/// - **Back-facing** and **zero-size** are decided only for [accurate](CullVertex::is_accurate) corners. They are
+///   snapped to steps of a 256th of a pixel, and tested in integers such that each corner may be a step off along both
+///   axes. That suffices if a device's corner is less than a step away before it is snapped: the nearest integers of
+///   two numbers less than 1 apart are at most 1 apart. With camera-relative transforms, corners are within 1e-3
+///   pixels, a quarter of a step, unless they are nearer to the camera than their mesh is large. Twice the area, a×b +
+///   b×c + c×a, changes by dᵢ×(pᵢ₊₁ − pᵢ₊₂) if one corner moves by dᵢ, at most by the opposite edge's extent along x
+///   plus that along y, and by dᵢ×dⱼ if two move, at most 2 for each of the three pairs. So if twice the area exceeds
+///   the extents of the edges + 6, the device finds the same winding. A covered pixel has its centre in the bounding
+///   rectangle of the corners. So nothing is drawn if that rectangle, enlarged by a step on each side, contains no
+///   pixel centre. Neither test applies to a triangle that a device may clip, because parts of it could turn over: that
+///   is, if a corner is not certainly inside the near plane (with w ≤ 0 it is not), the far plane, and twice the
+///   picture's width and height. All corners are inside a far plane at infinity if they have the same z: then z is a
+///   constant, on the device as well.
 ///
-/// So a triangle whose area is exactly 0 after snapping is kept if its corners differ and a pixel centre is in its bounding rectangle:
-/// a step further, its area is not 0. Triangles with an index beyond `vertices`, or with a corner that is not finite, are kept, too: the
-/// caller decides whether to reject them.
+/// So a triangle whose area is exactly 0 after snapping is kept if its corners differ and a pixel centre is in its
+/// bounding rectangle: a step further, its area is not 0. Triangles with an index beyond `vertices`, or with a corner
+/// that is not finite, are kept, too: the caller decides whether to reject them.
 pub fn cull_triangles(
     vertices: &[CullVertex],
     triangles: impl Iterator<Item = [u32; 3]>,

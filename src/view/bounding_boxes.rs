@@ -26,8 +26,8 @@ pub enum BoundingBoxes {
     Oriented(Box<LaneGroups<10>>),
 }
 
-/// `N` numbers per box, in metres. The numbers of eight boxes are adjacent, so a test of one box touches few cache lines, and a
-/// test of all boxes loads nothing superfluous.
+/// `N` numbers per box, in metres. The numbers of eight boxes are adjacent, so a test of one box touches few cache
+/// lines, and a test of all boxes loads nothing superfluous.
 pub type LaneGroups<const N: usize> = [[[f32; LANES]; N]; BoundingSpheres::COUNT / LANES];
 
 impl BoundingBoxes {
@@ -89,15 +89,15 @@ fn store<const N: usize, const M: usize>(groups: &mut LaneGroups<N>, entry: usiz
 }
 
 impl Frustum {
-    /// Tests the boxes of the `candidates` among the [`Frustum::WORD`] objects from `first` on; bit 0 of either mask is `first`.
-    /// Returns a mask of the boxes that intersect the frustum. The test is conservative: a box that intersects the frustum is
-    /// never missing, a box just outside may be included.
+    /// Tests the boxes of the `candidates` among the [`Frustum::WORD`] objects from `first` on; bit 0 of either mask is
+    /// `first`. Returns a mask of the boxes that intersect the frustum. The test is conservative: a box that intersects
+    /// the frustum is never missing, a box just outside may be included.
     ///
-    /// A box with the half axes a extends Σ|n·a| from its centre towards a plane of normal n (Gottschalk et al. 1996). Each
-    /// product carries five roundings of u = 2⁻²⁴ (of the normal, of the axis, of itself, and of two sums), and the sum over the
-    /// axes two more; normals have unit length, so the error of the extent R is at most 7u·Σ‖a‖₁. The error of the distance is at
-    /// most 11.5uN + u|o| (see [`Frustum::intersects_sphere`]), and that of their sum at most
-    /// u(|d| + R) ≤ u(1.5N + |o|) + u·Σ‖a‖₁. The tolerance is 16u each of N, of |o| and, in the margin, of Σ‖a‖₁.
+    /// A box with the half axes a extends Σ|n·a| from its centre towards a plane of normal n (Gottschalk et al. 1996).
+    /// Each product carries five roundings of u = 2⁻²⁴ (of the normal, of the axis, of itself, and of two sums), and
+    /// the sum over the axes two more; normals have unit length, so the error of the extent R is at most 7u·Σ‖a‖₁. The
+    /// error of the distance is at most 11.5uN + u|o| (see [`Frustum::intersects_sphere`]), and that of their sum at
+    /// most u(|d| + R) ≤ u(1.5N + |o|) + u·Σ‖a‖₁. The tolerance is 16u each of N, of |o| and, in the margin, of Σ‖a‖₁.
     ///
     /// NaN counts as intersecting: the caller has already rejected objects with invalid transforms.
     ///

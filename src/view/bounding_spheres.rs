@@ -16,8 +16,8 @@ impl BoundingSphere {
     pub const EMPTY: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
 }
 
-/// The bounding spheres of [`BoundingSpheres::COUNT`] objects, one array for each coordinate: a test loads only the coordinates
-/// that it needs, and tests several spheres with one instruction.
+/// The bounding spheres of [`BoundingSpheres::COUNT`] objects, one array for each coordinate: a test loads only the
+/// coordinates that it needs, and tests several spheres with one instruction.
 #[derive(Clone, Debug)]
 pub struct BoundingSpheres {
     /// World-space x, y and z in metres.

@@ -11,7 +11,8 @@ use crate::command::{DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
 
-/// Fills the commands of one pass. It computes no state: it copies what the object table holds, so workers contend for nothing.
+/// Fills the commands of one pass. It computes no state: it copies what the object table holds, so workers contend for
+/// nothing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fill<'a> {
     /// The frame's objects.
@@ -36,8 +37,8 @@ struct DepthOrder {
 }
 
 impl Fill<'_> {
-    /// Writes one command for each visible object whose rank is in `ranks`, at the index that is its rank: its index among the
-    /// visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
+    /// Writes one command for each visible object whose rank is in `ranks`, at the index that is its rank: its index
+    /// among the visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
     pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
         let camera = &self.view.camera;
         let order = DepthOrder {
@@ -84,7 +85,8 @@ impl Fill<'_> {
             }
         }
         let center = objects.spheres.get(entry).center;
-        // In f64, rounded once: two depths that differ in f32 are in the right order, however far the objects are to the side.
+        // In f64, rounded once: two depths that differ in f32 are in the right order, however far the objects are to
+        // the side.
         let depth = order.forward.dot(center - self.view.camera.position) as f32;
         let key = match blend {
             Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.quantize(depth)),

@@ -4,15 +4,15 @@ use glam::DVec3;
 
 /// A position in 64-bit fixed point, in steps of 2⁻³⁰ m (just below a nanometre).
 ///
-/// Devices have no f64, and f32 is wrong by metres far from the origin. With 32-bit integers and a borrow, the difference of two
-/// fixed-point positions is exact; only that difference, which is small where it matters, is rounded to f32. So one table of
-/// positions serves every view, wherever its camera is.
+/// Devices have no f64, and f32 is wrong by metres far from the origin. With 32-bit integers and a borrow, the
+/// difference of two fixed-point positions is exact; only that difference, which is small where it matters, is rounded
+/// to f32. So one table of positions serves every view, wherever its camera is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedPosition([i64; 3]);
 
 impl FixedPosition {
-    /// The largest coordinate in metres: 2³², about 4.3 million kilometres. The difference of any two positions also fits into
-    /// 64 bits.
+    /// The largest coordinate in metres: 2³², about 4.3 million kilometres. The difference of any two positions also
+    /// fits into 64 bits.
     pub const MAX_COORDINATE: f64 = 4_294_967_296.0;
 
     /// The world's origin.
@@ -20,7 +20,8 @@ impl FixedPosition {
 
     const STEPS_PER_METRE: f64 = 1_073_741_824.0;
 
-    /// The nearest fixed-point position; `None` if a coordinate is not finite or beyond [`FixedPosition::MAX_COORDINATE`].
+    /// The nearest fixed-point position; `None` if a coordinate is not finite or beyond
+    /// [`FixedPosition::MAX_COORDINATE`].
     pub fn new(position: DVec3) -> Option<Self> {
         // The comparison is false for NaN.
         let within = position.abs().cmplt(DVec3::splat(Self::MAX_COORDINATE)).all();

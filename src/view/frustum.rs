@@ -9,10 +9,10 @@ use crate::scene::{Camera, Projection, ViewKind};
 
 /// The volume that a camera sees, within six planes: a pyramid, a box or a hemisphere.
 ///
-/// The planes are relative to the camera, so positions far from the world's origin lose no precision: the only subtraction of
-/// large numbers, centre − camera, is done in f64. Opposite planes share dot products: for a point c relative to the camera,
-/// forward·c suffices for the near and the far plane; a pair of opposite side planes also needs across·c, and the two differ
-/// only in its sign. That takes 28 operations for six planes instead of 42.
+/// The planes are relative to the camera, so positions far from the world's origin lose no precision: the only
+/// subtraction of large numbers, centre − camera, is done in f64. Opposite planes share dot products: for a point c
+/// relative to the camera, forward·c suffices for the near and the far plane; a pair of opposite side planes also needs
+/// across·c, and the two differ only in its sign. That takes 28 operations for six planes instead of 42.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frustum {
     origin: DVec3,
@@ -28,8 +28,8 @@ pub struct Frustum {
     pub(super) normals: [Vec3; 5],
 }
 
-/// Two opposite side planes, relative to the camera. A point c with `slope · (forward · c) + offset ≥ |across · c|` lies between
-/// them.
+/// Two opposite side planes, relative to the camera. A point c with `slope · (forward · c) + offset ≥ |across · c|`
+/// lies between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SidePlanes {
     /// Perpendicular to `forward`. Its length is the cosine of half the field of view; 1 without perspective.
@@ -98,17 +98,17 @@ impl Frustum {
         }
     }
 
-    /// Whether a sphere intersects the frustum. The test is conservative: never `false` for a sphere that does, sometimes `true`
-    /// for one just outside.
+    /// Whether a sphere intersects the frustum. The test is conservative: never `false` for a sphere that does,
+    /// sometimes `true` for one just outside.
     ///
-    /// With u = 2⁻²⁴, and N = ‖c‖₁ of the centre relative to the camera, to first order: forward·c carries five roundings (of
-    /// the normal, of the centre, of the product, and of two sums), so its error is at most 5uN; times the slope, the error is
-    /// 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with the offset o add
-    /// 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the error of the distance from a
-    /// side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that from the near or the far plane 6uN + u|o|.
-    /// The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the offset, which also covers the tolerance's own
-    /// rounding. Subnormal numbers lose less than the smallest normal number, which the offset includes as well. The bound
-    /// consists of magnitudes from before any cancellation.
+    /// With u = 2⁻²⁴, and N = ‖c‖₁ of the centre relative to the camera, to first order: forward·c carries five
+    /// roundings (of the normal, of the centre, of the product, and of two sums), so its error is at most 5uN; times
+    /// the slope, the error is 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with
+    /// the offset o add 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the
+    /// error of the distance from a side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that
+    /// from the near or the far plane 6uN + u|o|. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
+    /// offset, which also covers the tolerance's own rounding. Subnormal numbers lose less than the smallest normal
+    /// number, which the offset includes as well. The bound consists of magnitudes from before any cancellation.
     ///
     /// NaN does not intersect. A centre so far away that it overflows does.
     #[inline]
@@ -128,8 +128,8 @@ impl Frustum {
     /// The number of spheres that [`Frustum::intersects_spheres`] tests: one for each bit of its mask.
     pub const WORD: usize = 64;
 
-    /// Like [`Frustum::intersects_spheres`], and also finds the spheres that are entirely inside. That costs a third more; where
-    /// the caller ignores it, inlining removes it.
+    /// Like [`Frustum::intersects_spheres`], and also finds the spheres that are entirely inside. That costs a third
+    /// more; where the caller ignores it, inlining removes it.
     #[inline(always)]
     pub(super) fn classify_spheres(&self, spheres: &BoundingSpheres, first: usize) -> Classified {
         let entries = first..first + Self::WORD;

@@ -1,7 +1,7 @@
 //! The GPU layout of an object.
 
-/// The GPU layout of an object: `Object` in `drawloom.wgsl`. The position is in fixed point, so its difference from any view's
-/// camera is exact, and one table serves all views.
+/// The GPU layout of an object: `Object` in `drawloom.wgsl`. The position is in fixed point, so its difference from any
+/// view's camera is exact, and one table serves all views.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuObject {

@@ -9,22 +9,23 @@ use crate::scene::{Projection, SceneRef, ViewKind};
 ///
 /// # Precision
 ///
-/// Transforming a vertex from object to clip space rounds some thirty times, each time by at most u = 2⁻²⁴ of the vertex's
-/// distance. For a vertex at least as far from the camera as its mesh's radius (around the mesh's own origin), and at least
-/// 10 cm, the error of its viewing angle is below 30u in the worst case, and some 6u where the roundings' signs are mixed,
-/// wherever in the world the camera is. In pixels, the error is f + r²/f times that, r pixels from the centre of a picture whose
-/// focal length f is H / (2 tan(fov / 2)). 6u are 1e-3 pixels in the corners of a picture of 1920 × 1080 pixels for fields of view
-/// from 27° to 90°. Narrower ones magnify the rounding of directions, and wider ones stretch the edges: 0.3 pixels at 0.1°, 0.06
-/// in the corners at 179°. Shadow maps of 1024² have an error of at most 1e-3 of their pixels for spot lights from 12° to 68° from
-/// the axis, and for other lights always. An orthographic main camera keeps to it up to a distance of 2.5 times its picture's
-/// height; beyond, the error grows with the distance. `testing/src/precision` measures all of it.
+/// Transforming a vertex from object to clip space rounds some thirty times, each time by at most u = 2⁻²⁴ of the
+/// vertex's distance. For a vertex at least as far from the camera as its mesh's radius (around the mesh's own origin),
+/// and at least 10 cm, the error of its viewing angle is below 30u in the worst case, and some 6u where the roundings'
+/// signs are mixed, wherever in the world the camera is. In pixels, the error is f + r²/f times that, r pixels from the
+/// centre of a picture whose focal length f is H / (2 tan(fov / 2)). 6u are 1e-3 pixels in the corners of a picture of
+/// 1920 × 1080 pixels for fields of view from 27° to 90°. Narrower ones magnify the rounding of directions, and wider
+/// ones stretch the edges: 0.3 pixels at 0.1°, 0.06 in the corners at 179°. Shadow maps of 1024² have an error of at
+/// most 1e-3 of their pixels for spot lights from 12° to 68° from the axis, and for other lights always. An
+/// orthographic main camera keeps to it up to a distance of 2.5 times its picture's height; beyond, the error grows
+/// with the distance. `testing/src/precision` measures all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuView {
     /// From world axes relative to the origin below to clip space: see [`RenderView::clip_from_relative`].
     pub clip_from_relative: Mat4,
-    /// The lower halves of the origin that vertices are relative to: the camera's position. The camera of a directional light's
-    /// shadow map is far from everything it sees, so its origin is midway between its near and far planes.
+    /// The lower halves of the origin that vertices are relative to: the camera's position. The camera of a directional
+    /// light's shadow map is far from everything it sees, so its origin is midway between its near and far planes.
     pub position_low: [u32; 3],
     /// The number of lights that reach the view.
     pub light_count: u32,
@@ -81,9 +82,9 @@ impl GpuView {
 
 /// The origin that a view's vertices are relative to, and the matrix from there to clip space.
 ///
-/// The camera of an orthographic shadow map is many radii away from what it covers. Along parallel rays that distance serves no
-/// purpose and costs f32 precision. So the origin is midway between the near and far planes, which at least halves the
-/// distances, and the matrix includes the translation to it.
+/// The camera of an orthographic shadow map is many radii away from what it covers. Along parallel rays that distance
+/// serves no purpose and costs f32 precision. So the origin is midway between the near and far planes, which at least
+/// halves the distances, and the matrix includes the translation to it.
 fn origin_and_matrix(view: &RenderView) -> (DVec3, Mat4) {
     let camera = &view.camera;
     let matrix = view.precise_clip_from_relative();

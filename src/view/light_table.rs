@@ -47,9 +47,9 @@ impl LightClass {
 }
 
 impl LightTable {
-    /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a class, lights
-    /// keep the order of the scene. With `shadows`, lights that cast shadows have classes of their own, and a shadow map if one of
-    /// `views` draws it. The table of a shadow map is empty.
+    /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a
+    /// class, lights keep the order of the scene. With `shadows`, lights that cast shadows have classes of their own,
+    /// and a shadow map if one of `views` draws it. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
         self.gpu_lights.clear();
         self.reaching.clear();
@@ -91,8 +91,8 @@ impl LightTable {
         &self.gpu_lights
     }
 
-    /// For each of [`LightTable::gpu_lights`]: its index among the frame's valid lights, and the index of the view that draws its
-    /// shadow map, if any.
+    /// For each of [`LightTable::gpu_lights`]: its index among the frame's valid lights, and the index of the view that
+    /// draws its shadow map, if any.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         let of_class = |class: usize| self.reaching.iter().filter(move |(other, _)| *other == class);
         let lights = (0..LightClass::COUNT).flat_map(of_class);

@@ -1,7 +1,7 @@
 //! Views: "everything is a camera" (M 10.4). Tables that all views of a frame share, and culling for each view.
 //!
-//! An embedder uses [`ShadowMaps`], [`RenderView`] and [`RejectionReason`]; everything else is public for this repository's
-//! tests and benchmarks.
+//! An embedder uses [`ShadowMaps`], [`RenderView`] and [`RejectionReason`]; everything else is public for this
+//! repository's tests and benchmarks.
 
 mod bounding_boxes;
 mod bounding_spheres;

@@ -15,10 +15,11 @@ use crate::command::{Cull, DrawState};
 use crate::quality::CullingVolume;
 use crate::scene::{Material, Mesh, SceneRef, is_unit};
 
-/// The frame's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are rejected.
+/// The frame's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are
+/// rejected.
 ///
-/// Objects are in blocks, each with its own lock: jobs that fill different blocks never wait for each other, and one uncontended
-/// lock per block costs a fraction of a nanosecond per object.
+/// Objects are in blocks, each with its own lock: jobs that fill different blocks never wait for each other, and one
+/// uncontended lock per block costs a fraction of a nanosecond per object.
 #[derive(Debug, Default)]
 pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
@@ -44,12 +45,12 @@ pub struct ObjectBlock {
 }
 
 impl ObjectBlock {
-    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of the objects that
-    /// a view may see; bit 0 is `entries.start`. The test is conservative: a visible object is never missing. Rejected objects
-    /// always are.
+    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
+    /// the objects that a view may see; bit 0 is `entries.start`. The test is conservative: a visible object is never
+    /// missing. Rejected objects always are.
     ///
-    /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only the others'
-    /// boxes are tested.
+    /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only
+    /// the others' boxes are tested.
     ///
     /// # Panics
     /// If `entries` is empty or not within the block.
@@ -78,7 +79,8 @@ impl ObjectBlock {
         }
     }
 
-    /// The `candidates`, in the word from `first` on, whose boxes intersect the frustum; all of them if there are no boxes.
+    /// The `candidates`, in the word from `first` on, whose boxes intersect the frustum; all of them if there are no
+    /// boxes.
     fn test_boxes(&self, frustum: &Frustum, first: usize, candidates: u64) -> u64 {
         self.boxes
             .as_ref()
@@ -249,10 +251,11 @@ fn entry_of(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, BoundingS
 
 /// An upper bound of the distance in metres between an object's computed centre and where devices draw it.
 ///
-/// The offset is rotated in f32: at most some 40 roundings of 2⁻²⁴ (thirteen of the orientation's length and direction and of the
-/// scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length; 2⁻¹⁸ is 64 of them.
-/// The error of each coordinate of the centre, in f64, is half a step, 2⁻⁵³ of it. The error of the drawn position relative to a
-/// camera is half a fixed-point step for each of the two, 2⁻³⁰ m per coordinate. √3 times as much in space is less than twice.
+/// The offset is rotated in f32: at most some 40 roundings of 2⁻²⁴ (thirteen of the orientation's length and direction
+/// and of the scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length;
+/// 2⁻¹⁸ is 64 of them. The error of each coordinate of the centre, in f64, is half a step, 2⁻⁵³ of it. The error of the
+/// drawn position relative to a camera is half a fixed-point step for each of the two, 2⁻³⁰ m per coordinate. √3 times
+/// as much in space is less than twice.
 #[inline]
 fn position_error(center: DVec3, offset: Vec3) -> f64 {
     let turned = f64::from(offset.abs().element_sum()) * 2_f64.powi(-18);
@@ -282,15 +285,15 @@ fn bounding_box(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> 
     }
 }
 
-/// The largest radius in metres of an object in the world. Larger ones exceed the range of f32 on the way to clip space: the
-/// narrowest field of view multiplies positions by some 1e6, and a tall picture by a hundred more.
+/// The largest radius in metres of an object in the world. Larger ones exceed the range of f32 on the way to clip
+/// space: the narrowest field of view multiplies positions by some 1e6, and a tall picture by a hundred more.
 const MAX_RADIUS: f32 = 1e30;
 
 /// Normalizes a quaternion whose length differs from 1 by no more than [`is_unit`] allows.
 ///
-/// Two steps of Newton's method for 1/√x, starting at 1, reduce an error e of the squared length to less than e⁴, which is below
-/// f32's precision, and take a fraction of the time of a square root and a division. They run in f64, because an error of one
-/// rounding in the length moves rotated vectors by four.
+/// Two steps of Newton's method for 1/√x, starting at 1, reduce an error e of the squared length to less than e⁴, which
+/// is below f32's precision, and take a fraction of the time of a square root and a division. They run in f64, because
+/// an error of one rounding in the length moves rotated vectors by four.
 #[inline]
 fn normalized(orientation: Quat) -> Quat {
     let newton_step = |q: DQuat| q * (1.5 - 0.5 * q.length_squared());

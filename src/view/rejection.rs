@@ -56,19 +56,21 @@ pub enum RejectionReason {
     InvalidTransform,
     /// An object's bounds are not finite or negative, or too large once scaled.
     InvalidBounds,
-    /// An object is farther from the world's origin than [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
+    /// An object is farther from the world's origin than
+    /// [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     OutOfReach,
     /// An object's mesh was removed.
     StaleMesh,
     /// An object's material was removed.
     StaleMaterial,
     /// An object's edges are too long for the paraboloid shadow map that sees it: longer than
-    /// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge) allows, even at the highest subdivision level. It is
-    /// drawn nevertheless.
+    /// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge) allows, even at the highest
+    /// subdivision level. It is drawn nevertheless.
     CoarseEdges,
     /// A light's intensity is 0.
     DarkLight,
-    /// A light is farther from the world's origin than [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
+    /// A light is farther from the world's origin than
+    /// [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     LightOutOfReach,
     /// A light's intensity, position, direction, range or angles are invalid.
     InvalidLight,

@@ -5,8 +5,8 @@ use glam::{DMat4, DVec4, Mat4, Vec3};
 use super::Frustum;
 use crate::scene::{Camera, Projection, ViewKind};
 
-/// A camera's rendering of the scene within a frame (M listing 10.4). The backend keeps its targets and its view queue under the
-/// view's index.
+/// A camera's rendering of the scene within a frame (M listing 10.4). The backend keeps its targets and its view queue
+/// under the view's index.
 #[derive(Clone, Debug)]
 pub struct RenderView {
     /// The camera.
@@ -17,8 +17,8 @@ pub struct RenderView {
     pub valid_light: Option<usize>,
     /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
-    /// Whether its targets still hold an earlier frame's shadow map. Then no render process draws into it, but others read its
-    /// targets: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
+    /// Whether its targets still hold an earlier frame's shadow map. Then no render process draws into it, but others
+    /// read its targets: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
     pub is_cached: bool,
 }
 
@@ -38,8 +38,9 @@ impl RenderView {
         self.camera.kind
     }
 
-    /// From world axes relative to the camera to clip space. Depth is reversed: 1 at the near plane, and 0 at the far plane or, in
-    /// perspective, at infinity. No matrix projects onto a paraboloid; there the matrix leads to camera axes.
+    /// From world axes relative to the camera to clip space. Depth is reversed: 1 at the near plane, and 0 at the far
+    /// plane or, in perspective, at infinity. No matrix projects onto a paraboloid; there the matrix leads to camera
+    /// axes.
     ///
     /// It is computed in f64 and rounded once: the error of each element is at most half a unit in the last place.
     pub fn clip_from_relative(&self) -> Mat4 {
@@ -68,9 +69,9 @@ impl RenderView {
         projection * DMat4::from_quat(camera.orientation.as_dquat().normalize().inverse())
     }
 
-    /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance of 1), and
-    /// forward. The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in perspective; otherwise it
-    /// starts at x·right + y·up and has the direction forward.
+    /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance
+    /// of 1), and forward. The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in
+    /// perspective; otherwise it starts at x·right + y·up and has the direction forward.
     pub fn picture_axes(&self) -> [Vec3; 3] {
         let half = match self.camera.projection {
             Projection::Perspective { field_of_view } => (field_of_view * 0.5).tan(),

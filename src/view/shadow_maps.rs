@@ -8,18 +8,20 @@ use crate::scene::{Camera, Light, Projection, ViewKind};
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
-    /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a hemispherical
-    /// light, and 2·d·tan(angle)/side for a spot light. For a directional light it is as wide as the diameter of the sphere around
-    /// what main cameras see, divided by `side`: at 60° and 16:9 some 2.3·`max_distance`/side.
+    /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a
+    /// hemispherical light, and 2·d·tan(angle)/side for a spot light. For a directional light it is as wide as the
+    /// diameter of the sphere around what main cameras see, divided by `side`: at 60° and 16:9 some
+    /// 2.3·`max_distance`/side.
     pub side: u32,
-    /// The distance from the main cameras, in metres, up to which a directional light's map covers their views; at most 1,000 km.
-    /// Beyond it, nothing is in shadow. There is one map for all main cameras: the farther they are apart, the coarser it is.
+    /// The distance from the main cameras, in metres, up to which a directional light's map covers their views; at most
+    /// 1,000 km. Beyond it, nothing is in shadow. There is one map for all main cameras: the farther they are apart,
+    /// the coarser it is.
     pub max_distance: f32,
-    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require. Below 1, lit surfaces shadow
-    /// themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
+    /// The depth bias, as a multiple of what a pixel's width and the surface's slope require. Below 1, lit surfaces
+    /// shadow themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
-    /// The radius of percentage-closer filtering: shadows fade over 2·`filter` + 1 pixels of the map; 0 is bilinear filtering. At most
-    /// [`ShadowMaps::MAX_FILTER`].
+    /// The radius of percentage-closer filtering: shadows fade over 2·`filter` + 1 pixels of the map; 0 is bilinear
+    /// filtering. At most [`ShadowMaps::MAX_FILTER`].
     pub filter: u32,
 }
 
@@ -42,10 +44,10 @@ impl ShadowMaps {
         }
     }
 
-    /// The camera of a light's shadow map: a perspective camera for a spot light, a paraboloid for a hemispherical light, and for a
-    /// directional light an orthographic camera around what the main cameras among `cameras` see. `None` for a light that casts no
-    /// shadow, and for a directional light if there is no main camera or if the map's camera would be beyond
-    /// [`FixedPosition::MAX_COORDINATE`].
+    /// The camera of a light's shadow map: a perspective camera for a spot light, a paraboloid for a hemispherical
+    /// light, and for a directional light an orthographic camera around what the main cameras among `cameras` see.
+    /// `None` for a light that casts no shadow, and for a directional light if there is no main camera or if the map's
+    /// camera would be beyond [`FixedPosition::MAX_COORDINATE`].
     pub fn camera(&self, name: String, light: &Light, cameras: &[Camera]) -> Option<Camera> {
         if !light.casts_shadow() {
             return None;
@@ -84,7 +86,8 @@ impl ShadowMaps {
         })
     }
 
-    /// A sphere around all that main cameras see within the maximum distance. Its size does not change when a camera turns.
+    /// A sphere around all that main cameras see within the maximum distance. Its size does not change when a camera
+    /// turns.
     fn visible_sphere(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
         let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
         main.map(|camera| {
@@ -111,8 +114,8 @@ impl ShadowMaps {
         .reduce(enclosing_sphere)
     }
 
-    /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to frame and
-    /// shadows do not crawl when the camera moves.
+    /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to
+    /// frame and shadows do not crawl when the camera moves.
     fn snapped_to_texels(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
         let pixel = 2.0 * radius / f64::from(self.side);
         let local = orientation.inverse() * center;
@@ -130,9 +133,9 @@ impl Default for ShadowMaps {
 /// The near plane of a light's map, as a share of its range.
 const NEAR_PLANE_SHARE: f32 = 1e-5;
 
-/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. A triangle that crosses
-/// the near plane is drawn with a wrong slope, since depth is clamped there. The larger the distance, the more f32 rounds: here to
-/// within a hundredth of a pixel of 1024.
+/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. A triangle that
+/// crosses the near plane is drawn with a wrong slope, since depth is clamped there. The larger the distance, the more
+/// f32 rounds: here to within a hundredth of a pixel of 1024.
 const CASTER_DISTANCE: f64 = 16.0;
 
 /// In radians. Towards 180°, the centre of a perspective picture shrinks to nothing.

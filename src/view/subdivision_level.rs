@@ -5,12 +5,12 @@ use glam::{DVec3, Vec3};
 use super::RenderView;
 use crate::scene::SceneRef;
 
-/// The subdivision level of an object in a paraboloid view: how often its edges are halved until none is seen under more than
-/// `widest_angle` radians; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that
-/// lies entirely behind the camera and so casts no shadow.
+/// The subdivision level of an object in a paraboloid view: how often its edges are halved until none is seen under
+/// more than `widest_angle` radians; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge).
+/// `None` for an object that lies entirely behind the camera and so casts no shadow.
 ///
-/// The distance is that of the nearest point of the mesh's box, so instances at one distance have one level. Where the box is very
-/// near, or contains the camera, the distance of every triangle is computed instead. The level may exceed
+/// The distance is that of the nearest point of the mesh's box, so instances at one distance have one level. Where the
+/// box is very near, or contains the camera, the distance of every triangle is computed instead. The level may exceed
 /// [`DrawState::MAX_SUBDIVISION_LEVEL`](crate::command::DrawState::MAX_SUBDIVISION_LEVEL).
 pub(super) fn subdivision_level(
     view: &RenderView,
@@ -128,7 +128,8 @@ mod tests {
         assert_eq!(floor_from(-3.0, Vec3::ONE), None);
     }
 
-    /// A room of 4 m whose walls are cut into squares of 10 cm, seen from its middle and from a hand's breadth off its floor.
+    /// A room of 4 m whose walls are cut into squares of 10 cm, seen from its middle and from a hand's breadth off its
+    /// floor.
     #[test]
     fn a_room_around_a_lamp_is_cut_no_finer_than_its_walls_want() {
         let mut vertices = Vec::new();

@@ -9,14 +9,15 @@ use crate::raster::{CullVertex, CulledTriangles, Vector, Winding, cull_triangles
 use crate::scene::{Projection, SceneRef, Vertex, ViewKind};
 
 impl RenderView {
-    /// Culls the triangles of an object, and appends the indices of those that may cover a pixel to `remaining`. Frames do so for
-    /// meshes that [request it](crate::scene::Mesh::with_triangles_culled). Triangles are culled if they are back-facing, outside the
-    /// picture, degenerate, or cover no pixel centre: "up to 70%" of them (S 9.6). It is worth its time if a device spends more on a
-    /// vertex than the 20 to 40 ns that this takes per triangle.
+    /// Culls the triangles of an object, and appends the indices of those that may cover a pixel to `remaining`. Frames
+    /// do so for meshes that [request it](crate::scene::Mesh::with_triangles_culled). Triangles are culled if they are
+    /// back-facing, outside the picture, degenerate, or cover no pixel centre: "up to 70%" of them (S 9.6). It is worth
+    /// its time if a device spends more on a vertex than the 20 to 40 ns that this takes per triangle.
     ///
-    /// Nothing is culled in views where [a matrix alone does not decide](RenderView::can_cull_triangles) what is visible. A triangle
-    /// with a corner whose position f32 does not determine to a 256th of a pixel, as of a mesh that is far larger than its distance, is
-    /// culled only if all its corners are beyond one side of the picture. Positions are those of camera-relative transforms.
+    /// Nothing is culled in views where [a matrix alone does not decide](RenderView::can_cull_triangles) what is
+    /// visible. A triangle with a corner whose position f32 does not determine to a 256th of a pixel, as of a mesh that
+    /// is far larger than its distance, is culled only if all its corners are beyond one side of the picture. Positions
+    /// are those of camera-relative transforms.
     ///
     /// An object that cannot be drawn has no triangles.
     ///
@@ -30,8 +31,8 @@ impl RenderView {
         )
     }
 
-    /// Whether a matrix alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow map whose depth is
-    /// clamped at the near plane.
+    /// Whether a matrix alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow
+    /// map whose depth is clamped at the near plane.
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
             Projection::Perspective { .. } => true,
@@ -101,12 +102,13 @@ impl RenderView {
     }
 }
 
-/// A device's position error of a vertex, as a share of its object's distance: 8 unit roundoffs of f32. The difference of the two
-/// positions is rounded once, its sum with the vertex once, and the matrix takes five, including those of its own elements.
+/// A device's position error of a vertex, as a share of its object's distance: 8 unit roundoffs of f32. The difference
+/// of the two positions is rounded once, its sum with the vertex once, and the matrix takes five, including those of
+/// its own elements.
 const ERROR_PER_DISTANCE: f64 = 1.0 / 2_097_152.0;
 
-/// A device's position error of a vertex, as a share of its distance from its object's origin: 16 unit roundoffs, of which scaling
-/// and rotating take 8.
+/// A device's position error of a vertex, as a share of its distance from its object's origin: 16 unit roundoffs, of
+/// which scaling and rotating take 8.
 const ERROR_PER_SIZE: f64 = 1.0 / 1_048_576.0;
 
 /// Twice a step of a [`FixedPosition`](super::FixedPosition), in metres.
@@ -115,9 +117,9 @@ const FIXED_POINT_ERROR: f64 = 2.0 / 1_073_741_824.0;
 /// The error that [`CullVertex::clip`] may have, as a share of |x| + |y| + |z| + |w|.
 const CLIP_TOLERANCE: f64 = 1.0 / 8192.0;
 
-/// A vertex that a device may draw up to `error` metres away. In the picture it moves by the errors of x and y, and by that of w times
-/// its distance from the centre; the viewport's three roundings are proportional to the picture's size. A vertex whose error exceeds
-/// the tolerance becomes NaN, so that its triangles are kept.
+/// A vertex that a device may draw up to `error` metres away. In the picture it moves by the errors of x and y, and by
+/// that of w times its distance from the centre; the viewport's three roundings are proportional to the picture's size.
+/// A vertex whose error exceeds the tolerance becomes NaN, so that its triangles are kept.
 fn cull_vertex(error: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 2]) -> CullVertex {
     let rows = clip_from_relative.transpose();
     let error_along = |row: DVec4| row.truncate().length() * error;

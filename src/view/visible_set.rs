@@ -9,7 +9,8 @@ use crate::chunked_array::block_ranges;
 
 /// The objects that a view sees: a bit for each object, and a prefix sum over words of 64.
 ///
-/// Any worker may test any object; the result does not depend on which. So the compacted order is always that of the objects.
+/// Any worker may test any object; the result does not depend on which. So the compacted order is always that of the
+/// objects.
 #[derive(Debug, Default)]
 pub struct VisibleSet {
     words: Vec<AtomicU64>,
@@ -25,9 +26,9 @@ impl VisibleSet {
         self.offsets.get_mut().clear();
     }
 
-    /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::WORD`] objects, and
-    /// returns a mask whose bit 0 is the first object of the part; excess bits are ignored. Ranges tested at the same time must
-    /// not share objects, but may share words.
+    /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::WORD`]
+    /// objects, and returns a mask whose bit 0 is the first object of the part; excess bits are ignored. Ranges tested
+    /// at the same time must not share objects, but may share words.
     pub fn test(&self, objects: Range<usize>, is_visible: impl Fn(Range<usize>) -> u64) {
         for (word, part) in block_ranges(objects, Self::WORD) {
             let mask = u64::MAX >> (Self::WORD - part.len());
@@ -37,9 +38,10 @@ impl VisibleSet {
         }
     }
 
-    /// Removes the hidden objects of a range, and returns their number. For each word that has visible objects in the range,
-    /// `is_hidden` is called with the word's first object and a mask of the visible ones, and returns a mask of the hidden ones; excess bits
-    /// are ignored. Ranges processed at the same time must not share objects, but may share words.
+    /// Removes the hidden objects of a range, and returns their number. For each word that has visible objects in the
+    /// range, `is_hidden` is called with the word's first object and a mask of the visible ones, and returns a mask of
+    /// the hidden ones; excess bits are ignored. Ranges processed at the same time must not share objects, but may
+    /// share words.
     pub fn remove_hidden(&self, objects: Range<usize>, is_hidden: impl Fn(usize, u64) -> u64) -> usize {
         let mut count = 0;
         for (word, part) in block_ranges(objects, Self::WORD) {
@@ -79,9 +81,9 @@ impl VisibleSet {
         self.offsets.read().last().map_or(0, |&total| total as usize)
     }
 
-    /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the visible
-    /// objects) is in `ranks`. Bit `b` is object `word × WORD + b`; the lowest set bit has the rank `rank`. Ranks beyond the last
-    /// are ignored.
+    /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the
+    /// visible objects) is in `ranks`. Bit `b` is object `word × WORD + b`; the lowest set bit has the rank `rank`.
+    /// Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
         let offsets = self.offsets.read();
         let end = ranks.end.min(offsets.last().map_or(0, |&total| total as usize));

@@ -3,18 +3,19 @@
 use super::welded_mesh::{WeldedMesh, edges};
 use super::{ConvexPart, Plane};
 
-/// Returns a connected component as a closed convex body, if it is one: every edge has a triangle on either side, and no corner is
-/// farther outside any triangle's plane than the tolerance.
+/// Returns a connected component as a closed convex body, if it is one: every edge has a triangle on either side, and
+/// no corner is farther outside any triangle's plane than the tolerance.
 ///
-/// **The outline's error.** Let no corner be farther outside any face than δ. From any viewpoint, an edge of the outline lies between a
-/// front face with the normal n₁ and a back face with n₂. The plane through the eye and the edge has a normal n = α n₁ + β n₂ with
-/// α, β ≥ 0, so no corner is farther outside it than (α + β) δ. From |n| = 1 and c = n₁ · n₂ follows
-/// 1 = (α + β)² − 2αβ(1 − c) ≥ (α + β)² (1 + c) / 2, so α + β ≤ √(2 / (1 + c)): the sharper an edge, the larger the error. The
-/// component's outline is within that distance of the outline of all its corners.
+/// **The outline's error.** Let no corner be farther outside any face than δ. From any viewpoint, an edge of the
+/// outline lies between a front face with the normal n₁ and a back face with n₂. The plane through the eye and the edge
+/// has a normal n = α n₁ + β n₂ with α, β ≥ 0, so no corner is farther outside it than (α + β) δ. From |n| = 1 and c =
+/// n₁ · n₂ follows 1 = (α + β)² − 2αβ(1 − c) ≥ (α + β)² (1 + c) / 2, so α + β ≤ √(2 / (1 + c)): the sharper an edge,
+/// the larger the error. The component's outline is within that distance of the outline of all its corners.
 ///
-/// **The depth's error.** A ray that meets the component enters it through a front-facing triangle, which is at most δ behind its face.
-/// Triangles that are in one plane to within δ share a face. If one of them is front-facing and the face is not, the plane through
-/// the eye and the triangle supports the component to within 2δ, so the triangle is at the outline.
+/// **The depth's error.** A ray that meets the component enters it through a front-facing triangle, which is at most δ
+/// behind its face. Triangles that are in one plane to within δ share a face. If one of them is front-facing and the
+/// face is not, the plane through the eye and the triangle supports the component to within 2δ, so the triangle is at
+/// the outline.
 pub(super) fn closed_body(welded: &WeldedMesh, component: &[u32], tolerance: f64) -> Option<ConvexPart> {
     let mut faces: Vec<Plane> = Vec::new();
     let mut max_deviation: f64 = 0.0;

@@ -17,7 +17,8 @@ pub struct ConvexPart {
     pub faces: Vec<Plane>,
     /// Whether it is a closed body. A polygon whose back faces are culled hides nothing when seen from behind.
     pub is_closed: bool,
-    /// A bound of the distance in metres between the part and the mesh: of any point of a face, and of any projection's outline.
+    /// A bound of the distance in metres between the part and the mesh: of any point of a face, and of any projection's
+    /// outline.
     pub slack: f64,
     /// The surface area in square metres, by which parts are ranked.
     pub area: f64,

@@ -7,11 +7,12 @@ use super::welded_mesh::WeldedMesh;
 use crate::scene::Mesh;
 
 impl ConvexPart {
-    /// Decomposes a mesh into convex parts, the largest first. A connected component that is a closed convex body is one part; the
-    /// flat surfaces of other components are divided into convex polygons. Parts much smaller than the largest are omitted.
+    /// Decomposes a mesh into convex parts, the largest first. A connected component that is a closed convex body is
+    /// one part; the flat surfaces of other components are divided into convex polygons. Parts much smaller than the
+    /// largest are omitted.
     ///
-    /// Vertices are rounded to f32, so surfaces are not exactly flat or convex. The tolerance is 16 unit roundoffs of 2⁻²⁴ of the
-    /// mesh's largest coordinate; [`ConvexPart::slack`] is the actual deviation.
+    /// Vertices are rounded to f32, so surfaces are not exactly flat or convex. The tolerance is 16 unit roundoffs of
+    /// 2⁻²⁴ of the mesh's largest coordinate; [`ConvexPart::slack`] is the actual deviation.
     pub fn decompose(mesh: &Mesh) -> Vec<Self> {
         if mesh.triangle_count() > Self::MAX_TRIANGLES {
             return Vec::new();

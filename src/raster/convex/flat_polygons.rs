@@ -5,12 +5,12 @@ use glam::DVec3;
 use super::welded_mesh::{WeldedMesh, edges};
 use super::{ConvexPart, Plane};
 
-/// Merges coplanar triangles into convex polygons by removing shared edges, the longest first (after Hertel and Mehlhorn, "Fast
-/// triangulation of the plane with respect to simple polygons", 1985).
+/// Merges coplanar triangles into convex polygons by removing shared edges, the longest first (after Hertel and
+/// Mehlhorn, "Fast triangulation of the plane with respect to simple polygons", 1985).
 ///
-/// Triangles of one winding whose edges cancel except for those of a convex loop cover the loop's interior exactly once, so every ray
-/// through the polygon from the front meets one of them. If corners deviate from the plane a little, this holds for all rays but those
-/// within that deviation of the loop.
+/// Triangles of one winding whose edges cancel except for those of a convex loop cover the loop's interior exactly
+/// once, so every ray through the polygon from the front meets one of them. If corners deviate from the plane a little,
+/// this holds for all rays but those within that deviation of the loop.
 pub(super) fn flat_polygons(welded: &WeldedMesh, component: &[u32], tolerance: f64, parts: &mut Vec<ConvexPart>) {
     let mut pool = Pool { welded, tolerance, polygons: Vec::new(), owners: vec![0; welded.triangles.len()] };
     for &triangle in component {
@@ -101,14 +101,15 @@ impl Pool<'_> {
     }
 }
 
-/// Merges two loops with a common edge, and removes spikes (edges traversed back and forth). `None` if a corner occurs twice, or if there
-/// are too many corners.
+/// Merges two loops with a common edge, and removes spikes (edges traversed back and forth). `None` if a corner occurs
+/// twice, or if there are too many corners.
 fn merged_loop(one: &[u32], other: &[u32], [from, to]: [u32; 2]) -> Option<Vec<u32>> {
     let starting_at = |corners: &[u32], first: u32| {
         let start = corners.iter().position(|&corner| corner == first)?;
         Some([&corners[start..], &corners[..start]].concat())
     };
-    // The first loop from the edge's end to its start, then the second loop, which has the edge in the opposite direction.
+    // The first loop from the edge's end to its start, then the second loop, which has the edge in the opposite
+    // direction.
     let mut corners = starting_at(one, to)?;
     let second = starting_at(other, from)?;
     if corners.last() != Some(&from) || second.last() != Some(&to) {

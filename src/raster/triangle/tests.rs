@@ -245,7 +245,8 @@ fn coverage<R: Real>(triangles: &[[[f64; 4]; 3]]) -> Vec<i32> {
     coverage
 }
 
-/// An octahedron with each face divided into 16 triangles, its vertices at these distances; counter-clockwise seen from inside.
+/// An octahedron with each face divided into 16 triangles, its vertices at these distances; counter-clockwise seen from
+/// inside.
 fn around_the_camera(radii: &[f64]) -> impl Iterator<Item = [DVec3; 3]> {
     let signs = (0..8).map(|face| [0, 1, 2].map(|axis| if face >> axis & 1 == 0 { 1 } else { -1 }));
     let cells = (0..4).flat_map(|i| (0..4 - i).map(move |j| [i, j]));
@@ -296,8 +297,8 @@ fn clip_of(point: GridPoint) -> [f64; 2] {
     [x - 1.0, 1.0 - y]
 }
 
-/// All pixels that a triangle covers, in order, each with 1 for a clockwise triangle and -1 for a counter-clockwise one. Pixel centres
-/// are moved slightly to the right, and even less down, so those on a left or a top edge are inside.
+/// All pixels that a triangle covers, in order, each with 1 for a clockwise triangle and -1 for a counter-clockwise
+/// one. Pixel centres are moved slightly to the right, and even less down, so those on a left or a top edge are inside.
 fn expected_coverage(points: [GridPoint; 3]) -> Vec<([usize; 2], i32)> {
     const FINER: i128 = 1 << 40;
     let [a, b, c] = points.map(|point| point.map(|coordinate| i128::from(coordinate) * FINER));

@@ -47,7 +47,8 @@ proptest! {
     }
 }
 
-/// Two million in release builds. The expected result tries all ways to move the corners by a step along each axis, in i128.
+/// Two million in release builds. The expected result tries all ways to move the corners by a step along each axis, in
+/// i128.
 #[test]
 fn no_sliver_that_a_device_may_draw_is_culled() {
     let slivers = if cfg!(debug_assertions) { 100_000 } else { 2_000_000 };

@@ -5,8 +5,8 @@ use glam::{DMat3, DVec2, DVec3, Quat, Vec3};
 use crate::raster::Plane;
 use crate::scene::{Camera, Projection};
 
-/// A camera for occlusion culling. Camera space has the axes right, down and forward, so its last coordinate is the depth in
-/// metres. The picture is in pixels from its upper left corner.
+/// A camera for occlusion culling. Camera space has the axes right, down and forward, so its last coordinate is the
+/// depth in metres. The picture is in pixels from its upper left corner.
 ///
 /// **Nearness** is the reversed depth that devices write to depth buffers: near ÷ depth in perspective, and
 /// (far − depth) ÷ (far − near) without.
@@ -32,7 +32,8 @@ pub(super) struct CameraFromObject {
     rotation: DMat3,
     scale: DVec3,
     origin: DVec3,
-    /// A bound of the distance in metres between a transformed point and where a device draws it: see [`OcclusionCamera::slack`].
+    /// A bound of the distance in metres between a transformed point and where a device draws it: see
+    /// [`OcclusionCamera::slack`].
     pub(super) slack: f64,
     /// A bound of the distance in metres between the camera and any point of the object.
     pub(super) distance: f64,
@@ -70,14 +71,14 @@ impl OcclusionCamera {
         self.rotation * (point - self.position)
     }
 
-    /// A bound of a device's position error, in metres, for an object's vertex. `distance` is the distance between the camera and
-    /// the object's origin, plus that between the origin and the vertex.
+    /// A bound of a device's position error, in metres, for an object's vertex. `distance` is the distance between the
+    /// camera and the object's origin, plus that between the origin and the vertex.
     ///
-    /// A device works in f32, with a unit roundoff of u = 2⁻²⁴. Let p be a vertex with |s p| ≤ e after scaling, and d the distance of
-    /// the object's origin from the camera, so `distance` is d + e. Scaling and rotating cost some 6u e, the difference of the two
-    /// positions u d, the sum u (d + e), and the camera's axes with their own rounding 6u (d + e): less than
-    /// 16u (d + e) = 2⁻²⁰ (d + e) in all. Positions are rounded to steps of 2⁻³⁰ m, an error of half a step for each of the two in
-    /// each coordinate: less than 2⁻²⁹. The rounding of f64 here is 2⁻²⁹ of the former.
+    /// A device works in f32, with a unit roundoff of u = 2⁻²⁴. Let p be a vertex with |s p| ≤ e after scaling, and d
+    /// the distance of the object's origin from the camera, so `distance` is d + e. Scaling and rotating cost some 6u
+    /// e, the difference of the two positions u d, the sum u (d + e), and the camera's axes with their own rounding 6u
+    /// (d + e): less than 16u (d + e) = 2⁻²⁰ (d + e) in all. Positions are rounded to steps of 2⁻³⁰ m, an error of half
+    /// a step for each of the two in each coordinate: less than 2⁻²⁹. The rounding of f64 here is 2⁻²⁹ of the former.
     pub(super) fn slack(&self, distance: f64) -> f64 {
         distance * F32_ERROR + FIXED_POINT_ERROR
     }
@@ -102,7 +103,8 @@ impl OcclusionCamera {
         if !self.is_perspective {
             return [low, high].map(|corner| self.center + corner * self.focal);
         }
-        // A bound on its own side of the picture's centre is farthest out at the nearest depth; one on the other side, at the farthest.
+        // A bound on its own side of the picture's centre is farthest out at the nearest depth; one on the other side,
+        // at the farthest.
         let [near, far] = [center.z - radius, center.z + radius].map(|depth| self.focal / depth);
         let low = DVec2::select(low.cmplt(DVec2::ZERO), low * near, low * far);
         let high = DVec2::select(high.cmplt(DVec2::ZERO), high * far, high * near);
@@ -131,8 +133,8 @@ impl OcclusionCamera {
         self.near + slack
     }
 
-    /// The depth at which an occluder that crosses the near plane is clipped. In perspective it is at least 1/256 of the occluder's
-    /// distance, so that rounding errors are magnified no more than 256 times.
+    /// The depth at which an occluder that crosses the near plane is clipped. In perspective it is at least 1/256 of
+    /// the occluder's distance, so that rounding errors are magnified no more than 256 times.
     pub(super) fn clip_depth(&self, placement: &CameraFromObject, slack: f64) -> f64 {
         let min_depth = if self.is_perspective { placement.distance / 256.0 } else { 0.0 };
         self.near.max(min_depth) + 2.0 * slack
@@ -154,14 +156,14 @@ impl OcclusionCamera {
         self.center + point.truncate() * scale
     }
 
-    /// A bound of a device's error in the picture, in pixels, for geometry beyond `depth` with a position error of up to `slack`
-    /// metres.
+    /// A bound of a device's error in the picture, in pixels, for geometry beyond `depth` with a position error of up
+    /// to `slack` metres.
     ///
-    /// A line of the picture is a plane through the eye, n · e = 0 with |n| = 1, and its pixels are those where
-    /// n · (x, y, focal) = 0. Where it crosses the picture, |n.z| focal ≤ r |n.xy| for the half diagonal r, so
-    /// 1 ≤ |n.xy|² (1 + r² ÷ focal²); a point at a distance of slack from the plane is at most
-    /// slack × focal ÷ (depth |n.xy|) ≤ slack (focal + r) ÷ depth from the line. A point of the picture moves no farther. Devices also
-    /// snap to 1/256 of a pixel, and the viewport transform has an error of a few unit roundoffs of the picture's size.
+    /// A line of the picture is a plane through the eye, n · e = 0 with |n| = 1, and its pixels are those where n · (x,
+    /// y, focal) = 0. Where it crosses the picture, |n.z| focal ≤ r |n.xy| for the half diagonal r, so 1 ≤ |n.xy|² (1 +
+    /// r² ÷ focal²); a point at a distance of slack from the plane is at most slack × focal ÷ (depth |n.xy|) ≤ slack
+    /// (focal + r) ÷ depth from the line. A point of the picture moves no farther. Devices also snap to 1/256 of a
+    /// pixel, and the viewport transform has an error of a few unit roundoffs of the picture's size.
     pub(super) fn pixel_error(&self, slack: f64, depth: f64) -> f64 {
         let scale = if self.is_perspective { self.pixels_per_metre / depth } else { self.pixels_per_metre };
         SNAPPING_ERROR + self.center.max_element() * F32_ERROR + slack * scale
@@ -185,14 +187,14 @@ impl OcclusionCamera {
         }
     }
 
-    /// The least nearness of a face's plane as a linear function of the picture: its change per pixel to the right, its change per
-    /// pixel down, and its value at the picture's origin. `None` for a back face.
+    /// The least nearness of a face's plane as a linear function of the picture: its change per pixel to the right, its
+    /// change per pixel down, and its value at the picture's origin. `None` for a back face.
     ///
-    /// A ray e = z (x, y, 1) meets n · e = d where 1 ÷ z = n · (x, y, 1) ÷ d, which is linear in the picture. Without perspective
-    /// z = (d − n.x x − n.y y) ÷ n.z is.
+    /// A ray e = z (x, y, 1) meets n · e = d where 1 ÷ z = n · (x, y, 1) ÷ d, which is linear in the picture. Without
+    /// perspective z = (d − n.x x − n.y y) ÷ n.z is.
     ///
-    /// A device interpolates depth between corners, so its error may be some unit roundoffs of the depth of the nearest corner, which
-    /// is at least `min_depth` away.
+    /// A device interpolates depth between corners, so its error may be some unit roundoffs of the depth of the nearest
+    /// corner, which is at least `min_depth` away.
     pub(super) fn nearness_plane(&self, face: &Plane, min_depth: f64) -> Option<[f64; 3]> {
         let Plane { normal, offset } = *face;
         let slope = normal.truncate() / self.focal;

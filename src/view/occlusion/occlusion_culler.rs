@@ -10,18 +10,18 @@ use crate::raster::{CoarseDepth, ConvexPart, Plane, Silhouettes};
 use crate::scene::SceneRef;
 use crate::view::{ObjectBlock, ObjectDraw, ObjectTable, RenderView, VisibleSet, set_bits};
 
-/// Finds the objects that a view's larger objects hide, in three steps: [`OcclusionCuller::select_occluders`] selects those with the
-/// largest projections and projects their convex parts, [`OcclusionCuller::draw_occluders`] draws them into a [`CoarseDepth`], and
-/// [`OcclusionCuller::hidden`] tests every object against that.
+/// Finds the objects that a view's larger objects hide, in three steps: [`OcclusionCuller::select_occluders`] selects
+/// those with the largest projections and projects their convex parts, [`OcclusionCuller::draw_occluders`] draws them
+/// into a [`CoarseDepth`], and [`OcclusionCuller::hidden`] tests every object against that.
 ///
-/// It is conservative: an object that it reports as hidden is hidden. An occluder counts only in tiles of the picture that it
-/// is_covered entirely, at its farthest depth there; an object is tested as a rectangle around its box, at the box's nearest corner.
-/// Both are moved by the bound of a device's f32 errors, in the direction that is_hidden less. An object that crosses the near plane
-/// is never hidden.
+/// It is conservative: an object that it reports as hidden is hidden. An occluder counts only in tiles of the picture
+/// that it is_covered entirely, at its farthest depth there; an object is tested as a rectangle around its box, at the
+/// box's nearest corner. Both are moved by the bound of a device's f32 errors, in the direction that is_hidden less. An
+/// object that crosses the near plane is never hidden.
 ///
-/// An object is hidden if no sample of the picture would show it, wherever in a pixel samples are, provided that every object is
-/// drawn as its mesh is. So only an opaque object whose bounds are those of its mesh is an occluder: if an engine has set other
-/// bounds, its shader may move vertices.
+/// An object is hidden if no sample of the picture would show it, wherever in a pixel samples are, provided that every
+/// object is drawn as its mesh is. So only an opaque object whose bounds are those of its mesh is an occluder: if an
+/// engine has set other bounds, its shader may move vertices.
 #[derive(Debug, Default)]
 pub struct OcclusionCuller {
     camera: Option<OcclusionCamera>,
@@ -67,8 +67,8 @@ impl OcclusionCuller {
         occluders.silhouettes.clear();
     }
 
-    /// Selects occluders among the visible objects: the largest of those for which `may_occlude` returns `true` and that are at least
-    /// as wide as a tile.
+    /// Selects occluders among the visible objects: the largest of those for which `may_occlude` returns `true` and
+    /// that are at least as wide as a tile.
     pub fn select_occluders(
         &self,
         scene: &SceneRef<'_>,
@@ -129,8 +129,8 @@ impl OcclusionCuller {
         self.depth.draw(strip, &self.occluders.read().silhouettes);
     }
 
-    /// Tests the objects of a word whose bits in `visible` are set; bit 0 is `first`, a multiple of [`VisibleSet::WORD`]. Returns a
-    /// mask of the hidden objects. Call it after all strips have been drawn.
+    /// Tests the objects of a word whose bits in `visible` are set; bit 0 is `first`, a multiple of
+    /// [`VisibleSet::WORD`]. Returns a mask of the hidden objects. Call it after all strips have been drawn.
     pub fn hidden(&self, scene: &SceneRef<'_>, table: &ObjectTable, first: usize, visible: u64) -> u64 {
         let Some(camera) = self.camera.as_ref().filter(|_| visible != 0) else { return 0 };
         let objects = table.block(first / ObjectTable::BLOCK_SIZE);
@@ -250,8 +250,9 @@ impl Occluders {
             }
             self.planes.push(plane);
         }
-        // Clipping opens the part: a ray that enters through the opening hits a face from behind. So nothing is known where all
-        // planes are nearer than the clip depth, less the slack that the faces were moved inwards by: at most 1 part in 128.
+        // Clipping opens the part: a ray that enters through the opening hits a face from behind. So nothing is known
+        // where all planes are nearer than the clip depth, less the slack that the faces were moved inwards by: at most
+        // 1 part in 128.
         let nearest = if is_clipped { camera.min_nearness(clip_depth) * (127.0 / 128.0) } else { f64::INFINITY };
         let depth = self.clipped.iter().map(|point| point.z).fold(f64::INFINITY, f64::min);
         let corners = self.clipped.iter().map(|&point| camera.project(point));
@@ -265,7 +266,8 @@ impl Occluders {
     }
 }
 
-/// The corners of the box around an object's mesh, if the object's bounds are those of its mesh: then it is drawn as its mesh is.
+/// The corners of the box around an object's mesh, if the object's bounds are those of its mesh: then it is drawn as
+/// its mesh is.
 fn exact_mesh_corners(scene: &SceneRef<'_>, object: usize) -> Option<[Vec3; 2]> {
     let mesh = scene.assets.get(scene.meshes[object]).ok()?;
     (scene.bounds[object] == mesh.bounds()).then(|| mesh.corners())
