@@ -1,4 +1,4 @@
-//! On which processors a thread may run.
+//! The processors that a thread may run on.
 
 use std::io;
 
@@ -9,7 +9,8 @@ pub struct AffinityMask {
 }
 
 impl AffinityMask {
-    /// These processors. Those that the machine has not, or the process may not use, are left out; one has to remain.
+    /// A set of these processors. The system ignores processors that do not exist or that the process may not use, but at least
+    /// one must remain.
     pub fn new(processors: impl IntoIterator<Item = usize>) -> Self {
         let mut processors: Vec<usize> = processors.into_iter().collect();
         processors.sort_unstable();
@@ -22,7 +23,7 @@ impl AffinityMask {
         &self.processors
     }
 
-    /// Has the calling thread run on these processors only.
+    /// Restricts the calling thread to these processors.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     pub(super) fn apply(&self) -> io::Result<()> {
         use rustix::thread::{CpuSet, sched_setaffinity};
@@ -35,9 +36,9 @@ impl AffinityMask {
         Ok(sched_setaffinity(None, &set)?)
     }
 
-    /// Has the calling thread run on these processors only.
+    /// Restricts the calling thread to these processors.
     #[cfg(not(any(target_os = "linux", target_os = "android")))]
     pub(super) fn apply(&self) -> io::Result<()> {
-        Err(io::Error::new(io::ErrorKind::Unsupported, "threads cannot be kept to processors on this system"))
+        Err(io::Error::new(io::ErrorKind::Unsupported, "thread affinity is not supported on this system"))
     }
 }

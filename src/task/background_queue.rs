@@ -1,4 +1,4 @@
-//! Background jobs that nobody has begun, the oldest first; any of them can be taken out.
+//! Background jobs that have not begun, the oldest first. Any of them can be removed.
 
 use std::{collections::BTreeMap, mem, sync::Arc};
 
@@ -7,26 +7,30 @@ use crate::{
     unwind::discard,
 };
 
-use super::background::Queued;
+/// A background job, without the type of its result.
+pub(super) trait QueuedJob: Send + Sync {
+    /// Runs the job, unless another thread has begun it. Returns whether it has run here. Does not unwind.
+    fn run(&self) -> bool;
+}
 
-/// A queue behind a lock, and a count that spares those who find it empty the lock.
+/// A queue behind a lock, and a count with which workers skip the lock if the queue is empty.
 ///
-/// The count is a hint, so it is relaxed. That a sleeping worker learns of a job that is put here is up to the fences of
-/// [`Sleep`](super::sleep::Sleep), and the lock orders the jobs themselves.
+/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to sleep
+/// finds a job that was put here. The lock orders the jobs themselves.
 pub(super) struct BackgroundQueue {
     count: AtomicUsize,
-    jobs: Mutex<Numbered>,
+    jobs: Mutex<NumberedJobs>,
 }
 
 #[derive(Default)]
-struct Numbered {
-    jobs: BTreeMap<u64, Arc<dyn Queued>>,
+struct NumberedJobs {
+    jobs: BTreeMap<u64, Arc<dyn QueuedJob>>,
     next: u64,
 }
 
 impl BackgroundQueue {
     pub(super) fn new() -> Self {
-        Self { count: AtomicUsize::new(0), jobs: Mutex::new(Numbered::default()) }
+        Self { count: AtomicUsize::new(0), jobs: Mutex::new(NumberedJobs::default()) }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -37,9 +41,9 @@ impl BackgroundQueue {
         self.len() == 0
     }
 
-    /// Puts a job behind all others, and gives it the number by which it can be [removed](Self::remove).
-    pub(super) fn put(&self, job: Arc<dyn Queued>) -> u64 {
-        self.change(|queue| {
+    /// Adds a job behind all others, and returns the number with which it can be [removed](Self::remove).
+    pub(super) fn put(&self, job: Arc<dyn QueuedJob>) -> u64 {
+        self.update(|queue| {
             let number = queue.next;
             queue.next += 1;
             queue.jobs.insert(number, job);
@@ -47,16 +51,16 @@ impl BackgroundQueue {
         })
     }
 
-    pub(super) fn take_oldest(&self) -> Option<Arc<dyn Queued>> {
-        if self.is_empty() { None } else { self.change(|queue| queue.jobs.pop_first().map(|(_, job)| job)) }
+    pub(super) fn take_oldest(&self) -> Option<Arc<dyn QueuedJob>> {
+        if self.is_empty() { None } else { self.update(|queue| queue.jobs.pop_first().map(|(_, job)| job)) }
     }
 
-    /// Takes out the job of that number, unless somebody has.
-    pub(super) fn remove(&self, number: u64) -> Option<Arc<dyn Queued>> {
-        self.change(|queue| queue.jobs.remove(&number))
+    /// Removes the job with this number, if it is still queued.
+    pub(super) fn remove(&self, number: u64) -> Option<Arc<dyn QueuedJob>> {
+        self.update(|queue| queue.jobs.remove(&number))
     }
 
-    fn change<R>(&self, change: impl FnOnce(&mut Numbered) -> R) -> R {
+    fn update<R>(&self, change: impl FnOnce(&mut NumberedJobs) -> R) -> R {
         let mut queue = self.jobs.lock();
         let result = change(&mut queue);
         self.count.store(queue.jobs.len(), Ordering::Relaxed);
@@ -64,7 +68,7 @@ impl BackgroundQueue {
     }
 }
 
-/// Jobs that nobody has begun are dropped by whoever drops the queue, and what they have captured may panic at that.
+/// Drops the jobs that have not begun. Their captures may panic when they are dropped.
 impl Drop for BackgroundQueue {
     fn drop(&mut self) {
         let jobs = mem::take(&mut self.jobs.lock().jobs);

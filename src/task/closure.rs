@@ -1,97 +1,98 @@
-//! What a spawned job runs: a closure that has forgotten its type and what it borrows.
+//! A closure whose type and lifetime are erased.
 //!
-//! To spawn ten thousand small jobs a frame is not to cost ten thousand allocations, which one worker makes and another
-//! gives back. So a closure that captures little is kept in the job itself. That more than halves what a small job costs.
+//! A closure that captures little lives in the job itself. So ten thousand small jobs a frame cost no allocations, each of
+//! which one worker would make and another free. That more than halves the cost of a small job.
 
 use std::{
     fmt,
     mem::{ManuallyDrop, MaybeUninit},
 };
 
-use super::{region::Region, scope::Scope, worker::Worker};
+/// Space for the captures of a closure, or for a box that holds it.
+type Storage = MaybeUninit<[usize; 4]>;
 
-/// Room for what a closure captures, or for a box that holds it.
-type Room = MaybeUninit<[usize; 4]>;
-
-/// A closure to be called once, on any thread. One that is never called is dropped.
-pub(super) struct Closure {
-    room: Room,
-    call: unsafe fn(*mut Room, &'static Region, &Worker),
-    discard: unsafe fn(*mut Room),
+/// A closure that is called once, on any thread, with a region and a worker. If it is never called, it is dropped.
+pub(super) struct Closure<Region: 'static, Worker> {
+    storage: Storage,
+    call: unsafe fn(*mut Storage, &'static Region, &Worker),
+    discard: unsafe fn(*mut Storage),
 }
 
-impl Closure {
+impl<Region: 'static, Worker> Closure<Region, Worker> {
+    /// Erases the type and the lifetime of a closure.
+    ///
     /// # Safety
     ///
-    /// It must be gone, called or dropped, before `'scope` ends, and be called with a region that was opened for a scope of
-    /// that lifetime.
-    pub(super) unsafe fn new<'scope, F>(closure: F) -> Self
+    /// The closure must be called or dropped before the lifetime of anything that it borrows ends.
+    pub(super) unsafe fn new<F>(closure: F) -> Self
     where
-        F: FnOnce(&Scope<'scope>, &Worker) + Send + 'scope,
+        F: FnOnce(&'static Region, &Worker) + Send,
     {
         if fits::<F>() {
-            Self::keep(closure)
+            Self::store(closure)
         } else {
             let closure = Box::new(closure);
-            Self::keep(move |scope: &Scope<'scope>, worker: &Worker| closure(scope, worker))
+            Self::store(move |region: &'static Region, worker: &Worker| closure(region, worker))
         }
     }
 
-    /// Calls the closure. By the time this returns, or unwinds, the closure and all it had captured are gone.
+    /// Calls the closure. When this returns or unwinds, the closure and its captures have been dropped.
     pub(super) fn call(self, region: &'static Region, worker: &Worker) {
         let mut this = ManuallyDrop::new(self);
-        // SAFETY: `call` was made for the type that is in the room, which is taken out only here, and is not dropped
-        // besides, as this is not. That the lifetime has not ended and the region is the right one was promised to `new`.
-        unsafe { (this.call)(&raw mut this.room, region, worker) }
+        // SAFETY: `call` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made `call` for the
+        // type that it stored. This takes `self`, and `ManuallyDrop` keeps `drop` from running. The caller of `new` guarantees
+        // that what the closure borrows is still valid.
+        unsafe { (this.call)(&raw mut this.storage, region, worker) }
     }
 
-    /// Puts the closure into the room, where it has to fit.
-    fn keep<'scope, F>(closure: F) -> Self
+    /// Moves a closure that fits into the storage.
+    fn store<F>(closure: F) -> Self
     where
-        F: FnOnce(&Scope<'scope>, &Worker) + Send + 'scope,
+        F: FnOnce(&'static Region, &Worker) + Send,
     {
-        assert!(fits::<F>(), "a box fits, and nothing else comes here that does not");
-        let mut room = Room::uninit();
-        // SAFETY: The room is large enough and aligned, as has just been asserted, and nothing is in it.
-        unsafe { room.as_mut_ptr().cast::<F>().write(closure) };
-        Self { room, call: call::<F>, discard: discard::<F> }
+        assert!(fits::<F>(), "a closure that does not fit is boxed");
+        let mut storage = Storage::uninit();
+        // SAFETY: The pointer must be valid for writes of an `F` and aligned. The assertion checks size and alignment, and the
+        // storage is a local that holds nothing yet.
+        unsafe { storage.as_mut_ptr().cast::<F>().write(closure) };
+        Self { storage, call: call::<F, Region, Worker>, discard: discard::<F> }
     }
 }
 
-impl Drop for Closure {
+impl<Region: 'static, Worker> Drop for Closure<Region, Worker> {
     fn drop(&mut self) {
-        // SAFETY: `discard` was made for the type that is in the room. It is still there, as `call` takes it out only where
-        // this is not dropped.
-        unsafe { (self.discard)(&raw mut self.room) }
+        // SAFETY: `discard` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made `discard`
+        // for the type that it stored. Only `call` takes the closure out, and it keeps this from running.
+        unsafe { (self.discard)(&raw mut self.storage) }
     }
 }
 
-impl fmt::Debug for Closure {
+impl<Region: 'static, Worker> fmt::Debug for Closure<Region, Worker> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_struct("Closure").finish_non_exhaustive()
     }
 }
 
 const fn fits<F>() -> bool {
-    size_of::<F>() <= size_of::<Room>() && align_of::<F>() <= align_of::<Room>()
+    size_of::<F>() <= size_of::<Storage>() && align_of::<F>() <= align_of::<Storage>()
 }
 
 /// # Safety
 ///
-/// An `F` is in the room, and is used no more after this.
-unsafe fn call<'scope, F>(room: *mut Room, region: &'static Region, worker: &Worker)
+/// The storage must hold an `F` that nobody uses after this call.
+unsafe fn call<F, Region: 'static, Worker>(storage: *mut Storage, region: &'static Region, worker: &Worker)
 where
-    F: FnOnce(&Scope<'scope>, &Worker),
+    F: FnOnce(&'static Region, &Worker),
 {
-    // SAFETY: It is there, as the caller promises, and this is the one time that it is taken out.
-    let closure = unsafe { room.cast::<F>().read() };
-    closure(&Scope::new(region), worker);
+    // SAFETY: The storage must hold an `F`, and it must be read only once. The caller guarantees both.
+    let closure = unsafe { storage.cast::<F>().read() };
+    closure(region, worker);
 }
 
 /// # Safety
 ///
-/// An `F` is in the room, and is used no more after this.
-unsafe fn discard<F>(room: *mut Room) {
-    // SAFETY: It is there, as the caller promises, and this is the one time that it is dropped.
-    unsafe { room.cast::<F>().drop_in_place() }
+/// The storage must hold an `F` that nobody uses after this call.
+unsafe fn discard<F>(storage: *mut Storage) {
+    // SAFETY: The storage must hold an `F`, and it must be dropped only once. The caller guarantees both.
+    unsafe { storage.cast::<F>().drop_in_place() }
 }

@@ -1,8 +1,8 @@
-//! How a worker that finds nothing to do passes its time: it looks again for a while, and then sleeps.
+//! What a worker without jobs does: it looks for jobs for a while, and then sleeps.
 //!
-//! Looking costs the processor, sleeping costs a wake-up. In the midst of a frame more work is likely, so a worker looks
-//! for as long as a wake-up takes, which at worst doubles what waiting costs. Between frames it looks for
-//! [`HOT`], so that frames that follow at once meet workers that are awake; then it sleeps.
+//! Looking costs processor time, sleeping costs a wake-up. Within a frame more jobs are likely, so a worker looks for as long as a
+//! wake-up takes, which at worst doubles the cost of waiting. Between frames it looks for [`SPIN_BETWEEN_FRAMES`], so that a frame
+//! that follows at once finds the workers awake. Then it sleeps.
 
 use std::time::Duration;
 
@@ -11,93 +11,111 @@ use crate::{
     timeline::IdleKind,
 };
 
-use super::{
-    sleep::WakeFor,
-    worker::{Until, Worker},
-};
+use super::{priority::Priority, region::JobContext, shared::Shared, sleep::WakeFor};
 
 /// How long workers stay awake after the end of a frame.
-const HOT: Duration = Duration::from_micros(10);
+const SPIN_BETWEEN_FRAMES: Duration = Duration::from_micros(10);
 
-/// How long they look at most, whatever a wake-up is said to cost.
-const LONGEST: Duration = Duration::from_micros(100);
+/// How long they look for jobs at most, whatever a wake-up costs.
+const MAX_SPIN: Duration = Duration::from_micros(100);
 
-/// The pauses of the processor between two looks, at most.
-const MOST_PAUSES: u32 = 8;
+/// The most pause instructions between two looks.
+const MAX_PAUSES: u32 = 8;
 
-/// How often a worker looks before it asks the time, and counts as a searcher: gaps between the passes of a frame are over
-/// by then.
-const SILENT_LOOKS: u32 = 16;
+/// How often a worker looks before it reads the clock and counts as a searcher. Most gaps between the nodes of a frame are over by
+/// then.
+const UNCOUNTED_LOOKS: u32 = 16;
 
-/// Under a model checker workers sleep at once: each look would be one more branch. Under Miri too: a look takes as long as
-/// a job.
+/// Under a model checker workers sleep at once, because each look would be one more branch. Under Miri too, because a look takes
+/// as long as a job.
 const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_loom, drawloom_shuttle, miri));
 
-/// A worker's time without work.
+/// A worker's time without jobs.
 #[derive(Default)]
 pub(super) struct Idle {
     looks: u32,
     is_searcher: bool,
-    /// Since when the worker has been looking, and whether it was in a frame then.
+    /// When the worker began to look, and whether it was in a frame then.
     since: Option<(Instant, bool)>,
 }
 
 impl Idle {
-    /// There was nothing again: pauses, or sleeps.
-    pub(super) fn go_on(&mut self, worker: &Worker, until: Until) {
+    /// Pauses or sleeps after a look that found nothing. `sees_work` looks for work once more before the worker sleeps.
+    pub(super) fn pause<W: JobContext>(
+        &mut self,
+        worker: usize,
+        shared: &Shared<W>,
+        wake_for: WakeFor,
+        sees_work: impl FnOnce() -> bool,
+    ) {
         if self.looks == 0 {
-            worker.timeline().start_idle(worker.index(), IdleKind::Searching);
+            shared.timeline().start_idle(worker, IdleKind::Searching);
         }
         if SLEEP_AT_ONCE {
-            self.sleep(worker, until);
+            self.sleep(worker, shared, wake_for, sees_work);
             return;
         }
-        (0..(1 << self.looks.min(8)).min(MOST_PAUSES)).for_each(|_| spin_loop());
+        (0..(1 << self.looks.min(8)).min(MAX_PAUSES)).for_each(|_| spin_loop());
         self.looks = self.looks.saturating_add(1);
-        if self.looks > SILENT_LOOKS && self.has_looked_enough(worker) {
-            self.sleep(worker, until);
-        } else if self.looks > SILENT_LOOKS && !self.is_searcher && until.wake_for() == WakeFor::Any {
+        if self.looks > UNCOUNTED_LOOKS && self.has_looked_enough(shared) {
+            self.sleep(worker, shared, wake_for, sees_work);
+        } else if self.looks > UNCOUNTED_LOOKS && !self.is_searcher && wake_for == WakeFor::Any {
             self.is_searcher = true;
-            worker.shared().sleep().start_search();
+            shared.sleep().start_search();
         }
     }
 
-    /// There is something, or it is time to stop.
+    /// Ends the idle time, if there was any: the worker has found a job, or exits. `sees_more_work` looks for further jobs.
     #[inline]
-    pub(super) fn end(&mut self, worker: &Worker) {
+    pub(super) fn end<W: JobContext>(
+        &mut self,
+        worker: usize,
+        shared: &Shared<W>,
+        sees_more_work: impl Fn(&[Priority]) -> bool,
+    ) {
         if self.looks > 0 {
-            self.end_looking(worker);
+            self.end_search(worker, shared, sees_more_work);
         }
     }
 
-    // Apart, so that one job after another costs no call.
+    // A function of its own, so that two jobs in a row cost no call.
     #[cold]
-    fn end_looking(&mut self, worker: &Worker) {
-        worker.timeline().end_idle(worker.index());
+    fn end_search<W: JobContext>(
+        &mut self,
+        worker: usize,
+        shared: &Shared<W>,
+        sees_more_work: impl Fn(&[Priority]) -> bool,
+    ) {
+        shared.timeline().end_idle(worker);
         if self.is_searcher {
-            worker.shared().sleep().end_search(|bands| worker.sees_loot(bands));
+            shared.sleep().end_search(sees_more_work);
         }
         *self = Self::default();
     }
 
-    fn has_looked_enough(&mut self, worker: &Worker) -> bool {
+    fn has_looked_enough<W: JobContext>(&mut self, shared: &Shared<W>) -> bool {
         let now = Instant::now();
-        let is_live = worker.shared().is_live();
+        let is_in_frame = shared.is_in_frame();
         let since = match self.since {
-            Some((since, was_live)) if was_live == is_live => since,
+            Some((since, was_in_frame)) if was_in_frame == is_in_frame => since,
             _ => now,
         };
-        self.since = Some((since, is_live));
-        let most = if is_live { worker.shared().wake_up_cost().min(LONGEST) } else { HOT };
-        now.duration_since(since) >= most
+        self.since = Some((since, is_in_frame));
+        let limit = if is_in_frame { shared.wake_up_cost().min(MAX_SPIN) } else { SPIN_BETWEEN_FRAMES };
+        now.duration_since(since) >= limit
     }
 
-    fn sleep(&mut self, worker: &Worker, until: Until) {
-        let sleep = worker.shared().sleep();
-        worker.timeline().start_idle(worker.index(), IdleKind::Asleep);
-        let is_searcher = sleep.sleep(worker.index(), until.wake_for(), self.is_searcher, || worker.sees_work(until));
-        worker.timeline().start_idle(worker.index(), IdleKind::Searching);
-        // Awake it looks for a while again, as it was called for something.
+    fn sleep<W: JobContext>(
+        &mut self,
+        worker: usize,
+        shared: &Shared<W>,
+        wake_for: WakeFor,
+        sees_work: impl FnOnce() -> bool,
+    ) {
+        shared.timeline().start_idle(worker, IdleKind::Asleep);
+        let is_searcher = shared.sleep().sleep(worker, wake_for, self.is_searcher, sees_work);
+        shared.timeline().start_idle(worker, IdleKind::Searching);
+        // The worker was woken for something, so it looks for a while again.
         *self = Self { looks: 1, is_searcher, since: None };
     }
 }

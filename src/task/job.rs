@@ -1,37 +1,36 @@
-//! One job.
+//! A job, as queues hold it.
 
 use crate::unwind::catch;
 
 use super::{
     closure::Closure,
-    region::{Region, TokenContext},
-    worker::Worker,
+    region::{JobContext, Region},
 };
 
 /// What a job does.
-pub(super) enum Work {
-    /// Something of its own. What it borrows is [`Scope`](super::scope::Scope)'s to vouch for.
-    Closure(Closure),
-    /// What the region's [`Tokens`](super::region::Tokens) do with this number. It takes no memory but the deque's.
+pub(super) enum Work<W: JobContext> {
+    /// Calls a closure. What it borrows is the responsibility of [`Scope`](super::Scope).
+    Closure(Closure<Region<W>, W>),
+    /// Runs this token of the region. It needs no memory but the deque's.
     Token(u64),
 }
 
-/// Work on its way to a worker, and the region that waits for it. It is counted by the region from before it is made
-/// until after it has run.
-pub(super) struct Job {
-    pub(super) work: Work,
-    pub(super) region: &'static Region,
-    /// Whether a worker has taken it out of another one's queue.
+/// Work for some worker, and the region that waits for it. The region counts the job from before it is made until after it has
+/// run.
+pub(super) struct Job<W: JobContext> {
+    pub(super) work: Work<W>,
+    pub(super) region: &'static Region<W>,
+    /// Whether a worker has taken it out of another worker's queue.
     pub(super) is_stolen: bool,
 }
 
-impl Job {
-    /// Does the work. By the time it returns the closure and all it had captured are gone.
-    pub(super) fn run(self, worker: &Worker) {
+impl<W: JobContext> Job<W> {
+    /// Runs the job. When this returns, the closure and its captures have been dropped. Does not unwind.
+    pub(super) fn run(self, worker: &W) {
         let Self { work, region, .. } = self;
         let outcome = match work {
             Work::Closure(closure) => catch(|| closure.call(region, worker)),
-            Work::Token(token) => catch(|| region.tokens().run(token, &TokenContext::new(region, worker))),
+            Work::Token(token) => catch(|| region.tokens().run_token(token, region, worker)),
         };
         if let Err(panic) = outcome {
             region.fail(panic);

@@ -1,44 +1,47 @@
-//! The count of jobs a region still waits for.
+//! The number of jobs that a region still waits for.
 //!
 //! # Memory ordering
 //!
-//! - `add` is relaxed. Whoever adds is counted itself, so the count is at least one before and after, and nobody can
-//!   take the addition for a release. The job that was added reaches its worker through a deque or a lock, which order
-//!   it.
+//! - `add` is relaxed. Its caller is counted itself, so the count is at least one before and after, and nobody can take the
+//!   addition for a release of the latch. A deque or a lock orders the added job before the worker that runs it.
 //! - `finish` is a release: what the jobs did happens before their decrement. Every change of the count is a
-//!   read-modify-write, so all decrements lie in one release sequence, and the load that reads zero synchronises with
-//!   every one of them, not only with the last.
-//! - `is_released` is the acquire that closes the pair. After it returned true the waiter sees the effects of all jobs,
-//!   the dropping of what they had captured included. `finish` acquires nothing: that it returned true is no leave to
-//!   touch what the jobs wrote.
+//!   read-modify-write, so all decrements are in one release sequence, and the load that reads zero synchronises with each of
+//!   them, not only with the last.
+//! - `is_released` is the acquire that pairs with them. When it has returned true, the waiter sees the effects of all jobs,
+//!   including the drops of their captures. `finish` acquires nothing: a worker for which it returned true must not read what
+//!   the jobs wrote.
 //!
-//! The latch wakes nobody. The worker whose `finish` returned true does that, through [`Sleep`](super::sleep::Sleep).
-//! From its decrement on the region may end at any moment, and the latch with it, so that worker touches neither after.
+//! The latch wakes nobody. The worker for which `finish` returned true does, through [`Sleep`](super::sleep::Sleep). After its
+//! decrement the region, and the latch in it, may end at any moment, so that worker touches neither.
 
 use crate::sync::{AtomicUsize, Ordering};
 
-/// Counts outstanding jobs down to zero, where it stays: a released latch is not used again.
+/// Counts outstanding jobs down to zero. A released latch is not used again.
 pub(super) struct Latch {
     outstanding: AtomicUsize,
 }
 
 impl Latch {
     /// A latch that waits for `outstanding` jobs.
+    #[inline]
     pub(super) fn new(outstanding: usize) -> Self {
         Self { outstanding: AtomicUsize::new(outstanding) }
     }
 
-    /// Waits for so many more. Only for callers that are counted themselves and have not finished.
+    /// Waits for `jobs` more. The caller must be counted itself, and must not have finished.
+    #[inline]
     pub(super) fn add(&self, jobs: usize) {
         self.outstanding.fetch_add(jobs, Ordering::Relaxed);
     }
 
-    /// Takes so many off, and says whether they were the last.
+    /// Counts off `jobs` jobs, and returns whether they were the last.
+    #[inline]
     pub(super) fn finish(&self, jobs: usize) -> bool {
         self.outstanding.fetch_sub(jobs, Ordering::Release) == jobs
     }
 
-    /// Whether the last one has been taken off.
+    /// Whether the last job has been counted off.
+    #[inline]
     pub(super) fn is_released(&self) -> bool {
         self.outstanding.load(Ordering::Acquire) == 0
     }
@@ -49,7 +52,7 @@ mod tests {
     use super::Latch;
 
     #[test]
-    fn only_the_last_one_releases() {
+    fn only_the_last_job_releases_the_latch() {
         let latch = Latch::new(1);
         latch.add(1);
         assert!(!latch.finish(1));
@@ -66,7 +69,7 @@ mod loom_tests {
     use super::Latch;
     use crate::sync::Arc;
 
-    /// What one job writes and the waiter reads, checked by loom for races.
+    /// Written by one job each and read by the waiter. Loom checks the accesses for races.
     struct Cells([UnsafeCell<usize>; 2]);
 
     #[test]
@@ -77,26 +80,26 @@ mod loom_tests {
                 state.0.add(1);
                 let state = Arc::clone(&state);
                 thread::spawn(move || {
-                    // SAFETY: the cell is this job's alone until it has finished; loom checks that.
+                    // SAFETY: The access must be exclusive. Only this job uses the cell until it has finished, which loom checks.
                     state.1.0[job].with_mut(|cell| unsafe { *cell = 1 });
                     state.0.finish(1)
                 })
             });
             let last_here = state.0.finish(1);
             if state.0.is_released() {
-                // SAFETY: all jobs have finished; loom checks that this is seen here.
+                // SAFETY: Nobody may write at the same time. All jobs have finished, and loom checks that this thread sees it.
                 let sum: usize = state.1.0.iter().map(|cell| cell.with(|cell| unsafe { *cell })).sum();
                 assert_eq!(sum, 2);
             }
             let last_in_jobs = jobs.map(|job| job.join().unwrap());
             let last: usize = last_in_jobs.into_iter().map(usize::from).sum();
-            assert_eq!(last + usize::from(last_here), 1, "one of them is the last");
+            assert_eq!(last + usize::from(last_here), 1, "exactly one of them is the last");
             assert!(state.0.is_released());
         });
     }
 
     #[test]
-    fn a_job_that_adds_another_keeps_the_latch_shut() {
+    fn a_job_that_adds_another_keeps_the_latch_closed() {
         model(|| {
             let state = Arc::new((Latch::new(1), UnsafeCell::new(0)));
             state.0.add(1);
@@ -105,7 +108,8 @@ mod loom_tests {
                 first.0.add(1);
                 let second = Arc::clone(&first);
                 let child = thread::spawn(move || {
-                    // SAFETY: nobody else writes, and the reader waits for the latch; loom checks that.
+                    // SAFETY: The access must be exclusive. Nobody else writes, and the reader waits for the latch, which loom
+                    // checks.
                     second.1.with_mut(|cell| unsafe { *cell = 1 });
                     second.0.finish(1);
                 });
@@ -114,7 +118,7 @@ mod loom_tests {
             });
             state.0.finish(1);
             if state.0.is_released() {
-                // SAFETY: both jobs have finished; loom checks that this is seen here.
+                // SAFETY: Nobody may write at the same time. Both jobs have finished, and loom checks that this thread sees it.
                 assert_eq!(state.1.with(|cell| unsafe { *cell }), 1);
             }
             job.join().unwrap();

@@ -1,13 +1,13 @@
-//! A queue behind a lock, and a count that spares those who find it empty the lock.
+//! A queue behind a lock, and a count with which workers skip the lock if the queue is empty.
 //!
-//! The count is a hint, so it is relaxed. That a sleeping worker learns of what is put here is up to the fences of
-//! [`Sleep`](super::sleep::Sleep), and the lock orders the items themselves.
+//! The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to
+//! sleep finds an item that was pushed here. The lock orders the items themselves.
 
 use std::collections::VecDeque;
 
 use crate::sync::{AtomicUsize, Mutex, Ordering};
 
-/// Items, the oldest first. Its memory grows and stays.
+/// Items, the oldest first. Its memory grows and is kept.
 pub(super) struct LockedQueue<T> {
     count: AtomicUsize,
     items: Mutex<VecDeque<T>>,
@@ -26,11 +26,12 @@ impl<T> LockedQueue<T> {
         self.count.load(Ordering::Relaxed)
     }
 
-    pub(super) fn put(&self, item: T) {
-        self.change(|items| items.push_back(item));
+    pub(super) fn push(&self, item: T) {
+        self.update(|items| items.push_back(item));
     }
 
-    pub(super) fn change<R>(&self, change: impl FnOnce(&mut VecDeque<T>) -> R) -> R {
+    /// Changes the queue under the lock, and updates the count.
+    pub(super) fn update<R>(&self, change: impl FnOnce(&mut VecDeque<T>) -> R) -> R {
         let mut items = self.items.lock();
         let result = change(&mut items);
         self.count.store(items.len(), Ordering::Relaxed);

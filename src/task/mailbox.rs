@@ -1,78 +1,82 @@
-//! Jobs that lie in no worker's queues, each with the owner of its region: those that only the owner may run, and those that
-//! the worker which spawned them must not keep.
+//! The jobs that other workers hand to the owner of their region: pinned ones, which only the owner may run, and those that the
+//! worker which spawned them must not keep.
 //!
-//! What a worker keeps in its queues is out of reach for an owner that waits in the midst of a job, since such an owner does
-//! not steal. So a job of a region that was opened inside a job is kept by the owner alone; other workers hand it to the
-//! owner's mailbox, where the owner finds it, and so does every worker that looks for work. Whatever a worker does after it
-//! has spawned the job, nobody waits for it to come back to its queues.
+//! An owner that waits inside a job does not steal, so it cannot reach jobs in another worker's queues. Therefore only the owner
+//! keeps jobs of such a region in its queues. Other workers put them into the owner's mailbox, where the owner finds them, and so
+//! does every worker that looks for work. So nobody depends on the worker that spawned a job to come back to its queues.
 //!
-//! The regions of a worker lie on its stack, so an open one is known by its level there, and each level has a queue that
-//! passes from one region to the next. It is empty by then: a region ends when its jobs have run.
+//! The regions of a worker lie on its stack, so an open region is identified by its level there. Each level has a queue, which
+//! the regions of that level use one after another. A region finds it empty, because the region before ended when all of its jobs
+//! had run.
 
 use std::{collections::VecDeque, fmt};
 
 use crate::sync::{AtomicUsize, Mutex, Ordering};
 
-use super::{job::Job, priority::Priority, region::Region};
+use super::{
+    job::Job,
+    priority::Priority,
+    region::{JobContext, Region},
+};
 
-/// The jobs of a worker's open regions that lie in no queue.
-pub(super) struct Mailbox {
-    /// For the owner alone, and in the order in which they came.
-    pinned: LevelQueues,
-    /// For the owner, and for whoever looks for work of a frame.
-    frame: LevelQueues,
-    /// For the owner, and for whoever looks for background work.
-    background: LevelQueues,
+/// The jobs of a worker's open regions that are in no worker's queues.
+pub(super) struct Mailbox<W: JobContext> {
+    /// For the owner alone, in the order in which they came.
+    pinned: LevelQueues<W>,
+    /// For the owner, and for any worker that looks for a frame's jobs.
+    frame: LevelQueues<W>,
+    /// For the owner, and for any worker that looks for background jobs.
+    background: LevelQueues<W>,
 }
 
-impl Mailbox {
+impl<W: JobContext> Mailbox<W> {
     pub(super) fn new() -> Self {
         Self { pinned: LevelQueues::new(), frame: LevelQueues::new(), background: LevelQueues::new() }
     }
 
-    pub(super) fn put_pinned(&self, job: Job) {
+    pub(super) fn put_pinned(&self, job: Job<W>) {
         self.pinned.put(job);
     }
 
-    /// The oldest pinned job of the region, which is the owner's.
-    pub(super) fn take_pinned(&self, region: &Region) -> Option<Job> {
-        self.pinned.change(region.level(), VecDeque::pop_front)
+    /// Takes the oldest pinned job of the region. Only its owner may call this.
+    pub(super) fn take_pinned(&self, region: &Region<W>) -> Option<Job<W>> {
+        self.pinned.take_from(region.level(), VecDeque::pop_front)
     }
 
-    pub(super) fn has_pinned(&self, region: &Region) -> bool {
+    pub(super) fn has_pinned(&self, region: &Region<W>) -> bool {
         self.pinned.has(region.level())
     }
 
-    /// Puts a job where the owner of its region finds it, and others too.
-    pub(super) fn put_shared(&self, job: Job) {
+    /// Puts a job where the owner of its region and other workers find it.
+    pub(super) fn put_shared(&self, job: Job<W>) {
         self.shared(job.region.is_background()).put(job);
     }
 
-    /// The newest shared job of the region, which is the owner's. The newest first, as with a worker's own queues, so that a
-    /// tree of jobs is not spread out over its whole breadth.
-    pub(super) fn take_shared(&self, region: &Region) -> Option<Job> {
-        self.shared(region.is_background()).change(region.level(), VecDeque::pop_back)
+    /// Takes the newest shared job of the region. Only its owner may call this. The newest comes first, as in a worker's queues,
+    /// so that a tree of jobs is run depth first.
+    pub(super) fn take_shared(&self, region: &Region<W>) -> Option<Job<W>> {
+        self.shared(region.is_background()).take_from(region.level(), VecDeque::pop_back)
     }
 
-    pub(super) fn has_shared(&self, region: &Region) -> bool {
+    pub(super) fn has_shared(&self, region: &Region<W>) -> bool {
         self.shared(region.is_background()).has(region.level())
     }
 
-    /// A shared job of this band, of whichever region.
-    pub(super) fn take_any_shared(&self, band: Priority) -> Option<Job> {
-        self.shared(band == Priority::Background).take_any()
+    /// Takes a shared job of any region for this priority.
+    pub(super) fn take_any_shared(&self, priority: Priority) -> Option<Job<W>> {
+        self.shared(priority == Priority::Background).take_any()
     }
 
-    pub(super) fn has_any_shared(&self, band: Priority) -> bool {
-        !self.shared(band == Priority::Background).is_empty()
+    pub(super) fn has_any_shared(&self, priority: Priority) -> bool {
+        !self.shared(priority == Priority::Background).is_empty()
     }
 
-    fn shared(&self, is_background: bool) -> &LevelQueues {
+    fn shared(&self, is_background: bool) -> &LevelQueues<W> {
         if is_background { &self.background } else { &self.frame }
     }
 }
 
-impl fmt::Debug for Mailbox {
+impl<W: JobContext> fmt::Debug for Mailbox<W> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter
             .debug_struct("Mailbox")
@@ -83,17 +87,17 @@ impl fmt::Debug for Mailbox {
     }
 }
 
-/// A queue for each level of nesting, and a count that spares those who find all of them empty the lock. Its memory grows and
-/// stays.
+/// A queue for each level of nesting behind one lock, and a count with which workers skip the lock if all queues are empty. Its
+/// memory grows and is kept.
 ///
-/// The count is a hint, so it is relaxed. That a sleeping worker learns of a job that is put here is up to the fences of
-/// [`Sleep`](super::sleep::Sleep), and the lock orders the jobs themselves.
-struct LevelQueues {
+/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to sleep
+/// finds a job that was put here. The lock orders the jobs themselves.
+struct LevelQueues<W: JobContext> {
     count: AtomicUsize,
-    levels: Mutex<Vec<VecDeque<Job>>>,
+    levels: Mutex<Vec<VecDeque<Job<W>>>>,
 }
 
-impl LevelQueues {
+impl<W: JobContext> LevelQueues<W> {
     fn new() -> Self {
         Self { count: AtomicUsize::new(0), levels: Mutex::new(Vec::new()) }
     }
@@ -106,7 +110,7 @@ impl LevelQueues {
         self.len() == 0
     }
 
-    fn put(&self, job: Job) {
+    fn put(&self, job: Job<W>) {
         let level = job.region.level();
         let mut levels = self.levels.lock();
         if levels.len() <= level {
@@ -120,8 +124,8 @@ impl LevelQueues {
         !self.is_empty() && self.levels.lock().get(level).is_some_and(|jobs| !jobs.is_empty())
     }
 
-    /// Takes what `take` takes out of the queue of a level, if there are any jobs at all.
-    fn change(&self, level: usize, take: impl FnOnce(&mut VecDeque<Job>) -> Option<Job>) -> Option<Job> {
+    /// Takes a job of this level with `take`.
+    fn take_from(&self, level: usize, take: impl FnOnce(&mut VecDeque<Job<W>>) -> Option<Job<W>>) -> Option<Job<W>> {
         if self.is_empty() {
             return None;
         }
@@ -131,8 +135,8 @@ impl LevelQueues {
         Some(taken)
     }
 
-    /// The newest job of the outermost region that has one.
-    fn take_any(&self) -> Option<Job> {
+    /// Takes the newest job of the lowest level that has one.
+    fn take_any(&self) -> Option<Job<W>> {
         if self.is_empty() {
             return None;
         }

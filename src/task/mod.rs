@@ -176,38 +176,55 @@
 //! one; then they sleep and take no time from anybody. [What waking one costs](Scheduler::wake_up_cost) is measured when
 //! the scheduler is built; a loop should be worth more than that, and a graph that is not is run by its caller alone.
 
+// In layers: each group uses only groups above it, and no two files import each other in a circle.
+
+// Data structures, which know neither workers nor schedulers.
 mod affinity;
-mod background;
+mod background_job;
 mod background_queue;
-mod builder;
+mod caller_slot;
 mod chunks;
 mod closure;
-mod idle;
 mod job;
 mod latch;
 mod locked_queue;
 mod mailbox;
-mod parallel_for;
+mod parker;
 mod placement;
+mod prepaid_count;
 mod priority;
-mod queue;
+mod queues;
 mod region;
-mod scheduler;
-mod scope;
-mod seat;
+mod shared;
 mod shuffle;
 mod sleep;
 mod tickets;
-mod wake_up_cost;
+
+// Workers, and which one a thread is.
+mod current_worker;
+mod idle;
 mod worker;
+
+// What workers run.
+mod parallel_loop;
+mod scope;
+mod tokens;
+
+// The scheduler, and how it is built.
+mod builder;
+mod scheduler;
+mod scheduler_error;
+mod wake_up_cost;
+mod worker_thread;
 
 #[cfg(all(test, drawloom_shuttle))]
 mod shuttle_tests;
 
 pub use affinity::AffinityMask;
-pub use background::BackgroundJob;
-pub use builder::{SchedulerBuilder, SchedulerError};
+pub use background_job::BackgroundJob;
+pub use builder::SchedulerBuilder;
 pub use scheduler::Scheduler;
+pub use scheduler_error::SchedulerError;
 pub use scope::Scope;
 pub use worker::Worker;
 
@@ -215,5 +232,5 @@ pub use crate::unwind::{JobPanic, catch};
 
 pub(crate) use chunks::Chunks;
 pub(crate) use priority::Priority;
-pub(crate) use region::{TokenContext, Tokens, run_tokens};
 pub(crate) use tickets::{TicketSize, Tickets};
+pub(crate) use tokens::{TokenContext, Tokens, run_tokens};

@@ -1,10 +1,10 @@
-//! Keeps workers off the processor of the thread that calls them, where the system does not see to that.
+//! Keeps worker threads off the processor of the thread that calls them, if the system does not.
 //!
-//! A worker that is woken should run beside its waker, not in its place. Systems look for an idle processor then, but on
-//! some virtual machines every idle processor passes for one that the host has taken away, so the worker is put on the
-//! waker's own, and the two take turns for a whole frame. Whether a machine is like that shows when the price of a wake-up is
-//! measured. If it is, the threads of the scheduler are kept off the processor that the caller is on, until a later call
-//! comes from another one.
+//! A worker that is woken should run beside the thread that wakes it, not on the same processor. Systems look for an idle
+//! processor then. But on some virtual machines every idle processor looks as if the host had taken it away, so the system puts the
+//! worker on the waker's own processor, and the two take turns for a whole frame. The measurement of the wake-up cost finds out
+//! whether a machine does that. If it does, the threads of the scheduler are kept off the processor that the caller runs on, until
+//! a later call comes from another processor.
 
 // Miri has no processors to choose from.
 #[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
@@ -24,12 +24,12 @@ mod linux {
         unwind::emit,
     };
 
-    /// Where the threads of a scheduler may run.
+    /// The processors that the threads of a scheduler may run on.
     pub(in crate::task) struct Placement {
-        /// Each with where it may run by itself.
+        /// The threads, each with the processors that it was allowed at first.
         threads: Mutex<Vec<(Pid, CpuSet)>>,
-        is_needed: AtomicBool,
-        /// The processor they are kept off.
+        is_enabled: AtomicBool,
+        /// The processor that the threads are kept off.
         avoided: AtomicUsize,
     }
 
@@ -37,52 +37,56 @@ mod linux {
 
     impl Placement {
         pub(in crate::task) fn new() -> Self {
-            Self { threads: Mutex::new(Vec::new()), is_needed: AtomicBool::new(false), avoided: AtomicUsize::new(NONE) }
+            Self {
+                threads: Mutex::new(Vec::new()),
+                is_enabled: AtomicBool::new(false),
+                avoided: AtomicUsize::new(NONE),
+            }
         }
 
-        /// Where the calling thread may run.
-        pub(in crate::task) fn of_this_thread() -> Option<CpuSet> {
+        /// The processors that the calling thread may run on.
+        pub(in crate::task) fn current_affinity() -> Option<CpuSet> {
             sched_getaffinity(None).ok()
         }
 
-        /// Takes note of the calling thread, which is one of the scheduler's, unless somebody has placed it since it was
-        /// to run there.
-        pub(in crate::task) fn add_this_thread(&self, at_first: Option<CpuSet>) {
-            if let Some(allowed) = at_first
-                && Self::of_this_thread() == at_first
+        /// Registers the calling thread, one of the scheduler's, unless the engine has changed its affinity since `before` was
+        /// read.
+        pub(in crate::task) fn add_current_thread(&self, before: Option<CpuSet>) {
+            if let Some(allowed) = before
+                && Self::current_affinity() == before
             {
                 self.threads.lock().push((gettid(), allowed));
             }
         }
 
-        /// The processor that the calling thread is on.
-        pub(in crate::task) fn processor() -> Option<usize> {
+        /// The processor that the calling thread runs on.
+        pub(in crate::task) fn current_processor() -> Option<usize> {
             Some(sched_getcpu())
         }
 
-        /// Has [`make_room`](Self::make_room) do its work from now on, if each thread can have a processor of its own.
-        /// Says whether it can.
+        /// Enables [`avoid_current_processor`](Self::avoid_current_processor), if each thread can have a processor of its own.
+        /// Returns whether it can.
         pub(in crate::task) fn enable(&self) -> bool {
             let threads = self.threads.lock();
             let is_room = threads.iter().all(|(_, allowed)| threads.len() < allowed.count() as usize);
-            // Relaxed, here and below: the flag and the number decide how fast something is, and hand nothing over.
-            self.is_needed.store(is_room, Ordering::Relaxed);
+            // Relaxed, here and below: the flag and the number only affect speed, and hand no data over.
+            self.is_enabled.store(is_room, Ordering::Relaxed);
             is_room
         }
 
-        /// Keeps the scheduler's threads off the processor that the calling thread is on.
+        /// Keeps the scheduler's threads off the processor that the calling thread runs on.
         #[inline]
-        pub(in crate::task) fn make_room(&self) {
-            if !self.is_needed.load(Ordering::Relaxed) {
+        pub(in crate::task) fn avoid_current_processor(&self) {
+            if !self.is_enabled.load(Ordering::Relaxed) {
                 return;
             }
             let here = sched_getcpu();
             if self.avoided.swap(here, Ordering::Relaxed) != here
                 && let Err(error) = self.avoid(here)
             {
-                // The machine has changed. It costs time, and nothing else.
-                self.is_needed.store(false, Ordering::Relaxed);
-                self.let_run_anywhere();
+                // The processors of the machine have changed. That only costs time.
+                self.is_enabled.store(false, Ordering::Relaxed);
+                self.restore();
                 emit(|| tracing::debug!(%error, "workers cannot be kept off the processor of their caller"));
             }
         }
@@ -99,10 +103,10 @@ mod linux {
             Ok(())
         }
 
-        fn let_run_anywhere(&self) {
+        fn restore(&self) {
             for (thread, allowed) in self.threads.lock().iter() {
                 if let Err(error) = sched_setaffinity(Some(*thread), allowed) {
-                    emit(|| tracing::debug!(%error, "a worker cannot be let go from its processors"));
+                    emit(|| tracing::debug!(%error, "the affinity of a worker cannot be restored"));
                 }
             }
         }
@@ -111,7 +115,7 @@ mod linux {
 
 #[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
 mod other {
-    /// Where the threads of a scheduler may run: wherever the system puts them.
+    /// Leaves it to the system where the threads of a scheduler run.
     pub(in crate::task) struct Placement;
 
     impl Placement {
@@ -119,11 +123,11 @@ mod other {
             Self
         }
 
-        pub(in crate::task) fn of_this_thread() {}
+        pub(in crate::task) fn current_affinity() {}
 
-        pub(in crate::task) fn add_this_thread(&self, _at_first: ()) {}
+        pub(in crate::task) fn add_current_thread(&self, _before: ()) {}
 
-        pub(in crate::task) fn processor() -> Option<usize> {
+        pub(in crate::task) fn current_processor() -> Option<usize> {
             None
         }
 
@@ -131,6 +135,6 @@ mod other {
             false
         }
 
-        pub(in crate::task) fn make_room(&self) {}
+        pub(in crate::task) fn avoid_current_processor(&self) {}
     }
 }

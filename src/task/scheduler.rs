@@ -7,43 +7,40 @@ use std::{
     time::Duration,
 };
 
-use crossbeam_utils::CachePadded;
-
 use crate::{
-    sync::{Arc, AtomicBool, AtomicUsize, Instant, Ordering, thread},
+    sync::{Arc, Instant, thread},
     timeline::Timeline,
     unwind::{JobPanic, catch, discard},
 };
 
 use super::{
-    background::BackgroundJob,
-    background_queue::BackgroundQueue,
-    builder::{SchedulerBuilder, SchedulerError},
+    background_job::BackgroundJob,
+    current_worker,
     mailbox::Mailbox,
-    parallel_for::Pass,
-    placement::Placement,
+    parallel_loop::ParallelLoop,
     priority::Priority,
-    queue::{Loot, Queues},
+    queues::Queues,
     scope::{self, Scope},
-    seat::{self, Seat},
-    sleep::{Sleep, WakeFor},
+    shared::Shared,
+    sleep::{self, WakeFor},
     worker::Worker,
 };
 
-/// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it has to do with threads.
+/// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it manages threads.
 ///
 /// The thread that calls [`scope`](Self::scope) or [`parallel_for`](Self::parallel_for) is a worker for the length of
-/// the call, so a scheduler of four workers starts three threads, which sleep as long as there is no work (L 3.3).
+/// the call, so a scheduler of four workers starts three threads. They sleep while there is no work (L 3.3).
 ///
-/// Any number of threads may share a scheduler, but only one from outside is served at a time: the next one waits until
-/// the call of the first has returned. A call from within a job, on whichever worker, waits for nobody. It follows that
-/// a call waits for ever if the call it has to let pass waits for it in turn. That happens where a body or a job starts
-/// a thread that calls the same scheduler, and waits for this thread; where a job of one scheduler calls a second one,
-/// and a job of that calls the first from a thread of the second; or where two threads each call one of two schedulers
-/// from within a call of the other.
+/// Any number of threads may share a scheduler, but it serves only one thread from outside at a time: the next one waits until the
+/// call of the first has returned. A call inside a job, on any worker, does not wait for other calls. So a call waits for ever if
+/// the call before it waits for it in turn. That happens in three cases:
 ///
-/// Dropping the scheduler ends its threads and waits until they are gone; so who drops it must not be waited for by one of
-/// its jobs. A background job that drops the last share of its own scheduler is no such case.
+/// - A body or a job starts a thread that calls the same scheduler, and waits for this thread.
+/// - A job of one scheduler calls a second one, and a job of the second calls the first from a thread of the second.
+/// - Two threads each call one of two schedulers inside a call of the other.
+///
+/// Dropping the scheduler ends its threads and waits for them, so none of its jobs may wait for the thread that drops it. A
+/// background job may drop the last reference to its own scheduler.
 ///
 /// ```
 /// # use drawloom::task::Scheduler;
@@ -58,83 +55,55 @@ use super::{
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Scheduler {
-    shared: Arc<Shared>,
+    shared: Arc<Shared<Worker>>,
     threads: Vec<thread::JoinHandle<()>>,
 }
 
 impl Scheduler {
-    /// The most workers a scheduler can have.
-    pub const MAX_WORKERS: usize = 1000;
+    /// The most workers of a scheduler.
+    pub const MAX_WORKERS: usize = sleep::MAX_WORKERS;
 
-    /// A scheduler of that many workers, the calling thread included: 1 starts no thread. There may be more workers
-    /// than the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
-    ///
-    /// # Errors
-    ///
-    /// [`SchedulerError::NoWorkers`] for 0 and [`SchedulerError::TooManyWorkers`] beyond
-    /// [`MAX_WORKERS`](Self::MAX_WORKERS). [`SchedulerError::Spawn`] if the system starts no more threads; those
-    /// started by then have ended when this returns.
-    pub fn new(workers: usize) -> Result<Self, SchedulerError> {
-        Self::builder().workers(workers).build()
-    }
-
-    /// A scheduler of as many workers as the process may run threads at once.
-    ///
-    /// # Errors
-    ///
-    /// [`SchedulerError::UnknownParallelism`] if the system does not tell, and [`SchedulerError::Spawn`] as with
-    /// [`new`](Self::new).
-    pub fn with_available_parallelism() -> Result<Self, SchedulerError> {
-        Self::builder().build()
-    }
-
-    /// A scheduler whose threads have names, places and hooks of the engine's choice.
-    pub fn builder() -> SchedulerBuilder {
-        SchedulerBuilder::default()
-    }
-
-    /// How many threads run jobs, the caller included.
+    /// How many workers the scheduler has, including the caller.
     pub fn workers(&self) -> usize {
         self.shared.workers()
     }
 
-    /// How long it takes from a call of [`Scope::spawn`] until a worker that slept begins on the job, as found in a few tries
-    /// while the scheduler was built; 0 with a single worker. A graph whose work takes no longer than this is not shared.
+    /// The time from a call of [`Scope::spawn`] until a worker that slept begins the job. It is measured in a few tries while the
+    /// scheduler is built, and is 0 with a single worker. A graph with less work than this runs on the calling thread alone.
     pub fn wake_up_cost(&self) -> Duration {
         self.shared.wake_up_cost()
     }
 
-    /// What records which worker does what, once it is [started](Timeline::start).
+    /// Records which worker does what, once it is [started](Timeline::start).
     pub fn timeline(&self) -> &std::sync::Arc<Timeline> {
         self.shared.timeline()
     }
 
-    /// Calls `body` with a scope, and returns what it returns when every job spawned in the scope has run and has been
-    /// dropped. Jobs may borrow all that outlives the call.
+    /// Calls `body` with a scope, and returns its result when all jobs of the scope have run and have been dropped. Jobs may borrow
+    /// anything that outlives the call.
     ///
-    /// While it waits, the thread runs jobs. Called from within a job, those are the jobs of this scope and of what is
-    /// opened inside of them, and no others.
+    /// While the thread waits, it runs jobs. If it was called inside a job, it runs only jobs of this scope and of scopes, loops
+    /// and graphs inside of it.
     ///
     /// # Errors
     ///
-    /// The first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler is
-    /// as good as new.
+    /// Returns the first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler works as
+    /// before.
     pub fn scope<'scope, R>(&self, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
         self.with_worker(|worker| scope::open(worker, body))
     }
 
-    /// Calls `body` with ranges that cover `0..length`, each index in exactly one, on as many workers as there is work
-    /// for, and returns when all calls have.
+    /// Calls `body` with ranges that cover each index of `0..length` once, on as many workers as there is work for. Returns when
+    /// all calls have returned.
     ///
-    /// The ranges are `chunk` indices long, the last one may be shorter. A chunk of 0 is taken for 1, and a `length`
-    /// beyond any slice, more than `isize::MAX`, may get chunks of up to 3. With a single worker or a single chunk
-    /// everything happens on the calling thread, and so it does where the first chunks show that the loop is not worth waking
-    /// a worker for. `body` is not entered on a worker that is in the midst of it for this
-    /// loop, even where it waits for a scope or a loop of its own.
+    /// The ranges are `chunk` indices long; the last one may be shorter. A chunk of 0 counts as 1, and a `length` of more than
+    /// `isize::MAX` may get chunks of up to 3. With a single worker or a single chunk all calls happen on the calling
+    /// thread. So they do if the first chunks show that the loop is not worth waking a worker. A worker that waits inside `body`,
+    /// for a scope or a loop of its own, does not enter `body` again for this loop.
     ///
     /// # Errors
     ///
-    /// The first [`JobPanic`] if `body` panicked. Chunks that had not been begun by then are skipped.
+    /// Returns the first [`JobPanic`] if `body` panicked. Chunks that had not begun by then are skipped.
     pub fn parallel_for(
         &self,
         length: usize,
@@ -144,39 +113,39 @@ impl Scheduler {
         if length == 0 {
             return catch(|| drop(body));
         }
-        let pass = Pass::new(length, chunk, body);
-        self.with_worker(|worker| pass.run(worker))
+        let parallel_loop = ParallelLoop::new(length, chunk, body);
+        self.with_worker(|worker| parallel_loop.run(worker))
     }
 
-    /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a worker
-    /// other than 0 when that has nothing else to do; or wherever [`run_background`](Self::run_background) is called, which
-    /// with a single worker is the only place; or where its end is [waited for](BackgroundJob::wait).
+    /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a worker other
+    /// than 0 that has nothing else to do, in [`run_background`](Self::run_background), or in [`BackgroundJob::wait`]. With a
+    /// single worker only the last two run it.
     ///
-    /// What it spawns itself, in scopes and loops on this scheduler, is background work as well, unless it is run by who waits
-    /// for it: then it is part of that. Jobs that have not begun when the scheduler is dropped run only if they are waited
-    /// for.
+    /// The scopes and loops that it opens on this scheduler are background work as well. If a thread runs the job by waiting for
+    /// it, they are part of that thread's work instead. Jobs that have not begun when the scheduler is dropped run only if a
+    /// thread waits for them.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let job = BackgroundJob::queued(self.shared.background(), job);
-        self.shared.sleep().wake_beside(Priority::Background);
+        self.shared.sleep().wake_despite_searchers(Priority::Background);
         job
     }
 
-    /// Runs background jobs on the calling thread, the oldest first, and says how many. It begins none when `budget` has
-    /// passed, so it returns late by the length of a job at most. While another thread from outside is being served it
+    /// Runs background jobs on the calling thread, the oldest first, and returns how many. It begins no job after `budget` has
+    /// passed, so it returns late by the length of one job at most. While the scheduler serves another thread from outside, it
     /// runs none.
     ///
-    /// The place for it is between two frames. In a job it runs background jobs on top of that job, as if that had called
-    /// them: they must not wait for what that job is part of.
+    /// Call it between two frames. Inside a job it runs background jobs on top of that job, as if the job had called them: they
+    /// must not wait for anything that the job is part of.
     pub fn run_background(&self, budget: Duration) -> usize {
         let start = Instant::now();
         let work = |worker: &Worker| worker.work_in_background(|| start.elapsed() >= budget);
-        seat::with_current(&self.shared, |current| match current {
+        current_worker::with_current(&self.shared, |current| match current {
             Some(worker) => work(worker),
-            None => self.shared.seat.try_take().map_or(0, |queues| self.work_seated(queues, work)),
+            None => self.shared.caller_slot().try_take().map_or(0, |queues| self.work_as_caller(queues, work)),
         })
     }
 
-    pub(super) fn without_threads(shared: Arc<Shared>) -> Self {
+    pub(super) fn without_threads(shared: Arc<Shared<Worker>>) -> Self {
         Self { shared, threads: Vec::new() }
     }
 
@@ -184,40 +153,40 @@ impl Scheduler {
         self.threads.push(thread);
     }
 
-    pub(super) fn shared(&self) -> &Arc<Shared> {
+    pub(super) fn shared(&self) -> &Arc<Shared<Worker>> {
         &self.shared
     }
 
-    /// Calls `body` as the worker this thread is already, or else from the seat. `body` must not unwind.
+    /// Calls `body` with the worker that this thread is. If it is none, the thread takes the caller slot for the length of the
+    /// call. `body` must not unwind.
     pub(crate) fn with_worker<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
-        seat::with_current(&self.shared, |current| match current {
+        current_worker::with_current(&self.shared, |current| match current {
             Some(worker) => body(worker),
-            None => self.work_seated(self.shared.seat.take(), body),
+            None => self.work_as_caller(self.shared.caller_slot().take(), body),
         })
     }
 
-    /// Calls `body` as worker 0, whose queues these are, and gives them back.
-    fn work_seated<R>(&self, queues: Box<Queues>, body: impl FnOnce(&Worker) -> R) -> R {
+    /// Calls `body` with worker 0, to which these queues belong, and frees the caller slot.
+    fn work_as_caller<R>(&self, queues: Box<Queues<Worker>>, body: impl FnOnce(&Worker) -> R) -> R {
         let worker = Worker::new(0, queues, Arc::clone(&self.shared));
-        // `body` catches what is the engine's, and the caller slot must be free again whatever was forgotten.
-        let result = panic::catch_unwind(AssertUnwindSafe(|| seat::occupy(&worker, || body(&worker))));
-        self.shared.seat.give_back(worker.into_queues());
+        // `body` catches the panics of the engine's code. If it missed one, the caller slot must be freed nevertheless.
+        let result = panic::catch_unwind(AssertUnwindSafe(|| current_worker::enter(&worker, || body(&worker))));
+        self.shared.caller_slot().put_back(worker.into_queues());
         result.unwrap_or_else(|payload| panic::resume_unwind(payload))
     }
 }
 
 impl Drop for Scheduler {
     fn drop(&mut self) {
-        self.shared.shut_down.store(true, Ordering::Relaxed);
-        self.shared.sleep.wake_all();
+        self.shared.shut_down();
         for thread in mem::take(&mut self.threads) {
-            // A background job may own the last share of its own scheduler. Its thread cannot wait for itself, and ends
-            // after the job.
+            // A background job may drop the last reference to its own scheduler. Its thread cannot wait for itself, and ends after
+            // the job.
             if thread.thread().id() == thread::current().id() {
                 continue;
             }
-            // A worker's thread has nothing to report: the panic of a job was caught with the job. What is left is that of a
-            // destructor of the engine's, such as a thread-local's.
+            // Panics of jobs have been caught. What remains is the panic of a destructor of the engine's, such as that of a
+            // thread-local.
             if let Err(payload) = thread.join() {
                 discard(payload);
             }
@@ -225,29 +194,30 @@ impl Drop for Scheduler {
     }
 }
 
-/// Each worker's queued jobs, its mailbox, and what it sleeps for: for looking into a hang. It may be printed at any time, from
-/// any thread, and waits for no job.
+/// Shows the queued jobs of each worker, its mailbox, and what it sleeps for, to investigate a hang. Any thread may print it at
+/// any time; it waits for no job.
 impl fmt::Debug for Scheduler {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shared = &self.shared;
-        let asleep = shared.sleep.asleep();
-        let workers = shared.loot.iter().zip(shared.mailboxes()).enumerate().map(|(worker, (loot, mailbox))| {
-            let sleeps_until = asleep.iter().find(|(sleeper, _)| *sleeper == worker).map(|(_, wake_for)| wake_for);
-            WorkerState { queued: loot.len(), mailbox, sleeps_until }
+        let sleeping = shared.sleep().sleeping();
+        let workers = shared.stealers().iter().zip(shared.mailboxes()).enumerate();
+        let workers = workers.map(|(worker, (stealers, mailbox))| {
+            let sleeps_until = sleeping.iter().find(|(sleeper, _)| *sleeper == worker).map(|(_, wake_for)| wake_for);
+            WorkerState { queued: stealers.len(), mailbox, sleeps_until }
         });
         formatter
             .debug_struct("Scheduler")
             .field("workers", &workers.collect::<Vec<_>>())
-            .field("background_jobs", &shared.background.len())
-            .field("serves_a_thread", &!shared.seat.is_free())
+            .field("background_jobs", &shared.background().len())
+            .field("serves_a_thread", &!shared.caller_slot().is_free())
             .finish_non_exhaustive()
     }
 }
 
-/// What others see of a worker: how many jobs lie in its queues and its mailbox, and for what it sleeps, if it does.
+/// How many jobs are in a worker's queues and mailbox, and what the worker sleeps for, if it sleeps.
 struct WorkerState<'state> {
     queued: usize,
-    mailbox: &'state Mailbox,
+    mailbox: &'state Mailbox<Worker>,
     sleeps_until: Option<&'state WakeFor>,
 }
 
@@ -262,121 +232,22 @@ impl fmt::Debug for WorkerState<'_> {
     }
 }
 
-/// What all workers see of each other.
-pub(super) struct Shared {
-    /// The way into the queues of each worker.
-    loot: Box<[Loot]>,
-    mailboxes: Box<[CachePadded<Mailbox>]>,
-    /// Not the model checker's `Arc`, which has no weak form: whoever waits for a job may outlive the scheduler.
-    background: std::sync::Arc<BackgroundQueue>,
-    sleep: Sleep,
-    placement: Placement,
-    seat: Seat,
-    /// Not the model checker's `Arc`: who submits frames has a share as well.
-    timeline: std::sync::Arc<Timeline>,
-    is_shuffled: bool,
-    /// In nanoseconds.
-    wake_up_cost: AtomicUsize,
-    is_live: AtomicBool,
-    shut_down: AtomicBool,
-}
-
-impl Shared {
-    pub(super) fn new(loot: Box<[Loot]>, first: Box<Queues>, timeline: Timeline, is_shuffled: bool) -> Self {
-        Self {
-            mailboxes: loot.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
-            background: std::sync::Arc::new(BackgroundQueue::new()),
-            sleep: Sleep::new(loot.len()),
-            placement: Placement::new(),
-            seat: Seat::new(first),
-            timeline: std::sync::Arc::new(timeline),
-            loot,
-            is_shuffled,
-            wake_up_cost: AtomicUsize::new(0),
-            is_live: AtomicBool::new(false),
-            shut_down: AtomicBool::new(false),
-        }
-    }
-
-    #[inline]
-    pub(super) fn workers(&self) -> usize {
-        self.loot.len()
-    }
-
-    pub(super) fn loot(&self) -> &[Loot] {
-        &self.loot
-    }
-
-    pub(super) fn mailbox(&self, worker: usize) -> &Mailbox {
-        &self.mailboxes[worker]
-    }
-
-    pub(super) fn mailboxes(&self) -> impl Iterator<Item = &Mailbox> {
-        self.mailboxes.iter().map(|mailbox| &**mailbox)
-    }
-
-    pub(super) fn background(&self) -> &std::sync::Arc<BackgroundQueue> {
-        &self.background
-    }
-
-    pub(super) fn sleep(&self) -> &Sleep {
-        &self.sleep
-    }
-
-    pub(super) fn placement(&self) -> &Placement {
-        &self.placement
-    }
-
-    #[inline]
-    pub(super) fn timeline(&self) -> &std::sync::Arc<Timeline> {
-        &self.timeline
-    }
-
-    #[inline]
-    pub(super) fn is_shuffled(&self) -> bool {
-        self.is_shuffled
-    }
-
-    // The rest are hints and a flag that hand nothing over, so relaxed is enough. That sleepers see the flag is up to the lock
-    // that `Sleep::wake_all` takes.
-
-    pub(super) fn wake_up_cost(&self) -> Duration {
-        Duration::from_nanos(self.wake_up_cost.load(Ordering::Relaxed) as u64)
-    }
-
-    pub(super) fn set_wake_price(&self, price: Duration) {
-        self.wake_up_cost.store(price.as_nanos().try_into().unwrap_or(usize::MAX), Ordering::Relaxed);
-    }
-
-    /// Whether a frame, or whatever a thread from outside has called for, is being worked on.
-    pub(super) fn is_live(&self) -> bool {
-        self.is_live.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn set_live(&self, is_live: bool) {
-        self.is_live.store(is_live, Ordering::Relaxed);
-    }
-
-    pub(super) fn is_shut_down(&self) -> bool {
-        self.shut_down.load(Ordering::Relaxed)
-    }
-}
-
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use std::{sync::mpsc, thread, time::Duration};
 
     use super::Scheduler;
 
-    /// Waits until so many workers sleep, for as long as the slowest machine may take, and says how many do.
+    /// Waits until this many workers sleep, for as long as the slowest machine may take, and returns how many do.
     fn sleepers(scheduler: &Scheduler, expected: usize) -> usize {
+        let sleep = scheduler.shared.sleep();
         for _look in 0..10_000 {
-            if scheduler.shared.sleep.sleepers() == expected {
+            if sleep.sleepers() == expected {
                 break;
             }
             thread::sleep(Duration::from_millis(1));
         }
-        scheduler.shared.sleep.sleepers()
+        sleep.sleepers()
     }
 
     #[test]
@@ -398,7 +269,7 @@ mod tests {
                 started.send(()).unwrap();
                 assert_eq!(sleepers(scheduler, 1), 1);
             });
-            // The other worker has the job now, so the owner is left with nothing.
+            // The other worker runs the job now, so the owner has nothing to do.
             has_started.recv().unwrap();
         });
         assert_eq!(outcome, Ok(()));
@@ -443,7 +314,7 @@ mod loom_tests {
     }
 
     #[test]
-    fn a_loop_gives_each_chunk_once() {
+    fn a_loop_runs_each_chunk_once() {
         bounded(2, || {
             let ran = [AtomicUsize::new(0), AtomicUsize::new(0)];
             let scheduler = Scheduler::new(2).unwrap();

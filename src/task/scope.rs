@@ -6,17 +6,18 @@ use crate::unwind::JobPanic;
 
 use super::{
     closure::Closure,
-    job::Work,
+    current_worker,
+    job::{Job, Work},
     priority::Priority,
-    region::{self, Region, TokenContext, Tokens},
-    seat,
+    region::Region,
+    tokens::{TokenContext, Tokens},
     worker::Worker,
 };
 
-/// Where jobs are spawned that may borrow whatever outlives the call of [`Scheduler::scope`](super::Scheduler::scope).
+/// Spawns jobs that may borrow anything that outlives the call of [`Scheduler::scope`](super::Scheduler::scope).
 ///
-/// Every job is given the scope again, to spawn more, and the [`Worker`] it runs on. What the body of the scope owns
-/// itself cannot be borrowed, as the jobs may outlive the body:
+/// Every job gets the scope, to spawn more jobs, and the [`Worker`] that it runs on. Jobs cannot borrow what the body of the scope
+/// owns, because they may outlive the body:
 ///
 /// ```compile_fail,E0597
 /// # let scheduler = drawloom::task::Scheduler::new(2)?;
@@ -27,55 +28,65 @@ use super::{
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Scope<'scope> {
-    region: &'static Region,
-    /// Makes the lifetime invariant. A scope that could pass for one of a shorter life would take jobs that borrow what
+    region: &'static Region<Worker>,
+    /// Makes the lifetime invariant. If a scope could pass for one with a shorter lifetime, it would accept jobs that borrow what
     /// does not live long enough.
     lifetime: PhantomData<&'scope mut &'scope ()>,
 }
 
 impl<'scope> Scope<'scope> {
-    /// A scope over the region. Its lifetime is right if it is the one that the region was opened with, or if nobody but
-    /// a job of this scope gets to see it, as such a job has been erased together with it.
-    pub(super) fn new(region: &'static Region) -> Self {
+    /// A scope over the region. `'scope` must be the lifetime that the region was opened with.
+    fn new(region: &'static Region<Worker>) -> Self {
         Self { region, lifetime: PhantomData }
     }
 
-    /// Adds a job that any worker may run, in no particular order.
+    /// Spawns a job that any worker may run, in no particular order.
     ///
-    /// It is queued with the worker this is called on if that waits for the scope, or if the scope was opened from outside of
-    /// all jobs. That worker runs the newest of its jobs first, while others take its oldest. Otherwise it goes to the thread
-    /// that opened the scope, where workers that look for something to do find it too. Called on a thread that is no worker
-    /// of the scheduler just now, one that was lent the scope by the body or a job, it falls to the thread that opened it.
+    /// The job goes to the queues of the calling worker if that worker waits for the scope, or if the scope was opened outside of
+    /// all jobs. A worker runs the newest job of its queues first, while others steal the oldest. Otherwise the job goes to the
+    /// thread that opened the scope, where workers that look for jobs find it too. On a thread that is not a worker of the
+    /// scheduler, to which the body or a job has lent the scope, the job goes to the thread that opened the scope.
     pub fn spawn(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let work = Self::work(job);
-        seat::with_current(self.region.shared(), |current| match current {
+        current_worker::with_current(self.region.shared(), |current| match current {
             Some(worker) => worker.push(self.region, work, Priority::Normal),
-            None => self.region.post(work),
+            None => self.push_from_outside(work),
         });
     }
 
-    /// Adds a job that runs on the thread that opened the scope, and nowhere else, in the order of the calls.
+    /// Spawns a job that only the thread that opened the scope runs. That thread runs pinned jobs in the order of the calls.
     ///
-    /// It runs when that thread waits for the scope, at the latest, and before other jobs that the thread could take up
-    /// then, since nobody can take a pinned one off it.
+    /// It runs them when it waits for the scope, at the latest, and before any other jobs, because no other thread can.
     pub fn spawn_pinned(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let work = Self::work(job);
-        seat::with_current(self.region.shared(), |current| match current {
+        current_worker::with_current(self.region.shared(), |current| match current {
             Some(worker) => worker.push_pinned(self.region, work),
-            None => self.region.post(work),
+            None => self.push_from_outside(work),
         });
     }
 
-    /// Takes the lifetime away from the closure.
-    fn work(closure: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) -> Work {
-        // SAFETY:
-        // 1. The closure is gone, run and dropped, before `'scope` ends. `'scope` outlives the call of `region::open` that
-        //    opened the region, as it is a parameter of the function that calls it. `region::open` returns only when the
-        //    latch is released, and an abort guard in it excludes that it unwinds. The job is counted when it is queued,
-        //    and taken off after the closure is gone; and whoever spawns is counted itself: the body until it has
-        //    returned, a job until it has run, and nobody can keep the scope for longer, as both are lent it for a
-        //    lifetime of their own. A lost job would keep `region::open` waiting, not let it return.
-        // 2. It is called with the region that its job was queued for, which is the one of this scope.
+    /// Hands a job to the owner of the region, from a thread that is no worker. The body or a job has lent it the scope, and that
+    /// is counted, so the latch is not released yet.
+    fn push_from_outside(&self, work: Work<Worker>) {
+        let Self { region, .. } = *self;
+        region.latch().add(1);
+        region.shared().mailbox(region.owner()).put_pinned(Job { work, region, is_stolen: false });
+        region.shared().sleep().wake_worker(region.owner());
+    }
+
+    /// Erases the type and the lifetime of a job.
+    fn work(job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) -> Work<Worker> {
+        // The region is the one that the job was queued for, which is that of this scope, so `'scope` is its lifetime.
+        let closure =
+            move |region: &'static Region<Worker>, worker: &Worker| job(&Scope::<'scope>::new(region), worker);
+        // SAFETY: The closure must be called or dropped before `'scope` ends.
+        // - `'scope` outlives the call of `Worker::open_region` that opened the region, because it is a parameter of the function
+        //   that makes that call.
+        // - `Worker::open_region` returns only when the latch is released, and a guard in it aborts if it unwinds.
+        // - The job is counted when it is queued, and counted off after its closure has been called and dropped.
+        // - The latch is not released before the job is queued, because the spawning code is counted too: the body until it
+        //   returns, a job until it has run. Neither can keep the scope longer, as each borrows it for a lifetime of its own.
+        // - A lost job would make `Worker::open_region` wait for ever, not return.
         Work::Closure(unsafe { Closure::new(closure) })
     }
 }
@@ -86,16 +97,16 @@ impl fmt::Debug for Scope<'_> {
     }
 }
 
-/// Opens a scope on the worker, runs `body` in it, and works until its jobs have run. Does not unwind.
+/// Opens a scope on the worker, runs `body` in it, and works until all of its jobs have run. Does not unwind.
 pub(super) fn open<'scope, R>(worker: &Worker, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
-    region::open(worker, &NoTokens, |region| body(&Scope::new(region)))
+    worker.open_region(&NoTokens, |region| body(&Scope::new(region)))
 }
 
-/// A scope's jobs are closures.
+/// The jobs of a scope are closures.
 struct NoTokens;
 
 impl Tokens for NoTokens {
-    fn run(&self, _token: u64, _crew: &TokenContext<'_>) {
-        unreachable!("nobody pushes tokens into a scope");
+    fn run(&self, _token: u64, _context: &TokenContext<'_>) {
+        unreachable!("a scope has no tokens");
     }
 }

@@ -1,24 +1,24 @@
-//! An order that is none: pseudo-random, and the same for the same seed.
+//! A pseudo-random order, the same for the same seed.
 
 use std::cell::Cell;
 
-/// Draws one of several, again and again (Steele, Lea & Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
+/// Pseudo-random numbers (Steele, Lea & Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
 pub(super) struct Shuffle {
     state: Cell<u64>,
 }
 
 impl Shuffle {
-    /// The draws for one worker; those of another are different ones.
+    /// The numbers of one worker. Every worker has different ones.
     pub(super) fn new(seed: u64, worker: usize) -> Self {
         let shuffle = Self { state: Cell::new(seed ^ (worker as u64).rotate_left(32)) };
         shuffle.next();
         shuffle
     }
 
-    /// A number from 0 up to `count`, and none if that is 0.
+    /// A number below `count`, or `None` if `count` is 0.
     pub(super) fn below(&self, count: usize) -> Option<usize> {
         let count = count as u64;
-        // The bias of a remainder is of no importance to an order.
+        // The bias of the remainder does not matter for an order.
         (count > 0).then(|| (self.next() % count) as usize)
     }
 

@@ -77,7 +77,7 @@ fn shuttle_pinned_jobs_run_on_the_calling_thread_in_order() {
 }
 
 #[test]
-fn shuttle_a_loop_gives_each_index_once() {
+fn shuttle_a_loop_runs_each_index_once() {
     check_on_schedulers(|scheduler| {
         let ran = counters(7);
         for times in 1..3 {

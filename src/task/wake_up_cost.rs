@@ -1,4 +1,4 @@
-//! What it costs to wake a worker, measured where it will be paid.
+//! Measures how long it takes to wake a worker, on the machine and with the scheduler that will pay it.
 
 use std::{sync::OnceLock, time::Duration};
 
@@ -6,82 +6,81 @@ use crate::sync::{Instant, spin_loop, thread};
 
 use super::{placement::Placement, scheduler::Scheduler};
 
-/// How often it is tried. What else the machine does makes tries longer, never shorter, so the second shortest counts.
+/// How many wake-ups are measured. Other work on the machine makes some longer, never shorter, so the second shortest counts.
 const TRIES: usize = 5;
 
-/// How long a try may take: one that takes longer says that the machine is busy, and nothing about a wake-up.
-const PATIENCE: Duration = Duration::from_micros(200);
+/// A wake-up that takes longer is not counted: the machine is busy, and it says nothing about the cost.
+const MAX_WAKE_UP: Duration = Duration::from_micros(200);
 
-/// How long it may take until all workers have started, or have gone back to sleep.
-const START: Duration = Duration::from_millis(5);
+/// How long all workers may take to start, or to go back to sleep.
+const START_TIMEOUT: Duration = Duration::from_millis(5);
 
-/// What is assumed where no try succeeded.
-const ASSUMED: Duration = Duration::from_micros(50);
+/// The cost if no wake-up was measured.
+const DEFAULT: Duration = Duration::from_micros(50);
 
-/// How long a worker stays asleep before each try, so that its processor sleeps too.
-const NAP: Duration = Duration::from_micros(20);
+/// How long a worker sleeps before it is woken, so that its processor sleeps too.
+const SLEEP_BEFORE: Duration = Duration::from_micros(20);
 
-/// The time from the spawning of a job until a worker that slept begins on it. If one ever begins where the spawning
-/// thread runs, workers are kept off there from then on, if they `may_move`.
+/// Measures the time from the spawning of a job until a worker that slept begins it. If a worker begins on the processor of the
+/// spawning thread even once, workers are kept off there from then on, if they `may_move`.
 pub(super) fn measure(scheduler: &Scheduler, may_move: bool) -> Duration {
-    // Where threads are modelled or interpreted, time does not pass as usual.
+    // Under a model checker or an interpreter, time does not pass as usual.
     if scheduler.workers() == 1 || cfg!(any(drawloom_loom, drawloom_shuttle, miri)) {
         return Duration::ZERO;
     }
-    let mut tries = try_often(scheduler);
-    let is_in_the_way = tries.iter().any(|wake| !wake.is_beside);
-    if may_move && is_in_the_way && scheduler.shared().placement().enable() {
-        tries = try_often(scheduler);
+    let mut wake_ups = measure_all(scheduler);
+    let shared_processor = wake_ups.iter().any(|wake_up| !wake_up.is_on_other_processor);
+    if may_move && shared_processor && scheduler.shared().placement().enable() {
+        wake_ups = measure_all(scheduler);
     }
-    tries.sort_unstable_by_key(|wake| wake.took);
-    tries.get(1).map_or(ASSUMED, |wake| wake.took)
+    wake_ups.sort_unstable_by_key(|wake_up| wake_up.took);
+    wake_ups.get(1).map_or(DEFAULT, |wake_up| wake_up.took)
 }
 
-/// One worker, woken.
-struct Wake {
+struct WakeUp {
     took: Duration,
-    /// Whether it ran on another processor than its waker, as far as is known.
-    is_beside: bool,
+    /// Whether the worker ran on another processor than its waker, as far as is known.
+    is_on_other_processor: bool,
 }
 
-fn try_often(scheduler: &Scheduler) -> Vec<Wake> {
-    (0..TRIES).filter_map(|_| try_once(scheduler)).collect()
+fn measure_all(scheduler: &Scheduler) -> Vec<WakeUp> {
+    (0..TRIES).filter_map(|_| measure_one(scheduler)).collect()
 }
 
-fn try_once(scheduler: &Scheduler) -> Option<Wake> {
+fn measure_one(scheduler: &Scheduler) -> Option<WakeUp> {
     let sleep = scheduler.shared().sleep();
-    if !wait_until(START, || sleep.sleepers() == scheduler.workers() - 1) {
+    if !wait_until(START_TIMEOUT, || sleep.sleepers() == scheduler.workers() - 1) {
         return None;
     }
-    let nap = Instant::now();
-    while nap.elapsed() < NAP {
+    let asleep_since = Instant::now();
+    while asleep_since.elapsed() < SLEEP_BEFORE {
         spin_loop();
     }
     let begun = OnceLock::new();
     let spawned = scheduler.scope(|scope| {
-        let here = Placement::processor();
+        let here = Placement::current_processor();
         let spawned = Instant::now();
         scope.spawn(|_scope, _worker| {
-            // There is one job, so nobody has set this before.
-            let _ = begun.set((Instant::now(), Placement::processor()));
+            // There is only one job, so the lock is empty.
+            let _ = begun.set((Instant::now(), Placement::current_processor()));
         });
-        wait_until(PATIENCE, || begun.get().is_some()).then_some((spawned, here))
+        wait_until(MAX_WAKE_UP, || begun.get().is_some()).then_some((spawned, here))
     });
     let (spawned, here) = spawned.ok()??;
     let &(begun, there) = begun.get()?;
     let took = begun.duration_since(spawned);
-    (took <= PATIENCE).then_some(Wake { took, is_beside: here.is_none() || here != there })
+    (took <= MAX_WAKE_UP).then_some(WakeUp { took, is_on_other_processor: here.is_none() || here != there })
 }
 
-/// Waits for that, as long as there is patience, and says whether it came.
-fn wait_until(patience: Duration, mut condition: impl FnMut() -> bool) -> bool {
+/// Waits until the condition holds, or the timeout has passed. Returns whether it holds.
+fn wait_until(timeout: Duration, mut condition: impl FnMut() -> bool) -> bool {
     let start = Instant::now();
     while !condition() {
-        if start.elapsed() >= patience {
+        if start.elapsed() >= timeout {
             return false;
         }
-        // The other thread may have to share this processor.
-        if patience > PATIENCE {
+        // During a long wait the other thread may need this processor.
+        if timeout > MAX_WAKE_UP {
             thread::yield_now();
         }
         spin_loop();

@@ -1,68 +1,76 @@
-//! What a worker does: run jobs, look for jobs, sleep.
+//! What a worker does: it runs jobs, looks for jobs, and sleeps.
 
-use std::{cell::Cell, fmt, marker::PhantomData, ptr, rc::Rc, time::Duration};
+use std::{cell::Cell, fmt, marker::PhantomData, mem, ptr, rc::Rc, time::Duration};
 
 use crate::{
     sync::Arc,
     timeline::Timeline,
-    unwind::{JobPanic, discard},
+    unwind::{AbortOnUnwind, JobPanic, catch, discard},
 };
 
 use super::{
-    background::Queued,
+    background_queue::QueuedJob,
     idle::Idle,
     job::{Job, Work},
+    prepaid_count::PrepaidCount,
     priority::Priority,
-    queue::{Popped, Queues},
-    region::Region,
-    scheduler::Shared,
+    queues::{Popped, Queues},
+    region::{JobContext, Region, RegionKind, RunToken},
+    shared::Shared,
     sleep::WakeFor,
 };
 
-/// For how many jobs a worker counts in advance.
-const JOBS_COUNTED_AT_ONCE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 32 };
-
-/// The witness that code runs as a job of a scheduler: only there can a reference to it be had, and it stays on its
-/// thread.
+/// Proof that code runs as a job of a scheduler: a reference to a worker exists only there, and stays on its thread.
 ///
-/// No two threads are the same worker at the same time, so what an engine keeps once per [`index`](Self::index) is
-/// never shared between threads. But a job that opens a scope or a loop and waits in it may find itself interrupted by
-/// a job of that scope on the same worker, so such a thing should not stay borrowed over a wait.
+/// No two threads are the same worker at the same time, so data that an engine keeps for each [`index`](Self::index) is never
+/// used by two threads at once. But while a job waits in a scope or a loop that it opened, other jobs of that scope may run on top
+/// of it, on the same worker. So such data should not stay borrowed over a wait.
 ///
 /// ```compile_fail,E0277
 /// # let scheduler = drawloom::task::Scheduler::new(2)?;
 /// scheduler.scope(|scope| {
-///     // A witness could testify for a thread that is no worker at all.
+///     // The reference would be on a thread that is no worker.
 ///     scope.spawn(|_scope, worker| std::thread::scope(|threads| { threads.spawn(|| worker.index()); }));
 /// })?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Worker {
     index: usize,
-    queues: Box<Queues>,
-    shared: Arc<Shared>,
-    /// Whom to steal from first: where there was something the last time.
+    queues: Box<Queues<Self>>,
+    shared: Arc<Shared<Self>>,
+    /// The first worker to steal from: the last one that had something.
     victim: Cell<usize>,
     /// How many regions are open on this worker, each inside a job of the one before.
     depth: Cell<usize>,
-    /// Whether what runs is a background job.
+    /// Whether the running job is a background job.
     is_in_background: Cell<bool>,
-    /// Whether the job that runs was stolen, until it is [past](Self::clear_stolen) what it was stolen for.
+    /// Whether the running job was stolen, until [`clear_stolen`](Self::clear_stolen).
     has_stolen: Cell<bool>,
-    /// For how many jobs that are not there this worker is counted, and by which region. While there is credit, the
-    /// region waits for it to come back; where there is none, a job of the region is running here.
-    credit: Cell<usize>,
-    creditor: Cell<Option<&'static Region>>,
-    /// The region that this worker waits for in the midst of a job, the innermost. Its own queues' newest jobs belong
-    /// there.
-    awaited: Cell<Option<&'static Region>>,
-    /// What else this thread is (see `seat`).
-    pub(super) outer: Cell<*const Worker>,
-    on_this_thread: PhantomData<Rc<()>>,
+    prepaid: PrepaidCount<Self>,
+    /// The innermost region that this worker waits for inside a job. The newest jobs of its own queues belong to it.
+    awaited: Cell<Option<&'static Region<Self>>>,
+    /// The next worker that this thread is (see `current_worker`).
+    pub(super) outer: Cell<*const Self>,
+    not_send: PhantomData<Rc<()>>,
+}
+
+impl JobContext for Worker {
+    type Shared = Shared<Self>;
+}
+
+/// When a worker stops working.
+#[derive(Clone, Copy)]
+pub(super) enum ExitCondition {
+    /// The scheduler is dropped.
+    Shutdown,
+    /// All jobs of the region have run. The worker opened the region, and runs its pinned jobs. If the region is not an outermost
+    /// one, the worker is inside some job, and takes only jobs of the region: a foreign job might take long, or want what the job
+    /// has borrowed.
+    Finished { region: &'static Region<Worker> },
 }
 
 impl Worker {
-    pub(super) fn new(index: usize, queues: Box<Queues>, shared: Arc<Shared>) -> Self {
+    pub(super) fn new(index: usize, queues: Box<Queues<Self>>, shared: Arc<Shared<Self>>) -> Self {
         Self {
             index,
             queues,
@@ -71,50 +79,49 @@ impl Worker {
             depth: Cell::new(0),
             is_in_background: Cell::new(false),
             has_stolen: Cell::new(false),
-            credit: Cell::new(0),
-            creditor: Cell::new(None),
+            prepaid: PrepaidCount::new(),
             awaited: Cell::new(None),
             outer: Cell::new(ptr::null()),
-            on_this_thread: PhantomData,
+            not_send: PhantomData,
         }
     }
 
-    /// Which worker this is, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that
-    /// called the scheduler.
+    /// The index of this worker, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that called the
+    /// scheduler.
     #[inline]
     pub fn index(&self) -> usize {
         self.index
     }
 
-    pub(super) fn shared(&self) -> &Arc<Shared> {
+    #[inline]
+    pub(super) fn shared(&self) -> &Arc<Shared<Self>> {
         &self.shared
     }
 
-    /// How many workers there are.
+    /// How many workers the scheduler has.
     #[inline]
     pub(crate) fn workers(&self) -> usize {
         self.shared.workers()
     }
 
-    /// What it costs to wake one of them.
+    /// How long it takes to wake a worker.
     #[inline]
     pub(crate) fn wake_up_cost(&self) -> Duration {
         self.shared.wake_up_cost()
     }
 
-    /// What records what workers do.
     #[inline]
     pub(crate) fn timeline(&self) -> &Timeline {
         self.shared.timeline()
     }
 
-    /// Whether what the worker does was stolen by it.
+    /// Whether the running job was stolen.
     #[inline]
     pub(crate) fn has_stolen(&self) -> bool {
         self.has_stolen.get()
     }
 
-    /// What the job was stolen for is done, and what it goes on with was not stolen.
+    /// Ends the part of the running job that was stolen: from here on the job does work of its own.
     #[inline]
     pub(crate) fn clear_stolen(&self) {
         self.has_stolen.set(false);
@@ -125,93 +132,112 @@ impl Worker {
         self.queues.len()
     }
 
-    /// Whether somebody sleeps who would have to be woken, and whom a worker may do without for what is not worth that.
-    pub(super) fn may_be_alone(&self) -> bool {
+    /// Whether a loop may begin on this worker alone: others sleep, and work that is shorter than a wake-up should not wake them.
+    pub(super) fn may_begin_serially(&self) -> bool {
         !self.is_shuffled() && !self.wake_up_cost().is_zero() && self.shared.sleep().sleepers() > 0
     }
 
-    /// Whether jobs are to run in no particular order.
+    /// Whether jobs run in a random order.
     #[inline]
     pub(crate) fn is_shuffled(&self) -> bool {
         self.shared.is_shuffled()
     }
 
-    /// Draws one of so many, if the scheduler is to [shuffle](super::SchedulerBuilder::shuffle).
+    /// A random number below `count`, if the scheduler [shuffles](super::SchedulerBuilder::shuffle).
     pub(crate) fn draw(&self, count: usize) -> Option<usize> {
         self.queues.draw(count)
     }
 
-    /// Whether what runs is a background job.
+    /// Whether the running job is a background job.
     pub(crate) fn is_in_background(&self) -> bool {
         self.is_in_background.get()
     }
 
-    pub(super) fn into_queues(self) -> Box<Queues> {
+    pub(super) fn into_queues(self) -> Box<Queues<Self>> {
         self.queues
     }
 
-    /// How many regions are open on this worker.
-    pub(super) fn depth(&self) -> usize {
-        self.depth.get()
-    }
-
-    /// Whether a region opened now is one that a thread from outside waits for, and in the midst of no job.
-    pub(super) fn opens_outermost(&self) -> bool {
-        self.index == 0 && self.depth() == 0 && !self.is_in_background()
-    }
-
-    /// Queues a job, and wakes somebody for it. Only from within a counted job of the region, or its body.
+    /// Queues a job, and wakes a worker for it. Call it only inside a counted job of the region, or inside its body.
     ///
-    /// The job stays in this worker's queues only if no owner can wait for it in vain there. A worker keeps jobs of the
-    /// innermost region that it waits for in the midst of a job. If it waits for none, it keeps those of an outermost region,
-    /// whose owner steals.
-    pub(super) fn push(&self, region: &'static Region, work: Work, band: Priority) {
-        self.spend(region);
+    /// The worker keeps the job in its own queues only if the owner cannot wait for it there in vain. If the worker waits inside a
+    /// job, it keeps jobs of the innermost region that it waits for. Otherwise it keeps jobs of an outermost region, whose owner
+    /// steals. All other jobs go to the owner's mailbox.
+    pub(super) fn push(&self, region: &'static Region<Self>, work: Work<Self>, priority: Priority) {
+        self.acquire_count(region);
         let job = Job { work, region, is_stolen: false };
-        let band = if region.is_background() { Priority::Background } else { band };
+        let priority = if region.is_background() { Priority::Background } else { priority };
         let may_keep = self.awaited.get().map_or(region.is_outermost(), |awaited| awaited.is(region));
         let (owner, level) = (region.owner(), region.level());
         if !may_keep {
             self.shared.mailbox(owner).put_shared(job);
-            self.shared.sleep().wake_owner_or_other(owner, level, band);
-        } else if band == Priority::Background {
-            self.queues.push(job, band);
-            self.shared.sleep().wake_beside(band);
+            self.shared.sleep().wake_owner_or_other(owner, level, priority);
+        } else if priority == Priority::Background {
+            self.queues.push(job, priority);
+            self.shared.sleep().wake_despite_searchers(priority);
         } else {
-            self.queues.push(job, band);
+            self.queues.push(job, priority);
             self.shared.sleep().wake_any();
         }
     }
 
-    /// Hands a job to the owner of the region. Only from within a counted job of the region, or its body.
-    pub(super) fn push_pinned(&self, region: &'static Region, work: Work) {
-        self.spend(region);
+    /// Hands a job to the owner of the region. Call it only inside a counted job of the region, or inside its body.
+    pub(super) fn push_pinned(&self, region: &'static Region<Self>, work: Work<Self>) {
+        self.acquire_count(region);
         let job = Job { work, region, is_stolen: false };
         self.shared.mailbox(region.owner()).put_pinned(job);
-        if region.owner() != self.index {
-            self.shared.sleep().wake_worker(region.owner());
-        }
+        self.wake_other(region.owner());
     }
 
-    /// Calls `body`, whose jobs are those of the region, and then works until they have run. Neither may unwind.
-    pub(super) fn wait_inside<R>(
+    /// Opens a region, runs `body` in it, and works until all jobs of the region have run. Does not unwind.
+    ///
+    /// # Errors
+    ///
+    /// Returns the first [`JobPanic`] of `body` or of a job. All jobs have run nevertheless.
+    pub(super) fn open_region<R>(
         &self,
-        region: &'static Region,
+        tokens: &dyn RunToken<Self>,
+        body: impl FnOnce(&'static Region<Self>) -> R,
+    ) -> Result<R, JobPanic> {
+        // SAFETY: The types differ only in lifetimes, so the referent must outlive every use of the result. Only jobs of the region
+        // use it. Each job is counted from before it is queued until it has run, `work_until_finished` returns only when the
+        // count is zero, and `guard`, which is made before the first use, aborts if this function unwinds before. The
+        // referent is borrowed for this whole call.
+        let tokens = unsafe { mem::transmute::<&dyn RunToken<Self>, &'static dyn RunToken<Self>>(tokens) };
+        let is_outermost = self.index == 0 && self.depth.get() == 0 && !self.is_in_background();
+        let kind = RegionKind { is_outermost, is_background: self.is_in_background() };
+        let storage = Region::new(self.index, self.depth.get(), kind, tokens, Arc::clone(&self.shared));
+        // SAFETY: The storage must not move, and must outlive every use of the reference. It is a local that is not moved. `body`
+        // uses the reference before it returns, jobs before they are counted off, and workers that hold a prepaid count before
+        // they flush it, which the latch counts too; a thread that releases the latch does not use the reference afterwards.
+        // `work_until_finished` returns only when the count is zero, and `guard` aborts if this function unwinds before.
+        let region: &'static Region<Self> = unsafe { &*ptr::from_ref(&storage) };
+        // The last local, so that an unwind drops it before any other.
+        let guard = AbortOnUnwind::new("an open region of jobs");
+        let result =
+            self.work_until_finished(region, || catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone())));
+        guard.disarm();
+        result
+    }
+
+    /// Calls `body`, and then works until all jobs of the region have run. `body` must not unwind.
+    fn work_until_finished<R>(
+        &self,
+        region: &'static Region<Self>,
         body: impl FnOnce() -> Result<R, JobPanic>,
     ) -> Result<R, JobPanic> {
         let is_outermost = region.is_outermost();
         self.depth.set(self.depth.get() + 1);
         let outer = (self.awaited.replace((!is_outermost).then_some(region)), self.queues.start_wait());
         if is_outermost {
-            self.shared.placement().make_room();
-            self.shared.set_live(true);
+            self.shared.placement().avoid_current_processor();
+            self.shared.set_in_frame(true);
         }
         let result = body();
-        // The count that the latch began with.
-        self.earn(region);
-        self.work(Until::Finished { region });
+        // The count that the latch began with is that of the body.
+        self.release_count(region);
+        self.work(ExitCondition::Finished { region });
         if is_outermost {
-            self.shared.set_live(false);
+            self.shared.set_in_frame(false);
         }
         self.awaited.set(outer.0);
         self.queues.end_wait(outer.1);
@@ -221,32 +247,33 @@ impl Worker {
         Err(first)
     }
 
-    /// Runs jobs, and sleeps where there are none, until that time has come. Does not unwind.
-    pub(super) fn work(&self, until: Until) {
+    /// Runs jobs, and sleeps while there are none, until the exit condition holds. Does not unwind.
+    pub(super) fn work(&self, until: ExitCondition) {
         let mut idle = Idle::default();
+        let sees_more_work = |priorities: &[Priority]| self.sees_jobs(priorities);
         loop {
             if let Some(job) = self.next_job(until) {
-                idle.end(self);
+                idle.end(self.index, &self.shared, sees_more_work);
                 self.run(job);
                 continue;
             }
-            self.settle();
-            if until.has_come(&self.shared) {
+            self.flush_counts();
+            if until.holds(&self.shared) {
                 break;
             }
-            if matches!(until, Until::Shutdown)
+            if matches!(until, ExitCondition::Shutdown)
                 && let Some(job) = self.shared.background().take_oldest()
             {
-                idle.end(self);
+                idle.end(self.index, &self.shared, sees_more_work);
                 self.run_in_background(&*job);
                 continue;
             }
-            idle.go_on(self, until);
+            idle.pause(self.index, &self.shared, until.wake_for(), || self.sees_work(until));
         }
-        idle.end(self);
+        idle.end(self.index, &self.shared, sees_more_work);
     }
 
-    /// Runs background jobs one after another, until there is none left or it is time to stop. Says how many have run.
+    /// Runs background jobs one after another until there are none or `stop` returns true. Returns how many have run.
     pub(super) fn work_in_background(&self, mut stop: impl FnMut() -> bool) -> usize {
         let mut jobs = 0;
         while !stop() {
@@ -256,16 +283,16 @@ impl Worker {
         jobs
     }
 
-    /// Whether there is a job that this worker would take up.
-    pub(super) fn sees_work(&self, until: Until) -> bool {
-        until.has_come(&self.shared)
+    /// Whether there is a job that this worker would run, or the exit condition holds.
+    fn sees_work(&self, until: ExitCondition) -> bool {
+        until.holds(&self.shared)
             || match until {
-                Until::Shutdown => self.sees_loot(&Priority::ALL),
-                Until::Finished { region } => {
+                ExitCondition::Shutdown => self.sees_jobs(&Priority::ALL),
+                ExitCondition::Finished { region } => {
                     let mailbox = self.shared.mailbox(self.index);
                     mailbox.has_pinned(region)
                         || if region.is_outermost() {
-                            self.sees_loot(&Priority::FRAME)
+                            self.sees_jobs(&Priority::FRAME)
                         } else {
                             mailbox.has_shared(region)
                         }
@@ -273,79 +300,68 @@ impl Worker {
             }
     }
 
-    /// Whether there is something in these bands that this worker could take up, and does not have itself.
-    pub(super) fn sees_loot(&self, bands: &[Priority]) -> bool {
+    /// Whether there is a job of these priorities that this worker could take, outside of its own queues.
+    fn sees_jobs(&self, priorities: &[Priority]) -> bool {
         let shared = &self.shared;
-        let has_queued = self.index > 0 && bands.contains(&Priority::Background) && !shared.background().is_empty();
-        let mut others = shared.loot().iter().enumerate().filter(|&(victim, _)| victim != self.index);
-        has_queued
-            || others.any(|(_, loot)| bands.iter().any(|&band| !loot.of(band).is_empty()))
-            || shared.mailboxes().any(|mailbox| bands.iter().any(|&band| mailbox.has_any_shared(band)))
+        let takes_background = self.index > 0 && priorities.contains(&Priority::Background);
+        let has_background = takes_background && !shared.background().is_empty();
+        let mut others = shared.stealers().iter().enumerate().filter(|&(victim, _)| victim != self.index);
+        has_background
+            || others.any(|(_, stealers)| priorities.iter().any(|&priority| !stealers.is_empty(priority)))
+            || shared.mailboxes().any(|mailbox| priorities.iter().any(|&priority| mailbox.has_any_shared(priority)))
     }
 
-    /// Takes over the count of a job of the region that has run here.
-    fn earn(&self, region: &'static Region) {
-        self.deal_with(region);
-        self.credit.set(self.credit.get() + 1);
+    #[inline]
+    fn acquire_count(&self, region: &'static Region<Self>) {
+        self.prepaid.acquire(region, |owner| self.wake_other(owner));
     }
 
-    /// Sees to it that one more job of the region is counted.
-    fn spend(&self, region: &'static Region) {
-        self.deal_with(region);
-        if self.credit.get() == 0 {
-            region.latch().add(JOBS_COUNTED_AT_ONCE);
-            self.credit.set(JOBS_COUNTED_AT_ONCE);
-        }
-        self.credit.set(self.credit.get() - 1);
+    #[inline]
+    fn release_count(&self, region: &'static Region<Self>) {
+        self.prepaid.release(region, |owner| self.wake_other(owner));
     }
 
-    /// Gives the credit of any other region back, so that what is earned and spent is this one's.
-    fn deal_with(&self, region: &'static Region) {
-        if !self.creditor.get().is_some_and(|creditor| creditor.is(region)) {
-            self.settle();
-            self.creditor.set(Some(region));
-        }
+    #[inline]
+    fn flush_counts(&self) {
+        self.prepaid.flush(|owner| self.wake_other(owner));
     }
 
-    /// Gives all credit back, and wakes the owner of the region if it was the last to come back.
-    fn settle(&self) {
-        let credit = self.credit.take();
-        let Some(region) = self.creditor.take() else { return };
-        // From the moment that the latch is released the region may be gone, and only the latch, which is nothing but
-        // an atomic, may still be referred to.
-        let (latch, owner) = (region.latch(), region.owner());
-        if credit > 0 && latch.finish(credit) && owner != self.index {
-            self.shared.sleep().wake_worker(owner);
+    /// Wakes a worker, unless it is this one.
+    #[inline]
+    fn wake_other(&self, worker: usize) {
+        if worker != self.index {
+            self.shared.sleep().wake_worker(worker);
         }
     }
 
-    fn run(&self, job: Job) {
+    fn run(&self, job: Job<Self>) {
         let region = job.region;
         let was_in_background = self.is_in_background.replace(region.is_background());
-        // The owner of another region may wait for the credit that is left of it, and this job may wait for that owner.
-        self.deal_with(region);
+        // The owner of another region may wait for the prepaid count that this worker holds of it, and this job may wait for that
+        // owner.
+        self.prepaid.switch_to(region, |owner| self.wake_other(owner));
         self.has_stolen.set(job.is_stolen);
         job.run(self);
         self.is_in_background.set(was_in_background);
-        self.earn(region);
+        self.release_count(region);
     }
 
-    /// Says whether the job had not been begun by somebody else.
-    fn run_in_background(&self, job: &dyn Queued) -> bool {
+    /// Runs a background job, unless another thread has begun it. Returns whether it has run.
+    fn run_in_background(&self, job: &dyn QueuedJob) -> bool {
         let was_in_background = self.is_in_background.replace(true);
         let has_run = job.run();
         self.is_in_background.set(was_in_background);
         has_run
     }
 
-    /// Pinned jobs come first, as nobody else can run them: while this worker does, others take those of its queues.
-    fn next_job(&self, until: Until) -> Option<Job> {
+    /// The next job to run. Pinned jobs come first, because only this worker can run them, while others can steal from its queues.
+    fn next_job(&self, until: ExitCondition) -> Option<Job<Self>> {
         match until {
-            Until::Shutdown => self
+            ExitCondition::Shutdown => self
                 .frame_job()
-                .or_else(|| self.shared_job(Priority::Background))
+                .or_else(|| self.mailbox_job(Priority::Background))
                 .or_else(|| self.steal(&[Priority::Background])),
-            Until::Finished { region } => {
+            ExitCondition::Finished { region } => {
                 let mailbox = self.shared.mailbox(self.index);
                 let pinned = mailbox.take_pinned(region);
                 pinned.or_else(|| {
@@ -359,44 +375,43 @@ impl Worker {
         }
     }
 
-    /// A job of whatever belongs to the frame. What lies in mailboxes comes before what can be stolen: somebody waits for it
-    /// in the midst of a job.
-    fn frame_job(&self) -> Option<Job> {
-        let own = Priority::FRAME.into_iter().find_map(|band| self.queues.pop(band));
-        own.or_else(|| self.shared_job(Priority::Normal)).or_else(|| self.steal(&Priority::FRAME))
+    /// A job of a frame. Mailboxes come before stealing, because the owner of a job in a mailbox waits for it inside another job.
+    fn frame_job(&self) -> Option<Job<Self>> {
+        let own = Priority::FRAME.into_iter().find_map(|priority| self.queues.pop(priority));
+        own.or_else(|| self.mailbox_job(Priority::Normal)).or_else(|| self.steal(&Priority::FRAME))
     }
 
-    /// A job out of somebody's mailbox, for whoever looks for work of this band.
-    fn shared_job(&self, band: Priority) -> Option<Job> {
-        let job = self.shared.mailboxes().find_map(|mailbox| mailbox.take_any_shared(band))?;
+    /// A job for this priority from any worker's mailbox.
+    fn mailbox_job(&self, priority: Priority) -> Option<Job<Self>> {
+        let job = self.shared.mailboxes().find_map(|mailbox| mailbox.take_any_shared(priority))?;
         Some(Job { is_stolen: true, ..job })
     }
 
-    /// The newest job here, if it is one of this region, which the worker waits for in the midst of another job.
-    fn awaited_job(&self, region: &Region) -> Option<Job> {
-        Priority::ALL.into_iter().find_map(|band| match self.queues.pop_awaited(band, region) {
+    /// The newest job of this worker's queues, if it belongs to the region that the worker waits for inside another job.
+    fn awaited_job(&self, region: &Region<Self>) -> Option<Job<Self>> {
+        Priority::ALL.into_iter().find_map(|priority| match self.queues.pop_awaited(priority, region) {
             Popped::Job(job) => Some(job),
             Popped::Nothing => None,
             Popped::PutBack => {
-                // Somebody may have looked for it in vain meanwhile.
-                self.shared.sleep().wake_beside(band);
+                // Another worker may have looked for the job while it was out of the queue.
+                self.shared.sleep().wake_despite_searchers(priority);
                 None
             }
         })
     }
 
-    /// One job of somebody else, the more urgent bands first.
-    fn steal(&self, bands: &[Priority]) -> Option<Job> {
-        let loot = self.shared.loot();
+    /// A job of another worker's queues. Earlier priorities come first.
+    fn steal(&self, priorities: &[Priority]) -> Option<Job<Self>> {
+        let stealers = self.shared.stealers();
         let first = self.victim.get();
-        bands.iter().find_map(|&band| {
-            let mut victims = (first..loot.len()).chain(0..first).filter(|&victim| victim != self.index);
+        priorities.iter().find_map(|&priority| {
+            let mut victims = (first..stealers.len()).chain(0..first).filter(|&victim| victim != self.index);
             victims.find_map(|victim| {
-                let job = self.queues.steal_from(&loot[victim], band)?;
-                if !loot[self.index].of(band).is_empty() {
-                    // More came over than this one job. Whoever pushed them may have relied on this worker to look for
-                    // more, and it is not going to look at what it has.
-                    self.shared.sleep().wake_beside(band);
+                let job = self.queues.steal_from(&stealers[victim], priority)?;
+                if !stealers[self.index].is_empty(priority) {
+                    // Further jobs have moved to this worker's queues. The worker that pushed them may have relied on this one to
+                    // look for more jobs, and this one does not look into its own queues for that.
+                    self.shared.sleep().wake_despite_searchers(priority);
                 }
                 self.victim.set(victim);
                 Some(job)
@@ -411,27 +426,16 @@ impl fmt::Debug for Worker {
     }
 }
 
-/// How long a worker works.
-#[derive(Clone, Copy)]
-pub(super) enum Until {
-    /// Until the scheduler ends.
-    Shutdown,
-    /// Until the jobs of the region have run. The worker is the one that opened it, and runs its pinned jobs. Unless the
-    /// region is an outermost one, the worker is in the midst of some job, and takes up nothing else meanwhile than what
-    /// belongs to the region: a job of somebody else might take long, or want what this one has borrowed.
-    Finished { region: &'static Region },
-}
-
-impl Until {
-    fn has_come(self, shared: &Shared) -> bool {
+impl ExitCondition {
+    fn holds(self, shared: &Shared<Worker>) -> bool {
         match self {
             Self::Shutdown => shared.is_shut_down(),
-            Self::Finished { region, .. } => region.latch().is_released(),
+            Self::Finished { region } => region.latch().is_released(),
         }
     }
 
-    /// What a worker is woken for that sleeps meanwhile.
-    pub(super) fn wake_for(self) -> WakeFor {
+    /// What wakes the worker if it sleeps meanwhile.
+    fn wake_for(self) -> WakeFor {
         match self {
             Self::Finished { region } if !region.is_outermost() => WakeFor::Region { level: region.level() },
             Self::Shutdown | Self::Finished { .. } => WakeFor::Any,

@@ -21,7 +21,6 @@ const KNOWN_CIRCLES: &[&str] = &[
     "frame",
     "process",
     "report",
-    "task",
 ];
 
 /// How many re-exports are followed to the definition of one item.

@@ -1,8 +1,8 @@
-//! The protocol of sleep, walked through by loom.
+//! Loom's models of the sleep protocol.
 
 use std::mem;
 
-use loom::{model, model::Builder, thread};
+use loom::{model as check, model::Builder, thread};
 
 use super::{Sleep, WakeFor};
 use crate::{
@@ -10,8 +10,8 @@ use crate::{
     task::{latch::Latch, priority::Priority},
 };
 
-/// Jobs are only counted here, and relaxed, so that nothing but the protocol's fences orders them.
-struct Room {
+/// What the threads of a model share. Jobs are relaxed counts, so that only the fences of the protocol order them.
+struct Model {
     sleep: Sleep,
     jobs: AtomicUsize,
     background: AtomicUsize,
@@ -21,7 +21,7 @@ struct Room {
     shut_down: AtomicBool,
 }
 
-impl Room {
+impl Model {
     fn new(outstanding: usize) -> Arc<Self> {
         Arc::new(Self {
             sleep: Sleep::new(3),
@@ -42,7 +42,7 @@ impl Room {
         self.jobs.load(Ordering::Relaxed) > 0
     }
 
-    /// What a worker sees that ends its search: `jobs` are a frame's.
+    /// Whether there are jobs of these priorities, for a worker that ends its search: `jobs` are those of a frame.
     fn sees(&self, bands: &[Priority]) -> bool {
         let background = || self.background.load(Ordering::Relaxed) > 0;
         (bands.contains(&Priority::Normal) && self.has_jobs())
@@ -53,12 +53,12 @@ impl Room {
         self.jobs.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |jobs| jobs.checked_sub(1)).is_ok()
     }
 
-    /// What `Worker::work` and `Idle` do: looks for a job, and sleeps as long as there is none.
+    /// As `Worker::work` and `Idle` do: looks for a job, and sleeps while there is none.
     fn consume(&self, worker: usize) {
         self.search(worker, false);
     }
 
-    /// The same, by a worker that counts as a searcher before it sleeps.
+    /// The same by a worker that counts as a searcher before it sleeps.
     fn search_and_consume(&self, worker: usize) {
         if !self.try_consume() {
             self.sleep.start_search();
@@ -75,14 +75,14 @@ impl Room {
         }
     }
 
-    /// What the owner of a region does that runs no jobs.
+    /// As the owner of a region that runs no jobs.
     fn wait(&self, worker: usize) {
         while !self.latch.is_released() {
             self.sleep.sleep(worker, WakeFor::Region { level: 0 }, false, || self.latch.is_released());
         }
     }
 
-    /// What a worker does that takes one job: of a frame if there is one, and otherwise of the background.
+    /// Takes one job: a frame's if there is one, and a background job otherwise.
     fn consume_either(&self, worker: usize) {
         let take = |jobs: &AtomicUsize| {
             jobs.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |jobs| jobs.checked_sub(1)).is_ok()
@@ -96,22 +96,21 @@ impl Room {
         }
     }
 
-    /// What the owner of a region does in the midst of a job: it takes what lies in its mailbox for that region, and nothing
-    /// else.
+    /// As the owner of a region inside a job: it takes only jobs of that region, from its mailbox.
     fn consume_own(&self, worker: usize, level: usize) {
         while !self.try_consume() {
             self.sleep.sleep(worker, WakeFor::Region { level }, false, || self.has_jobs());
         }
     }
 
-    /// Puts a job into the mailbox of worker 0, for the region of that level.
+    /// Puts a job into the mailbox of worker 0, for its region at this level.
     fn produce_for_owner(&self, level: usize) {
         self.jobs.fetch_add(1, Ordering::Relaxed);
         self.sleep.wake_owner_or_other(0, level, Priority::Normal);
     }
 
-    /// What the owner of a region does that helps others: it looks for jobs, and for the end of its region only where there
-    /// is none.
+    /// As the owner of a region that helps others: it looks for jobs, and checks for the end of its region only if there is
+    /// none.
     fn wait_and_help(&self, worker: usize) {
         let mut is_searcher = false;
         loop {
@@ -140,17 +139,17 @@ impl Room {
     }
 }
 
-/// Runs the closure on a thread of the model that shares the room.
-fn start(room: &Arc<Room>, run: impl FnOnce(&Room) + 'static) -> thread::JoinHandle<()> {
-    let room = Arc::clone(room);
-    thread::spawn(move || run(&room))
+/// Runs the closure on a thread of the model.
+fn start(model: &Arc<Model>, run: impl FnOnce(&Model) + 'static) -> thread::JoinHandle<()> {
+    let model = Arc::clone(model);
+    thread::spawn(move || run(&model))
 }
 
 fn join(threads: [thread::JoinHandle<()>; 2]) {
     threads.into_iter().for_each(|thread| thread.join().unwrap());
 }
 
-/// Explores all executions with at most that many preemptions, for models too large to explore whole.
+/// Explores all executions with at most this many preemptions, for models that are too large to explore completely.
 fn bounded(preemptions: usize, run: impl Fn() + Sync + Send + 'static) {
     let mut builder = Builder::new();
     builder.preemption_bound = Some(preemptions);
@@ -159,72 +158,72 @@ fn bounded(preemptions: usize, run: impl Fn() + Sync + Send + 'static) {
 
 #[test]
 fn a_job_wakes_the_worker_that_waits_for_one() {
-    model(|| {
-        let room = Room::new(1);
-        let worker = start(&room, |room| room.consume(0));
-        room.produce();
+    check(|| {
+        let model = Model::new(1);
+        let worker = start(&model, |model| model.consume(0));
+        model.produce();
         worker.join().unwrap();
-        assert_eq!(room.sleep.sleepers(), 0);
+        assert_eq!(model.sleep.sleepers(), 0);
     });
 }
 
 #[test]
 fn a_job_is_seen_by_a_searcher_that_goes_to_sleep() {
     bounded(4, || {
-        let room = Room::new(1);
-        let worker = start(&room, |room| room.search_and_consume(0));
-        room.produce();
+        let model = Model::new(1);
+        let worker = start(&model, |model| model.search_and_consume(0));
+        model.produce();
         worker.join().unwrap();
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
     });
 }
 
 #[test]
 fn a_bed_can_be_slept_in_again() {
     bounded(3, || {
-        let room = Room::new(1);
-        let worker = start(&room, |room| {
-            room.consume(0);
-            room.consume(0);
+        let model = Model::new(1);
+        let worker = start(&model, |model| {
+            model.consume(0);
+            model.consume(0);
         });
-        room.produce();
-        room.produce();
+        model.produce();
+        model.produce();
         worker.join().unwrap();
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "a call was left over, and cut the next sleep short");
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "a call was left over, and cut the next sleep short");
     });
 }
 
 #[test]
 fn two_jobs_reach_two_workers_though_one_is_woken() {
     bounded(3, || {
-        let room = Room::new(1);
-        let workers = [0, 1].map(|worker| start(&room, move |room| room.consume(worker)));
-        room.produce();
-        room.produce();
+        let model = Model::new(1);
+        let workers = [0, 1].map(|worker| start(&model, move |model| model.consume(worker)));
+        model.produce();
+        model.produce();
         join(workers);
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0);
     });
 }
 
 #[test]
 fn a_searcher_that_finds_one_job_wakes_a_sleeper_for_the_next() {
     bounded(3, || {
-        let room = Room::new(1);
-        let workers = [start(&room, |room| room.search_and_consume(0)), start(&room, |room| room.consume(1))];
-        room.produce();
-        room.produce();
+        let model = Model::new(1);
+        let workers = [start(&model, |model| model.search_and_consume(0)), start(&model, |model| model.consume(1))];
+        model.produce();
+        model.produce();
         join(workers);
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0);
     });
 }
 
 #[test]
 fn two_producers_wake_two_workers() {
     bounded(2, || {
-        let room = Room::new(1);
-        let workers = [0, 1].map(|worker| start(&room, move |room| room.search_and_consume(worker)));
-        let producer = start(&room, Room::produce);
-        room.produce();
+        let model = Model::new(1);
+        let workers = [0, 1].map(|worker| start(&model, move |model| model.search_and_consume(worker)));
+        let producer = start(&model, Model::produce);
+        model.produce();
         producer.join().unwrap();
         join(workers);
     });
@@ -232,35 +231,35 @@ fn two_producers_wake_two_workers() {
 
 #[test]
 fn the_last_job_of_a_region_wakes_its_owner() {
-    for waits in [Room::wait, Room::wait_and_help] {
+    for waits in [Model::wait, Model::wait_and_help] {
         bounded(4, move || {
-            let room = Room::new(2);
-            let workers = [(); 2].map(|()| start(&room, Room::finish));
-            waits(&room, 0);
+            let model = Model::new(2);
+            let workers = [(); 2].map(|()| start(&model, Model::finish));
+            waits(&model, 0);
             join(workers);
-            assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0);
+            assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0);
         });
     }
 }
 
 #[test]
 fn an_owner_called_for_a_job_as_its_region_ends_passes_the_call_on() {
-    for waits in [Room::wait, Room::wait_and_help] {
+    for waits in [Model::wait, Model::wait_and_help] {
         bounded(3, move || {
-            let room = Room::new(1);
+            let model = Model::new(1);
             // Whoever takes the job ends the thief.
-            let thief = start(&room, |room| {
+            let thief = start(&model, |model| {
                 let mut is_searcher = false;
-                while !room.ran.load(Ordering::Relaxed) && !room.try_consume() {
-                    let sees_work = || room.ran.load(Ordering::Relaxed) || room.has_jobs();
-                    is_searcher = room.sleep.sleep(1, WakeFor::Any, is_searcher, sees_work);
+                while !model.ran.load(Ordering::Relaxed) && !model.try_consume() {
+                    let sees_work = || model.ran.load(Ordering::Relaxed) || model.has_jobs();
+                    is_searcher = model.sleep.sleep(1, WakeFor::Any, is_searcher, sees_work);
                 }
             });
-            let producer = start(&room, |room| {
-                room.produce();
-                room.finish();
+            let producer = start(&model, |model| {
+                model.produce();
+                model.finish();
             });
-            waits(&room, 0);
+            waits(&model, 0);
             join([thief, producer]);
         });
     }
@@ -269,13 +268,13 @@ fn an_owner_called_for_a_job_as_its_region_ends_passes_the_call_on() {
 #[test]
 fn a_background_job_wakes_a_worker_though_worker_0_searches() {
     bounded(3, || {
-        let room = Room::new(1);
-        let worker = start(&room, |room| room.consume(1));
-        room.sleep.start_search();
-        room.jobs.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_beside(Priority::Background);
-        // Worker 0 has no eyes for it.
-        room.sleep.end_search(|_| false);
+        let model = Model::new(1);
+        let worker = start(&model, |model| model.consume(1));
+        model.sleep.start_search();
+        model.jobs.fetch_add(1, Ordering::Relaxed);
+        model.sleep.wake_despite_searchers(Priority::Background);
+        // Worker 0 does not look for background jobs.
+        model.sleep.end_search(|_| false);
         worker.join().unwrap();
     });
 }
@@ -283,11 +282,11 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
 #[test]
 fn a_job_in_a_mailbox_reaches_its_owner_though_a_searcher_is_late() {
     bounded(4, || {
-        let room = Room::new(1);
-        // It is going to look one day, and has something else to do until then.
-        room.sleep.start_search();
-        let owner = start(&room, |room| room.consume_own(0, 1));
-        room.produce_for_owner(1);
+        let model = Model::new(1);
+        // The searcher does something else before it looks.
+        model.sleep.start_search();
+        let owner = start(&model, |model| model.consume_own(0, 1));
+        model.produce_for_owner(1);
         owner.join().unwrap();
     });
 }
@@ -295,29 +294,29 @@ fn a_job_in_a_mailbox_reaches_its_owner_though_a_searcher_is_late() {
 #[test]
 fn jobs_in_a_mailbox_reach_the_owner_and_a_helper() {
     bounded(3, || {
-        let room = Room::new(1);
-        let threads = [start(&room, |room| room.consume_own(0, 1)), start(&room, |room| room.consume(1))];
-        room.produce_for_owner(1);
-        room.produce_for_owner(1);
+        let model = Model::new(1);
+        let threads = [start(&model, |model| model.consume_own(0, 1)), start(&model, |model| model.consume(1))];
+        model.produce_for_owner(1);
+        model.produce_for_owner(1);
         join(threads);
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
     });
 }
 
 #[test]
 fn a_job_of_an_outer_region_wakes_a_helper_while_the_owner_sleeps_for_an_inner_one() {
     bounded(3, || {
-        let room = Room::new(1);
-        let owner = start(&room, |room| {
-            while !room.latch.is_released() {
-                room.sleep.sleep(0, WakeFor::Region { level: 2 }, false, || room.latch.is_released());
+        let model = Model::new(1);
+        let owner = start(&model, |model| {
+            while !model.latch.is_released() {
+                model.sleep.sleep(0, WakeFor::Region { level: 2 }, false, || model.latch.is_released());
             }
         });
-        let helper = start(&room, |room| {
-            room.consume(1);
-            room.finish();
+        let helper = start(&model, |model| {
+            model.consume(1);
+            model.finish();
         });
-        room.produce_for_owner(1);
+        model.produce_for_owner(1);
         join([owner, helper]);
     });
 }
@@ -325,32 +324,32 @@ fn a_job_of_an_outer_region_wakes_a_helper_while_the_owner_sleeps_for_an_inner_o
 #[test]
 fn a_worker_called_for_a_background_job_that_finds_a_frames_passes_the_call_on() {
     bounded(3, || {
-        let room = Room::new(1);
-        let workers = [1, 2].map(|worker| start(&room, move |room| room.consume_either(worker)));
-        room.background.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_beside(Priority::Background);
-        room.jobs.fetch_add(1, Ordering::Relaxed);
-        room.sleep.wake_any();
+        let model = Model::new(1);
+        let workers = [1, 2].map(|worker| start(&model, move |model| model.consume_either(worker)));
+        model.background.fetch_add(1, Ordering::Relaxed);
+        model.sleep.wake_despite_searchers(Priority::Background);
+        model.jobs.fetch_add(1, Ordering::Relaxed);
+        model.sleep.wake_any();
         join(workers);
-        assert_eq!(room.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "nobody sleeps or searches");
     });
 }
 
 #[test]
 fn the_end_of_the_scheduler_wakes_everyone() {
     bounded(4, || {
-        let room = Room::new(1);
+        let model = Model::new(1);
         let workers = [1, 2].map(|worker| {
-            start(&room, move |room| {
+            start(&model, move |model| {
                 let mut is_searcher = false;
-                while !room.shut_down.load(Ordering::Relaxed) {
-                    let is_over = || room.shut_down.load(Ordering::Relaxed);
-                    is_searcher = room.sleep.sleep(worker, WakeFor::Any, is_searcher, is_over);
+                while !model.shut_down.load(Ordering::Relaxed) {
+                    let is_over = || model.shut_down.load(Ordering::Relaxed);
+                    is_searcher = model.sleep.sleep(worker, WakeFor::Any, is_searcher, is_over);
                 }
             })
         });
-        room.shut_down.store(true, Ordering::Relaxed);
-        room.sleep.wake_all();
+        model.shut_down.store(true, Ordering::Relaxed);
+        model.sleep.wake_all();
         join(workers);
     });
 }

@@ -1,4 +1,4 @@
-//! Work that no frame waits for: streaming, baking, whatever may take longer than a frame.
+//! Jobs that no frame waits for: streaming, baking, anything that may take longer than a frame.
 
 use std::{
     fmt,
@@ -10,17 +10,17 @@ use crate::{
     unwind::{JobPanic, catch, discard, emit},
 };
 
-use super::background_queue::BackgroundQueue;
+use super::background_queue::{BackgroundQueue, QueuedJob};
 
-/// A job that runs when no frame needs its worker, and what comes of it; made by
-/// [`Scheduler::background`](super::Scheduler::background).
+/// A job that runs when no frame needs its worker, and its result. [`Scheduler::background`](super::Scheduler::background) makes
+/// it.
 ///
-/// Who drops it lets go of the result, not of the job, which runs nevertheless. A panic that nobody has waited for is
+/// Dropping it drops the result, but not the job, which runs nevertheless. If the job panics and nobody waits for it, the panic is
 /// reported to [`tracing`] as an error.
-#[must_use = "who drops it lets go of the job's result"]
+#[must_use = "dropping it drops the result of the job"]
 pub struct BackgroundJob<T> {
-    ticket: Arc<Ticket<T>>,
-    /// The queue of its scheduler, as long as that is there, and the number of the job in it.
+    state: Arc<JobState<T>>,
+    /// The queue of the job's scheduler, as long as that exists, and the number of the job in it.
     queue: Weak<BackgroundQueue>,
     number: u64,
 }
@@ -28,47 +28,47 @@ pub struct BackgroundJob<T> {
 impl<T: Send + 'static> BackgroundJob<T> {
     /// Queues a job.
     pub(super) fn queued(queue: &Arc<BackgroundQueue>, job: impl FnOnce() -> T + Send + 'static) -> Self {
-        let ticket = Arc::new(Ticket {
+        let state = Arc::new(JobState {
             job: Mutex::new(Some(Box::new(job))),
             outcome: Mutex::new(Outcome { result: None, is_abandoned: false }),
             finished: Condvar::new(),
         });
-        let number = queue.put(Arc::<Ticket<T>>::clone(&ticket));
-        Self { ticket, queue: Arc::downgrade(queue), number }
+        let number = queue.put(Arc::<JobState<T>>::clone(&state));
+        Self { state, queue: Arc::downgrade(queue), number }
     }
 
     /// Whether the job has run, so that [`wait`](Self::wait) returns at once.
     pub fn is_finished(&self) -> bool {
-        self.ticket.outcome.lock().result.is_some()
+        self.state.outcome.lock().result.is_some()
     }
 
-    /// Returns what the job returned.
+    /// Returns the result of the job.
     ///
-    /// If the job has not begun, this thread runs it here and now, before all that were queued earlier, and nothing of it
-    /// stays queued. Otherwise this thread blocks until the job has run, and runs no other job meanwhile. It may be called
-    /// anywhere: in a frame's jobs, in background jobs, and on threads that are no workers. A job that waits for itself, by
-    /// whatever detour, waits for ever.
+    /// If the job has not begun, this thread runs it at once, before all jobs that were queued earlier, and removes it from the
+    /// queue. Otherwise this thread blocks until the job has run, and runs no other job meanwhile. It may be called anywhere: in a
+    /// frame's jobs, in background jobs, and on threads that are no workers. A job that waits for itself, directly or through
+    /// others, waits for ever.
     ///
     /// # Errors
     ///
-    /// The [`JobPanic`] if the job panicked.
+    /// Returns the [`JobPanic`] if the job panicked.
     pub fn wait(self) -> Result<T, JobPanic> {
-        // Where the scheduler is gone, so is the queue.
+        // If the scheduler was dropped, the queue was too.
         drop(self.queue.upgrade().and_then(|queue| queue.remove(self.number)));
-        self.ticket.run();
-        let mut outcome = self.ticket.outcome.lock();
+        self.state.run();
+        let mut outcome = self.state.outcome.lock();
         loop {
             if let Some(result) = outcome.result.take() {
                 return result;
             }
-            outcome = self.ticket.finished.wait(outcome);
+            outcome = self.state.finished.wait(outcome);
         }
     }
 }
 
 impl<T> Drop for BackgroundJob<T> {
     fn drop(&mut self) {
-        let mut outcome = self.ticket.outcome.lock();
+        let mut outcome = self.state.outcome.lock();
         outcome.is_abandoned = true;
         let result = outcome.result.take();
         drop(outcome);
@@ -80,20 +80,14 @@ impl<T> Drop for BackgroundJob<T> {
 
 impl<T> fmt::Debug for BackgroundJob<T> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let is_finished = self.ticket.outcome.lock().result.is_some();
+        let is_finished = self.state.outcome.lock().result.is_some();
         formatter.debug_struct("BackgroundJob").field("is_finished", &is_finished).finish_non_exhaustive()
     }
 }
 
-/// A background job as the queue knows it.
-pub(super) trait Queued: Send + Sync {
-    /// Runs the job, unless somebody else has begun it, and says whether it did. Does not unwind.
-    fn run(&self) -> bool;
-}
-
 /// What the queue and the handle share of a job.
-struct Ticket<T> {
-    /// Taken by whoever runs it.
+struct JobState<T> {
+    /// The thread that runs the job takes it.
     job: Mutex<Option<Box<dyn FnOnce() -> T + Send>>>,
     outcome: Mutex<Outcome<T>>,
     finished: Condvar,
@@ -101,10 +95,11 @@ struct Ticket<T> {
 
 struct Outcome<T> {
     result: Option<Result<T, JobPanic>>,
+    /// Whether the handle has been dropped.
     is_abandoned: bool,
 }
 
-impl<T: Send> Queued for Ticket<T> {
+impl<T: Send> QueuedJob for JobState<T> {
     fn run(&self) -> bool {
         let Some(job) = self.job.lock().take() else { return false };
         let result = catch(job);
@@ -121,6 +116,7 @@ impl<T: Send> Queued for Ticket<T> {
     }
 }
 
+/// Drops a result that nobody waits for, and reports a panic.
 fn abandon<T>(result: Result<T, JobPanic>) {
     match result {
         Ok(value) => discard(value),

@@ -1,0 +1,146 @@
+//! What all workers of a scheduler share.
+
+use std::time::Duration;
+
+use crossbeam_utils::CachePadded;
+
+use crate::{
+    sync::{AtomicBool, AtomicUsize, Ordering},
+    timeline::Timeline,
+};
+
+use super::{
+    background_queue::BackgroundQueue,
+    caller_slot::CallerSlot,
+    mailbox::Mailbox,
+    placement::Placement,
+    queues::{Queues, Stealers},
+    region::JobContext,
+    sleep::Sleep,
+};
+
+/// The workers' queues as others see them, their mailboxes, and the state of the scheduler.
+pub(super) struct Shared<W: JobContext> {
+    stealers: Box<[Stealers<W>]>,
+    mailboxes: Box<[CachePadded<Mailbox<W>>]>,
+    /// Not the model checker's `Arc`, which has no weak references: a thread that waits for a job may outlive the scheduler.
+    background: std::sync::Arc<BackgroundQueue>,
+    sleep: Sleep,
+    placement: Placement,
+    caller_slot: CallerSlot<W>,
+    /// Not the model checker's `Arc`: the thread that submits frames has a reference too.
+    timeline: std::sync::Arc<Timeline>,
+    is_shuffled: bool,
+    /// In nanoseconds.
+    wake_up_cost: AtomicUsize,
+    is_in_frame: AtomicBool,
+    shut_down: AtomicBool,
+}
+
+impl<W: JobContext> Shared<W> {
+    /// `stealers` has one entry for each worker, and `first` is the queues of worker 0.
+    pub(super) fn new(
+        stealers: Box<[Stealers<W>]>,
+        first: Box<Queues<W>>,
+        timeline: Timeline,
+        is_shuffled: bool,
+    ) -> Self {
+        Self {
+            mailboxes: stealers.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
+            background: std::sync::Arc::new(BackgroundQueue::new()),
+            sleep: Sleep::new(stealers.len()),
+            placement: Placement::new(),
+            caller_slot: CallerSlot::new(first),
+            timeline: std::sync::Arc::new(timeline),
+            stealers,
+            is_shuffled,
+            wake_up_cost: AtomicUsize::new(0),
+            is_in_frame: AtomicBool::new(false),
+            shut_down: AtomicBool::new(false),
+        }
+    }
+
+    /// The number of workers.
+    #[inline]
+    pub(super) fn workers(&self) -> usize {
+        self.stealers.len()
+    }
+
+    #[inline]
+    pub(super) fn stealers(&self) -> &[Stealers<W>] {
+        &self.stealers
+    }
+
+    #[inline]
+    pub(super) fn mailbox(&self, worker: usize) -> &Mailbox<W> {
+        &self.mailboxes[worker]
+    }
+
+    #[inline]
+    pub(super) fn mailboxes(&self) -> impl Iterator<Item = &Mailbox<W>> {
+        self.mailboxes.iter().map(|mailbox| &**mailbox)
+    }
+
+    #[inline]
+    pub(super) fn background(&self) -> &std::sync::Arc<BackgroundQueue> {
+        &self.background
+    }
+
+    #[inline]
+    pub(super) fn sleep(&self) -> &Sleep {
+        &self.sleep
+    }
+
+    #[inline]
+    pub(super) fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    pub(super) fn caller_slot(&self) -> &CallerSlot<W> {
+        &self.caller_slot
+    }
+
+    #[inline]
+    pub(super) fn timeline(&self) -> &std::sync::Arc<Timeline> {
+        &self.timeline
+    }
+
+    #[inline]
+    pub(super) fn is_shuffled(&self) -> bool {
+        self.is_shuffled
+    }
+
+    // The atomics below are hints and a flag that hand no data over, so relaxed is enough. The lock that `Sleep::wake_all` takes
+    // makes sure that sleepers see the flag.
+
+    #[inline]
+    pub(super) fn wake_up_cost(&self) -> Duration {
+        Duration::from_nanos(self.wake_up_cost.load(Ordering::Relaxed) as u64)
+    }
+
+    pub(super) fn set_wake_up_cost(&self, cost: Duration) {
+        self.wake_up_cost.store(cost.as_nanos().try_into().unwrap_or(usize::MAX), Ordering::Relaxed);
+    }
+
+    /// Whether a thread from outside waits for a frame, or for anything else that it called the scheduler for.
+    #[inline]
+    pub(super) fn is_in_frame(&self) -> bool {
+        self.is_in_frame.load(Ordering::Relaxed)
+    }
+
+    #[inline]
+    pub(super) fn set_in_frame(&self, is_in_frame: bool) {
+        self.is_in_frame.store(is_in_frame, Ordering::Relaxed);
+    }
+
+    #[inline]
+    pub(super) fn is_shut_down(&self) -> bool {
+        self.shut_down.load(Ordering::Relaxed)
+    }
+
+    /// Makes all workers but the caller end when they have no more jobs to run.
+    pub(super) fn shut_down(&self) {
+        self.shut_down.store(true, Ordering::Relaxed);
+        self.sleep.wake_all();
+    }
+}
