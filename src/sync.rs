@@ -1,12 +1,13 @@
-//! The primitives that threads meet in, behind one switch.
+//! The synchronisation primitives, which a build flag replaces by those of a model checker.
 //!
-//! Everything in `task`, `graph` and `timeline` that blocks, counts or hands work over takes its atomics, locks, threads and
-//! deques from here. Built as usual, these are the standard library's, parking_lot's and crossbeam-deque's. Built with
-//! `--cfg drawloom_loom` they are those of loom, a model checker that walks through all interleavings of a few threads and
-//! knows what each memory ordering leaves open; with `--cfg drawloom_shuttle` they are those of shuttle, which tries
-//! interleavings at random, in one total order, and so copes with whole runs. The tests for either stand beside the code.
+//! The modules `task`, `graph` and `timeline` take their atomics, locks, threads and deques from here. By default these are the
+//! standard library's, parking_lot's and crossbeam-deque's. With `--cfg drawloom_loom` they are those of loom, a model checker that
+//! explores all interleavings of a few threads, and all values that each memory ordering allows. With `--cfg drawloom_shuttle`
+//! they are those of shuttle, which tries random interleavings in one total order, and so can check whole runs. The tests for both
+//! are beside the code that they check.
 //!
-//! All sides have one shape: a lock returns its guard and cannot be poisoned, and a wait takes the guard and gives it back.
+//! All variants have the same interface: a lock returns its guard and cannot be poisoned, and a wait takes the guard and returns
+//! it.
 
 #[cfg(drawloom_loom)]
 use loom as primitives;
@@ -21,9 +22,9 @@ pub(crate) use self::modelled::{Condvar, Deque, Mutex, Stealer};
 pub(crate) use self::native::{Condvar, Deque, Mutex, Stealer};
 
 #[cfg(drawloom_shuttle)]
-pub(crate) use self::drawn::Instant;
+pub(crate) use self::randomised::Instant;
 #[cfg(all(test, drawloom_shuttle))]
-pub(crate) use self::drawn::check;
+pub(crate) use self::randomised::check;
 #[cfg(not(drawloom_shuttle))]
 pub(crate) use std::time::Instant;
 
@@ -45,7 +46,7 @@ mod native {
     pub(crate) use crossbeam_deque::{Stealer, Worker as Deque};
     pub(crate) use parking_lot::Mutex;
 
-    /// A condition variable whose wait takes the guard and gives it back.
+    /// A condition variable whose wait takes the guard and returns it.
     #[derive(Default)]
     pub(crate) struct Condvar(parking_lot::Condvar);
 
@@ -103,7 +104,7 @@ mod modelled {
         }
     }
 
-    /// A locked stand-in for crossbeam's deque, which has no form that a checker can look into.
+    /// Replaces crossbeam's deque, which no checker supports, by a queue behind a lock.
     pub(crate) struct Deque<T>(Arc<Mutex<VecDeque<T>>>);
 
     impl<T> Deque<T> {
@@ -128,7 +129,7 @@ mod modelled {
         }
     }
 
-    /// The side of the stand-in that thieves hold.
+    /// The end of the deque that other threads steal from.
     pub(crate) struct Stealer<T>(Arc<Mutex<VecDeque<T>>>);
 
     impl<T> Stealer<T> {
@@ -149,27 +150,27 @@ mod modelled {
     }
 }
 
-/// What shuttle draws.
+/// A random clock and random interleavings.
 #[cfg(drawloom_shuttle)]
-mod drawn {
+mod randomised {
     use std::{ops::Add, time::Duration};
 
     use shuttle::rand::{Rng, thread_rng};
 
-    /// A moment that is drawn too, so that what the time decides comes out either way, and the same way when an interleaving
-    /// is run again. One that is said to be later may be earlier, which counts as no time between them.
+    /// A random point in time, so that decisions that depend on the clock go either way, and the same way when an interleaving
+    /// is repeated. A later reading may be smaller, which counts as no time between the two.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Instant(Duration);
 
-    /// The latest moment, in nanoseconds, as a rule and at times: most things take about the same, and few take long.
-    const LATEST: u64 = 1_000;
-    const LATEST_AT_TIMES: u64 = 20_000;
+    /// The upper bounds of a reading in nanoseconds. Most readings use the first, so that most work seems short and some long.
+    const MAX_USUAL: u64 = 1_000;
+    const MAX_RARE: u64 = 20_000;
 
     impl Instant {
         pub(crate) fn now() -> Self {
             let mut random = thread_rng();
-            let latest = if random.gen_ratio(1, 8) { LATEST_AT_TIMES } else { LATEST };
-            Self(Duration::from_nanos(random.gen_range(0..=latest)))
+            let max = if random.gen_ratio(1, 8) { MAX_RARE } else { MAX_USUAL };
+            Self(Duration::from_nanos(random.gen_range(0..=max)))
         }
 
         pub(crate) fn duration_since(self, earlier: Self) -> Duration {
@@ -189,9 +190,9 @@ mod drawn {
         }
     }
 
-    /// Runs a test in some thousand interleavings: half of them with a switch of threads at any moment, and half with few
-    /// switches, each of which holds a thread up for long (Burckhardt et al., "A Randomized Scheduler with Probabilistic
-    /// Guarantees of Finding Bugs", 2010).
+    /// Runs a test in some thousand interleavings: half of them switch threads at random, and half switch a few times only, but
+    /// delay a thread for long each time (Burckhardt et al., "A Randomized Scheduler with Probabilistic Guarantees of Finding
+    /// Bugs", 2010).
     #[cfg(test)]
     pub(crate) fn check(run: impl Fn() + Send + Sync + 'static) {
         use shuttle::{
@@ -203,7 +204,7 @@ mod drawn {
         const SWITCHES: usize = 3;
 
         let mut config = Config::new();
-        // The stack that shuttle gives a thread by itself is too small for the message of a panic to be put together.
+        // Shuttle's default stack is too small to format the message of a panic.
         config.stack_size = 256 * 1024;
         let run = std::sync::Arc::new(run);
         let again = std::sync::Arc::clone(&run);

@@ -1,8 +1,7 @@
-//! What becomes of panics in code that an engine supplies: jobs, hooks, clocks, and subscribers of `tracing`.
+//! Handles panics in code of the engine: jobs, hooks, clocks, and subscribers of `tracing`.
 //!
-//! A panic is caught where the engine's code is called, and becomes an error there. Where an unwind would leave memory
-//! that another thread still uses, an [`AbortOnUnwind`] stands behind that, so that soundness never depends on every call
-//! having been found.
+//! A panic is caught where the engine's code is called, and becomes an error there. Where an unwind would free memory that another
+//! thread still uses, an [`AbortOnUnwind`] guards the code as well. So soundness does not depend on every call being caught.
 
 use std::{
     any::Any,
@@ -13,13 +12,13 @@ use std::{
 
 use thiserror::Error;
 
-/// A job panicked. The scheduler it ran on is unharmed.
+/// A job panicked. Its scheduler works as before.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("a job panicked: {message}")]
 #[non_exhaustive]
 pub struct JobPanic {
-    /// What the panic said: its payload where that is a `&str` or a `String`, as with the `panic!` macro, and otherwise
-    /// a fixed text.
+    /// The message of the panic: its payload if that is a `&str` or a `String`, as with the `panic!` macro, and otherwise a fixed
+    /// text.
     pub message: String,
 }
 
@@ -36,53 +35,50 @@ impl JobPanic {
     }
 }
 
-/// Calls `call`, and makes an error of its panic.
+/// Calls `call`, and turns its panic into an error.
 ///
-/// The closure need not be unwind safe: whoever goes on after the error has to see to it that nothing half-done is
-/// used.
-///
-/// # Errors
-///
-/// [`JobPanic`] with the message of the panic. With `panic = "abort"` there is no such error, as the process ends.
-///
-/// # Example
+/// The closure need not be unwind safe: after an error the caller must not use values that the closure has left half-changed.
 ///
 /// ```
 /// # use drawloom::task::catch;
-/// let panic = catch(|| [1, 2, 3].iter().position(|&number| number == 4).expect("four is there")).unwrap_err();
-/// assert_eq!(format!("process \"count\": {}", panic.message), "process \"count\": four is there");
+/// let panic = catch(|| [1, 2, 3].iter().position(|&number| number == 4).expect("4 is in the list")).unwrap_err();
+/// assert_eq!(format!("process \"count\": {}", panic.message), "process \"count\": 4 is in the list");
 /// ```
+///
+/// # Errors
+///
+/// Returns a [`JobPanic`] with the message of the panic. With `panic = "abort"` the process ends instead.
 #[inline]
 pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
     catch_unwind(AssertUnwindSafe(call)).map_err(JobPanic::new)
 }
 
-/// Drops a value of the engine's. If its destructor panics, nobody is left to hear it. The payload of that second panic is
-/// leaked, as dropping it might panic as well, and so on.
+/// Drops a value of the engine's, and ignores a panic of its destructor. The payload of that panic is leaked, because dropping it
+/// might panic as well.
 pub(crate) fn discard<T>(value: T) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(value))) {
         mem::forget(payload);
     }
 }
 
-/// Calls `event`, which sends an event to the engine's `tracing` subscriber. If the subscriber panics, the event is lost and
-/// the panic ends here: its message has gone to the panic hook, and the work that is reported on goes on.
+/// Calls `event`, which sends an event to the engine's `tracing` subscriber. If the subscriber panics, the event is lost, the panic
+/// hook gets the message, and this function returns as usual.
 pub(crate) fn emit(event: impl FnOnce()) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(event)) {
         discard(payload);
     }
 }
 
-/// Aborts the process if it is dropped, which only an unwind does: every other way out [disarms](Self::disarm) it.
+/// Aborts the process if it is dropped. Only an unwind drops it: every other path [disarms](Self::disarm) it.
 ///
-/// It guards code that other threads rely on to run to its end. Rayon does the same.
-#[must_use = "it guards what follows until it is disarmed"]
+/// It guards code that must run to its end because other threads rely on it. Rayon does the same.
+#[must_use = "it guards the code that follows until it is disarmed"]
 pub(crate) struct AbortOnUnwind {
     what: &'static str,
 }
 
 impl AbortOnUnwind {
-    /// `what` names the code that must not unwind, for the last message of the process.
+    /// `what` names the code that must not unwind, for the message before the process aborts.
     pub(crate) fn new(what: &'static str) -> Self {
         Self { what }
     }
@@ -95,7 +91,7 @@ impl AbortOnUnwind {
 impl Drop for AbortOnUnwind {
     #[cold]
     fn drop(&mut self) {
-        // A model checker that has found something drops the threads of its model where they stand.
+        // A model checker that has found a failure drops the threads of its model in the middle of their work.
         if cfg!(any(drawloom_loom, drawloom_shuttle)) {
             return;
         }
@@ -111,7 +107,7 @@ mod tests {
     use super::{AbortOnUnwind, catch, emit};
 
     #[test]
-    fn a_panic_in_an_event_ends_there() {
+    fn a_panic_in_an_event_does_not_leave_emit() {
         emit(|| panic!("as planned"));
         struct PanicsAgain;
         impl Drop for PanicsAgain {
@@ -123,11 +119,11 @@ mod tests {
     }
 
     #[test]
-    fn a_disarmed_guard_does_nothing() {
+    fn a_disarmed_guard_does_not_abort() {
         AbortOnUnwind::new("nothing").disarm();
     }
 
-    /// This test is its own child process, which is the one that aborts. Miri starts no processes.
+    /// Starts itself as a child process, which aborts. Miri cannot start processes.
     #[test]
     #[cfg_attr(miri, ignore)]
     fn an_unwind_through_a_guard_aborts_the_process() {
@@ -145,9 +141,9 @@ mod tests {
             .env(IS_CHILD, "1")
             .output()
             .unwrap();
-        let said = String::from_utf8_lossy(&child.stderr);
-        assert!(said.contains("unwind through a test"), "{said}");
-        assert!(!said.contains("let a panic through"), "{said}");
+        let message = String::from_utf8_lossy(&child.stderr);
+        assert!(message.contains("unwind through a test"), "{message}");
+        assert!(!message.contains("let a panic through"), "{message}");
         assert!(!child.status.success());
     }
 }

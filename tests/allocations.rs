@@ -1,11 +1,10 @@
-//! A steady frame takes no memory: not from the graph, not from a loop, on no thread. And what is done leaves none behind.
+//! A steady frame allocates nothing: neither in graphs nor in loops, on no thread. And jobs that have run leave no memory behind.
 //!
-//! The allocator of this binary counts for all threads, so everything is in one test: a second one, or the harness that
-//! starts it, would be counted as well.
+//! The allocator of this binary counts for all threads, so everything is in one test. A second test, or the harness that starts
+//! it, would be counted too.
 //!
-//! Queues keep the memory that they once took, and take more only when more jobs lie in them than ever before. Where a
-//! worker is late that may happen in any frame. So before anything is counted each queue is made to hold more than the frames
-//! could put there.
+//! Queues keep their memory, and allocate only when they hold more jobs than ever before. If a worker is late, that may happen in
+//! any frame. So the test first fills each queue with more jobs than the frames could put there.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -24,66 +23,66 @@ use drawloom::{
     task::{Scheduler, Worker, catch},
 };
 
-/// The system's allocator, and how often any thread has asked it for memory.
+/// The system's allocator, which also counts the allocations of all threads.
 struct Counting;
 
-static REQUESTS: AtomicUsize = AtomicUsize::new(0);
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
-/// How many bytes have been asked for and not given back.
+/// How many bytes are allocated.
 static BYTES: AtomicUsize = AtomicUsize::new(0);
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// SAFETY: Everything is left to the system's allocator, which is one.
+// SAFETY: The methods must behave as an allocator. They pass every call on to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
         BYTES.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: Whoever calls this has promised the same.
+        // SAFETY: The caller guarantees the same conditions.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
         BYTES.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: Whoever calls this has promised the same.
+        // SAFETY: The caller guarantees the same conditions.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        REQUESTS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
         BYTES.fetch_add(size.wrapping_sub(layout.size()), Ordering::Relaxed);
-        // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
+        // SAFETY: The caller guarantees the same conditions, and the memory is from the system's allocator.
         unsafe { System.realloc(memory, layout, size) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
         BYTES.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
+        // SAFETY: The caller guarantees the same conditions, and the memory is from the system's allocator.
         unsafe { System.dealloc(memory, layout) }
     }
 }
 
-/// More than any frame here has jobs at once.
-const MOST_JOBS: usize = 600;
-const WARMING: usize = 50;
+/// More jobs than any frame of this test has at once.
+const MAX_JOBS: usize = 600;
+const WARM_UP: usize = 50;
 const COUNTED: usize = 100;
-const SPELLS: usize = 3;
+const ROUNDS: usize = 3;
 
-/// Runs frames, and says how often the counted ones asked for memory: those of the best of three spells, as whatever a
-/// thread does for the first time, such as to steal or to wait for a lock, may take memory that once, in any frame.
-fn requests_of(mut frame: impl FnMut(usize)) -> usize {
-    (0..WARMING).for_each(&mut frame);
-    let spells = (0..SPELLS).map(|_| {
-        let before = REQUESTS.load(Ordering::Relaxed);
+/// Runs frames, and returns the number of allocations in the best of three rounds. When a thread steals or waits for a lock for
+/// the first time, that may allocate, in any frame.
+fn allocations_of(mut frame: impl FnMut(usize)) -> usize {
+    (0..WARM_UP).for_each(&mut frame);
+    let rounds = (0..ROUNDS).map(|_| {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
         (0..COUNTED).for_each(&mut frame);
-        REQUESTS.load(Ordering::Relaxed) - before
+        ALLOCATIONS.load(Ordering::Relaxed) - before
     });
-    spells.min().expect("there are some")
+    rounds.min().expect("at least one round")
 }
 
-/// What a frame is lent: how much work an item is.
+/// The context of a frame: how much work an item is.
 #[derive(Default)]
 struct World {
     work: AtomicUsize,
@@ -102,7 +101,7 @@ fn process() -> Process {
     })
 }
 
-/// A layered graph: narrow, wide and pinned processes, of which each waits for some of the layer before.
+/// A layered graph of narrow, wide and pinned nodes, each of which depends on some nodes of the layer before.
 fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
     let mut state = seed;
     let mut below = |count: usize| {
@@ -113,14 +112,14 @@ fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
     let mut before: Vec<NodeId> = Vec::new();
     for (layer, &width) in layers.iter().enumerate() {
         let processes: Vec<NodeId> = (0..width)
-            .map(|place| {
+            .map(|index| {
                 let (items, chunk) = (2 + below(100), 1 + below(4));
                 let payload = match below(8) {
                     0 => process().on_calling_thread(),
                     1 | 2 => process().with_width(move |_| items).with_chunk(chunk),
                     _ => process(),
                 };
-                let added = graph.add(format!("{layer} {place}"), payload);
+                let added = graph.add(format!("{layer} {index}"), payload);
                 graph.keep(added);
                 for _ in 0..before.len().min(1 + below(3)) {
                     graph.order(before[below(before.len())], added);
@@ -130,11 +129,11 @@ fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
             .collect();
         before = processes;
     }
-    graph.compile().expect("nothing is wrong")
+    graph.compile().expect("the graph is valid")
 }
 
-/// A root, which takes as long as it is told, and then a spine of processes, each of which makes its successor ready and a
-/// tooth that nothing waits for: whoever runs the spine queues all teeth.
+/// A root that sleeps for the given time, and then a chain of nodes, the spine. Each makes its successor ready, and a tooth on which
+/// nothing depends. So the worker that runs the spine queues all teeth.
 fn comb() -> Schedule<Closure<'static, Duration>> {
     let nothing = || Closure::new(|_: &Duration, _, _| Ok(()));
     let mut graph = FrameGraph::new();
@@ -142,43 +141,43 @@ fn comb() -> Schedule<Closure<'static, Duration>> {
         thread::sleep(*long);
         Ok(())
     });
-    // Of processes that cost the same the first added comes first, so the spine does.
+    // Of nodes with equal cost the one that was added first comes first, so the spine does.
     let mut last = graph.add("root", root);
     graph.keep(last);
-    let bones: Vec<NodeId> = (0..MOST_JOBS).map(|place| graph.add(format!("bone {place}"), nothing())).collect();
-    for (place, bone) in bones.into_iter().enumerate() {
+    let bones: Vec<NodeId> = (0..MAX_JOBS).map(|index| graph.add(format!("bone {index}"), nothing())).collect();
+    for (index, bone) in bones.into_iter().enumerate() {
         graph.order(last, bone);
         last = bone;
-        let tooth = graph.add(format!("tooth {place}"), nothing());
+        let tooth = graph.add(format!("tooth {index}"), nothing());
         graph.order(bone, tooth);
         graph.keep(bone);
         graph.keep(tooth);
     }
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     schedule.always_parallel(true);
     schedule
 }
 
-/// A root that makes everything ready which is for the calling thread.
-fn mail() -> Schedule<Process> {
+/// A root on which all pinned nodes depend.
+fn pinned_nodes() -> Schedule<Process> {
     let mut graph = FrameGraph::new();
     let root = graph.add("root", process());
     graph.keep(root);
-    for place in 0..MOST_JOBS {
-        let pinned = graph.add(format!("pinned {place}"), process().on_calling_thread());
+    for index in 0..MAX_JOBS {
+        let pinned = graph.add(format!("pinned {index}"), process().on_calling_thread());
         graph.order(root, pinned);
         graph.keep(pinned);
     }
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     schedule.always_parallel(true);
     schedule
 }
 
-/// Has every worker sleep once, and every queue and mailbox take the memory that it will ever need.
-fn stretch(scheduler: &Scheduler) {
+/// Makes every worker sleep once, and every queue and mailbox allocate the memory that it will ever need.
+fn grow_queues(scheduler: &Scheduler) {
     let together = Barrier::new(scheduler.workers());
     for runner in 0..scheduler.workers() {
-        // The others have nothing to do meanwhile. A lock takes memory for a thread that waits for the first time.
+        // The other workers have nothing to do meanwhile. A lock allocates when a thread waits for the first time.
         let outcome = scheduler.parallel_for(scheduler.workers(), 1, |_range, worker| {
             together.wait();
             if worker.index() == runner {
@@ -186,20 +185,20 @@ fn stretch(scheduler: &Scheduler) {
             }
         });
         assert_eq!(outcome, Ok(()));
-        with_others_kept(scheduler, runner, || {
-            mail().run(scheduler, &World::default()).unwrap();
-            // Nothing is known of the costs, so nothing is urgent.
+        with_others_blocked(scheduler, runner, || {
+            pinned_nodes().run(scheduler, &World::default()).unwrap();
+            // The costs are unknown, so nothing is urgent.
             let mut schedule = comb();
             // The first run is not measured, and the second is.
             (0..2).for_each(|_| schedule.run(scheduler, &Duration::from_millis(200)).unwrap());
-            // Beside such a root all else costs nothing, so all ways are the longest, and everything is urgent.
+            // Compared with the root all other nodes cost nothing, so all paths are critical, and everything is urgent.
             schedule.run(scheduler, &Duration::ZERO).unwrap();
         });
     }
 }
 
-/// Calls that on one worker, while the others can take nothing off it.
-fn with_others_kept(scheduler: &Scheduler, chosen: usize, call: impl FnMut() + Send) {
+/// Calls `call` on one worker, while the other workers cannot steal from it.
+fn with_others_blocked(scheduler: &Scheduler, chosen: usize, call: impl FnMut() + Send) {
     let [begin, end] = [(); 2].map(|()| Barrier::new(scheduler.workers()));
     let call = Mutex::new(call);
     let outcome = scheduler.parallel_for(scheduler.workers(), 1, |_range, worker| {
@@ -211,20 +210,20 @@ fn with_others_kept(scheduler: &Scheduler, chosen: usize, call: impl FnMut() + S
     assert_eq!(outcome, Ok(()));
 }
 
-/// The requests of frames of a graph, whose work changes: heavy frames are too long to be run alone.
-fn requests_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, always_parallel: bool) -> usize {
+/// The allocations of frames of a graph whose work changes. Heavy frames are too long to run serially.
+fn allocations_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, always_parallel: bool) -> usize {
     schedule.always_parallel(always_parallel);
     let world = World::default();
-    let requests = requests_of(|frame| {
+    let allocations = allocations_of(|frame| {
         world.work.store(if frame % 5 == 4 { 200 } else { 0 }, Ordering::Relaxed);
         schedule.run(scheduler, &world).unwrap();
     });
-    assert!(world.items.into_inner() >= schedule.len() * (WARMING + SPELLS * COUNTED), "all has been run");
-    requests
+    assert!(world.items.into_inner() >= schedule.len() * (WARM_UP + ROUNDS * COUNTED), "every item ran");
+    allocations
 }
 
-/// Background jobs that were waited for before anybody had begun them are gone, wherever nobody takes them out of a queue.
-fn check_that_waiting_leaves_nothing(workers: usize) {
+/// Background jobs that were waited for before they began leave the queue, even if no worker takes jobs from it.
+fn check_that_waiting_frees_memory(workers: usize) {
     const JOBS: usize = 1_000;
     const RESULT: usize = 16_384;
     let scheduler = Scheduler::new(workers).unwrap();
@@ -237,54 +236,56 @@ fn check_that_waiting_leaves_nothing(workers: usize) {
     let before = BYTES.load(Ordering::Relaxed);
     wait_for_all();
     let left = BYTES.load(Ordering::Relaxed).saturating_sub(before);
-    assert!(left < 2 * RESULT, "{workers} workers: {JOBS} jobs that were waited for have left {left} bytes");
+    assert!(left < 2 * RESULT, "{workers} workers: {JOBS} jobs that were waited for leave {left} bytes allocated");
 }
 
 #[test]
-fn a_steady_frame_takes_no_memory() {
-    [1, 2].into_iter().for_each(check_that_waiting_leaves_nothing);
+fn a_steady_frame_allocates_nothing() {
+    [1, 2].into_iter().for_each(check_that_waiting_frees_memory);
 
-    // What counts must count, on every thread.
-    let before = REQUESTS.load(Ordering::Relaxed);
+    // The allocator counts on every thread.
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
     thread::spawn(|| drop(black_box(Box::new(7)))).join().unwrap();
-    assert!(REQUESTS.load(Ordering::Relaxed) > before);
+    assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);
 
     let scheduler = Scheduler::builder().workers(2).build().unwrap();
-    stretch(&scheduler);
+    grow_queues(&scheduler);
 
     let mut found = Vec::new();
-    let mut note = |case: String, requests: usize| found.extend((requests > 0).then(|| format!("{case}: {requests}")));
+    let mut check = |case: String, allocations: usize| {
+        found.extend((allocations > 0).then(|| format!("{case}: {allocations}")));
+    };
     for (seed, layers) in [&[1, 12, 3, 30, 7, 1][..], &[5, 100, 2, 150, 40], &[200, 1, 200]].into_iter().enumerate() {
         for always_parallel in [true, false] {
-            let requests = requests_of_graph(&scheduler, layered(seed as u64, layers), always_parallel);
-            note(format!("layers of {layers:?}, always shared: {always_parallel}"), requests);
+            let allocations = allocations_of_graph(&scheduler, layered(seed as u64, layers), always_parallel);
+            check(format!("layers of {layers:?}, always shared: {always_parallel}"), allocations);
         }
     }
     let mut schedule = comb();
-    let mut requests = 0;
-    with_others_kept(&scheduler, 0, || {
-        requests = requests_of(|_frame| schedule.run(&scheduler, &Duration::ZERO).unwrap());
+    let mut allocations = 0;
+    with_others_blocked(&scheduler, 0, || {
+        allocations = allocations_of(|_frame| schedule.run(&scheduler, &Duration::ZERO).unwrap());
     });
-    note("jobs that the deque has no room for".to_owned(), requests);
-    let requests = requests_of(|_frame| schedule.run(&scheduler, &Duration::ZERO).unwrap());
-    note("the same with thieves".to_owned(), requests);
+    check("more jobs than fit into a deque".to_owned(), allocations);
+    let allocations = allocations_of(|_frame| schedule.run(&scheduler, &Duration::ZERO).unwrap());
+    check("the same with thieves".to_owned(), allocations);
     for (length, chunk) in [(1_000, 1), (1_000, 7), (2, 1), (1, 1)] {
         let sum = AtomicUsize::new(0);
-        let requests = requests_of(|_frame| {
+        let allocations = allocations_of(|_frame| {
             let body = |range: Range<usize>, _: &Worker| {
                 sum.fetch_add(range.len(), Ordering::Relaxed);
             };
             scheduler.parallel_for(length, chunk, body).unwrap();
         });
-        note(format!("a loop over {length} by {chunk}"), requests);
-        assert_eq!(sum.into_inner(), length * (WARMING + SPELLS * COUNTED));
+        check(format!("a loop over {length} by {chunk}"), allocations);
+        assert_eq!(sum.into_inner(), length * (WARM_UP + ROUNDS * COUNTED));
     }
-    note(
+    check(
         "loops in a loop".to_owned(),
-        requests_of(|_frame| {
+        allocations_of(|_frame| {
             let inner = |_: Range<usize>, _: &Worker| scheduler.parallel_for(20, 1, |_range, _worker| {}).unwrap();
             scheduler.parallel_for(20, 1, inner).unwrap();
         }),
     );
-    assert_eq!(found, [""; 0], "requests for memory in {COUNTED} frames each");
+    assert_eq!(found, [""; 0], "allocations in {COUNTED} frames each");
 }

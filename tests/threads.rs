@@ -1,4 +1,4 @@
-//! A pool that is dropped leaves no thread. It is the only test of its binary, so that it can count all threads there are.
+//! A dropped scheduler leaves no thread. This is the only test of its binary, so that it can count the threads of the process.
 
 use std::sync::{
     Arc,
@@ -7,14 +7,14 @@ use std::sync::{
 
 use drawloom::task::Scheduler;
 
-/// How many threads the process has, as the system says.
+/// How many threads the process has.
 #[cfg(target_os = "linux")]
 fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
 }
 
 #[test]
-fn a_thousand_pools_leave_no_thread() {
+fn a_thousand_dropped_schedulers_leave_no_thread() {
     #[cfg(target_os = "linux")]
     let before = threads();
     let (live, started) = (Arc::new(AtomicIsize::new(0)), Arc::new(AtomicUsize::new(0)));
@@ -45,7 +45,7 @@ fn a_thousand_pools_leave_no_thread() {
         assert_eq!(live.load(Ordering::Relaxed), 0, "round {round}");
     }
     assert_eq!(started.load(Ordering::Relaxed), 3_000);
-    // A thread that was joined may be listed for a moment longer; one that was leaked, for ever.
+    // A joined thread may be listed for a moment longer; a leaked one would be listed for ever.
     #[cfg(target_os = "linux")]
     assert!((0..10_000).any(|_look| {
         threads() <= before || {

@@ -1,7 +1,7 @@
-//! The job system: all cores for one call, without the call noticing.
+//! The job system: a call runs on all cores and returns like any other call.
 //!
-//! It is for whoever produces frames: the graph runs its nodes on it, and an engine can run its own loops on the same
-//! workers, before and between frames, rather than keep a second pool that fights for the same cores.
+//! The graph runs its nodes on it. An engine can run its own loops on the same workers, before and between frames, so it needs no
+//! second pool that competes for the same cores.
 //!
 //! ```text
 //!   the calling thread = worker 0                worker 1            worker 2
@@ -9,14 +9,14 @@
 //!       scope.spawn(a);           a ─────────────► steals a          sleeps, until
 //!       scope.spawn(b);             c ◄─ spawns c  │                 a push wakes it
 //!       scope.spawn_pinned(p);    p               ...
-//!   })  runs p, b, then what                       steals, sleeps    steals c
-//!       there is to steal; sleeps
-//!       until a, b, c and p have run
+//!   })  runs p, b, steals jobs,                    steals, sleeps    steals c
+//!       and sleeps until a, b, c
+//!       and p have run
 //! ```
 //!
-//! A [`Scheduler`] owns the threads. In a [`Scope`] jobs are spawned that borrow from the caller, and spawn more.
-//! [`Scheduler::parallel_for`] is the loop over a range. Every job is handed the [`Worker`] it runs on, whose index
-//! tells apart what an engine keeps per worker. A graph of jobs, with an order between them, is a
+//! A [`Scheduler`] owns the threads. Jobs in a [`Scope`] borrow from the caller, and can spawn more jobs.
+//! [`Scheduler::parallel_for`] runs a loop over a range. Every job gets the [`Worker`] that it runs on, whose index an engine can
+//! use for data that it keeps for each worker. A graph of jobs with an order between them is a
 //! [`Schedule`](crate::graph::Schedule).
 //!
 //! # A loop
@@ -49,14 +49,14 @@
 //!     scope.spawn(|_scope, _worker| sounds.retain(|&sound| sound != "step"));
 //!     scope.spawn(|_scope, _worker| shapes.sort());
 //! })?;
-//! // All jobs have run, and what they borrowed is back.
+//! // All jobs have run, so nothing is borrowed any more.
 //! assert_eq!((sounds, shapes), (vec!["door"], vec![1, 2, 3]));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # A job for one thread
 //!
-//! What only the thread of the window or the device may touch goes to a pinned job. It may be spawned from any job.
+//! Work that only the thread of the window or the device may do goes into a pinned job. Any job can spawn one.
 //!
 //! ```
 //! use std::{cell::Cell, thread};
@@ -76,11 +76,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A job for the background
+//! # A job in the background
 //!
-//! What may take longer than a frame goes to the [background](Scheduler::background). No thread that calls the scheduler for
-//! a frame ever picks it up, so a frame is not late by the length of somebody's loading; it runs on other workers while
-//! they have nothing else to do.
+//! Work that may take longer than a frame goes into the [background](Scheduler::background). A thread that calls the scheduler for
+//! a frame never takes a background job, so loading never delays a frame. Other workers run it while they have nothing else to
+//! do.
 //!
 //! ```
 //! use std::time::Duration;
@@ -94,87 +94,88 @@
 //!         tiles = job.wait()?;
 //!     }
 //!     scheduler.parallel_for(100, 10, |_range, _worker| { /* the frame, with or without the tiles */ })?;
-//!     // What is left of the frame's time. With a single worker this is where background jobs run.
+//!     // Uses the rest of the frame's time. With a single worker, background jobs run only here.
 //!     scheduler.run_background(Duration::from_micros(200));
 //! }
 //! if let Some(job) = level {
-//!     // It cannot be put off any longer: run here and now if nobody has begun it.
+//!     // The tiles are needed now: runs the job here if no worker has begun it.
 //!     tiles = job.wait()?;
 //! }
 //! assert_eq!(tiles.len(), 1_000);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A failure, again
+//! # Repeating a failure
 //!
-//! With one worker and a [seed](SchedulerBuilder::shuffle) all jobs run on one thread in an order that the seed decides, the
-//! same every time; with several workers and a seed, results that depend on an order show themselves.
+//! With one worker and a [seed](SchedulerBuilder::shuffle), all jobs run on one thread in an order that the seed decides, the same
+//! every time. With several workers and a seed, results that depend on the order of jobs show up.
 //!
 //! # Panics
 //!
-//! The panic of a job, of a loop's body or of a scope's is caught. It harms no worker, and the call returns it as a
-//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the
-//! process ends on the spot, and no error names anything.
+//! The panic of a job, of a loop's body or of a scope's body is caught. All workers go on, and the call returns the panic as a
+//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the process ends at
+//! once, without an error.
 //!
-//! Everything else that an engine supplies may panic too. Hooks that name, place or start threads fail the
-//! [build](SchedulerBuilder::build); the hook that stops a thread is reported to [`tracing`]; a
-//! [clock](SchedulerBuilder::timeline_clock) stands still; a subscriber of `tracing` loses the event, or fails the run that it
-//! was told of. What panics while another panic unwinds, such as a destructor, ends the process, as in any Rust program.
+//! Other code of the engine may panic too. The hooks that name, place or start threads fail the
+//! [build](SchedulerBuilder::build). The panic of the hook that stops a thread is reported to [`tracing`]. A
+//! [clock](SchedulerBuilder::timeline_clock) that panics stands still. If a subscriber of `tracing` panics, its event is lost, or
+//! the run that sent it fails. A panic during the unwinding of another panic, such as that of a destructor, ends the process, as
+//! in any Rust program.
 //!
-//! # What waiting means
+//! # What a thread does while it waits
 //!
-//! A thread that calls the scheduler from outside runs whatever there is to run of a frame until its call returns. A job that
-//! waits, for a scope, a loop or a graph of its own, runs jobs of that meanwhile, on top of its stack, and nothing else: it is
-//! late by no work but its own, and finds nothing borrowed that it had not borrowed itself. Jobs that open scopes in which jobs
-//! open scopes, without bound, need a stack without bound, as any recursion does.
+//! A thread that calls the scheduler from outside runs all jobs of the frame until its call returns. A job that waits for a scope,
+//! a loop or a graph of its own runs only jobs of that, on top of its stack. So no foreign job delays it, and no job on top of
+//! it finds a value borrowed that the waiting job did not borrow itself. If scopes nest without bound, the stack grows without
+//! bound, as with any recursion.
 //!
-//! No thread keeps a job to itself that another one waits for: who waits for a scope, a loop or a graph finds each of its jobs
-//! that has not begun. So a program waits for ever only if a *running* job waits, by way of other running jobs, for itself. The
-//! ways to bring that about:
+//! No thread keeps a job that another thread waits for: a thread that waits for a scope, a loop or a graph finds all of its jobs
+//! that have not begun. So a program waits for ever only if a *running* job waits for itself, by way of other running jobs. These
+//! programs do:
 //!
-//! - A job waits for a background job that waits for what the first job is part of.
-//! - A job holds a lock, and waits for a scope, or a background job, in which the lock is wanted.
+//! - A job waits for a background job that waits for something that the first job is part of.
+//! - A job holds a lock while it waits for a scope or a background job that needs the lock.
 //! - A job waits for a thread that calls the same scheduler from outside, or two threads call two schedulers crosswise
-//!   ([`Scheduler`] says when).
+//!   (see [`Scheduler`]).
 //! - Jobs that are ready wait for each other to run at the same time: one thread may have both.
-//! - A job calls [`Scheduler::run_background`], which runs whatever is the oldest background job on top of it, and that
-//!   waits for what the first job is part of.
+//! - A job calls [`Scheduler::run_background`], which runs the oldest background job on top of it, and that waits for something
+//!   that the first job is part of.
 //!
 //! # Which calls may block
 //!
 //! | call | blocks until | meanwhile, the thread |
 //! | --- | --- | --- |
 //! | [`Scheduler::scope`], [`Scheduler::parallel_for`], [`Schedule::run`](crate::graph::Schedule::run), from outside | calls of other threads from outside have returned | sleeps |
-//! | | all jobs of the call have run | runs jobs of the frame, sleeps if there is none |
-//! | the same in a job | all jobs of the call have run | runs jobs of the call, sleeps if there is none |
-//! | [`BackgroundJob::wait`] | the job has run | runs that job if nobody has begun it, and otherwise sleeps |
+//! | | all jobs of the call have run | runs jobs of the frame, sleeps if there are none |
+//! | the same in a job | all jobs of the call have run | runs jobs of the call, sleeps if there are none |
+//! | [`BackgroundJob::wait`] | the job has run | runs that job if no thread has begun it, and otherwise sleeps |
 //! | [`Scheduler::run_background`] | the last job that was begun in time has run | runs background jobs |
-//! | dropping a [`Scheduler`] | its threads have ended: until the jobs that they are at have run | sleeps |
-//! | building a [`Scheduler`] | its threads have begun, and what waking one costs is measured | sleeps, or looks at the time |
+//! | dropping a [`Scheduler`] | its threads have ended: their current jobs have run | sleeps |
+//! | building a [`Scheduler`] | its threads have begun, and the cost of waking one is measured | sleeps, or reads the clock |
 //! | [`Timeline::start`](crate::timeline::Timeline::start), [`now`](crate::timeline::Timeline::now) or [`take`](crate::timeline::Timeline::take) for the first time | the scheduler is 10 ms old | sleeps |
 //!
 //! [`Scope::spawn`], [`Scope::spawn_pinned`] and [`Scheduler::background`] return at once.
 //!
 //! # What costs more than linear
 //!
-//! Jobs of all kinds cost the same however many there are, but for this:
+//! A job costs the same however many there are, with these exceptions:
 //!
-//! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all that lie in a queue: time grows with their square.
-//! - A worker that finds nothing in its own queues looks into those of all others, so an idle moment costs time that grows
-//!   with the number of workers.
-//! - Where scopes nest deeply, a worker that takes a job for somebody else looks through the levels of who waits for it.
-//! - A [graph](crate::graph::FrameGraph::compile) has an edge or two for each access of a resource. But readers that are put
-//!   before some of a resource's makers have an edge for each maker before them; and for each resource with makers and readers,
-//!   and each modifier of one with several, the orders that lead there are walked back.
-//! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out what follows from other edges, in time that grows with the
+//! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all jobs of a queue, so time grows with their square.
+//! - A worker that finds nothing in its own queues looks into those of all others, so the cost of being idle grows with the number
+//!   of workers.
+//! - Where scopes nest deeply, a worker that takes a job from another worker's mailbox searches the levels of that worker.
+//! - A [graph](crate::graph::FrameGraph::compile) has an edge or two for each access of a resource. But readers that are ordered
+//!   before some of a resource's makers have an edge from each maker before them. And for each resource with makers and readers,
+//!   and each modifier of one with several, compiling walks back the orders that lead there.
+//! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out edges that follow from others, in time that grows with the
 //!   product of nodes and edges.
 //!
 //! # What it costs
 //!
-//! A job that captures up to four words is spawned without an allocation, others are one each. A loop allocates nothing.
-//! Workers look for work for some microseconds after the end of a frame, and as long as waking them would take within
-//! one; then they sleep and take no time from anybody. [What waking one costs](Scheduler::wake_up_cost) is measured when
-//! the scheduler is built; a loop should be worth more than that, and a graph that is not is run by its caller alone.
+//! A job that captures up to four words is spawned without an allocation; others need one each. A loop allocates nothing. Workers
+//! look for work for some microseconds after the end of a frame, and within a frame for as long as a wake-up takes. Then they
+//! sleep and use no processor time. [The cost of a wake-up](Scheduler::wake_up_cost) is measured when the scheduler is built. A
+//! loop should be worth more than that, and a graph that is not runs on the calling thread alone.
 
 // In layers: each group uses only groups above it, and no two files import each other in a circle.
 

@@ -1,7 +1,7 @@
-//! Scopes, loops and background jobs on a whole scheduler, in interleavings that shuttle draws.
+//! Scopes, loops and background jobs on a whole scheduler, in random interleavings of shuttle's.
 //!
-//! What is asserted is that all is run, once, and where it may be. That nobody sleeps through it is asserted by shuttle: a
-//! call that never returns leaves all threads asleep, which it takes for a failure.
+//! The tests assert that each job runs once, on a worker that may run it. Shuttle asserts that no wake-up is lost: if a call never
+//! returns, all threads sleep, which shuttle reports as a failure.
 
 use std::{iter, panic::resume_unwind, sync::Arc, time::Duration};
 
@@ -21,7 +21,7 @@ fn count(counter: &AtomicUsize) {
     counter.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Panics without a word on the console, which would be said in each interleaving.
+/// Panics without a message on the console, which would be printed in each interleaving.
 fn panic_as_planned() -> ! {
     resume_unwind(Box::new("as planned"))
 }
@@ -62,10 +62,10 @@ fn shuttle_pinned_jobs_run_on_the_calling_thread_in_order() {
         let outcome = scheduler.scope(|scope| {
             for counter in &pinned {
                 scope.spawn(move |scope, _worker| {
-                    for place in 0..2 {
+                    for position in 0..2 {
                         scope.spawn_pinned(move |_scope, worker| {
                             assert_eq!((worker.index(), thread::current().id()), (0, caller));
-                            assert_eq!(counter.fetch_add(1, Ordering::Relaxed), place);
+                            assert_eq!(counter.fetch_add(1, Ordering::Relaxed), position);
                         });
                     }
                 });
@@ -89,7 +89,7 @@ fn shuttle_a_loop_runs_each_index_once() {
 }
 
 #[test]
-fn shuttle_a_loop_in_a_job_runs_nothing_else_on_its_worker() {
+fn shuttle_a_worker_that_waits_for_a_loop_in_a_job_runs_no_foreign_job() {
     check_on_schedulers(|scheduler| {
         let ran = counters(4);
         let depths = counters(scheduler.workers());
@@ -101,7 +101,7 @@ fn shuttle_a_loop_in_a_job_runs_nothing_else_on_its_worker() {
                     assert_eq!(
                         depth.fetch_add(1, Ordering::Relaxed),
                         0,
-                        "another job of the scope has been interrupted"
+                        "another job of the scope runs on this worker"
                     );
                     let inner = scheduler.parallel_for(2, 1, |range, _worker| count(&ran[range.start]));
                     assert_eq!(inner, Ok(()));
@@ -184,7 +184,7 @@ fn shuttle_background_jobs_run_beside_frames_and_off_the_calling_thread() {
 }
 
 #[test]
-fn shuttle_whoever_waits_for_a_background_job_gets_it_whoever_runs_it() {
+fn shuttle_waiting_returns_the_result_of_a_background_job_wherever_it_ran() {
     check_on_schedulers(|scheduler| {
         let ran = Arc::new(AtomicUsize::new(0));
         let job = scheduler.background({
@@ -223,7 +223,7 @@ fn shuttle_a_background_job_has_scopes_of_its_own() {
 }
 
 #[test]
-fn shuttle_a_scheduler_ends_whatever_its_workers_are_at() {
+fn shuttle_a_scheduler_can_be_dropped_while_its_workers_are_busy() {
     check_on_schedulers(|_scheduler| ());
     check(|| {
         let scheduler = Scheduler::new(3).unwrap();
@@ -236,12 +236,16 @@ fn shuttle_a_scheduler_ends_whatever_its_workers_are_at() {
         let before = ran.load(Ordering::Relaxed);
         assert_eq!(jobs.map(|job| job.wait()), [Ok(()), Ok(())]);
         assert!(before <= 2);
-        assert_eq!(ran.load(Ordering::Relaxed), 2, "each has run once, before the end or when it was waited for");
+        assert_eq!(
+            ran.load(Ordering::Relaxed),
+            2,
+            "each has run once, before the scheduler ended or when it was waited for"
+        );
     });
 }
 
-/// One of the background job's jobs spawns another one and goes on to a frame's job, which waits for a scope; a job of that waits
-/// for the background job. So none of the three may keep a job from who waits for it.
+/// A worker runs a job of the background job's scope, spawns another one, and goes on to a frame's job. That waits for a scope, a
+/// job of which waits for the background job. So no worker may keep a job that another one waits for.
 #[test]
 fn shuttle_a_frames_nested_job_waits_for_a_background_job() {
     check(|| {
@@ -276,7 +280,7 @@ fn shuttle_a_frames_nested_job_waits_for_a_background_job() {
     });
 }
 
-/// A thief of an inner scope's job spawns into both scopes, and may then run either.
+/// A thief of an inner scope's job spawns into both scopes, and may run either job next.
 #[test]
 fn shuttle_jobs_for_two_scopes_spawned_under_a_nested_wait_all_run() {
     check_on_schedulers(|scheduler| {
@@ -300,7 +304,7 @@ fn shuttle_jobs_for_two_scopes_spawned_under_a_nested_wait_all_run() {
 }
 
 #[test]
-fn shuttle_whoever_runs_background_jobs_runs_each_once() {
+fn shuttle_running_and_waiting_for_background_jobs_runs_each_once() {
     check_on_schedulers(|scheduler| {
         let ran = Arc::new(AtomicUsize::new(0));
         let jobs = [(); 3].map(|()| {
@@ -314,7 +318,7 @@ fn shuttle_whoever_runs_background_jobs_runs_each_once() {
         assert_eq!(outcomes, [const { Ok(()) }; 3]);
         assert_eq!(ran.load(Ordering::Relaxed), 3);
         assert!(here <= 3);
-        assert!(scheduler.shared().background().is_empty(), "what was waited for is not queued any more");
+        assert!(scheduler.shared().background().is_empty(), "a job that was waited for is not queued any more");
     });
 }
 
@@ -341,7 +345,7 @@ fn shuttle_a_scope_takes_jobs_from_a_thread_that_is_no_worker() {
 }
 
 #[test]
-fn shuttle_a_background_job_drops_the_last_share_of_its_scheduler() {
+fn shuttle_a_background_job_drops_the_last_reference_to_its_scheduler() {
     check(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
         let ran = Arc::new(AtomicUsize::new(0));
@@ -353,7 +357,7 @@ fn shuttle_a_background_job_drops_the_last_share_of_its_scheduler() {
             })
         });
         drop(scheduler);
-        // Whoever waits for one that nobody has begun runs it, and may be the one that drops the scheduler.
+        // Waiting for a job that has not begun runs it here, so this thread may drop the scheduler.
         assert_eq!(jobs.map(|job| job.wait()), [const { Ok(()) }; 2]);
         assert_eq!(ran.load(Ordering::Relaxed), 4);
     });

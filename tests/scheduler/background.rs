@@ -1,4 +1,4 @@
-//! Background jobs: where they run, when, and what comes of them.
+//! Background jobs: where and when they run, and their results.
 
 use std::{
     sync::{
@@ -13,21 +13,21 @@ use std::{
 use crate::{assert_intact, eventually, scheduler};
 
 #[test]
-fn frames_never_run_them_on_the_calling_thread() {
+fn frames_never_run_background_jobs_on_the_calling_thread() {
     let scheduler = Arc::new(scheduler(3));
     let here = thread::current().id();
-    let strays = Arc::new(AtomicUsize::new(0));
+    let on_caller = Arc::new(AtomicUsize::new(0));
     let jobs: Vec<_> = (0..12)
         .map(|_job| {
-            let (scheduler, strays) = (Arc::clone(&scheduler), Arc::clone(&strays));
+            let (scheduler, on_caller) = (Arc::clone(&scheduler), Arc::clone(&on_caller));
             scheduler.clone().background(move || {
                 let look = || {
-                    // Long enough for others to come by.
+                    // Long enough for other workers to join.
                     thread::sleep(Duration::from_micros(200));
-                    strays.fetch_add(usize::from(thread::current().id() == here), Ordering::Relaxed);
+                    on_caller.fetch_add(usize::from(thread::current().id() == here), Ordering::Relaxed);
                 };
                 look();
-                // What it opens is background work too.
+                // Its loops and scopes are background work too.
                 scheduler.parallel_for(8, 1, |_range, _worker| look()).unwrap();
                 let inner = scheduler.scope(|scope| (0..8).for_each(|_| scope.spawn(|_scope, _worker| look())));
                 inner.unwrap();
@@ -38,13 +38,13 @@ fn frames_never_run_them_on_the_calling_thread() {
     while !are_finished() {
         scheduler.parallel_for(30, 1, |_range, _worker| thread::yield_now()).unwrap();
     }
-    assert_eq!(strays.load(Ordering::Relaxed), 0);
+    assert_eq!(on_caller.load(Ordering::Relaxed), 0);
     assert!(jobs.into_iter().all(|job| job.wait() == Ok(())));
     assert_intact(&scheduler);
 }
 
 #[test]
-fn with_one_worker_they_run_only_where_they_are_asked_for() {
+fn with_one_worker_background_jobs_run_only_on_request() {
     let scheduler = scheduler(1);
     let ran = Arc::new(Mutex::new(Vec::new()));
     let jobs: Vec<_> = (0..4)
@@ -54,19 +54,19 @@ fn with_one_worker_they_run_only_where_they_are_asked_for() {
         })
         .collect();
     scheduler.parallel_for(10, 1, |_range, _worker| {}).unwrap();
-    assert_eq!(*ran.lock().unwrap(), [0; 0], "a frame has run them");
+    assert_eq!(*ran.lock().unwrap(), [0; 0], "a frame has run background jobs");
     let mut jobs = jobs.into_iter();
     let third = jobs.by_ref().nth(2).unwrap();
     assert_eq!(third.wait(), Ok(()));
-    assert_eq!(*ran.lock().unwrap(), [2], "that one, before older ones");
-    // The first two have been let go of, and run nevertheless; the third is not run again.
+    assert_eq!(*ran.lock().unwrap(), [2], "the awaited job runs before older ones");
+    // The handles of the first two have been dropped, and the jobs run nevertheless. The third is not run again.
     assert_eq!(scheduler.run_background(Duration::MAX), 3);
     assert_eq!(*ran.lock().unwrap(), [2, 0, 1, 3]);
     assert!(jobs.all(|job| job.is_finished()));
 }
 
 #[test]
-fn none_is_begun_when_the_budget_has_passed() {
+fn no_background_job_begins_after_the_budget() {
     let scheduler = scheduler(1);
     let budget = Duration::from_millis(5);
     let _jobs = [(); 3].map(|()| scheduler.background(move || thread::sleep(2 * budget)));
@@ -76,21 +76,21 @@ fn none_is_begun_when_the_budget_has_passed() {
 }
 
 #[test]
-fn a_panic_is_what_waiting_returns() {
+fn waiting_returns_the_panic_of_the_job() {
     for workers in [1, 3] {
         let scheduler = scheduler(workers);
         let job = scheduler.background(|| panic!("in the background"));
         let outcome: Result<(), _> = job.wait();
         assert_eq!(outcome.unwrap_err().message, "in the background");
         // Nobody waits for this one.
-        drop(scheduler.background(|| panic!("unheard")));
+        drop(scheduler.background(|| panic!("not waited for")));
         scheduler.run_background(Duration::MAX);
         assert_intact(&scheduler);
     }
 }
 
 #[test]
-fn who_waits_sleeps_until_a_job_that_has_begun_ends() {
+fn a_waiting_thread_sleeps_until_a_running_job_ends() {
     let scheduler = scheduler(2);
     for _round in 0..20 {
         let (go, may_go) = mpsc::channel::<()>();

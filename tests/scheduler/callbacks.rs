@@ -1,4 +1,4 @@
-//! What an engine supplies may panic: it is an error, or it is reported, and no job, no worker and no borrow is lost.
+//! Hooks, clocks and captures of the engine may panic: that is an error or is reported, and no job, worker or borrow is lost.
 
 use std::{
     sync::{
@@ -11,9 +11,9 @@ use std::{
 
 use drawloom::task::{AffinityMask, Scheduler, SchedulerError};
 
-use crate::{assert_intact, waits::ends};
+use crate::{assert_intact, waits::assert_ends};
 
-/// A clock that panics from its `first`-th reading on, and the number of its readings so far.
+/// A clock that panics from reading number `first` on, and the number of its readings so far.
 fn clock_that_panics(first: usize) -> (impl Fn() -> Duration + Send + Sync, Arc<AtomicUsize>) {
     let readings = Arc::new(AtomicUsize::new(0));
     let counted = Arc::clone(&readings);
@@ -26,9 +26,9 @@ fn clock_that_panics(first: usize) -> (impl Fn() -> Duration + Send + Sync, Arc<
 }
 
 #[test]
-fn a_clock_that_panics_takes_no_job_and_no_borrow_away() {
-    ends(|| {
-        // Whoever reads it first then: the caller or a worker, before a job, after one, or as it falls asleep.
+fn a_clock_that_panics_loses_no_job_and_no_borrow() {
+    assert_ends(|| {
+        // So that the clock panics on the caller and on workers: before a job, after one, and as the worker goes to sleep.
         for first in 1..40 {
             let (clock, readings) = clock_that_panics(first);
             let scheduler = Scheduler::builder().workers(3).timeline_clock(clock).build().unwrap();
@@ -36,10 +36,10 @@ fn a_clock_that_panics_takes_no_job_and_no_borrow_away() {
             for frame in 0..100 {
                 let mut lent = vec![0_usize; 64];
                 let outcome = scheduler.scope(|scope| {
-                    for place in &mut lent {
+                    for number in &mut lent {
                         scope.spawn(move |scope, _worker| {
-                            *place += 1;
-                            scope.spawn_pinned(move |_scope, _worker| *place += 1);
+                            *number += 1;
+                            scope.spawn_pinned(move |_scope, _worker| *number += 1);
                         });
                     }
                 });
@@ -54,9 +54,9 @@ fn a_clock_that_panics_takes_no_job_and_no_borrow_away() {
             let log = scheduler.timeline().take();
             assert_eq!(log.clock_panic.as_deref(), Some("the clock has stopped"));
             let called = readings.load(Ordering::Relaxed);
-            assert!(called <= first + scheduler.workers(), "only those who were at it have called it");
+            assert!(called <= first + scheduler.workers(), "only threads that were reading the clock have called it");
             scheduler.timeline().now();
-            assert_eq!(readings.load(Ordering::Relaxed), called, "it is not called again");
+            assert_eq!(readings.load(Ordering::Relaxed), called, "the clock is not called again");
         }
     });
 }
@@ -86,13 +86,13 @@ struct PanicsWhenDropped(Arc<AtomicUsize>);
 impl Drop for PanicsWhenDropped {
     fn drop(&mut self) {
         self.0.fetch_add(1, Ordering::Relaxed);
-        panic!("it is dropped");
+        panic!("dropped");
     }
 }
 
 #[test]
-fn what_jobs_capture_may_panic_when_it_is_dropped() {
-    ends(|| {
+fn captures_of_jobs_may_panic_when_they_are_dropped() {
+    assert_ends(|| {
         for workers in [1, 3] {
             let scheduler = Scheduler::new(workers).unwrap();
             let dropped = Arc::new(AtomicUsize::new(0));
@@ -103,22 +103,22 @@ fn what_jobs_capture_may_panic_when_it_is_dropped() {
                     scope.spawn(move |_scope, _worker| _ = &captured);
                 }
             });
-            assert_eq!(outcome.unwrap_err().message, "it is dropped");
+            assert_eq!(outcome.unwrap_err().message, "dropped");
             for length in [0, 1, 1_000] {
                 let captured = captured();
                 let outcome = scheduler.parallel_for(length, 1, move |_range, _worker| _ = &captured);
-                assert_eq!(outcome.unwrap_err().message, "it is dropped");
+                assert_eq!(outcome.unwrap_err().message, "dropped");
             }
-            // The job's result is dropped by whoever is the last to have it.
+            // The last thread that holds the job's result drops it.
             drop(scheduler.background({
                 let captured = captured();
                 move || captured
             }));
             let captured = captured();
-            assert_eq!(scheduler.background(move || _ = &captured).wait().unwrap_err().message, "it is dropped");
+            assert_eq!(scheduler.background(move || _ = &captured).wait().unwrap_err().message, "dropped");
             assert_intact(&scheduler);
             drop(scheduler);
-            assert_eq!(dropped.load(Ordering::Relaxed), 9, "with a job that nobody has begun");
+            assert_eq!(dropped.load(Ordering::Relaxed), 9, "including the captures of a job that has not begun");
         }
     });
 }

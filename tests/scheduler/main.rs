@@ -1,8 +1,8 @@
-//! The job system from outside: what an embedder can rely on, against plain loops and counts.
+//! What an embedder can rely on in the job system, compared with plain loops and counts.
 
 mod background;
 mod callbacks;
-mod helping;
+mod foreign_jobs;
 mod panics;
 mod pools;
 mod stress;
@@ -26,7 +26,7 @@ fn scheduler(workers: usize) -> Scheduler {
     Scheduler::new(workers).expect("threads can be started")
 }
 
-/// Every worker of the scheduler still runs jobs.
+/// Asserts that every worker of the scheduler still runs jobs.
 fn assert_intact(scheduler: &Scheduler) {
     let together = Barrier::new(scheduler.workers());
     let outcome = scheduler.parallel_for(scheduler.workers(), 1, |_range, _worker| {
@@ -35,7 +35,7 @@ fn assert_intact(scheduler: &Scheduler) {
     assert_eq!(outcome, Ok(()));
 }
 
-/// Waits for that, as long as the slowest machine may take, and says whether it came.
+/// Waits until the condition holds, for as long as the slowest machine may take, and returns whether it does.
 fn eventually(condition: impl Fn() -> bool) -> bool {
     (0..10_000).any(|_look| {
         condition() || {
@@ -45,7 +45,7 @@ fn eventually(condition: impl Fn() -> bool) -> bool {
     })
 }
 
-/// How often a loop over `length` items visits each of them, and how long its chunks are.
+/// How often a loop over `length` items visits each of them, and the ranges of its chunks.
 fn visits(scheduler: &Scheduler, length: usize, chunk: usize) -> (Vec<usize>, Vec<Range<usize>>) {
     let visited: Vec<AtomicUsize> = (0..length).map(|_| AtomicUsize::new(0)).collect();
     let ranges = Mutex::new(Vec::new());
@@ -75,13 +75,13 @@ proptest! {
 }
 
 #[test]
-fn a_loop_over_nothing_calls_nobody() {
-    let outcome = scheduler(2).parallel_for(0, 0, |_range, _worker| panic!("there is nothing to do"));
+fn an_empty_loop_does_not_call_its_body() {
+    let outcome = scheduler(2).parallel_for(0, 0, |_range, _worker| panic!("the loop is empty"));
     assert_eq!(outcome, Ok(()));
 }
 
 #[test]
-fn a_loop_as_long_as_numbers_go_gives_the_last_index() {
+fn a_loop_of_usize_max_visits_the_last_index() {
     for workers in [1, 4] {
         let ranges = Mutex::new(Vec::new());
         let quarter = usize::MAX / 4;
@@ -104,7 +104,7 @@ fn workers_have_an_index_each_and_the_caller_has_the_first() {
     let seen = Mutex::new(Vec::new());
     scheduler
         .parallel_for(4, 1, |_range, worker| {
-            // Four chunks that wait for each other can only be run by four workers.
+            // Four chunks that wait for each other need four workers.
             together.wait();
             seen.lock().unwrap().push((worker.index(), thread::current().id()));
         })
@@ -131,7 +131,7 @@ fn jobs_borrow_what_outlives_the_scope() {
 }
 
 #[test]
-fn what_a_job_owns_is_dropped_before_the_scope_returns() {
+fn captures_are_dropped_before_the_scope_returns() {
     struct Counted<'count>(&'count AtomicUsize);
     impl Drop for Counted<'_> {
         fn drop(&mut self) {
@@ -216,7 +216,7 @@ fn pinned_jobs_run_on_the_thread_that_opened_their_scope() {
         .scope(|scope| {
             pin(scope, &ran);
             for _job in 0..4 {
-                // The barrier brings the jobs to four workers, so three pin from elsewhere.
+                // The barrier spreads the jobs over four workers, so three of them pin jobs to another worker.
                 scope.spawn(|scope, _worker| {
                     together.wait();
                     pin(scope, &ran);
@@ -229,7 +229,7 @@ fn pinned_jobs_run_on_the_thread_that_opened_their_scope() {
 }
 
 #[test]
-fn a_scope_may_be_handed_to_a_thread_that_is_no_worker() {
+fn a_scope_may_be_lent_to_a_thread_that_is_no_worker() {
     let scheduler = scheduler(2);
     let ran = AtomicUsize::new(0);
     scheduler
@@ -259,9 +259,9 @@ fn threads_take_turns_on_one_scheduler() {
                 for _round in 0..200 {
                     let sum = AtomicUsize::new(0);
                     let outcome = scheduler.scope(|scope| {
-                        // Gives the others the time to find the seat taken.
+                        // Gives the other threads time to find the caller slot taken.
                         thread::yield_now();
-                        assert!(!busy.swap(true, Ordering::Relaxed), "two threads sit on one seat");
+                        assert!(!busy.swap(true, Ordering::Relaxed), "two threads are in the caller slot");
                         scope.spawn_pinned(|_scope, _worker| busy.store(false, Ordering::Relaxed));
                         scope.spawn(|_scope, _worker| {
                             sum.fetch_add(1, Ordering::Relaxed);
@@ -288,7 +288,7 @@ fn schedulers_nest() {
                     assert!(on_inner.index() < 2);
                     sum.fetch_add(1, Ordering::Relaxed);
                 });
-                // The thread sits in both, and is still the same worker of the outer one.
+                // The thread is a worker of both schedulers, and still the same worker of the outer one.
                 let again = outer.parallel_for(1, 1, |_range, worker| assert_eq!(worker.index(), index));
                 assert_eq!(again, Ok(()));
             });
@@ -299,7 +299,7 @@ fn schedulers_nest() {
 }
 
 #[test]
-fn a_scheduler_on_many_more_workers_than_cores_works() {
+fn a_scheduler_may_have_many_more_workers_than_cores() {
     let scheduler = scheduler(64);
     assert_intact(&scheduler);
     let (visited, _ranges) = visits(&scheduler, 10_000, 3);
@@ -307,27 +307,27 @@ fn a_scheduler_on_many_more_workers_than_cores_works() {
 }
 
 #[test]
-fn a_scheduler_needs_a_worker_and_takes_so_many() {
+fn a_scheduler_has_at_least_one_and_at_most_max_workers() {
     assert!(matches!(Scheduler::new(0), Err(SchedulerError::NoWorkers)));
     assert!(matches!(Scheduler::new(usize::MAX), Err(SchedulerError::TooManyWorkers { workers: usize::MAX })));
     assert!(Scheduler::with_available_parallelism().unwrap().workers() >= 1);
 }
 
 #[test]
-fn a_pinned_job_does_not_keep_another_from_who_sleeps() {
+fn a_pinned_job_does_not_keep_another_job_from_a_sleeping_worker() {
     let scheduler = scheduler(3);
     let (begun, elsewhere) = (AtomicBool::new(false), AtomicBool::new(false));
     let outcome = scheduler.scope(|scope| {
         scope.spawn(|scope, worker| {
             elsewhere.store(worker.index() != 0, Ordering::SeqCst);
-            // Long enough for the others to lie down, the owner last; sooner, and there is nothing to see.
+            // Long enough for the others to fall asleep, the owner last. Otherwise the test shows nothing.
             thread::sleep(Duration::from_millis(30));
             scope.spawn(|_scope, _worker| begun.store(true, Ordering::SeqCst));
-            // The pinned job waits for the other one, and so does this, so only the third worker can run it.
+            // The pinned job waits for the other job, and so does this one, so only the third worker can run that.
             scope.spawn_pinned(|_scope, _worker| assert!(eventually(|| begun.load(Ordering::SeqCst))));
             assert!(eventually(|| begun.load(Ordering::SeqCst)));
         });
-        // Until another worker has the job, this one does not look for any.
+        // This worker runs no jobs until another worker has begun the job.
         eventually(|| elsewhere.load(Ordering::SeqCst));
         thread::sleep(Duration::from_millis(10));
     });
@@ -337,36 +337,36 @@ fn a_pinned_job_does_not_keep_another_from_who_sleeps() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_dropped_scheduler_leaves_no_thread() {
-    /// How many threads of this process bear the name.
+    /// How many threads of this process have the name.
     fn threads_named(name: &str) -> usize {
         let tasks = std::fs::read_dir("/proc/self/task").unwrap();
-        // A thread of another test may end between being listed and being read.
+        // A thread of another test may end after it was listed and before its name is read.
         let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
         names.filter(|found| found.trim() == name).count()
     }
-    // No other test has that many workers, so none but this one starts threads of that name.
+    // No other test has this many workers, so only this one starts threads of this name.
     let (workers, last) = (66, "drawloom-65");
     for _scheduler in 0..200 {
         let scheduler = scheduler(workers);
         assert_eq!(scheduler.parallel_for(2, 1, |_range, _worker| {}), Ok(()));
     }
-    // A thread that was joined may be listed for a moment longer; one that was leaked, for ever.
+    // A joined thread may be listed for a moment longer; a leaked one would be listed for ever.
     assert!(eventually(|| threads_named(last) == 0));
     let intact = scheduler(workers);
     assert_intact(&intact);
     assert_eq!(threads_named(last), 1);
 }
 
-/// Far more than could run in time if each had to be looked for among all others.
+/// So many that the test would time out if each job were searched for among all others.
 #[test]
-fn any_number_of_pinned_jobs_is_run() {
+fn a_million_pinned_jobs_run_in_linear_time() {
     const JOBS: usize = if cfg!(debug_assertions) { 200_000 } else { 1_000_000 };
-    waits::ends(|| {
+    waits::assert_ends(|| {
         for workers in [1, 2] {
             let scheduler = scheduler(workers);
             let ran = AtomicUsize::new(0);
             let outcome = scheduler.scope(|outer| {
-                // Those of an outer scope wait meanwhile.
+                // The jobs of the outer scope wait meanwhile.
                 (0..JOBS)
                     .for_each(|_job| outer.spawn_pinned(|_scope, _worker| _ = ran.fetch_add(1, Ordering::Relaxed)));
                 let inner = scheduler.scope(|inner| {
@@ -382,16 +382,16 @@ fn any_number_of_pinned_jobs_is_run() {
 }
 
 #[test]
-fn a_loop_that_is_not_worth_waking_anybody_for_is_the_callers() {
-    let run = |price| {
-        let scheduler = Scheduler::builder().workers(4).wake_up_cost(price).build().unwrap();
+fn a_loop_shorter_than_a_wake_up_runs_on_the_caller() {
+    let run = |cost| {
+        let scheduler = Scheduler::builder().workers(4).wake_up_cost(cost).build().unwrap();
         let by: [AtomicUsize; 4] = Default::default();
         for _frame in 0..20 {
-            // Until the others sleep.
+            // Until the other workers sleep.
             thread::sleep(Duration::from_millis(5));
             let outcome = scheduler.parallel_for(256, 1, |range, worker| {
                 by[worker.index()].fetch_add(range.len(), Ordering::Relaxed);
-                if price.is_zero() {
+                if cost.is_zero() {
                     thread::yield_now();
                 }
             });
@@ -402,6 +402,6 @@ fn a_loop_that_is_not_worth_waking_anybody_for_is_the_callers() {
         by[0]
     };
     assert_eq!(run(Duration::from_secs(3600)), 20 * 256);
-    // Nobody can be sure to come in time, but in one of so many loops somebody does.
+    // No worker joins every loop in time, but in one of 20 loops some worker does.
     assert!(run(Duration::ZERO) < 20 * 256);
 }

@@ -1,4 +1,4 @@
-//! Panics in jobs: each becomes an error with its message, and leaves the scheduler as good as new.
+//! Panics in jobs: each becomes an error with its message, and the scheduler works as before.
 
 use std::{
     panic::panic_any,
@@ -14,31 +14,31 @@ use drawloom::task::{JobPanic, Scheduler, Scope, Worker, catch};
 use crate::{assert_intact, scheduler};
 
 fn message<R>(outcome: Result<R, JobPanic>) -> String {
-    outcome.err().expect("a panic is reported").message
+    outcome.err().expect("a panic").message
 }
 
 #[test]
-fn a_loop_of_more_chunks_than_could_ever_run_ends_at_its_first_panic() {
+fn a_loop_of_usize_max_chunks_ends_at_its_first_panic() {
     for (workers, chunk) in [(1, 0), (1, 1), (4, 0), (4, 1)] {
         let together = Barrier::new(workers);
         let begun: Vec<_> = (0..workers).map(|_| AtomicUsize::new(0)).collect();
-        // Where it costs nothing to wake workers they are woken before the first chunk is run.
+        // If a wake-up costs nothing, workers are woken before the first chunk runs.
         let scheduler = Scheduler::builder().workers(workers).wake_up_cost(Duration::ZERO).build().unwrap();
         let outcome = scheduler.parallel_for(usize::MAX, chunk, |range, _worker| {
-            // The first chunk of each worker waits for those of the others, so that all are there to go on too long.
+            // The first chunk of each worker waits for those of the others, so that all workers are in the loop.
             let Some(begun) = begun.get(range.start / range.len()) else { return };
             if begun.fetch_add(1, Ordering::Relaxed) == 0 {
                 together.wait();
             }
-            assert!(range.start < (workers - 1) * range.len(), "far enough");
+            assert!(range.start < (workers - 1) * range.len(), "as planned");
         });
-        assert_eq!(message(outcome), "far enough");
-        assert!(begun.iter().all(|begun| begun.load(Ordering::Relaxed) == 1), "the count of chunks has gone round");
+        assert_eq!(message(outcome), "as planned");
+        assert!(begun.iter().all(|begun| begun.load(Ordering::Relaxed) == 1), "the counter of chunks has wrapped");
     }
 }
 
 #[test]
-fn a_panic_is_an_error_and_the_scheduler_is_as_good_as_new() {
+fn a_panic_is_an_error_and_the_scheduler_works_as_before() {
     for workers in [1, 4] {
         let scheduler = scheduler(workers);
         let others = AtomicUsize::new(0);
@@ -73,12 +73,12 @@ fn a_panic_is_an_error_and_the_scheduler_is_as_good_as_new() {
         });
         assert_eq!(nested, Ok(()));
         assert_intact(&scheduler);
-        assert_eq!(others.into_inner(), 4, "what was spawned beside a panic runs");
+        assert_eq!(others.into_inner(), 4, "jobs that were spawned beside a panic run");
     }
 }
 
 #[test]
-fn the_first_panic_wins() {
+fn the_first_panic_is_returned() {
     let outcome = scheduler(1).scope(|scope| {
         scope.spawn_pinned(|_scope, _worker| panic!("second"));
         scope.spawn_pinned(|_scope, _worker| panic!("third"));
@@ -100,8 +100,8 @@ fn chunks_after_a_panic_are_skipped() {
 
 #[test]
 fn catch_keeps_the_text_of_a_panic() {
-    struct Spiteful;
-    impl Drop for Spiteful {
+    struct PanicsWhenDropped;
+    impl Drop for PanicsWhenDropped {
         fn drop(&mut self) {
             panic!("dropped");
         }
@@ -110,11 +110,11 @@ fn catch_keeps_the_text_of_a_panic() {
     assert_eq!(message::<()>(catch(|| panic!("plain"))), "plain");
     assert_eq!(message::<()>(catch(|| panic!("with {}", 1))), "with 1");
     assert_eq!(message::<()>(catch(|| panic_any(7))), "a panic whose payload is not text");
-    assert_eq!(message::<()>(catch(|| panic_any(Spiteful))), "a panic whose payload is not text");
-    // A result that is thrown away for a panic may not take the thread with it either.
+    assert_eq!(message::<()>(catch(|| panic_any(PanicsWhenDropped))), "a panic whose payload is not text");
+    // A result that is dropped because of a panic may panic itself.
     let outcome = scheduler(2).scope(|scope| {
         scope.spawn(|_scope, _worker| panic!("in the job"));
-        Spiteful
+        PanicsWhenDropped
     });
     assert_eq!(message(outcome), "in the job");
 }

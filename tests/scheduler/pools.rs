@@ -1,4 +1,4 @@
-//! How pools are built and dropped: names, places and hooks of their threads, and what becomes of those when that fails.
+//! How schedulers are built and dropped: names, affinities and hooks of their threads, and failures of these.
 
 use std::{
     sync::{Arc, Mutex, mpsc},
@@ -11,12 +11,12 @@ use crate::{assert_intact, eventually};
 
 type Threads = Arc<Mutex<Vec<(usize, ThreadId)>>>;
 
-/// A builder that notes who starts and who stops, and where.
-fn watched(workers: usize) -> (SchedulerBuilder, [Threads; 2]) {
-    let notes: [Threads; 2] = Default::default();
-    let [started, stopped] = notes.clone();
-    let note = |threads: Threads| move |worker| threads.lock().unwrap().push((worker, thread::current().id()));
-    (Scheduler::builder().workers(workers).on_start(note(started)).on_stop(note(stopped)), notes)
+/// A builder whose hooks log which worker starts and stops on which thread.
+fn logged(workers: usize) -> (SchedulerBuilder, [Threads; 2]) {
+    let log: [Threads; 2] = Default::default();
+    let [started, stopped] = log.clone();
+    let push = |threads: Threads| move |worker| threads.lock().unwrap().push((worker, thread::current().id()));
+    (Scheduler::builder().workers(workers).on_start(push(started)).on_stop(push(stopped)), log)
 }
 
 fn sorted(threads: &Threads) -> Vec<(usize, ThreadId)> {
@@ -25,7 +25,7 @@ fn sorted(threads: &Threads) -> Vec<(usize, ThreadId)> {
     threads
 }
 
-/// Which thread each worker runs jobs on, and what `look` says there.
+/// The thread of each worker, and the result of `look` on it.
 fn on_each<R: Send>(scheduler: &Scheduler, look: impl Fn() -> R + Sync) -> Vec<(usize, ThreadId, R)> {
     let together = std::sync::Barrier::new(scheduler.workers());
     let seen = Mutex::new(Vec::new());
@@ -41,10 +41,10 @@ fn on_each<R: Send>(scheduler: &Scheduler, look: impl Fn() -> R + Sync) -> Vec<(
 
 #[test]
 fn hooks_run_once_on_the_thread_of_each_worker() {
-    let (builder, [started, stopped]) = watched(5);
+    let (builder, [started, stopped]) = logged(5);
     let scheduler = builder.build().unwrap();
     let workers: Vec<_> = on_each(&scheduler, || ()).into_iter().map(|(worker, thread, ())| (worker, thread)).collect();
-    // The calling thread is not the scheduler's, and has no hooks.
+    // The scheduler did not start the calling thread, so it runs no hooks there.
     assert_eq!(sorted(&started), workers[1..]);
     assert_eq!(sorted(&stopped), []);
     drop(scheduler);
@@ -53,7 +53,7 @@ fn hooks_run_once_on_the_thread_of_each_worker() {
 }
 
 #[test]
-fn threads_have_the_names_they_are_given() {
+fn threads_have_their_configured_names() {
     let name = || thread::current().name().map(str::to_owned);
     let named = Scheduler::builder().workers(4).name(|worker| format!("frame {worker}")).build().unwrap();
     for (worker, _, name) in on_each(&named, name).split_off(1) {
@@ -66,7 +66,7 @@ fn threads_have_the_names_they_are_given() {
 
 #[test]
 fn a_name_with_a_null_character_is_an_error_and_no_thread_is_started() {
-    let (builder, [started, stopped]) = watched(4);
+    let (builder, [started, stopped]) = logged(4);
     let name = |worker| if worker == 3 { "three\0".to_owned() } else { "fine".to_owned() };
     let error = builder.name(name).build().unwrap_err();
     let SchedulerError::Name { worker, name } = error else { panic!("{error}") };
@@ -77,26 +77,26 @@ fn a_name_with_a_null_character_is_an_error_and_no_thread_is_started() {
 #[test]
 fn a_panic_in_a_start_hook_is_an_error_and_no_thread_is_left() {
     for _round in 0..50 {
-        let (live, is_over) = mpsc::channel();
+        let (live, has_ended) = mpsc::channel();
         let live = Mutex::new(live);
         let hook = move |worker| {
-            // The clone is dropped with the thread, as is what is on its stack.
+            // The clone is dropped when the thread ends.
             thread_local!(static LIVE: std::cell::RefCell<Option<mpsc::Sender<()>>> = const { std::cell::RefCell::new(None) });
             let sender = live.lock().unwrap().clone();
             LIVE.set(Some(sender));
-            assert_ne!(worker, 2, "not this one");
+            assert_ne!(worker, 2, "as planned");
         };
         let error = Scheduler::builder().workers(4).on_start(hook).build().unwrap_err();
         let SchedulerError::StartHook { worker, panic } = error else { panic!("{error}") };
         assert_eq!(worker, 2);
-        assert!(panic.message.contains("not this one"), "{panic}");
-        assert_eq!(is_over.try_recv(), Err(mpsc::TryRecvError::Disconnected), "a thread lives, or its hook");
+        assert!(panic.message.contains("as planned"), "{panic}");
+        assert_eq!(has_ended.try_recv(), Err(mpsc::TryRecvError::Disconnected), "a thread or its hook is left");
     }
 }
 
 #[test]
-fn a_panic_in_a_stop_hook_harms_nobody() {
-    let scheduler = Scheduler::builder().workers(3).on_stop(|worker| panic!("{worker} objects")).build().unwrap();
+fn a_panic_in_a_stop_hook_does_not_affect_other_threads() {
+    let scheduler = Scheduler::builder().workers(3).on_stop(|worker| panic!("stop hook of {worker}")).build().unwrap();
     assert_intact(&scheduler);
     drop(scheduler);
 }
@@ -104,7 +104,7 @@ fn a_panic_in_a_stop_hook_harms_nobody() {
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_stay_on_their_processors() {
-    /// What the system lets the calling thread run on.
+    /// The processors that the calling thread may run on.
     fn allowed() -> Vec<usize> {
         let status = std::fs::read_to_string("/proc/thread-self/status").unwrap();
         let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap();
@@ -120,7 +120,7 @@ fn threads_stay_on_their_processors() {
     let scheduler = Scheduler::builder().workers(4).affinity(mask_of.clone()).build().unwrap();
     for _frame in 0..3 {
         let seen = on_each(&scheduler, allowed);
-        assert_eq!(seen[0].2, here, "the caller stays where it is");
+        assert_eq!(seen[0].2, here, "the affinity of the caller does not change");
         for (worker, _, allowed) in &seen[1..] {
             assert_eq!(allowed, mask_of(*worker).processors());
         }
@@ -129,9 +129,9 @@ fn threads_stay_on_their_processors() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_impossible_place_is_an_error_that_names_the_worker() {
+fn an_impossible_affinity_is_an_error_that_names_the_worker() {
     for impossible in [AffinityMask::new([]), AffinityMask::new([1023]), AffinityMask::new([usize::MAX])] {
-        let (builder, [started, stopped]) = watched(4);
+        let (builder, [started, stopped]) = logged(4);
         let possible = AffinityMask::new(0..1024);
         let mask = move |worker| if worker == 2 { impossible.clone() } else { possible.clone() };
         let error = builder.affinity(mask).build().unwrap_err();
@@ -141,9 +141,9 @@ fn an_impossible_place_is_an_error_that_names_the_worker() {
 }
 
 #[test]
-fn a_background_job_may_own_the_last_share_of_its_scheduler() {
+fn a_background_job_may_drop_the_last_reference_to_its_scheduler() {
     for _round in 0..50 {
-        let (builder, [started, stopped]) = watched(3);
+        let (builder, [started, stopped]) = logged(3);
         let scheduler = Arc::new(builder.build().unwrap());
         let (go, may_go) = mpsc::channel::<()>();
         let owned = Arc::clone(&scheduler);
@@ -152,13 +152,13 @@ fn a_background_job_may_own_the_last_share_of_its_scheduler() {
             drop(owned);
             7
         });
-        // Nobody may begin it here, where waiting for it would run it.
+        // Waiting for the job here would run it on this thread.
         assert_eq!(Arc::strong_count(&scheduler), 2);
         drop(scheduler);
         go.send(()).unwrap();
         assert!(eventually(|| job.is_finished()));
         assert_eq!(job.wait(), Ok(7));
-        // The thread that ran the job ends after it, and nobody waits for that.
+        // The thread that ran the job ends after it, and nothing joins that thread.
         assert!(eventually(|| stopped.lock().unwrap().len() == 2));
         assert_eq!(sorted(&started), sorted(&stopped));
     }

@@ -1,4 +1,4 @@
-//! Random trees of spawned jobs, pinned jobs, scopes and loops, against a plain recursion.
+//! Random trees of spawned jobs, pinned jobs, scopes and loops, compared with a plain recursion.
 
 use std::{
     ops::Range,
@@ -7,7 +7,7 @@ use std::{
 
 use drawloom::task::{Scheduler, Scope, Worker};
 
-/// What a random tree of jobs is made of. A subtree has a seed and a height.
+/// A branch of a random tree of jobs. A subtree has a seed and a height.
 #[derive(Clone, Copy)]
 enum Branch {
     Spawn(u64),
@@ -16,7 +16,7 @@ enum Branch {
     Loop(usize, usize),
 }
 
-/// The branches that grow from a seed, by the generator SplitMix64.
+/// The branches of a seed, by the generator SplitMix64.
 fn branches(seed: u64) -> impl Iterator<Item = Branch> {
     let random = move |step: u64| {
         let mixed = seed.wrapping_add(step.wrapping_mul(0x9e37_79b9_7f4a_7c15));
@@ -35,8 +35,8 @@ fn branches(seed: u64) -> impl Iterator<Item = Branch> {
     })
 }
 
-/// Grows the tree with jobs, scopes and loops, and counts the items of the loops and the ends of branches.
-fn plant<'scope>(
+/// Runs the tree as jobs, scopes and loops, and counts the items of loops and the ends of branches.
+fn run_tree<'scope>(
     scheduler: &'scope Scheduler,
     scope: &Scope<'scope>,
     leaves: &'scope AtomicUsize,
@@ -49,12 +49,14 @@ fn plant<'scope>(
     }
     for branch in branches(seed) {
         match branch {
-            Branch::Spawn(seed) => scope.spawn(move |scope, _worker| plant(scheduler, scope, leaves, seed, height - 1)),
+            Branch::Spawn(seed) => {
+                scope.spawn(move |scope, _worker| run_tree(scheduler, scope, leaves, seed, height - 1))
+            }
             Branch::Pinned(seed) => {
-                scope.spawn_pinned(move |scope, _worker| plant(scheduler, scope, leaves, seed, height - 1));
+                scope.spawn_pinned(move |scope, _worker| run_tree(scheduler, scope, leaves, seed, height - 1));
             }
             Branch::Scope(seed) => {
-                scheduler.scope(|scope| plant(scheduler, scope, leaves, seed, height - 1)).unwrap();
+                scheduler.scope(|scope| run_tree(scheduler, scope, leaves, seed, height - 1)).unwrap();
             }
             Branch::Loop(length, chunk) => {
                 let visit = |range: Range<usize>, _worker: &Worker| {
@@ -66,7 +68,7 @@ fn plant<'scope>(
     }
 }
 
-/// What [`plant`] counts, without any job.
+/// The count of [`run_tree`], without jobs.
 fn leaves(seed: u64, height: usize) -> usize {
     if height == 0 {
         return 1;
@@ -78,16 +80,16 @@ fn leaves(seed: u64, height: usize) -> usize {
     branches(seed).map(count).sum()
 }
 
-/// Random trees on few and many workers. `DRAWLOOM_STRESS` is how many; without it, a short run.
+/// Random trees on few and many workers. `DRAWLOOM_STRESS` is the number of trees, 300 by default.
 #[test]
-fn random_trees_of_jobs_count_what_a_plain_recursion_counts() {
+fn random_trees_of_jobs_count_the_same_as_a_plain_recursion() {
     let trees =
         std::env::var("DRAWLOOM_STRESS").map_or(300, |trees| trees.parse().expect("DRAWLOOM_STRESS is a number"));
     let schedulers = [1, 2, 4, 7].map(|workers| Scheduler::new(workers).unwrap());
     for seed in 0..trees {
         for scheduler in &schedulers {
             let counted = AtomicUsize::new(0);
-            scheduler.scope(|scope| plant(scheduler, scope, &counted, seed, 6)).unwrap();
+            scheduler.scope(|scope| run_tree(scheduler, scope, &counted, seed, 6)).unwrap();
             assert_eq!(counted.into_inner(), leaves(seed, 6), "seed {seed}, {} workers", scheduler.workers());
         }
     }

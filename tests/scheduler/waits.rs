@@ -1,5 +1,5 @@
-//! Jobs that wait: for scopes of their own, for background jobs, for locks. None waits for ever, and none is interrupted by
-//! what it did not wait for.
+//! Jobs that wait for their own scopes, for background jobs and for locks. No job waits for ever, and no foreign job runs on top of
+//! one that waits.
 
 use std::{
     cell::Cell,
@@ -14,17 +14,17 @@ use std::{
 
 use drawloom::task::{BackgroundJob, Scheduler};
 
-/// Runs `body` on a thread of its own, and fails if it does not end in a time that is long for the slowest machine.
-pub fn ends(body: impl FnOnce() + Send + 'static) {
+/// Runs `body` on another thread, and fails if it does not end within a time that is long for the slowest machine.
+pub fn assert_ends(body: impl FnOnce() + Send + 'static) {
     let (done, is_done) = mpsc::channel();
     let thread = thread::spawn(move || {
         body();
-        // The other end is gone only if this came too late.
+        // The receiver is dropped only after the timeout.
         let _ = done.send(());
     });
     match is_done.recv_timeout(Duration::from_secs(30)) {
         Ok(()) | Err(mpsc::RecvTimeoutError::Disconnected) => thread.join().unwrap(),
-        Err(mpsc::RecvTimeoutError::Timeout) => panic!("it waits for ever"),
+        Err(mpsc::RecvTimeoutError::Timeout) => panic!("the test waits for ever"),
     }
 }
 
@@ -43,7 +43,8 @@ impl Flag {
     }
 }
 
-/// Waits for the background job in a job of a frame, and lets the one that helps with it go on, who comes across that job.
+/// Waits for the background job in a frame's job, and lets the worker that helps with the background job continue, which may find
+/// that job.
 fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_on: &Flag) {
     let waits = Flag::default();
     let outcome = scheduler.scope(|scope| {
@@ -57,10 +58,10 @@ fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_
     assert_eq!(outcome, Ok(()));
 }
 
-/// A worker has helped with a scope of a background job, and goes on to a frame's job that waits for that background job.
+/// A worker runs a job of a background job's scope, and then a frame's job that waits for that background job.
 #[test]
-fn who_has_helped_a_background_job_may_wait_for_it() {
-    ends(|| {
+fn a_worker_that_has_helped_a_background_job_may_wait_for_it() {
+    assert_ends(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
         let [helped, may_go_on] = [(); 2].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
@@ -82,10 +83,11 @@ fn who_has_helped_a_background_job_may_wait_for_it() {
     });
 }
 
-/// As before, and what the background job still waits for lies in the queue of the worker that waits for it.
+/// As above, but the token that the background job still waits for is in the queues of the worker that waits for the background
+/// job.
 #[test]
-fn who_has_a_background_loops_token_may_wait_for_that_loop() {
-    ends(|| {
+fn a_worker_that_holds_a_background_loops_token_may_wait_for_that_loop() {
+    assert_ends(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
         let [joined, may_go_on, has_left] = [(); 3].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
@@ -110,11 +112,10 @@ fn who_has_a_background_loops_token_may_wait_for_that_loop() {
     });
 }
 
-/// A job holds a lock while it waits for a scope of its own. A worker that has helped with that scope goes on to a job that
-/// wants the lock.
+/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, and then a job that needs the lock.
 #[test]
 fn a_lock_may_be_held_over_a_wait() {
-    ends(|| {
+    assert_ends(|| {
         let scheduler = &Scheduler::new(2).unwrap();
         let lock = &Mutex::new(());
         let [is_held, has_helped] = &[(); 2].map(|()| Flag::default());
@@ -137,11 +138,11 @@ fn a_lock_may_be_held_over_a_wait() {
     });
 }
 
-/// A worker has one of a background job's jobs left, and begins a job of a frame that waits for a scope. A job of that scope
-/// waits for the background job. The owner of the background job's scope finds its job wherever it lies.
+/// A worker spawns a job into a background job's scope, and begins a frame's job that waits for a scope. A job of that scope waits
+/// for the background job. The owner of the background job's scope must find the spawned job.
 #[test]
-fn who_has_helped_a_background_job_may_wait_for_who_waits_for_it() {
-    ends(|| {
+fn a_worker_that_has_helped_a_background_job_may_wait_for_a_job_that_waits_for_it() {
+    assert_ends(|| {
         let scheduler = Arc::new(Scheduler::new(3).unwrap());
         let [helped, may_spawn, has_spawned] = [(); 3].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
@@ -176,7 +177,7 @@ fn who_has_helped_a_background_job_may_wait_for_who_waits_for_it() {
                 });
                 assert_eq!(outcome, Ok(()));
             });
-            // The third worker is in the background job, so the one that has helped with it begins this job.
+            // The third worker runs the background job, so the worker that has helped with it begins this job.
             may_spawn.raise();
             begins.wait();
         });
@@ -184,11 +185,11 @@ fn who_has_helped_a_background_job_may_wait_for_who_waits_for_it() {
     });
 }
 
-/// A job holds a lock while it waits for a scope of its own. A worker that has helped with that scope has spawned another job
-/// into it, and goes on to a job that wants the lock, which it finds first.
+/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, spawns another job into it, and then
+/// finds a job first that needs the lock.
 #[test]
-fn what_is_spawned_into_a_scope_is_not_behind_what_a_worker_does_next() {
-    ends(|| {
+fn a_job_spawned_into_a_scope_does_not_wait_for_the_next_job_of_the_spawning_worker() {
+    assert_ends(|| {
         let scheduler = &Scheduler::new(2).unwrap();
         let lock = &Mutex::new(());
         let [is_held, has_spawned] = &[(); 2].map(|()| Flag::default());
@@ -226,7 +227,7 @@ fn a_job_of_an_outer_scope_does_not_run_inside_the_wait_for_an_inner_one() {
                     assert!(!INSIDE.replace(true));
                     let outcome = scheduler.scope(|_inner| {
                         outer.spawn(|_outer, _worker| {
-                            assert!(!INSIDE.get(), "it interrupted a job that waits for something else");
+                            assert!(!INSIDE.get(), "it runs on top of a job that waits for something else");
                             ran.fetch_add(1, Ordering::Relaxed);
                         });
                     });
@@ -240,11 +241,11 @@ fn a_job_of_an_outer_scope_does_not_run_inside_the_wait_for_an_inner_one() {
     }
 }
 
-/// Two jobs that need each other, which one thief takes out of an overflow at once.
+/// One thief takes two jobs out of an overflow at once, which wait for each other.
 #[test]
-fn what_a_thief_takes_beside_its_job_is_seen_by_others() {
-    ends(|| {
-        // A shuffled scheduler has all jobs in overflows.
+fn extra_jobs_that_a_thief_takes_are_visible_to_others() {
+    assert_ends(|| {
+        // A shuffled scheduler keeps all jobs in overflows.
         let scheduler = Scheduler::builder().workers(3).shuffle(1).build().unwrap();
         for _ in 0..20 {
             // Until all workers sleep.
@@ -269,10 +270,10 @@ fn what_a_thief_takes_beside_its_job_is_seen_by_others() {
     });
 }
 
-/// The owner of a scope waits in the midst of a job, and has nothing to do. What is spawned into the scope then is not for the
-/// owner alone.
+/// The owner of a scope waits inside a job, and has nothing to do. Other workers run jobs that are spawned into the scope then,
+/// too.
 #[test]
-fn an_owner_without_work_does_not_get_all_of_it() {
+fn an_idle_owner_does_not_run_all_jobs_of_its_scope() {
     let scheduler = &Scheduler::new(5).unwrap();
     let by: &[AtomicUsize; 5] = &[const { AtomicUsize::new(0) }; 5];
     let [is_away, is_over] = &[(); 2].map(|()| Flag::default());
@@ -299,5 +300,5 @@ fn an_owner_without_work_does_not_get_all_of_it() {
     });
     assert_eq!(outcome, Ok(()));
     let by = by.each_ref().map(|jobs| jobs.load(Ordering::Relaxed));
-    assert!(by.iter().filter(|&&jobs| jobs > 20).count() >= 2, "200 jobs ran so: {by:?}");
+    assert!(by.iter().filter(|&&jobs| jobs > 20).count() >= 2, "200 jobs by worker: {by:?}");
 }

@@ -1,4 +1,4 @@
-//! Random graphs inside of random programs: every item once, after all that it depends on, and again after a failure.
+//! Random graphs inside of random programs: every item runs once, after everything that it depends on, and again after a failure.
 
 use std::{
     ops::Range,
@@ -19,13 +19,13 @@ use crate::{
     watchdog::{Activity, during},
 };
 
-/// The most items of a node.
-const WIDEST: usize = if cfg!(miri) { 4 } else { 20 };
+/// The maximum width of a node.
+const MAX_WIDTH: usize = if cfg!(miri) { 4 } else { 20 };
 
-/// A node, which waits for some of those before it.
+/// The description of a node, which depends on some nodes before it.
 struct Plan {
     seed: u64,
-    waits_for: Vec<usize>,
+    depends_on: Vec<usize>,
     width: usize,
     chunk: usize,
     is_pinned: bool,
@@ -36,15 +36,15 @@ fn plans(seed: u64) -> Vec<Plan> {
     (0..1 + random.below(9))
         .map(|index| Plan {
             seed: random.next(),
-            waits_for: (0..random.below(3).min(index)).map(|_| random.below(index)).collect(),
-            width: [1, 1, random.below(WIDEST)][random.below(3)],
+            depends_on: (0..random.below(3).min(index)).map(|_| random.below(index)).collect(),
+            width: [1, 1, random.below(MAX_WIDTH)][random.below(3)],
             chunk: random.below(4),
             is_pinned: random.one_in(6),
         })
         .collect()
 }
 
-/// The sum over all items of a graph, without any job.
+/// The sum over all items of a graph, computed without jobs.
 pub fn value(seed: u64, height: usize) -> u64 {
     let of_node = |plan: &Plan| items(plan.seed, 0..plan.width, height);
     plans(seed).iter().map(of_node).fold(0, u64::wrapping_add)
@@ -56,13 +56,13 @@ enum Failure {
     Panic,
 }
 
-/// What a run is lent.
+/// The context of a run.
 struct Frame<'frame> {
     world: &'frame Arc<World>,
     height: usize,
-    /// Per node, how many of its items are done, and their sum.
+    /// For each node, how many of its items are done, and their sum.
     done: Vec<(AtomicU64, AtomicU64)>,
-    came_too_early: AtomicBool,
+    began_too_early: AtomicBool,
     /// The node that fails, and how.
     failing: Option<(usize, Failure)>,
 }
@@ -88,10 +88,10 @@ impl Node<Frame<'_>> for Process {
     }
 
     fn run(&self, frame: &Frame<'_>, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
-        // Relaxed: that the counts are seen is what the schedule is to see to.
+        // Relaxed, so that only the schedule makes the counts visible.
         let is_done = |&(before, width): &(usize, usize)| frame.done[before].0.load(Ordering::Relaxed) == width as u64;
         if !self.before.iter().all(is_done) {
-            frame.came_too_early.store(true, Ordering::Relaxed);
+            frame.began_too_early.store(true, Ordering::Relaxed);
         }
         match frame.failing.filter(|&(failing, _)| failing == self.index) {
             Some((_, Failure::Error)) => return Err("as planned".into()),
@@ -106,21 +106,21 @@ impl Node<Frame<'_>> for Process {
     }
 }
 
-/// Runs a graph, and says the sum over all of its items. Before that it may fail a few times.
+/// Runs a graph, and returns the sum over all of its items. Some runs that fail may come before.
 pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
     let widths: Vec<usize> = plans(seed).iter().map(|plan| plan.width).collect();
     let mut graph = FrameGraph::new();
     let mut ids = Vec::new();
     for (index, plan) in plans(seed).into_iter().enumerate() {
-        let waits_for = plan.waits_for.clone();
-        let before = waits_for.iter().map(|&before| (before, widths[before])).collect();
-        // The width stands in the name, for whoever reads a log.
+        let depends_on = plan.depends_on.clone();
+        let before = depends_on.iter().map(|&before| (before, widths[before])).collect();
+        // The name contains the width, for `check_log`.
         let id = graph.add(format!("{index} of width {}", plan.width), Process { index, plan, before });
-        waits_for.iter().for_each(|&before| graph.order(ids[before], id));
+        depends_on.iter().for_each(|&before| graph.order(ids[before], id));
         graph.keep(id);
         ids.push(id);
     }
-    let mut schedule = graph.compile().expect("each waits for some before it");
+    let mut schedule = graph.compile().expect("each node depends on nodes before it");
     let mut random = Random(seed);
     for _run in 0..random.below(4) {
         schedule.always_parallel(random.one_in(2));
@@ -129,10 +129,10 @@ pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
         let failing = (widths[node] > 0 && random.one_in(2)).then_some((node, failure));
         run_once(world, &mut schedule, &widths, seed, height, failing);
     }
-    run_once(world, &mut schedule, &widths, seed, height, None).expect("nothing was to fail")
+    run_once(world, &mut schedule, &widths, seed, height, None).expect("no node fails")
 }
 
-/// Says the sum over all items, unless a node is to fail.
+/// Returns the sum over all items, or `None` if a node was made to fail.
 fn run_once(
     world: &Arc<World>,
     schedule: &mut Schedule<Process>,
@@ -142,10 +142,10 @@ fn run_once(
     failing: Option<(usize, Failure)>,
 ) -> Option<u64> {
     let done = widths.iter().map(|_| Default::default()).collect();
-    let frame = Frame { world, height, done, came_too_early: AtomicBool::new(false), failing };
+    let frame = Frame { world, height, done, began_too_early: AtomicBool::new(false), failing };
     let outcome = during(Activity::Graph, seed, || schedule.run(&world.scheduler, &frame));
     let at = format!("{}: graph {seed:x}", world.name);
-    assert!(!frame.came_too_early.into_inner(), "{at}: a node ran before what it waits for");
+    assert!(!frame.began_too_early.into_inner(), "{at}: a node ran before a dependency");
     let (counts, sums): (Vec<u64>, Vec<u64>) =
         frame.done.into_iter().map(|(count, sum)| (count.into_inner(), sum.into_inner())).unzip();
     let Some((node, failure)) = failing else {
@@ -164,7 +164,7 @@ fn run_once(
         (Failure::Panic, Err(RunError::Panicked { node: failed, message })) => {
             assert_eq!((failed, message.as_str()), (name, "as planned"), "{at}");
         }
-        (_, outcome) => panic!("{at}: node {node} was to fail, and the outcome is {outcome:?}"),
+        (_, outcome) => panic!("{at}: node {node} should fail, but the outcome is {outcome:?}"),
     }
     assert!(counts.iter().zip(widths).all(|(&count, &width)| count <= width as u64), "{at}: {counts:?} of {widths:?}");
     None

@@ -1,8 +1,8 @@
-//! Random work of every kind on one scheduler at once, for as long as one likes: scopes in scopes, loops, graphs, background
-//! jobs and those who wait for them, locks held over waits, panics, threads that are no workers, a timeline that is switched on
-//! and off. Whatever is computed is compared with a plain recursion, and a hang ends with a list of who waits for what.
+//! Random programs on one scheduler, for any length of time: scopes in scopes, loops, graphs, background jobs and jobs that wait
+//! for them, locks held over waits, panics, threads that are no workers, and a timeline that is started and stopped. Their
+//! results are compared with a plain recursion. A hang aborts with a list of what each thread is doing.
 //!
-//! `cargo test` runs a second of it. An hour, with progress, and with what to do again if something fails:
+//! `cargo test` runs it for a second. This runs it for an hour, and shows the progress and the seed that repeats a failure:
 //!
 //! ```sh
 //! DRAWLOOM_SOAK_SECONDS=3600 DRAWLOOM_SOAK_SEED=7 cargo test --release --no-default-features --test soak -- --nocapture
@@ -25,18 +25,18 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A setting out of the environment.
-fn setting(name: &str, otherwise: u64) -> u64 {
-    env::var(name).map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: {text}")))
+/// A setting from the environment.
+fn setting(name: &str, default: u64) -> u64 {
+    env::var(name).map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number: {text}")))
 }
 
-/// Miri's clock is its own, so seconds say little there.
+/// How many seeds run under Miri, whose clock is virtual.
 const SEEDS_UNDER_MIRI: u64 = 6;
 
-/// How many panics there were that no program had planned: planned ones pass the hook by.
+/// How many panics no program planned. Planned panics do not call the panic hook.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
-/// A job's panic is caught, and need not reach anybody: of a background job that nobody waits for, it does not.
+/// Counts unplanned panics. They might not be returned otherwise: the panic of a job is caught, and nobody may wait for the job.
 fn count_panics() {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
@@ -46,10 +46,10 @@ fn count_panics() {
 }
 
 #[test]
-fn whatever_runs_at_once_does_what_a_plain_recursion_does() {
+fn concurrent_random_programs_compute_the_same_as_a_plain_recursion() {
     let length = Duration::from_secs(setting("DRAWLOOM_SOAK_SECONDS", 1));
     let first = setting("DRAWLOOM_SOAK_SEED", 1);
-    // Miri finds threads that wait for each other by itself.
+    // Miri detects deadlocks itself.
     if !cfg!(miri) {
         watchdog::start();
     }
@@ -61,7 +61,7 @@ fn whatever_runs_at_once_does_what_a_plain_recursion_does() {
     let mut totals = rounds::Totals::default();
     for seed in first.. {
         totals += rounds::run(seed);
-        assert_eq!(PANICS.load(Ordering::Relaxed), 0, "seed {seed}: something panicked, see above");
+        assert_eq!(PANICS.load(Ordering::Relaxed), 0, "seed {seed}: an unplanned panic, see above");
         let elapsed = start.elapsed();
         bar.set_message(format!("seed {seed}"));
         bar.set_position(elapsed.as_secs().min(length.as_secs()));
@@ -71,6 +71,6 @@ fn whatever_runs_at_once_does_what_a_plain_recursion_does() {
         }
     }
     bar.finish();
-    assert!(cfg!(miri) || totals.complete_runs > 0, "no log had a complete run to be checked");
+    assert!(cfg!(miri) || totals.complete_runs > 0, "no log had a complete run to check");
     println!("{:.0?}: {totals}", start.elapsed());
 }

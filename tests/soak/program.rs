@@ -1,8 +1,8 @@
-//! Random programs: what a seed and a height stand for, by a plain recursion and by jobs.
+//! Random programs: the value of a seed and a height, computed by a plain recursion and by jobs.
 //!
-//! A program adds up numbers, so its value depends on no order. Each part of a height is made of parts of lesser heights. Whoever
-//! waits for a background job, or holds a lock, does so for a part of lesser height, which takes the locks of lesser heights
-//! only: so no program waits for itself.
+//! A program adds numbers, so its value does not depend on their order. A part of one height consists of parts of lower heights. A
+//! part waits for a background job, or holds a lock, only for parts of lower height, which take only the locks of lower
+//! heights. So no program waits for itself.
 
 use std::{
     ops::Range,
@@ -22,18 +22,18 @@ use crate::{
     watchdog::{Activity, during, progress},
 };
 
-/// The greatest height of a program. Miri takes some thousand times as long.
-pub const HEIGHT: usize = if cfg!(miri) { 2 } else { 5 };
+/// The maximum height of a program. Miri is some thousand times slower.
+pub const MAX_HEIGHT: usize = if cfg!(miri) { 2 } else { 5 };
 
-/// The longest loop.
-const LONGEST_LOOP: usize = if cfg!(miri) { 6 } else { 60 };
+/// The maximum length of a loop.
+const MAX_LOOP: usize = if cfg!(miri) { 6 } else { 60 };
 
-/// What all parts of a program share.
+/// What all parts of all programs share.
 pub struct World {
     pub name: String,
     pub scheduler: Scheduler,
-    /// One for each height.
-    locks: [Mutex<()>; HEIGHT + 1],
+    /// One lock for each height.
+    locks: [Mutex<()>; MAX_HEIGHT + 1],
 }
 
 impl World {
@@ -42,12 +42,12 @@ impl World {
     }
 }
 
-/// A piece of a part, with the seed of the part that it leads to.
+/// A piece of a part, with the seed of a part of lower height.
 enum Piece {
     Leaf(u64),
     Spawn(u64),
     SpawnPinned(u64),
-    /// A job of the scope outside of this one.
+    /// Spawns a job into the scope outside of this one.
     SpawnOutside(u64),
     Scope {
         seed: u64,
@@ -65,13 +65,13 @@ enum Piece {
         wait: Wait,
         panics: bool,
     },
-    /// A lock is held while a part is waited for.
+    /// Holds a lock while it waits for a part.
     Lock(u64),
-    /// A thread that is no worker spawns jobs.
+    /// Lends the scope to a thread that is no worker, which spawns jobs.
     LentThread(u64),
 }
 
-/// Who waits for a background job.
+/// When and where a part waits for a background job.
 enum Wait {
     AtOnce,
     AfterAScope(u64),
@@ -82,8 +82,8 @@ enum Wait {
 
 fn pieces(seed: u64, height: usize) -> Vec<Piece> {
     let mut random = Random(seed ^ (height as u64) << 56);
-    let most = [1, 2, 3, 4, 5, 6][height.min(5)];
-    (0..1 + random.below(most))
+    let max = [1, 2, 3, 4, 5, 6][height.min(5)];
+    (0..1 + random.below(max))
         .map(|_| {
             let panics = random.one_in(12);
             let seed = random.next();
@@ -93,7 +93,7 @@ fn pieces(seed: u64, height: usize) -> Vec<Piece> {
                 4 => Piece::SpawnPinned(seed),
                 5 => Piece::SpawnOutside(seed),
                 6..8 => Piece::Scope { seed, panics },
-                8..10 => Piece::Loop { seed, length: random.below(LONGEST_LOOP), chunk: random.below(6), panics },
+                8..10 => Piece::Loop { seed, length: random.below(MAX_LOOP), chunk: random.below(6), panics },
                 10 => Piece::Graph(seed),
                 11..14 => {
                     let wait = match random.below(6) {
@@ -112,20 +112,20 @@ fn pieces(seed: u64, height: usize) -> Vec<Piece> {
         .collect()
 }
 
-/// The number that a seed stands for at the end of a branch.
+/// The value of a seed at the end of a branch.
 pub fn leaf(seed: u64) -> u64 {
     Random(seed).next() >> 8
 }
 
-/// Whether an index of a loop, or an item of a graph, leads to a part of its own.
+/// Whether an index of a loop, or an item of a graph, is a part of its own.
 pub fn branches(seed: u64, index: usize) -> bool {
     Random(seed ^ index as u64).one_in(23)
 }
 
-/// How many jobs a lent thread spawns.
-const LENT: u64 = 3;
+/// How many jobs a thread that is no worker spawns.
+const LENT_JOBS: u64 = 3;
 
-/// The value of a part, without any job; and what it adds to the value of the part outside of its scope.
+/// The value of a part, computed without jobs, and what the part adds to the value of the scope outside of its own.
 fn values(seed: u64, height: usize, has_outside: bool) -> (u64, u64) {
     if height == 0 {
         return (leaf(seed), 0);
@@ -157,18 +157,18 @@ fn values(seed: u64, height: usize, has_outside: bool) -> (u64, u64) {
                 }
             }
             Piece::Lock(seed) => add(value(seed, height - 1)),
-            Piece::LentThread(seed) => (0..LENT).for_each(|job| add(leaf(seed ^ job))),
+            Piece::LentThread(seed) => (0..LENT_JOBS).for_each(|job| add(leaf(seed ^ job))),
         }
     }
     (own, outside)
 }
 
-/// The value of a part in a scope of its own, without any job.
+/// The value of a part in a scope of its own, computed without jobs.
 pub fn value(seed: u64, height: usize) -> u64 {
     values(seed, height, false).0
 }
 
-/// The value of some items of a loop or a graph, without any job.
+/// The value of some items of a loop or a graph, computed without jobs.
 pub fn items(seed: u64, range: Range<usize>, height: usize) -> u64 {
     range.fold(0, |sum, index| {
         let of_item =
@@ -177,7 +177,7 @@ pub fn items(seed: u64, range: Range<usize>, height: usize) -> u64 {
     })
 }
 
-/// The same, where parts run as jobs.
+/// The same, with parts that run as jobs.
 pub fn run_items(world: &Arc<World>, seed: u64, range: Range<usize>, height: usize) -> u64 {
     range.fold(0, |sum, index| {
         let of_item =
@@ -186,7 +186,7 @@ pub fn run_items(world: &Arc<World>, seed: u64, range: Range<usize>, height: usi
     })
 }
 
-/// Runs a part in a scope of its own, and says its value.
+/// Runs a part in a scope of its own, and returns its value.
 pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
     let total = AtomicU64::new(0);
     let outcome = during(Activity::Scope, seed, || {
@@ -202,7 +202,7 @@ fn check(world: &World, seed: u64, found: u64, expected: u64) -> u64 {
     found
 }
 
-/// Panics without a word on the console.
+/// Panics without a message on the console.
 pub fn panic_as_planned() -> ! {
     resume_unwind(Box::new("as planned"))
 }
@@ -212,7 +212,7 @@ pub fn assert_planned(outcome: Result<(), JobPanic>, panics: bool) {
     assert_eq!(message.as_deref(), panics.then_some("as planned"));
 }
 
-/// The scope outside of the one that a part runs in, and where its value is added up.
+/// The scope outside of the one that a part runs in, and its total.
 #[derive(Clone, Copy)]
 struct Outside<'scope, 'outer> {
     scope: &'scope Scope<'outer>,
@@ -220,12 +220,12 @@ struct Outside<'scope, 'outer> {
 }
 
 fn add(total: &AtomicU64, value: u64) {
-    // Relaxed: that it is seen is what the scheduler is to see to.
+    // Relaxed, so that only the scheduler makes the value visible.
     total.fetch_add(value, Ordering::Relaxed);
     progress();
 }
 
-/// Runs a part in this scope: its jobs have run when the scope ends.
+/// Runs a part in this scope. Its jobs have run when the scope ends.
 fn spawn_part<'outer, 'scope>(
     world: &'scope Arc<World>,
     scope: &Scope<'scope>,
@@ -279,17 +279,17 @@ fn spawn_part<'outer, 'scope>(
             Piece::LentThread(seed) => during(Activity::LentThread, seed, || {
                 let spawn = |job: u64| scope.spawn(move |_scope, _worker| add(total, leaf(seed ^ job)));
                 thread::scope(|threads| {
-                    threads.spawn(|| (0..LENT).for_each(spawn)).join().expect("it spawns jobs only")
+                    threads.spawn(|| (0..LENT_JOBS).for_each(spawn)).join().expect("the thread only spawns jobs")
                 });
             }),
         }
     }
 }
 
-/// A scope inside of another one, some of whose jobs go there.
+/// Runs a part in a scope inside of another one, into which it spawns some of its jobs.
 fn run_inner_scope(world: &Arc<World>, seed: u64, panics: bool, height: usize) -> u64 {
     let [inner_total, outer_total] = [const { AtomicU64::new(0) }; 2];
-    // Between the two, so that what goes outside of the inner one has ended when this has.
+    // The middle scope is outside of the inner one, so its jobs have run when this function returns.
     let outcome = during(Activity::Scope, seed, || {
         world.scheduler.scope(|middle| {
             let outside = Outside { scope: middle, total: &outer_total };

@@ -1,4 +1,5 @@
-//! A race on purpose: what the thread sanitizer is shown first, so that its silence about the soak says something.
+//! An intentional data race. `.ci/run` checks that the thread sanitizer reports it, so that its silence about the soak means
+//! something.
 
 use std::{
     cell::UnsafeCell,
@@ -10,28 +11,28 @@ use drawloom::task::Scheduler;
 /// A number that nothing protects.
 struct Unprotected(UnsafeCell<u64>);
 
-// SAFETY: It is not true. Two threads change the number at once in a test that runs under the thread sanitizer alone, which
-// is to say so.
+// SAFETY: Unsound on purpose. Two threads change the number at once, in a test that only the thread sanitizer runs, to report
+// this.
 unsafe impl Sync for Unprotected {}
 
 impl Unprotected {
     fn increase(&self) {
-        // SAFETY: It is not true either, for the same reason.
+        // SAFETY: Unsound on purpose, for the same reason.
         unsafe { *self.0.get() += 1 };
     }
 }
 
-/// Two chunks of one loop change the same number, and nothing orders them: if it did, the scheduler would hide the races of its
-/// jobs from the sanitizer.
+/// Two chunks of one loop change the same number, and nothing orders them. If the scheduler did, it would hide races of its jobs
+/// from the sanitizer.
 #[test]
-#[ignore = "a data race, which the thread sanitizer is to find"]
+#[ignore = "a data race for the thread sanitizer to find"]
 fn a_race_between_two_chunks_is_there_to_be_found() {
     let scheduler = Scheduler::new(2).expect("a thread can be started");
-    // The sanitizer remembers a few accesses only, so it may miss one pair of them; it does not miss all.
+    // The sanitizer remembers only a few accesses, so it may miss one pair of them, but not all.
     for _round in 0..100 {
         let (number, begun) = (Unprotected(UnsafeCell::new(0)), AtomicUsize::new(0));
         let outcome = scheduler.parallel_for(2, 1, |_range, _worker| {
-            // Relaxed, so that it brings the two together and orders nothing.
+            // Relaxed, so that it brings both chunks together and orders nothing.
             begun.fetch_add(1, Ordering::Relaxed);
             while begun.load(Ordering::Relaxed) < 2 {
                 std::hint::spin_loop();

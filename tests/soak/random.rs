@@ -1,6 +1,6 @@
-//! Numbers that a seed decides.
+//! Pseudo-random numbers.
 
-/// Numbers by the generator SplitMix64 (Steele, Lea & Flood, 2014).
+/// The generator SplitMix64 (Steele, Lea & Flood, 2014) with this state.
 pub struct Random(pub u64);
 
 impl Random {
@@ -15,7 +15,7 @@ impl Random {
         (self.next() % count as u64) as usize
     }
 
-    /// True in one case out of so many.
+    /// True with probability 1 / `count`.
     pub fn one_in(&mut self, count: usize) -> bool {
         self.below(count) == 0
     }

@@ -1,4 +1,4 @@
-//! Rounds: a scheduler each, of a few threads' programs.
+//! A round runs programs of a few threads on one scheduler.
 
 use std::{
     fmt,
@@ -17,20 +17,20 @@ use drawloom::{
 };
 
 use crate::{
-    program::{HEIGHT, World, panic_as_planned, run as run_program, value},
+    program::{MAX_HEIGHT, World, panic_as_planned, run as run_program, value},
     random::Random,
     watchdog::{self, Activity, during},
 };
 
-/// What has been run.
+/// How much has run.
 #[derive(Default)]
 pub struct Totals {
     schedulers: u64,
     programs: u64,
-    /// Jobs and other parts that were checked.
+    /// Jobs and other parts.
     parts: u64,
     recorded_runs: u64,
-    /// Of those, the ones that a log calls complete and not failed.
+    /// Recorded runs that are complete and did not fail.
     pub complete_runs: u64,
 }
 
@@ -52,30 +52,30 @@ impl fmt::Display for Totals {
     }
 }
 
-/// The most programs of a thread in a round.
-const PROGRAMS: usize = if cfg!(miri) { 3 } else { 40 };
+/// The maximum number of programs of a thread in a round.
+const MAX_PROGRAMS: usize = if cfg!(miri) { 3 } else { 40 };
 
-/// Little room for events, and more.
+/// A small capacity of the timeline, which drops events, and a larger one.
 const CAPACITIES: [usize; 2] = if cfg!(miri) { [8, 32] } else { [64, 1 << 14] };
 
-/// The most workers.
-const WORKERS: usize = if cfg!(miri) { 3 } else { 8 };
+/// The maximum number of workers.
+const MAX_WORKERS: usize = if cfg!(miri) { 3 } else { 8 };
 
 /// Runs the round of a seed.
 pub fn run(seed: u64) -> Totals {
     let mut random = Random(seed);
-    let workers = 1 + random.below(WORKERS);
+    let workers = 1 + random.below(MAX_WORKERS);
     let builder = Scheduler::builder().workers(workers).timeline_capacity(CAPACITIES[random.below(2)]);
     let shuffle = random.one_in(4).then(|| random.next());
     let builder = shuffle.into_iter().fold(builder, SchedulerBuilder::shuffle);
-    // Measured anew each time, it would take longer than the programs; and every price leads elsewhere.
-    let price = Duration::from_micros([0, 1, 20, 1_000][random.below(4)]);
+    // Measuring it would take longer than the programs, and different costs make different decisions.
+    let cost = Duration::from_micros([0, 1, 20, 1_000][random.below(4)]);
     let builder = match random.below(6) {
         0..3 => builder,
         3..5 => builder.timeline_clock(clock(u64::MAX)),
         _ => builder.timeline_clock(clock(random.next() % 500)),
     };
-    let scheduler = builder.wake_up_cost(price).build().expect("threads can be started");
+    let scheduler = builder.wake_up_cost(cost).build().expect("threads can be started");
     let world = World::new(format!("seed {seed}, {workers} workers, shuffled by {shuffle:?}"), scheduler);
     watchdog::watch(&world);
     let done_before = watchdog::done();
@@ -90,7 +90,7 @@ pub fn run(seed: u64) -> Totals {
                 })
             })
             .collect();
-        threads.into_iter().map(|thread| thread.join().expect("what is wrong has been said")).fold(
+        threads.into_iter().map(|thread| thread.join().expect("a thread panicked, see above")).fold(
             Totals { schedulers: 1, ..Totals::default() },
             |mut sum, totals| {
                 sum += totals;
@@ -102,8 +102,8 @@ pub fn run(seed: u64) -> Totals {
     Totals { parts: watchdog::done() - done_before, ..totals }
 }
 
-/// Waits until the background jobs that nobody has waited for have run, and drops the scheduler. They share the world, so it is
-/// not dropped before.
+/// Runs the background jobs that no part has waited for, and drops the scheduler. The jobs hold references to the world, so it is
+/// not dropped before they have run.
 fn finish(mut world: Arc<World>) {
     during(Activity::Finish, 0, || {
         while let Err(shared) = Arc::try_unwrap(world) {
@@ -114,7 +114,7 @@ fn finish(mut world: Arc<World>) {
     });
 }
 
-/// An engine's clock that panics after so many readings.
+/// An engine's clock that panics after this number of readings.
 fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
     let (start, left) = (Instant::now(), AtomicU64::new(readings));
     move || {
@@ -123,12 +123,12 @@ fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
     }
 }
 
-/// What a thread of an engine does: a frame after another, with something in between.
+/// Runs programs one after another, as an engine runs frames, and uses the timeline and runs background jobs in between.
 fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
     let mut random = Random(seed);
     let mut totals = Totals::default();
     let timeline = world.scheduler.timeline();
-    for _program in 0..1 + random.below(PROGRAMS) {
+    for _program in 0..1 + random.below(MAX_PROGRAMS) {
         match random.below(5) {
             0 => timeline.start(),
             1 => timeline.stop(),
@@ -136,7 +136,7 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
             3 => timeline.mark_frame(),
             _ => {}
         }
-        let (seed, height) = (random.next(), 1 + random.below(HEIGHT));
+        let (seed, height) = (random.next(), 1 + random.below(MAX_HEIGHT));
         assert_eq!(run_program(world, seed, height), value(seed, height), "{}: program {seed:x}", world.name);
         totals.programs += 1;
         if random.one_in(2) {
@@ -147,13 +147,13 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
     totals
 }
 
-/// Checks that each run in the log which is said to be complete is, and counts the runs.
+/// Checks that each run that the log calls complete contains every item once, and counts the runs.
 fn check_log(log: &Log, totals: &mut Totals) {
     totals.recorded_runs += log.runs.len() as u64;
     for run in log.runs.iter().filter(|run| run.complete && !run.failed) {
         for (index, process) in run.graph.processes.iter().enumerate() {
             let width = process.name.rsplit(' ').next().and_then(|width| width.parse().ok());
-            assert_eq!(Some(run.width(index)), width, "{:?} of a run that is said to be complete", process.name);
+            assert_eq!(Some(run.width(index)), width, "{:?} of a complete run", process.name);
             let mut ends = 0;
             for chunk in run.chunks_of(index) {
                 assert_eq!(chunk.items.start, ends, "{:?} has a gap, or an item twice", process.name);

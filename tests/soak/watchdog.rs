@@ -1,7 +1,7 @@
-//! Turns a hang into a list of who waits for what.
+//! Turns a hang into a list of what each thread is doing.
 //!
-//! Every thread keeps a stack of what it is in the midst of, in relaxed atomics: they order nothing, so a race that a sanitizer
-//! could see is not hidden by its being watched.
+//! Every thread keeps a stack of its current activities in relaxed atomics. These order nothing, so they hide no race from a
+//! sanitizer.
 
 use std::{
     cell::OnceCell,
@@ -18,18 +18,18 @@ use std::{
 
 use crate::program::World;
 
-/// How long nothing at all may be done.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How long there may be no progress.
+const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// How many activities of a thread are listed.
-const LISTED: usize = 64;
+/// How many activities of a thread are listed at most.
+const MAX_LISTED: usize = 64;
 
 static DONE: AtomicU64 = AtomicU64::new(0);
 static THREADS: Mutex<Vec<Arc<Activities>>> = Mutex::new(Vec::new());
 static WORLD: Mutex<Weak<World>> = Mutex::new(Weak::new());
 static STARTED: OnceLock<()> = OnceLock::new();
 
-/// What a thread can be in the midst of.
+/// What a thread can be doing.
 #[derive(Clone, Copy, Debug)]
 pub enum Activity {
     Scope,
@@ -64,26 +64,26 @@ impl Activity {
 struct Activities {
     thread: thread::Thread,
     depth: AtomicUsize,
-    /// Each with the seed of its part of the program.
-    kinds: [AtomicUsize; LISTED],
-    seeds: [AtomicU64; LISTED],
+    /// The kind of each activity, and the seed of its part of the program.
+    kinds: [AtomicUsize; MAX_LISTED],
+    seeds: [AtomicU64; MAX_LISTED],
 }
 
 thread_local! {
     static OWN: OnceCell<Arc<Activities>> = const { OnceCell::new() };
 }
 
-/// Something has been done.
+/// Counts a step of progress.
 pub fn progress() {
     DONE.fetch_add(1, Ordering::Relaxed);
 }
 
-/// How much has been done.
+/// How many steps of progress there were.
 pub fn done() -> u64 {
     DONE.load(Ordering::Relaxed)
 }
 
-/// Calls `body` while the calling thread is said to be in the midst of this.
+/// Calls `body` as an activity of the calling thread.
 pub fn during<R>(activity: Activity, seed: u64, body: impl FnOnce() -> R) -> R {
     struct Leave<'activities>(&'activities Activities);
     impl Drop for Leave<'_> {
@@ -93,7 +93,7 @@ pub fn during<R>(activity: Activity, seed: u64, body: impl FnOnce() -> R) -> R {
     }
     let own = OWN.with(|own| Arc::clone(own.get_or_init(register)));
     let depth = own.depth.fetch_add(1, Ordering::Relaxed);
-    if depth < LISTED {
+    if depth < MAX_LISTED {
         own.kinds[depth].store(activity as usize, Ordering::Relaxed);
         own.seeds[depth].store(seed, Ordering::Relaxed);
     }
@@ -105,34 +105,34 @@ fn register() -> Arc<Activities> {
     let activities = Arc::new(Activities {
         thread: thread::current(),
         depth: AtomicUsize::new(0),
-        kinds: [const { AtomicUsize::new(0) }; LISTED],
-        seeds: [const { AtomicU64::new(0) }; LISTED],
+        kinds: [const { AtomicUsize::new(0) }; MAX_LISTED],
+        seeds: [const { AtomicU64::new(0) }; MAX_LISTED],
     });
     let mut threads = THREADS.lock().unwrap();
-    // Those whose threads have ended are held by nobody else.
+    // If a thread has ended, this list holds the only reference.
     threads.retain(|activities| Arc::strong_count(activities) > 1);
     threads.push(Arc::clone(&activities));
     activities
 }
 
-/// Shows this world's scheduler after a hang.
+/// Sets the world whose scheduler is printed after a hang.
 pub fn watch(world: &Arc<World>) {
     *WORLD.lock().unwrap() = Arc::downgrade(world);
 }
 
-/// Watches from now on, on a thread of its own.
+/// Starts the watchdog on a thread of its own.
 pub fn start() {
     STARTED.get_or_init(|| {
-        thread::Builder::new().name("watchdog".to_owned()).spawn(watch_for_ever).expect("a thread can be started");
+        thread::Builder::new().name("watchdog".to_owned()).spawn(run_watchdog).expect("a thread can be started");
     });
 }
 
-fn watch_for_ever() {
+fn run_watchdog() {
     loop {
         let before = done();
-        thread::sleep(PATIENCE);
+        thread::sleep(TIMEOUT);
         if done() == before {
-            // Past the test harness, which keeps what a test prints until it ends.
+            // Bypasses the test harness, which holds back output until the test ends.
             let _ = io::stderr().write_all(report().as_bytes());
             process::abort();
         }
@@ -140,11 +140,10 @@ fn watch_for_ever() {
 }
 
 fn report() -> String {
-    let mut report =
-        format!("\nNothing has been done for {PATIENCE:?}. Who is in the midst of what, the innermost last:\n");
+    let mut report = format!("\nNo progress for {TIMEOUT:?}. The activities of each thread, the innermost last:\n");
     for activities in THREADS.lock().unwrap().iter() {
         let depth = activities.depth.load(Ordering::Relaxed);
-        let list = (0..depth.min(LISTED)).map(|at| {
+        let list = (0..depth.min(MAX_LISTED)).map(|at| {
             let kind = Activity::ALL[activities.kinds[at].load(Ordering::Relaxed)];
             format!("{kind:?} {:x}", activities.seeds[at].load(Ordering::Relaxed))
         });

@@ -179,7 +179,7 @@ fn a_job_is_seen_by_a_searcher_that_goes_to_sleep() {
 }
 
 #[test]
-fn a_bed_can_be_slept_in_again() {
+fn a_worker_can_park_again() {
     bounded(3, || {
         let model = Model::new(1);
         let worker = start(&model, |model| {
@@ -189,12 +189,12 @@ fn a_bed_can_be_slept_in_again() {
         model.produce();
         model.produce();
         worker.join().unwrap();
-        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "a call was left over, and cut the next sleep short");
+        assert_eq!(model.sleep.counts.load(Ordering::Relaxed), 0, "a notification is left over");
     });
 }
 
 #[test]
-fn two_jobs_reach_two_workers_though_one_is_woken() {
+fn two_jobs_reach_two_workers_although_one_is_woken_at_a_time() {
     bounded(3, || {
         let model = Model::new(1);
         let workers = [0, 1].map(|worker| start(&model, move |model| model.consume(worker)));
@@ -243,11 +243,11 @@ fn the_last_job_of_a_region_wakes_its_owner() {
 }
 
 #[test]
-fn an_owner_called_for_a_job_as_its_region_ends_passes_the_call_on() {
+fn an_owner_woken_for_a_job_as_its_region_ends_wakes_another_worker() {
     for waits in [Model::wait, Model::wait_and_help] {
         bounded(3, move || {
             let model = Model::new(1);
-            // Whoever takes the job ends the thief.
+            // The thief ends when one of the threads has taken the job.
             let thief = start(&model, |model| {
                 let mut is_searcher = false;
                 while !model.ran.load(Ordering::Relaxed) && !model.try_consume() {
@@ -266,7 +266,7 @@ fn an_owner_called_for_a_job_as_its_region_ends_passes_the_call_on() {
 }
 
 #[test]
-fn a_background_job_wakes_a_worker_though_worker_0_searches() {
+fn a_background_job_wakes_a_worker_although_worker_0_searches() {
     bounded(3, || {
         let model = Model::new(1);
         let worker = start(&model, |model| model.consume(1));
@@ -280,7 +280,7 @@ fn a_background_job_wakes_a_worker_though_worker_0_searches() {
 }
 
 #[test]
-fn a_job_in_a_mailbox_reaches_its_owner_though_a_searcher_is_late() {
+fn a_job_in_a_mailbox_reaches_its_owner_although_a_searcher_is_late() {
     bounded(4, || {
         let model = Model::new(1);
         // The searcher does something else before it looks.
@@ -322,7 +322,7 @@ fn a_job_of_an_outer_region_wakes_a_helper_while_the_owner_sleeps_for_an_inner_o
 }
 
 #[test]
-fn a_worker_called_for_a_background_job_that_finds_a_frames_passes_the_call_on() {
+fn a_worker_woken_for_a_background_job_that_finds_a_frames_job_wakes_another_worker() {
     bounded(3, || {
         let model = Model::new(1);
         let workers = [1, 2].map(|worker| start(&model, move |model| model.consume_either(worker)));

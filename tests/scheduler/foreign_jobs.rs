@@ -1,4 +1,4 @@
-//! What a thread does while it waits in the midst of a job: what belongs to that job, and nothing else.
+//! A thread that waits inside a job runs jobs that belong to that job, and no foreign jobs.
 
 use std::{
     cell::RefCell,
@@ -18,15 +18,15 @@ use drawloom::{
 use crate::{eventually, scheduler};
 
 thread_local! {
-    /// The families whose jobs this thread is in the midst of, the innermost last.
+    /// The families whose jobs are running on this thread, the innermost last.
     static WITHIN: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Calls `job` as one of a family. It may lie on top of others of that family, and of no other.
-fn as_one_of(family: usize, strangers: &AtomicUsize, job: impl FnOnce()) {
+/// Calls `job` as a job of a family. It may run on top of jobs of that family only; others count as foreign.
+fn as_one_of(family: usize, foreign: &AtomicUsize, job: impl FnOnce()) {
     WITHIN.with_borrow_mut(|within| {
         if within.iter().any(|&other| other != family) {
-            strangers.fetch_add(1, Ordering::Relaxed);
+            foreign.fetch_add(1, Ordering::Relaxed);
         }
         within.push(family);
     });
@@ -34,9 +34,9 @@ fn as_one_of(family: usize, strangers: &AtomicUsize, job: impl FnOnce()) {
     WITHIN.with_borrow_mut(|within| within.pop());
 }
 
-/// Something to do inside of a job: a scope, a loop or a graph, all of whose jobs are of its family.
-fn wait_inside(scheduler: &Scheduler, family: usize, strangers: &AtomicUsize) {
-    let child = |_: Range<usize>, _: &Worker| as_one_of(family, strangers, thread::yield_now);
+/// Waits inside a job for a scope, a loop or a graph, whose jobs all belong to its family.
+fn wait_inside(scheduler: &Scheduler, family: usize, foreign: &AtomicUsize) {
+    let child = |_: Range<usize>, _: &Worker| as_one_of(family, foreign, thread::yield_now);
     match family % 3 {
         0 => scheduler.parallel_for(8, 1, child).unwrap(),
         1 => scheduler
@@ -71,50 +71,50 @@ fn wait_inside(scheduler: &Scheduler, family: usize, strangers: &AtomicUsize) {
 }
 
 #[test]
-fn who_waits_in_a_job_runs_nothing_else() {
+fn a_job_that_waits_runs_no_foreign_jobs() {
     for workers in [1, 2, 4] {
         let scheduler = scheduler(workers);
-        let strangers = AtomicUsize::new(0);
+        let foreign = AtomicUsize::new(0);
         for _round in 0..60 {
             scheduler
                 .scope(|scope| {
                     for family in 0..24 {
-                        let (scheduler, strangers) = (&scheduler, &strangers);
+                        let (scheduler, foreign) = (&scheduler, &foreign);
                         scope.spawn(move |_scope, _worker| {
-                            as_one_of(family, strangers, || wait_inside(scheduler, family, strangers));
+                            as_one_of(family, foreign, || wait_inside(scheduler, family, foreign));
                         });
                     }
                 })
                 .unwrap();
         }
-        assert_eq!(strangers.into_inner(), 0, "{workers} workers");
+        assert_eq!(foreign.into_inner(), 0, "{workers} workers");
     }
 }
 
 #[test]
-fn what_is_spawned_into_an_outer_scope_does_not_run_in_an_inner_wait() {
+fn jobs_of_an_outer_scope_do_not_run_in_an_inner_wait() {
     for workers in [1, 2, 4] {
         let scheduler = scheduler(workers);
-        let (strangers, ran) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let (foreign, ran) = (AtomicUsize::new(0), AtomicUsize::new(0));
         for _round in 0..20 {
             scheduler
                 .scope(|outer| {
                     for family in 0..8 {
-                        let (scheduler, strangers, ran) = (&scheduler, &strangers, &ran);
+                        let (scheduler, foreign, ran) = (&scheduler, &foreign, &ran);
                         outer.spawn(move |outer, _worker| {
-                            as_one_of(family, strangers, || {
-                                // Another family's, and nobody waits for it in here.
+                            as_one_of(family, foreign, || {
+                                // A job of another family, which the inner scope does not wait for.
                                 let spawn = || {
                                     outer.spawn(move |_scope, _worker| {
-                                        as_one_of(family + 100, strangers, || {
+                                        as_one_of(family + 100, foreign, || {
                                             ran.fetch_add(1, Ordering::Relaxed);
                                         });
                                     });
                                 };
                                 let inner = scheduler.scope(|inner| {
-                                    inner.spawn(|_scope, _worker| as_one_of(family, strangers, thread::yield_now));
+                                    inner.spawn(|_scope, _worker| as_one_of(family, foreign, thread::yield_now));
                                     spawn();
-                                    inner.spawn(|_scope, _worker| as_one_of(family, strangers, thread::yield_now));
+                                    inner.spawn(|_scope, _worker| as_one_of(family, foreign, thread::yield_now));
                                 });
                                 inner.unwrap();
                             });
@@ -123,18 +123,18 @@ fn what_is_spawned_into_an_outer_scope_does_not_run_in_an_inner_wait() {
                 })
                 .unwrap();
         }
-        assert_eq!((strangers.into_inner(), ran.into_inner()), (0, 20 * 8), "{workers} workers");
+        assert_eq!((foreign.into_inner(), ran.into_inner()), (0, 20 * 8), "{workers} workers");
     }
 }
 
 #[test]
-fn an_owner_with_nothing_to_do_gets_jobs_that_a_thief_spawns_into_its_scope() {
+fn an_idle_owner_runs_jobs_that_a_thief_spawns_into_its_scope() {
     let scheduler = scheduler(2);
     for _round in 0..50 {
-        let (together, is_there) = (Barrier::new(2), AtomicBool::new(false));
+        let (together, has_run) = (Barrier::new(2), AtomicBool::new(false));
         let ran_on = Mutex::new(Vec::new());
-        let midst = |_: &Scope<'_>, _: &Worker| {
-            // In a job of its own the owner steals nothing, so it finds what the other one spawns in its mailbox.
+        let pinned = |_: &Scope<'_>, _: &Worker| {
+            // The owner waits inside a job, so it does not steal, and finds the thief's jobs in its mailbox.
             let inner = scheduler.scope(|scope| {
                 scope.spawn(|scope, thief| {
                     together.wait();
@@ -142,20 +142,20 @@ fn an_owner_with_nothing_to_do_gets_jobs_that_a_thief_spawns_into_its_scope() {
                     for _job in 0..1_000 {
                         scope.spawn(|_scope, worker| {
                             ran_on.lock().unwrap().push(worker.index());
-                            is_there.store(true, Ordering::Relaxed);
+                            has_run.store(true, Ordering::Relaxed);
                         });
-                        if is_there.load(Ordering::Relaxed) {
+                        if has_run.load(Ordering::Relaxed) {
                             break;
                         }
                         thread::sleep(std::time::Duration::from_millis(1));
                     }
-                    assert!(eventually(|| is_there.load(Ordering::Relaxed)), "worker {} is left alone", thief.index());
+                    assert!(eventually(|| has_run.load(Ordering::Relaxed)), "nobody helps worker {}", thief.index());
                 });
                 together.wait();
             });
             inner.unwrap();
         };
-        scheduler.scope(|scope| scope.spawn_pinned(midst)).unwrap();
-        assert_eq!(ran_on.into_inner().unwrap()[0], 0, "the first is the owner's");
+        scheduler.scope(|scope| scope.spawn_pinned(pinned)).unwrap();
+        assert_eq!(ran_on.into_inner().unwrap()[0], 0, "the owner runs the first job");
     }
 }
