@@ -91,7 +91,7 @@ impl SchedulerBuilder {
     /// Sets the processors that each thread may run on, by the index of the worker, 1 or more. Threads that call the scheduler are
     /// not affected. Only Linux and Android support this; on other systems use [`on_start`](Self::on_start).
     ///
-    /// Without this the system places the threads. If it puts them on the processor of the thread that wakes them, as on some
+    /// Without this the system chooses the processors. If it puts them on the processor of the thread that wakes them, as on some
     /// virtual machines, they are kept off there (on Linux and Android), except threads that [`on_start`](Self::on_start) has
     /// placed.
     pub fn affinity(mut self, affinity: impl Fn(usize) -> AffinityMask + 'static) -> Self {

@@ -1,4 +1,4 @@
-//! The place of worker 0, which one thread from outside at a time can take.
+//! The slot of worker 0, which one thread from outside can take at a time.
 
 use crate::sync::{Condvar, Mutex};
 

@@ -3,7 +3,7 @@
 //!
 //! An owner that waits inside a job does not steal, so it cannot reach jobs in another worker's queues. Therefore only the owner
 //! keeps jobs of such a region in its queues. Other workers put them into the owner's mailbox, where the owner finds them, and so
-//! does every worker that looks for work. So nobody depends on the worker that spawned a job to come back to its queues.
+//! does every worker that looks for work. So no job has to wait until the worker that spawned it looks into its queues again.
 //!
 //! The regions of a worker lie on its stack, so an open region is identified by its level there. Each level has a queue, which
 //! the regions of that level use one after another. A region finds it empty, because the region before ended when all of its jobs

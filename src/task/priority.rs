@@ -8,7 +8,7 @@ pub(crate) enum Priority {
     Urgent,
     /// Any other job of a frame.
     Normal,
-    /// Jobs that no frame waits for. Worker 0 only runs them if asked to.
+    /// Jobs that no frame waits for. Worker 0 runs them only on request.
     Background,
 }
 

@@ -43,7 +43,7 @@ pub enum SchedulerError {
         /// The panic.
         panic: JobPanic,
     },
-    /// The hook that places threads panicked.
+    /// The hook that chooses affinities panicked.
     #[error("the hook that places the thread of worker {worker} failed: {}", panic.message)]
     AffinityHook {
         /// The [index](super::Worker::index) of the worker.

@@ -15,7 +15,7 @@ use super::chunks::Chunks;
 /// # Memory ordering
 ///
 /// All accesses are relaxed. A ticket only decides who runs a chunk. The data that the chunk reads came with the job through
-/// which the worker joined; the data that it writes is ordered by whoever counts finished chunks.
+/// which the worker joined; the counter of finished chunks orders the data that it writes.
 #[derive(Debug)]
 pub(crate) struct Tickets {
     /// How many chunks are claimed: the position of the next one.

@@ -159,9 +159,9 @@ impl Worker {
 
     /// Queues a job, and wakes a worker for it. Call it only inside a counted job of the region, or inside its body.
     ///
-    /// The worker keeps the job in its own queues only if the owner cannot wait for it there in vain. If the worker waits inside a
-    /// job, it keeps jobs of the innermost region that it waits for. Otherwise it keeps jobs of an outermost region, whose owner
-    /// steals. All other jobs go to the owner's mailbox.
+    /// The worker keeps the job in its own queues only if the owner of the region can take it from there. If the worker waits
+    /// inside a job, it keeps jobs of the innermost region that it waits for, whose owner it is. Otherwise it keeps jobs of an
+    /// outermost region, whose owner steals. All other jobs go to the owner's mailbox.
     pub(super) fn push(&self, region: &'static Region<Self>, work: Work<Self>, priority: Priority) {
         self.acquire_count(region);
         let job = Job { work, region, is_stolen: false };

@@ -82,7 +82,7 @@ fn waiting_returns_the_panic_of_the_job() {
         let job = scheduler.background(|| panic!("in the background"));
         let outcome: Result<(), _> = job.wait();
         assert_eq!(outcome.unwrap_err().message, "in the background");
-        // Nobody waits for this one.
+        // No thread waits for this job.
         drop(scheduler.background(|| panic!("not waited for")));
         scheduler.run_background(Duration::MAX);
         assert_intact(&scheduler);

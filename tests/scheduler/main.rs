@@ -357,7 +357,7 @@ fn a_dropped_scheduler_leaves_no_thread() {
     assert_eq!(threads_named(last), 1);
 }
 
-/// So many that the test would time out if each job were searched for among all others.
+/// The test would time out if each job were searched for among all others.
 #[test]
 fn a_million_pinned_jobs_run_in_linear_time() {
     const JOBS: usize = if cfg!(debug_assertions) { 200_000 } else { 1_000_000 };

@@ -77,7 +77,7 @@ enum Wait {
     AfterAScope(u64),
     InAJob,
     InAPinnedJob,
-    Nobody,
+    Never,
 }
 
 fn pieces(seed: u64, height: usize) -> Vec<Piece> {
@@ -101,7 +101,7 @@ fn pieces(seed: u64, height: usize) -> Vec<Piece> {
                         1 | 2 => Wait::AfterAScope(random.next()),
                         3 => Wait::InAJob,
                         4 => Wait::InAPinnedJob,
-                        _ => Wait::Nobody,
+                        _ => Wait::Never,
                     };
                     Piece::Background { seed, wait, panics }
                 }
@@ -149,7 +149,7 @@ fn values(seed: u64, height: usize, has_outside: bool) -> (u64, u64) {
             Piece::Loop { panics: true, .. } => {}
             Piece::Loop { seed, length, .. } => add(items(seed, 0..length, height - 1)),
             Piece::Graph(seed) => add(graphs::value(seed, height - 1)),
-            Piece::Background { wait: Wait::Nobody, .. } => {}
+            Piece::Background { wait: Wait::Never, .. } => {}
             Piece::Background { seed, wait, panics } => {
                 add(if panics { 0 } else { value(seed, height - 1) });
                 if let Wait::AfterAScope(seed) = wait {
@@ -268,7 +268,7 @@ fn spawn_part<'outer, 'scope>(
                     }
                     Wait::InAJob => scope.spawn(move |_scope, _worker| add(total, finish())),
                     Wait::InAPinnedJob => scope.spawn_pinned(move |_scope, _worker| add(total, finish())),
-                    Wait::Nobody => {}
+                    Wait::Never => {}
                 }
             }
             Piece::Lock(seed) => {
