@@ -1,14 +1,14 @@
-//! What bits of a sort key's depth give and take: how many objects they leave in the wrong order.
+//! The sorting error by the number of depth bits in a sort key.
 //!
 //!     cargo bench -p drawloom-benches --bench depth_order
 //!
-//! 10,000 distances, drawn from two distributions between 0.1 m and 10 km, are sorted by their numbers and, where those are the
-//! same, by chance, as objects are by their index. Against them stands the same sorted by distance. Nothing is timed, so the
-//! figures are the same on every machine.
+//! 10,000 random distances of two distributions between 0.1 m and 10 km are sorted by their depth codes. Equal codes stay in random
+//! order, as equal keys are sorted by object index. The result is compared with the distances in sorted order. Nothing is timed, so
+//! the figures are the same on every machine.
 //!
-//! - ties: of the pairs that are neighbours by distance, those that have one number;
-//! - inversions: of the pairs that are drawn one after the other, those that are in the wrong order;
-//! - worst: how far apart two are that are in the wrong order, at most, as a share of the step that is stated for them.
+//! - ties: the share of pairs of neighbours by distance that have the same code;
+//! - inversions: the share of pairs drawn one after the other that are in the wrong order;
+//! - worst: the greatest distance between two that are in the wrong order, as a share of the documented step.
 
 use std::process::ExitCode;
 
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
                 let percent = |share: f64| format!("{:.3}", share * 100.0);
                 let cells = [(*name).to_owned(), curve_name.to_owned(), bits.to_string(), percent(ties)];
                 let [distances, curve, bits, ties] = cells;
-                table.line([distances, curve, bits, ties, percent(inversions), format!("{worst:.3}")]);
+                table.row([distances, curve, bits, ties, percent(inversions), format!("{worst:.3}")]);
             }
         }
     }
@@ -47,11 +47,11 @@ fn main() -> ExitCode {
     if within {
         return ExitCode::SUCCESS;
     }
-    eprintln!("error: two are in the wrong order that are farther apart than the step that is stated");
+    eprintln!("error: two distances in the wrong order differ by more than the documented step");
     ExitCode::FAILURE
 }
 
-/// How good an order is.
+/// The errors of an order.
 struct Order {
     ties: f64,
     inversions: f64,
@@ -60,15 +60,15 @@ struct Order {
 
 impl Order {
     fn of(key: DepthKey, distances: &[f32]) -> Self {
-        let number = |distance: f32| key.quantize(distance, NEAR, FAR);
+        let code = |distance: f32| key.quantize(distance, NEAR, FAR);
         let share = |count: usize| count as f64 / (distances.len() - 1) as f64;
 
         let mut exact = distances.to_vec();
         exact.sort_by(f32::total_cmp);
-        let ties = exact.windows(2).filter(|pair| pair[0] < pair[1] && number(pair[0]) == number(pair[1])).count();
+        let ties = exact.windows(2).filter(|pair| pair[0] < pair[1] && code(pair[0]) == code(pair[1])).count();
 
         let mut drawn = distances.to_vec();
-        drawn.sort_by_key(|&distance| number(distance));
+        drawn.sort_by_key(|&distance| code(distance));
         let inversions = drawn.windows(2).filter(|pair| pair[0] > pair[1]).count();
 
         let (mut farthest, mut worst) = (0.0_f32, 0.0_f64);

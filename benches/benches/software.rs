@@ -1,12 +1,11 @@
-//! What a second worker gains where the processor draws.
+//! The speed-up of a second worker on the software backend.
 //!
 //!     cargo bench -p drawloom-benches --bench software
 //!     cargo bench -p drawloom-benches --bench software -- --quick
 //!
-//! The project's own scene, drawn in f32 by the software backend on one worker and on two. They take turns,
-//! in an order drawn anew each round; a turn is one frame, from the scene's hand-over to the return of submit, by which time it
-//! is drawn. Medians are compared, and both must have the same bytes. What was measured is written to
-//! `drawloom/software.json` in the target folder too.
+//! The software backend draws the project's own scene in f32, on one worker and on two, interleaved. Measured is one frame, from
+//! the hand-over of the scene to the return of submit, by which time it is drawn. The table compares medians; both pictures must
+//! have the same bytes. `target/drawloom/software.json` has the same.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -20,12 +19,13 @@ use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
-use drawloom_benches::quick::Quick;
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::{Harness, Rounds, WARM_UP, progress_bar};
 use drawloom_benches::results;
-use drawloom_benches::stopwatch::{WARM_UP, median, timed_frame};
+use drawloom_benches::statistics::median_duration;
+use drawloom_benches::stopwatch::timed_frame;
 use drawloom_benches::table::Table;
-use drawloom_testing::random::Random;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 /// A frame of one scene and size.
@@ -36,17 +36,16 @@ struct Row {
     rounds: usize,
     one_worker_ms: f64,
     two_workers_ms: f64,
-    /// How many times as fast two are.
+    /// Speed-up of two workers over one.
     ratio: f64,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let quick = Quick::parse().is_quick();
+    let quick = ExtentArguments::parse().is_quick();
     let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (3, &[[96, 54]]) } else { (15, &[[480, 270], [960, 540]]) };
     let maps = ShadowMaps::default();
     let maps = if quick { ShadowMaps { side: 64, ..maps } } else { maps };
-    let progress = ProgressBar::new((sizes.len() * (rounds + WARM_UP)) as u64);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} rounds, {eta} left")?);
+    let progress = progress_bar("frames");
     let rows: Result<Vec<_>, _> =
         sizes.iter().map(|&size| measure(demo::colonnade()?, size, maps, rounds, &progress)).collect();
     progress.finish_and_clear();
@@ -56,36 +55,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     for Row { scene, size: [width, height], one_worker_ms, two_workers_ms, ratio, .. } in &rows {
         let figures = [one_worker_ms, two_workers_ms].map(|milliseconds| format!("{milliseconds:.1}"));
         let [one, two] = figures;
-        table.line([(*scene).to_owned(), format!("{width} × {height}"), one, two, format!("{ratio:.2}")]);
+        table.row([(*scene).to_owned(), format!("{width} × {height}"), one, two, format!("{ratio:.2}")]);
     }
     table.print();
-    // A trial must not take the place of what was measured.
     if !quick {
         results::write_json("software.json", &rows)?;
     }
     Ok(())
 }
 
-/// A renderer on the software backend, and how long its frames took.
-struct Setting {
+/// A renderer on the software backend.
+struct Runner {
     renderer: Renderer<SoftwareBackend>,
     submitter: Submitter<SoftwareBackend>,
-    times: Vec<Duration>,
 }
 
-impl Setting {
+impl Runner {
     fn new(workers: usize, maps: ShadowMaps) -> Result<Self, Box<dyn Error>> {
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
         let deferred = Deferred::new().shadow_maps(Some(maps)).post(ToneMapping::default()).post(Fxaa::default());
         let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
-        Ok(Self { renderer, submitter, times: Vec::new() })
+        Ok(Self { renderer, submitter })
     }
 
-    fn turn(&mut self, scene: &Scene) -> Result<Picture, Box<dyn Error>> {
+    fn frame(&mut self, scene: &Scene) -> Result<(Picture, Duration), Box<dyn Error>> {
         let (submitted, time) = timed_frame(&mut self.renderer, &self.submitter, scene.as_scene_ref(), |_| Ok(()))?;
-        self.times.push(time.processor);
-        Ok(submitted.submission.read(0, "picture")?)
+        Ok((submitted.submission.read(0, "picture")?, time.cpu))
     }
 }
 
@@ -97,17 +93,19 @@ fn measure(
     progress: &ProgressBar,
 ) -> Result<Row, Box<dyn Error>> {
     scene.cameras.iter_mut().for_each(|camera| camera.size = size);
-    let mut settings = [Setting::new(1, maps)?, Setting::new(2, maps)?];
-    let (mut random, mut expected) = (Random::new(), None);
-    for _ in 0..rounds + WARM_UP {
-        for setting in random.order(settings.len()) {
-            let picture = settings[setting].turn(&scene)?;
+    let mut runners = [Runner::new(1, maps)?, Runner::new(2, maps)?];
+    let mut expected = None;
+    let times = Harness::new(Rounds { warm_up: WARM_UP, measured: rounds }, progress).measure(
+        &mut runners,
+        |runner, _round| {
+            let (picture, time) = runner.frame(&scene)?;
             if *expected.get_or_insert_with(|| picture.clone()) != picture {
-                return Err("the number of workers changes the picture".into());
+                return Err(Box::<dyn Error>::from("the number of workers changes the picture"));
             }
-        }
-        progress.inc(1);
-    }
-    let [one, two] = settings.map(|setting| median(setting.times.into_iter().skip(WARM_UP)).as_secs_f64() * 1e3);
+            Ok(time)
+        },
+    )?;
+    let milliseconds = |times: &Vec<Duration>| median_duration(times.iter().copied()).as_secs_f64() * 1e3;
+    let (one, two) = (milliseconds(&times[0]), milliseconds(&times[1]));
     Ok(Row { scene: "colonnade", size, rounds, one_worker_ms: one, two_workers_ms: two, ratio: one / two })
 }

@@ -1,4 +1,4 @@
-//! The backends that benches run on: never mixed, each beside its own only.
+//! The wgpu backends that benchmarks run on. Results of different backends are never compared.
 
 use std::error::Error;
 
@@ -6,25 +6,25 @@ use drawloom::backend::WgpuBackend;
 use drawloom_testing::adapter;
 use serde::Serialize;
 
-/// What draws.
+/// A wgpu backend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendName {
-    /// wgpu's own, which does nothing: what is left is the processor's part.
+    /// wgpu's no-op backend, which leaves the CPU part of a frame.
     Noop,
-    /// The machine's.
+    /// The machine's adapter.
     Adapter,
 }
 
 impl BackendName {
     pub const ALL: &[Self] = &[Self::Noop, Self::Adapter];
 
-    /// Those there are on this machine.
+    /// The backends that this machine has.
     pub fn available() -> &'static [Self] {
         if adapter_name().is_some() { Self::ALL } else { &Self::ALL[..1] }
     }
 
-    /// What a bench's extent says of this one.
+    /// This backend's value of a pair.
     pub fn of<T>(self, [noop, adapter]: [T; 2]) -> T {
         match self {
             Self::Noop => noop,
@@ -36,10 +36,10 @@ impl BackendName {
         self.of(["noop", "adapter"])
     }
 
-    /// A device of its own.
+    /// Opens a new device.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if no device can be opened.
     pub fn open(self) -> Result<WgpuBackend, Box<dyn Error>> {
         let (device, queue) = match self {
             Self::Noop => adapter::noop_device()?,
@@ -49,7 +49,7 @@ impl BackendName {
     }
 }
 
-/// The machine's adapter; `None` where there is none.
+/// The name of the machine's adapter, if it has one.
 pub fn adapter_name() -> Option<String> {
     let (device, _) = adapter::device().ok()?;
     let information = device.adapter_info();

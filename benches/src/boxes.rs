@@ -1,12 +1,12 @@
-//! Boxes to fill scenes with.
+//! Box meshes.
 
 use drawloom::glam::Vec3;
 use drawloom::scene::{Mesh, SceneError, Topology, Vertex};
 
-/// A box around the origin of object space; `half` of its size, in metres.
+/// A box around the origin of object space. `half` is half of its size, in metres.
 ///
 /// # Errors
-/// If `half` is not finite.
+/// Returns an error if `half` is not finite.
 pub fn new_box(name: String, half: Vec3) -> Result<Mesh, SceneError> {
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
     for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {

@@ -12,52 +12,53 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 pub type Failure = Box<dyn Error>;
 
-/// A part of a chart's file, with axes of its own.
+/// A part of a chart, with axes of its own.
 pub enum Panel {
     Bars(Bars),
     Lines(Lines),
-    Ranks(Ranks),
+    HorizontalBars(HorizontalBars),
 }
 
-/// Groups of upright bars, from 0 up: in each group one a series.
+/// Groups of vertical bars, with one bar per series in each group.
 pub struct Bars {
     pub title: String,
     pub series: Vec<String>,
-    /// Their names, and what each series is there; nothing where it is not a number.
+    /// The name of each group, and the value of each series; NaN for no bar.
     pub groups: Vec<(String, Vec<f64>)>,
-    /// A mark across a group's bars, by group; none where it is not a number.
+    /// A mark across the bars of each group; NaN for no mark.
     pub marks: Vec<f64>,
-    /// What the marks are.
+    /// The legend of the marks.
     pub mark_name: String,
-    /// Where a line goes across.
+    /// The value of a horizontal line.
     pub line: f64,
 }
 
-/// Lines; both axes grow by factors.
+/// Lines with logarithmic axes.
 pub struct Lines {
     pub title: String,
-    pub across: String,
+    /// The label of the horizontal axis.
+    pub x_label: String,
     /// Their names, and their points.
     pub series: Vec<(String, Vec<(f64, f64)>)>,
-    /// Which colour the first has: 0 is grey, for what others are compared with.
+    /// The colour of the first line: 0 is grey, for a baseline.
     pub first_color: usize,
-    /// Where the lower axis is labelled.
+    /// The ticks of the horizontal axis.
     pub ticks: Vec<f64>,
 }
 
-/// Lying bars, from 0 on, each with its figure at its end.
-pub struct Ranks {
+/// Horizontal bars, each with its value at its end.
+pub struct HorizontalBars {
     pub title: String,
-    /// A bar's name, its length, and the colour it has.
+    /// Name, length and colour of each bar.
     pub bars: Vec<(String, f64, usize)>,
 }
 
 /// In pixels.
 const WIDTH: u32 = 1200;
 const PANEL: u32 = 340;
-const RANK: u32 = 26;
-/// Of an upright bar, of what its group has.
-const MOST_WIDTH: f64 = 0.27;
+const BAR: u32 = 26;
+/// The greatest width of a vertical bar, as a share of its group.
+const MAX_BAR_WIDTH: f64 = 0.27;
 const HEAD: u32 = 84;
 
 /// Okabe and Ito's colours, which the colour-blind can tell apart too, and a grey.
@@ -74,10 +75,10 @@ const COLORS: [RGBColor; 8] = [
 
 const BLACK_INDEX: usize = COLORS.len() - 1;
 
-/// Draws panels one below the other.
+/// Draws panels below each other.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(path: &Path, panels: &[Panel]) -> Result<(), Failure> {
     let heights: Vec<_> = panels.iter().map(Panel::height).collect();
     let root = SVGBackend::new(path, (WIDTH, heights.iter().sum())).into_drawing_area();
@@ -99,7 +100,7 @@ impl Panel {
     fn height(&self) -> u32 {
         match self {
             Self::Bars(_) | Self::Lines(_) => PANEL,
-            Self::Ranks(ranks) => HEAD + RANK * ranks.bars.len() as u32,
+            Self::HorizontalBars(bars) => HEAD + BAR * bars.bars.len() as u32,
         }
     }
 
@@ -107,7 +108,7 @@ impl Panel {
         match self {
             Self::Bars(bars) => bars.draw(area),
             Self::Lines(lines) => lines.draw(area),
-            Self::Ranks(ranks) => ranks.draw(area),
+            Self::HorizontalBars(bars) => bars.draw(area),
         }
     }
 }
@@ -118,13 +119,13 @@ impl Bars {
         let top = values.filter(|value| value.is_finite()).fold(self.line, f64::max) * 1.1;
         let black = (!self.marks.is_empty()).then_some((BLACK_INDEX, self.mark_name.as_str()));
         let legend = self.series.iter().map(String::as_str).enumerate().chain(black);
-        let area = headed(area, &self.title, legend)?;
+        let area = with_heading(area, &self.title, legend)?;
         let count = self.groups.len();
         let mut chart = ChartBuilder::on(&area)
             .margin_right(16)
             .x_label_area_size(28)
             .y_label_area_size(56)
-            .build_cartesian_2d(Places(count), 0.0..top)?;
+            .build_cartesian_2d(Slots(count), 0.0..top)?;
         let name = |middle: &f64| self.groups.get(*middle as usize).map_or_else(String::new, |(name, _)| name.clone());
         chart
             .configure_mesh()
@@ -137,9 +138,9 @@ impl Bars {
             .y_label_formatter(&|value: &f64| short(*value))
             .label_style(text(15))
             .draw()?;
-        let across = vec![(0.0, self.line), (count as f64, self.line)];
-        chart.plotting_area().draw(&PathElement::new(across, BLACK.mix(0.6).stroke_width(1)))?;
-        let width = (0.92 / self.series.len() as f64).min(MOST_WIDTH);
+        let line = vec![(0.0, self.line), (count as f64, self.line)];
+        chart.plotting_area().draw(&PathElement::new(line, BLACK.mix(0.6).stroke_width(1)))?;
+        let width = (0.92 / self.series.len() as f64).min(MAX_BAR_WIDTH);
         let margin = (1.0 - width * self.series.len() as f64) / 2.0;
         for (group, (_, values)) in self.groups.iter().enumerate() {
             for (series, &value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
@@ -167,7 +168,7 @@ impl Lines {
         let low = points().map(|point| point.1).fold(f64::INFINITY, f64::min).max(1e-9);
         let high = points().map(|point| point.1).fold(low, f64::max);
         let legend = (self.first_color..).zip(self.series.iter().map(|(name, _)| name.as_str()));
-        let area = headed(area, &self.title, legend)?;
+        let area = with_heading(area, &self.title, legend)?;
         let ends = |ticks: &[f64]| {
             let (first, last) =
                 (ticks.iter().copied().fold(f64::INFINITY, f64::min), ticks.iter().copied().fold(0.0, f64::max));
@@ -175,18 +176,18 @@ impl Lines {
         };
         let mut builder = ChartBuilder::on(&area);
         builder.margin_right(24).x_label_area_size(44).y_label_area_size(64);
-        let across = ends(&self.ticks).log_scale().with_key_points(self.ticks.clone());
-        let upright = low / 1.3..high * 1.3;
-        let decades = decades(&upright);
-        let upright = upright.log_scale().with_key_points(decades);
-        let mut chart = builder.build_cartesian_2d(across, upright)?;
+        let horizontal = ends(&self.ticks).log_scale().with_key_points(self.ticks.clone());
+        let vertical = low / 1.3..high * 1.3;
+        let decades = decades(&vertical);
+        let vertical = vertical.log_scale().with_key_points(decades);
+        let mut chart = builder.build_cartesian_2d(horizontal, vertical)?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.15))
             .x_labels(self.ticks.len())
             .y_labels(10)
-            .x_desc(&self.across)
+            .x_desc(&self.x_label)
             .x_label_formatter(&|value: &f64| grouped(*value))
             .y_label_formatter(&|value: &f64| if *value >= 100.0 { grouped(*value) } else { short(*value) })
             .label_style(text(15))
@@ -200,17 +201,17 @@ impl Lines {
     }
 }
 
-impl Ranks {
+impl HorizontalBars {
     fn draw(&self, area: &Area) -> Result<(), Failure> {
         let longest = self.bars.iter().map(|(_, length, _)| *length).fold(0.0, f64::max);
-        let area = headed(area, &self.title, [])?;
+        let area = with_heading(area, &self.title, [])?;
         let count = self.bars.len();
         let mut chart = ChartBuilder::on(&area)
             .margin_right(16)
             .x_label_area_size(28)
             .y_label_area_size(230)
-            .build_cartesian_2d(0.0..longest * 1.08, Places(count))?;
-        // Places are counted from below, bars from above.
+            .build_cartesian_2d(0.0..longest * 1.08, Slots(count))?;
+        // Slots are counted from the bottom, bars from the top.
         let name = |middle: &f64| {
             let bar = self.bars.iter().rev().nth(*middle as usize);
             bar.map_or_else(String::new, |(name, ..)| name.clone())
@@ -236,10 +237,10 @@ impl Ranks {
     }
 }
 
-/// An axis of places side by side, each 1 wide and named in its middle.
-struct Places(usize);
+/// An axis of slots side by side, each of width 1 and labelled at its centre.
+struct Slots(usize);
 
-impl Ranged for Places {
+impl Ranged for Slots {
     type FormatOption = DefaultFormatting;
     type ValueType = f64;
 
@@ -248,7 +249,7 @@ impl Ranged for Places {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
-        (0..self.0).map(|place| place as f64 + 0.5).collect()
+        (0..self.0).map(|slot| slot as f64 + 0.5).collect()
     }
 
     fn range(&self) -> Range<f64> {
@@ -262,8 +263,8 @@ fn decades(range: &Range<f64>) -> Vec<f64> {
     all.filter(|value| range.contains(value)).collect()
 }
 
-/// Writes the title and which colour is whose, and returns what is left below.
-fn headed<'a, 'b>(
+/// Draws the title and the legend, and returns the area below.
+fn with_heading<'a, 'b>(
     area: &Area<'a>,
     title: &str,
     legend: impl IntoIterator<Item = (usize, &'b str)>,
@@ -290,7 +291,7 @@ fn centered(size: u32, vertical: VPos) -> TextStyle<'static> {
     text(size).pos(Pos::new(HPos::Center, vertical))
 }
 
-/// In three figures, or as many as there are before the point.
+/// With three digits, or all digits before the point.
 fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -300,7 +301,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// As a whole number, its thousands set apart.
+/// As a whole number, with commas between thousands.
 pub fn grouped(value: f64) -> String {
     let digits = format!("{value:.0}");
     let (first, rest) = digits.split_at((digits.len() - 1) % 3 + 1);

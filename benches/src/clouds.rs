@@ -1,4 +1,4 @@
-//! Scenes of boxes scattered in clouds, with cameras of which each sees a cloud as a whole.
+//! Scenes of boxes scattered in clouds. Each camera sees a whole cloud.
 
 use std::f64::consts::TAU;
 
@@ -9,21 +9,21 @@ use drawloom_testing::random::Random;
 use crate::boxes::new_box;
 
 pub const MESHES: u32 = 64;
-/// So many that a view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
+/// A view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
 pub const MATERIALS: u32 = 16;
 
-/// In metres. A cloud fills 20° to each side of where its camera looks. A camera sees 30° up and down, and with its square
-/// picture as far to the left and right; so it sees all of its cloud, and nothing of those a quarter turn away.
+/// In metres. A cloud covers 20° to each side of its camera's axis. A camera sees 30° in each direction, as its picture is square: all
+/// of its own cloud, and nothing of the clouds at right angles to it.
 const DISTANCE: f64 = 150.0;
 const CLOUD_RADIUS: f64 = 50.0;
 
-/// In pixels, to each side. What is measured is the processor's part; a device in software would share it.
+/// Width and height in pixels. It is small, as the CPU part is measured and a software device would share the cores.
 const PICTURE: u32 = 64;
 
-/// So many cameras around one cloud of objects: each sees all of it.
+/// Cameras around one cloud of objects, all of which see all of it.
 ///
 /// # Errors
-/// If the scene cannot be.
+/// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn around_one(cameras: usize, objects: usize) -> Result<Scene, SceneError> {
     let mut scene = scene_of_clouds([(DVec3::ZERO, objects)])?;
     let around = directions(cameras).enumerate();
@@ -34,7 +34,7 @@ pub fn around_one(cameras: usize, objects: usize) -> Result<Scene, SceneError> {
 /// Four cameras back to back, each with a cloud of its own.
 ///
 /// # Errors
-/// If the scene cannot be.
+/// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn back_to_back(objects: [usize; 4]) -> Result<Scene, SceneError> {
     let centers: Vec<_> = directions(4).map(|direction| direction * DISTANCE).collect();
     let mut scene = scene_of_clouds(centers.iter().copied().zip(objects))?;
@@ -53,7 +53,7 @@ fn camera(index: usize, position: DVec3, target: DVec3) -> Camera {
     Camera { size: [PICTURE; 2], ..Camera::looking_at(format!("camera {index}"), position, target) }
 }
 
-/// Boxes scattered in clouds, given by centre and number of boxes.
+/// A scene of clouds, each given by its centre and number of boxes.
 fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<Scene, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();

@@ -3,16 +3,16 @@
 //!     cargo bench -p drawloom-benches --bench record
 //!     cargo bench -p drawloom-benches --bench record -- --quick
 
+pub mod arguments;
 #[cfg(feature = "wgpu")]
 pub mod backends;
 pub mod boxes;
 pub mod chart;
 pub mod clouds;
+pub mod harness;
 pub mod moving;
-pub mod quick;
 pub mod results;
+pub mod statistics;
 pub mod stopwatch;
 pub mod table;
-#[cfg(feature = "wgpu")]
-pub mod trial;
 pub mod work;

@@ -1,16 +1,16 @@
-//! A scene all of whose objects move.
+//! A scene whose objects all move.
 
 use drawloom::glam::DVec3;
 use drawloom::scene::{Scene, SceneRef};
 
-/// An engine's world: what moves are arrays of its own, which it lends.
+/// An engine's world: its positions are an array of its own, which it lends to the renderer.
 pub struct Moving {
     scene: Scene,
     positions: Vec<DVec3>,
     frame: u32,
 }
 
-/// How far an object moves in a frame, in metres; and after how many it turns round.
+/// How far an object moves per frame, in metres, and after how many frames it turns around.
 const STEP: f64 = 1e-3;
 const FRAMES: u32 = 64;
 
@@ -20,10 +20,10 @@ impl Moving {
         Self { scene, positions, frame: 0 }
     }
 
-    /// Moves every object a little: to and fro, so that it is never far from where it was.
+    /// Moves every object a little, back and forth, so that it stays near its original position.
     pub fn step(&mut self) {
-        let forth = (self.frame / FRAMES).is_multiple_of(2);
-        let step = DVec3::new(STEP, STEP / 2.0, 0.0) * if forth { 1.0 } else { -1.0 };
+        let forward = (self.frame / FRAMES).is_multiple_of(2);
+        let step = DVec3::new(STEP, STEP / 2.0, 0.0) * if forward { 1.0 } else { -1.0 };
         for position in &mut self.positions {
             *position += step;
         }

@@ -1,4 +1,4 @@
-//! How long a frame takes, on the processor and on the device.
+//! How long frames take, on the CPU and on the device.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -7,16 +7,13 @@ use drawloom::backend::{Backend, BackendError};
 use drawloom::scene::SceneRef;
 use drawloom::{Renderer, Submitted, Submitter};
 
-/// Frames of each setting that are drawn first and not counted: tables grow and pipelines are made in them.
-pub const WARM_UP: usize = 2;
-
-/// What a frame took.
+/// The times of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameTime {
-    /// From the scene's hand-over to the return of submit.
-    pub processor: Duration,
-    /// How much of that the scene was held: until recording ended (L 3).
-    pub held: Duration,
+    /// From the hand-over of the scene to the return of submit.
+    pub cpu: Duration,
+    /// The part of that in which the scene is borrowed: until recording ends (L 3).
+    pub borrowed: Duration,
     /// From the call of submit until the device has drawn the frame.
     pub device: Duration,
 }
@@ -24,7 +21,7 @@ pub struct FrameTime {
 /// Draws a frame, and waits until the device is idle again.
 ///
 /// # Errors
-/// If the frame cannot be drawn.
+/// Returns an error if the frame cannot be drawn.
 pub fn timed_frame<B: Backend>(
     renderer: &mut Renderer<B>,
     submitter: &Submitter<B>,
@@ -33,23 +30,22 @@ pub fn timed_frame<B: Backend>(
 ) -> Result<(Submitted<B>, FrameTime), Box<dyn Error>> {
     let start = Instant::now();
     let recorded = renderer.record(scene)?;
-    let hand_over = Instant::now();
+    let submit = Instant::now();
     let submitted = submitter.submit(recorded)?;
-    let processor = start.elapsed();
+    let cpu = start.elapsed();
     wait(&submitted.submission)?;
-    Ok((submitted, FrameTime { processor, held: hand_over - start, device: hand_over.elapsed() }))
+    Ok((submitted, FrameTime { cpu, borrowed: submit - start, device: submit.elapsed() }))
 }
 
-/// The one in the middle; of an even number, the later of the two. Zero of none.
-pub fn median(times: impl IntoIterator<Item = Duration>) -> Duration {
-    let mut times: Vec<_> = times.into_iter().collect();
-    times.sort();
-    times.get(times.len() / 2).copied().unwrap_or_default()
-}
-
-/// The same of figures.
-pub fn middle(figures: impl IntoIterator<Item = f64>) -> f64 {
-    let mut figures: Vec<_> = figures.into_iter().collect();
-    figures.sort_by(f64::total_cmp);
-    figures.get(figures.len() / 2).copied().unwrap_or_default()
+/// Calls `frame` once, and again until the times that it returns add up to `at_least`. Returns the mean, in seconds.
+///
+/// # Errors
+/// Returns the first error of `frame`.
+pub fn mean_frame<E>(at_least: Duration, mut frame: impl FnMut() -> Result<Duration, E>) -> Result<f64, E> {
+    let (mut elapsed, mut frames) = (Duration::ZERO, 0);
+    while frames == 0 || elapsed < at_least {
+        elapsed += frame()?;
+        frames += 1;
+    }
+    Ok(elapsed.as_secs_f64() / f64::from(frames))
 }

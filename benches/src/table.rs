@@ -1,6 +1,6 @@
-//! Tables of what was measured, in Markdown.
+//! Tables in Markdown.
 
-/// A table whose columns are as wide as what is in them. Columns of numbers are aligned to the right.
+/// A table whose columns are as wide as their longest cell. Columns of numbers are aligned to the right.
 pub struct Table {
     lines: Vec<Vec<String>>,
 }
@@ -10,7 +10,7 @@ impl Table {
         Self { lines: vec![headings.iter().map(|&heading| heading.to_owned()).collect()] }
     }
 
-    pub fn line<const COLUMNS: usize>(&mut self, cells: [String; COLUMNS]) {
+    pub fn row<const COLUMNS: usize>(&mut self, cells: [String; COLUMNS]) {
         self.lines.push(cells.into());
     }
 

@@ -1,10 +1,10 @@
-//! What a job does: nothing, or a calibrated while of arithmetic.
+//! The work of a job: nothing, or arithmetic for a calibrated time.
 
 use std::hint::black_box;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-/// What every job of a row does, whoever runs it.
+/// The work of every job of a row, for all executors.
 pub struct Work {
     /// Rounds of arithmetic; 0 for an empty job.
     rounds: u32,
@@ -17,7 +17,7 @@ impl Work {
         Self { rounds: 0, record: None }
     }
 
-    /// Jobs that keep a core busy for so long.
+    /// Jobs that keep a core busy for `time`.
     pub fn busy(time: Duration) -> Self {
         const SAMPLE: u32 = 100_000;
         let sample = || {
@@ -25,13 +25,13 @@ impl Work {
             arithmetic(SAMPLE);
             start.elapsed()
         };
-        // The least of several: whatever else the machine does can only add to it.
-        let least = (0..50).map(|_| sample()).min().unwrap_or_default();
-        let rounds = time.as_secs_f64() / least.as_secs_f64() * f64::from(SAMPLE);
+        // The minimum, as disturbances can only add time.
+        let minimum = (0..50).map(|_| sample()).min().unwrap_or_default();
+        let rounds = time.as_secs_f64() / minimum.as_secs_f64() * f64::from(SAMPLE);
         Self { rounds: rounds.round().max(1.0) as u32, record: None }
     }
 
-    /// The same jobs, which write down when they run.
+    /// The same jobs, which record when they run.
     pub fn recorded(&self, jobs: usize) -> Self {
         Self { record: Some(Record::new(jobs)), ..*self }
     }
@@ -40,8 +40,7 @@ impl Work {
         self.record.as_ref()
     }
 
-    /// Does one job. What is timed and what is checked is the same code: a branch that always goes the same way is all
-    /// that the record costs, and it costs everybody the same.
+    /// Runs one job. Timed and checked frames run the same code: recording costs a well-predicted branch, for all executors alike.
     #[inline]
     pub fn job(&self, index: usize) {
         let index = black_box(index);
@@ -57,7 +56,7 @@ impl Work {
     }
 }
 
-/// Each round waits for the one before.
+/// Each iteration depends on the one before.
 #[inline]
 fn arithmetic(rounds: u32) {
     let mut state = 1_u64;
@@ -66,7 +65,7 @@ fn arithmetic(rounds: u32) {
     }
 }
 
-/// When each job of a frame ran, by a clock that counts beginnings and ends.
+/// When each job of a frame ran, by a logical clock that counts starts and ends.
 pub struct Record {
     clock: AtomicU32,
     jobs: Vec<Job>,
@@ -88,7 +87,7 @@ impl Record {
         self.clock.fetch_add(1, Ordering::AcqRel)
     }
 
-    /// Forgets the last frame.
+    /// Clears the counts of the last frame.
     pub fn clear(&self) {
         for job in &self.jobs {
             job.runs.store(0, Ordering::Relaxed);
@@ -99,7 +98,7 @@ impl Record {
         self.jobs.iter().map(|job| job.runs.load(Ordering::Relaxed))
     }
 
-    /// Whether one job had ended when the other began.
+    /// Whether job `before` ended before job `after` began.
     pub fn in_order(&self, before: usize, after: usize) -> bool {
         self.ended(before) < self.began(after)
     }

@@ -1,18 +1,17 @@
-//! What it costs to find out what a camera sees, and that nothing of it is ever left out.
+//! The cost of frustum culling, and a check that it never culls what a camera sees.
 //!
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling -- --quick
 //!
-//! First the time: what each volume takes an object, beside spheres asked for one by one, and beside how it is commonly done.
-//! They take turns, in an order drawn anew each round.
+//! First the time per object: all volumes, spheres tested one by one, and the usual test in f32, interleaved.
 //!
-//! Then the proof: cameras at all extremes (`culling/cameras.rs`), a new one every 256 objects, and f64 as the judge
-//! (`culling/oracle.rs`). Three in four spheres, and as many objects, touch a plane, an edge or a corner of what the camera sees to
-//! within four steps of f32 (*tangent*); the others are *anywhere*. Spheres are asked for as they are; objects go all the way
-//! from the scene through the table of objects, with scales from 0 to 1e20. A false cull ends the run with an error, and so do
-//! too many objects kept that are outside.
+//! Then the check: cameras at all extremes (`drawloom_testing::culling::cameras`), a new one every 256 objects, against an f64
+//! oracle (`drawloom_testing::culling::oracle`). Three in four spheres, and as many objects, touch a plane, an edge or a corner of
+//! the frustum to within four steps of f32 (*tangent*); the others are *anywhere*. Spheres are tested directly; objects pass from
+//! the scene through the object table, with scales from 0 to 1e20. A false cull fails the run, and so do too many visible objects
+//! that are outside.
 //!
-//! Written to `drawloom/culling.json` in the target folder too.
+//! `target/drawloom/culling.json` has the same.
 
 mod report;
 mod speed;
@@ -22,20 +21,20 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Parser;
 use drawloom::task::Scheduler;
-use drawloom_benches::quick::Quick;
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::progress_bar;
 use drawloom_testing::culling::boxes::{BoxTallies, Shapes};
 use drawloom_testing::culling::spheres::SphereTallies;
 use drawloom_testing::culling::{boxes, spheres};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use report::Report;
 
-/// How much is measured and tried.
+/// The size of the measurement and the check.
 struct Extent {
     name: &'static str,
     objects: usize,
     rounds: usize,
-    /// Of 256 each.
+    /// Batches of 256.
     sphere_batches: usize,
     box_batches: usize,
 }
@@ -46,30 +45,28 @@ impl Extent {
     const QUICK: Self = Self { name: "quick", objects: 10_000, rounds: 5, sphere_batches: 400, box_batches: 100 };
 }
 
-/// Batches that a job tries.
-const AT_A_TIME: usize = 50;
+/// Batches per job.
+const BATCHES_PER_JOB: usize = 50;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let quick = Quick::parse().is_quick();
+    let quick = ExtentArguments::parse().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
-    let progress = ProgressBar::new(2 * extent.rounds as u64);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}, {eta} left")?);
-    progress.set_message("rounds");
+    let progress = progress_bar("runs");
     let speeds = speed::measure(extent.objects, extent.rounds, &progress)?;
 
     progress.reset();
     progress.set_length((extent.sphere_batches + extent.box_batches) as u64);
-    progress.set_message("cameras");
+    progress.set_prefix("cameras");
     let scheduler = Scheduler::new(std::thread::available_parallelism()?.get())?;
     let spheres = Mutex::new(SphereTallies::default());
-    scheduler.parallel_for(extent.sphere_batches, AT_A_TIME, |batches, _| {
+    scheduler.parallel_for(extent.sphere_batches, BATCHES_PER_JOB, |batches, _| {
         progress.inc(batches.len() as u64);
         let found = spheres::try_batches(batches);
         spheres.lock().unwrap_or_else(PoisonError::into_inner).add(&found);
     })?;
     let shapes = Shapes::new()?;
     let boxes = Mutex::new(BoxTallies::default());
-    scheduler.parallel_for(extent.box_batches, AT_A_TIME, |batches, _| {
+    scheduler.parallel_for(extent.box_batches, BATCHES_PER_JOB, |batches, _| {
         progress.inc(batches.len() as u64);
         let found = boxes::try_batches(&shapes, batches);
         boxes.lock().unwrap_or_else(PoisonError::into_inner).add(&found);
@@ -80,7 +77,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let boxes = boxes.into_inner().unwrap_or_else(PoisonError::into_inner);
     let report = Report::new(extent.name, speeds, &spheres, &boxes);
     report.print();
-    // A trial must not take the place of what was measured.
     if !quick {
         report.write()?;
     }

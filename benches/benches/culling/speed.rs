@@ -1,4 +1,4 @@
-//! What it takes to ask for each of many objects whether a camera sees it.
+//! The time to test many objects against a frustum.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -9,46 +9,49 @@ use drawloom::quality::CullingVolume;
 use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
 use drawloom::view::{BoundingSphere, Frustum, ObjectTable};
 use drawloom_benches::boxes::new_box;
-use drawloom_benches::stopwatch::middle;
+use drawloom_benches::harness::{Harness, Rounds};
+use drawloom_benches::statistics::median;
 use drawloom_testing::culling::naive::Naive;
 use drawloom_testing::random::Random;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-/// How one way to ask did.
+/// The result of one test.
 #[derive(Serialize)]
 pub struct Speed {
     scene: &'static str,
-    pub way: &'static str,
+    #[serde(rename = "way")]
+    pub test: &'static str,
     objects: usize,
-    /// The median round's nanoseconds an object, on one thread.
+    /// Median nanoseconds per object, on one thread.
     pub nanoseconds: f64,
-    /// The share of the objects that may be seen.
-    pub seen: f64,
+    /// The share of visible objects.
+    #[serde(rename = "seen")]
+    pub visible: f64,
 }
 
 impl Speed {
     pub fn cells(&self) -> [String; 5] {
-        let Self { scene, way, objects, nanoseconds, seen } = self;
+        let Self { scene, test, objects, nanoseconds, visible } = self;
         [
             scene.to_string(),
-            way.to_string(),
+            test.to_string(),
             objects.to_string(),
             format!("{nanoseconds:.2}"),
-            format!("{:.2} %", seen * 100.0),
+            format!("{:.2} %", visible * 100.0),
         ]
     }
 }
 
-type Way<'a> = (&'static str, Box<dyn Fn() -> u64 + 'a>);
+type Test<'a> = (&'static str, Box<dyn Fn() -> u64 + 'a>);
 
-/// Asks for all objects of two scenes, all ways in turn, so many rounds.
+/// Runs all tests on all objects of two scenes, interleaved.
 ///
 /// # Errors
-/// If a scene cannot be.
+/// Returns an error if a scene rejects a mesh, a material or an object.
 pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<Vec<Speed>, SceneError> {
     let mut speeds = Vec::new();
-    // A few metres large in a cloud of 2 km: few of them touch a plane. And so large that most of them do.
+    // In a cloud of 2 km few objects of some metres intersect a plane, and most of the large ones do.
     for (name, size) in [("small objects", 3.0), ("large objects", 400.0)] {
         let scene = cloud(objects, size)?;
         let tables = [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox].map(|volume| {
@@ -59,35 +62,30 @@ pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<
             table
         });
         let camera = Camera { far: 900.0, ..Camera::looking_at("main", DVec3::new(3.0, 2.0, 1.0), DVec3::NEG_Z) };
-        let mut ways = ways(&tables, &camera);
-        let mut samples = vec![Vec::new(); ways.len()];
-        let mut seen = vec![0; ways.len()];
-        let mut random = Random::new();
-        for _ in 0..rounds {
-            for way in random.order(ways.len()) {
-                let start = Instant::now();
-                seen[way] = (ways[way].1)();
-                samples[way].push(start.elapsed().as_nanos() as f64 / objects as f64);
-            }
-            progress.inc(1);
-        }
-        speeds.extend(ways.drain(..).zip(samples).zip(seen).map(|(((way, _), samples), seen)| Speed {
+        let mut tests = tests(&tables, &camera);
+        let rounds = Rounds { warm_up: 0, measured: rounds };
+        let samples = Harness::new(rounds, progress).measure(&mut tests, |(_, test), _round| {
+            let start = Instant::now();
+            let visible = test();
+            Ok::<_, SceneError>((visible, start.elapsed().as_nanos() as f64 / objects as f64))
+        })?;
+        speeds.extend(tests.iter().zip(samples).map(|(&(test, _), samples)| Speed {
             scene: name,
-            way,
+            test,
             objects,
-            nanoseconds: middle(samples),
-            seen: seen as f64 / objects as f64,
+            nanoseconds: median(samples.iter().map(|&(_, nanoseconds)| nanoseconds)),
+            visible: samples.last().map_or(0.0, |&(visible, _)| visible as f64 / objects as f64),
         }));
     }
     Ok(speeds)
 }
 
-fn ways<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Way<'a>> {
+fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
     let [spheres, boxes, oriented] = tables;
     let frustum = Frustum::new(camera);
     let each = |table: &'a ObjectTable, volume| -> Box<dyn Fn() -> u64 + 'a> {
         let frustum = frustum.clone();
-        Box::new(move || seen_by_words(table, &frustum, volume))
+        Box::new(move || visible_by_words(table, &frustum, volume))
     };
     let mut all = vec![
         ("none", each(spheres, CullingVolume::None)),
@@ -99,7 +97,7 @@ fn ways<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Way<'a>> {
         "sphere, one by one",
         Box::new(move || one_by_one(spheres, |bounds| frustum.intersects_sphere(bounds.center, bounds.radius))),
     ));
-    // What stands in f32 already, as such engines have it: 16 bytes an object.
+    // The spheres in f32, 16 bytes each, as such engines store them.
     let plain: Vec<(Vec3, f32)> = (0..spheres.len())
         .map(|object| {
             let bounds = spheres.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
@@ -113,8 +111,8 @@ fn ways<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Way<'a>> {
     all
 }
 
-/// As a frame does it: a word of objects at a time, and their block's lock for each.
-fn seen_by_words(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
+/// As a frame does it: one word of objects at a time, each with its block locked once.
+fn visible_by_words(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
     let word = |first: usize| {
         let count = (table.len() - first).min(Frustum::WORD);
         let entry = first % ObjectTable::BLOCK_SIZE;
@@ -134,7 +132,7 @@ fn one_by_one(table: &ObjectTable, sees: impl Fn(BoundingSphere) -> bool) -> u64
     (0..table.block_count()).map(block).sum()
 }
 
-/// Boxes up to so many metres long, scattered in a cloud of 2 km around the camera.
+/// Boxes up to `size` metres long, scattered in a cloud of 2 km around the camera.
 fn cloud(objects: usize, size: f64) -> Result<Scene, SceneError> {
     let (mut random, mut scene) = (Random::new(), Scene::new());
     let mut meshes = Vec::new();

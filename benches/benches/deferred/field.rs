@@ -9,29 +9,27 @@ use drawloom_testing::random::Random;
 
 use crate::Extent;
 
-/// From the middle of the field to its edges, in metres.
+/// From the centre of the field to its edges, in metres.
 const HALF: f64 = 25.0;
 const MATERIALS: usize = 16;
 
-/// What is in a field beside its boxes.
+/// A field of boxes, and what else is in it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Field {
-    /// Half of them point lights, half spot lights, none of which reaches further than some 3 m. The lights of a smaller
-    /// number are the first of a larger one.
+    /// Small lights, half of them point lights and half spot lights, that reach some 3 m. A smaller number of lights is a prefix of
+    /// a larger one.
     pub lights: usize,
-    /// Spot lights high above the field that cast shadows.
+    /// Spot lights that cast shadows, high above the field.
     pub shadow_maps: usize,
-    /// Whether each object is there a second time, as one that is added to what is drawn: pipelines that draw it once for
-    /// each light find it so.
-    pub twice: bool,
+    /// Whether each object has an additive copy, which [`pass_per_light`](crate::forward::pass_per_light) draws for each light.
+    pub has_copies: bool,
 }
 
 impl Field {
-    /// The field, with a camera that sees all of it and every light. All objects are of one mesh, so that whoever draws them
-    /// can do so in one draw.
+    /// The field, with a camera that sees all objects and lights. All objects have one mesh, so that one instanced draw suffices.
     ///
     /// # Errors
-    /// None that this causes.
+    /// Returns an error if the scene rejects a mesh, a material or an object.
     pub fn scene(self, extent: &Extent) -> Result<Scene, SceneError> {
         let mut random = Random::new();
         let mut scene = Scene::new();
@@ -49,16 +47,17 @@ impl Field {
         }];
         let mut materials = vec![0];
         for _ in 0..extent.boxes {
-            let place = DVec3::new(random.between(-HALF, HALF), random.between(0.2, 0.8), random.between(-HALF, HALF));
+            let position =
+                DVec3::new(random.between(-HALF, HALF), random.between(0.2, 0.8), random.between(-HALF, HALF));
             let scale = random.vector(0.15, 0.5);
             let orientation = Quat::from_axis_angle(random.direction().as_vec3(), random.between(0.0, TAU) as f32);
             let material = random.below(MATERIALS);
             materials.push(material);
-            objects.push(RenderObject { orientation, scale, ..RenderObject::new(cube, paints[material][0], place) });
+            objects.push(RenderObject { orientation, scale, ..RenderObject::new(cube, paints[material][0], position) });
         }
         for (object, &material) in objects.iter().zip(&materials) {
             scene.add_object(*object)?;
-            if self.twice {
+            if self.has_copies {
                 scene.add_object(RenderObject { material: paints[material][1], ..*object })?;
             }
         }
@@ -71,9 +70,9 @@ impl Field {
         Ok(scene)
     }
 
-    /// How many objects there are.
+    /// Number of objects.
     pub fn objects(self, extent: &Extent) -> usize {
-        (extent.boxes + 1) * if self.twice { 2 } else { 1 }
+        (extent.boxes + 1) * if self.has_copies { 2 } else { 1 }
     }
 }
 
@@ -97,7 +96,7 @@ fn small_light(index: usize, random: &mut Random) -> Light {
     }
 }
 
-/// One of several on a ring above the field, each of which lights the middle of it and more.
+/// One of several lights on a ring above the field, each of which lights its centre and more.
 fn high_light(index: usize, of: usize) -> Light {
     let (sine, cosine) = (TAU * index as f64 / of as f64).sin_cos();
     Light::Spot {

@@ -1,5 +1,4 @@
-//! Two pipelines of the bench's own, without a geometry buffer: they draw the same picture as the deferred one, lights
-//! without shadows and opaque objects alone.
+//! Two forward pipelines. They draw the same picture as the deferred one, for lights without shadows and opaque objects.
 
 use std::borrow::Cow;
 
@@ -8,15 +7,15 @@ use drawloom::backend::WgpuBackend;
 use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess, ToneMapping};
 
-/// Draws everything once without lights, and then once more for each light: N × L (L 2). What it draws for lights are objects
-/// that are added to what is there, each in the place of an opaque one.
-pub fn a_pass_a_light(builder: RendererBuilder<WgpuBackend>, lights: usize) -> RendererBuilder<WgpuBackend> {
+/// Draws all objects once without lights, and then once more for each light: N × L (L 2). For the lights it draws additive copies of
+/// the opaque objects.
+pub fn pass_per_light(builder: RendererBuilder<WgpuBackend>, lights: usize) -> RendererBuilder<WgpuBackend> {
     let first = builder.process(WithoutLights).process(ToneMapping::default()).output("picture");
     (0..lights).fold(first, |builder, light| builder.process(OneLight::new(light)))
 }
 
-/// Draws everything once; each pixel of each object asks all lights that reach the view.
-pub fn a_loop_over_lights(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
+/// Draws all objects once; the fragment shader loops over all lights that reach the view.
+pub fn loop_over_lights(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
     builder.process(AllLights).process(ToneMapping::default()).output("picture")
 }
 
@@ -41,7 +40,7 @@ const NAME_WITHOUT_LIGHTS: &str = "without lights";
 
 struct OneLight {
     name: String,
-    /// Its index among those that reach the view.
+    /// Its index among the lights that reach the view.
     light: u32,
     after: String,
 }

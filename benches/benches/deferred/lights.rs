@@ -1,4 +1,4 @@
-//! By the number of lights: N + L, and N × L.
+//! Cost by the number of lights: N + L against N × L.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -11,84 +11,86 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::block::{Block, Setting};
 use crate::field::Field;
-use crate::forward::{a_loop_over_lights, a_pass_a_light};
+use crate::forward::{loop_over_lights, pass_per_light};
 use crate::report::milliseconds;
-use crate::turns::{Setting, Turns};
 
-/// A line of the table.
+/// A row of the table.
 #[derive(Serialize)]
-pub struct Line {
+pub struct Row {
     backend: BackendName,
     pipeline: Pipeline,
     lights: usize,
     processes: usize,
     draws: usize,
-    /// Objects drawn, over all processes.
+    /// Objects drawn by all processes.
     commands: usize,
     processor_ms: f64,
     device_ms: Option<f64>,
-    /// Of the processor, for each light more than in the line above.
-    ns_a_light: Option<f64>,
+    /// CPU time for each light more than in the row above.
+    #[serde(rename = "ns_a_light")]
+    ns_per_light: Option<f64>,
 }
 
-/// How lights are drawn.
+/// A way to draw lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Pipeline {
-    /// Drawloom's.
+    /// Drawloom's pipeline.
     Deferred,
-    /// See [`a_pass_a_light`].
-    PassALight,
-    /// See [`a_loop_over_lights`].
+    /// See [`pass_per_light`].
+    #[serde(rename = "pass-a-light")]
+    PassPerLight,
+    /// See [`loop_over_lights`].
     LoopOverLights,
 }
 
 impl Pipeline {
-    const ALL: [Self; 3] = [Self::Deferred, Self::PassALight, Self::LoopOverLights];
+    const ALL: [Self; 3] = [Self::Deferred, Self::PassPerLight, Self::LoopOverLights];
 
     fn name(self) -> &'static str {
         match self {
             Self::Deferred => "deferred",
-            Self::PassALight => "a pass a light",
+            Self::PassPerLight => "a pass a light",
             Self::LoopOverLights => "a loop a pixel",
         }
     }
 }
 
-/// One worker, so that it is the sum of the work that is compared.
+/// One worker, so that the times compare the sum of the work.
 const WORKERS: usize = 1;
 
 /// # Errors
-/// If a frame cannot be drawn, not all that there is is seen, or pipelines draw different pictures.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Line>, Box<dyn Error>> {
-    let most_passes = backend.of(extent.most_passes);
-    let mut turns = Turns::new(backend, progress);
+/// Returns an error if a frame cannot be drawn, an object or light is not visible, or pipelines draw different pictures.
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
+    let max_passes = backend.of(extent.max_passes);
+    let mut block = Block::new(backend, progress);
     let mut drawn = Vec::new();
     for &lights in extent.lights {
         for pipeline in Pipeline::ALL {
-            if pipeline == Pipeline::PassALight && lights > most_passes {
+            if pipeline == Pipeline::PassPerLight && lights > max_passes {
                 continue;
             }
-            let field = Field { lights, twice: pipeline == Pipeline::PassALight, ..Field::default() };
+            let field = Field { lights, has_copies: pipeline == Pipeline::PassPerLight, ..Field::default() };
             let scene = Rc::new(field.scene(extent)?);
-            turns.add(scene, WORKERS, |builder| match pipeline {
+            block.add(scene, WORKERS, |builder| match pipeline {
                 Pipeline::Deferred => builder.deferred(Deferred::to_picture()),
-                Pipeline::PassALight => a_pass_a_light(builder, lights),
-                Pipeline::LoopOverLights => a_loop_over_lights(builder),
+                Pipeline::PassPerLight => pass_per_light(builder, lights),
+                Pipeline::LoopOverLights => loop_over_lights(builder),
             })?;
             drawn.push((pipeline, field));
         }
     }
-    let settings = turns.take(extent, "lights")?;
+    let settings = block.measure(extent, "lights")?;
 
-    let mut lines: Vec<Line> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for pipeline in Pipeline::ALL {
         for (setting, (_, field)) in settings.iter().zip(&drawn).filter(|(_, (own, _))| *own == pipeline) {
-            check_sight(setting, *field, extent)?;
-            let processor_ms = milliseconds(setting.processor());
-            let above = lines.last().filter(|line| line.pipeline == pipeline);
-            lines.push(Line {
+            check_visible(setting, *field, extent)?;
+            let processor_ms = milliseconds(setting.cpu());
+            let above = rows.last().filter(|row| row.pipeline == pipeline);
+            rows.push(Row {
                 backend,
                 pipeline,
                 lights: field.lights,
@@ -97,7 +99,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
                 commands: setting.commands(),
                 processor_ms,
                 device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
-                ns_a_light: above
+                ns_per_light: above
                     .map(|above| (processor_ms - above.processor_ms) * 1e6 / (field.lights - above.lights) as f64),
             });
         }
@@ -108,11 +110,11 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             check_pictures(lights, of_these.map(|(setting, (pipeline, _))| (*pipeline, setting)))?;
         }
     }
-    Ok(lines)
+    Ok(rows)
 }
 
-/// All there is must be seen, or lines would not be of as many lights as they say.
-fn check_sight(setting: &Setting, field: Field, extent: &Extent) -> Result<(), Box<dyn Error>> {
+/// All objects and lights must be visible, or a row would measure fewer lights than it says.
+fn check_visible(setting: &Setting, field: Field, extent: &Extent) -> Result<(), Box<dyn Error>> {
     let view = &setting.statistics().views[0];
     let (seen, there) = ([view.visible, view.lights], [field.objects(extent), field.lights]);
     if seen != there {
@@ -121,7 +123,7 @@ fn check_sight(setting: &Setting, field: Field, extent: &Extent) -> Result<(), B
     Ok(())
 }
 
-/// Who draws something else has other work to do, and proves nothing.
+/// All pipelines must draw the same picture, or their work is not comparable.
 fn check_pictures<'a>(
     lights: usize,
     settings: impl Iterator<Item = (Pipeline, &'a Setting)>,
@@ -133,8 +135,8 @@ fn check_pictures<'a>(
             first = Some(picture);
             continue;
         };
-        let share = share_apart(first, &picture);
-        if share > MOST_APART {
+        let share = share_that_differs(first, &picture);
+        if share > MAX_DIFFERENT {
             let name = pipeline.name();
             return Err(
                 format!("{lights} lights: {share:.4} of what {name:?} draws is not the deferred picture").into()
@@ -144,23 +146,23 @@ fn check_pictures<'a>(
     Ok(())
 }
 
-/// The share of bytes that are further apart than rounding puts them: the geometry buffer keeps a byte of each channel of the
-/// diffuse colour, and half floats are added up in another order.
-fn share_apart(one: &Picture, other: &Picture) -> f64 {
+/// The share of bytes that differ by more than rounding: the geometry buffer stores a byte per channel of the diffuse colour, and
+/// half floats are added in another order.
+fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
     const ROUNDING: u8 = 3;
     let apart = one.bytes.iter().zip(&other.bytes).filter(|(one, other)| one.abs_diff(**other) > ROUNDING);
     apart.count() as f64 / one.bytes.len() as f64
 }
 
-/// A few pixels on edges may go either way.
-const MOST_APART: f64 = 2e-4;
+/// A few pixels on edges may differ.
+const MAX_DIFFERENT: f64 = 2e-4;
 
-pub fn print(lines: &[Line]) {
+pub fn print(rows: &[Row]) {
     println!(
         "Lights over a field of boxes, 1 worker. Draws: batches of objects, and one for each process that draws lights."
     );
     println!(
-        "Objects: as often as they are drawn. ns a light: of CPU time, for each light more than in the line above.\n"
+        "Objects: as often as they are drawn. ns a light: of CPU time, for each light more than in the row above.\n"
     );
     let mut table = Table::new(&[
         "backend",
@@ -173,17 +175,17 @@ pub fn print(lines: &[Line]) {
         "device ms",
         "ns a light",
     ]);
-    for line in lines {
-        table.line([
-            line.backend.name().to_owned(),
-            line.pipeline.name().to_owned(),
-            line.lights.to_string(),
-            line.processes.to_string(),
-            line.draws.to_string(),
-            line.commands.to_string(),
-            format!("{:.3}", line.processor_ms),
-            line.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
-            line.ns_a_light.map_or_else(String::new, |share| format!("{share:.0}")),
+    for row in rows {
+        table.row([
+            row.backend.name().to_owned(),
+            row.pipeline.name().to_owned(),
+            row.lights.to_string(),
+            row.processes.to_string(),
+            row.draws.to_string(),
+            row.commands.to_string(),
+            format!("{:.3}", row.processor_ms),
+            row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
+            row.ns_per_light.map_or_else(String::new, |share| format!("{share:.0}")),
         ]);
     }
     table.print();

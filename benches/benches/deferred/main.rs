@@ -1,43 +1,42 @@
-//! What the deferred pipeline costs: by the number of lights, beside two pipelines that draw the same picture forward; by
-//! the number of shadow maps; and with a depth pre-pass and without.
+//! The cost of the deferred pipeline: by the number of lights, beside two forward pipelines that draw the same picture; by the
+//! number of shadow maps; and with and without a depth pre-pass.
 //!
 //!     cargo bench -p drawloom-benches --bench deferred
 //!     cargo bench -p drawloom-benches --bench deferred -- --quick
 //!
-//! All settings of a block take turns, a frame each and in an order drawn anew each round, so that whatever else the
-//! machine does meets them alike. What is shown is the median. A block is one table on one backend: wgpu's `noop`,
-//! which is the processor alone, or the machine's adapter. Where there is no adapter its blocks are left out. What was
-//! measured is written to `drawloom/deferred.json` in the target folder too.
+//! A block is one table on one backend: wgpu's `noop`, which measures the CPU alone, or the machine's adapter. The settings of a block
+//! are interleaved, one frame each per round. The tables show medians. Without an adapter its blocks are left out.
+//! `target/drawloom/deferred.json` has the same.
 
+mod block;
 mod field;
 mod forward;
 mod lights;
 mod pre_pass;
 mod report;
 mod shadows;
-mod turns;
 
 use std::error::Error;
 
 use clap::Parser;
 use drawloom_benches::backends;
 use drawloom_benches::backends::BackendName;
-use indicatif::{ProgressBar, ProgressStyle};
+use drawloom_benches::harness::progress_bar;
 
 use report::Report;
 
-/// Compares the deferred pipeline with others, and with itself.
+/// Measures the deferred pipeline.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds, to see where things stand.
+    /// Runs few rounds, for a first impression.
     #[arg(long)]
     quick: bool,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a trial of each setting.
+    /// Cargo passes it under `cargo bench`; without it, as under `cargo test --benches`, each setting is only tried.
     #[arg(long, hide = true)]
     bench: bool,
 }
 
-/// How much is measured.
+/// The size of the measurement.
 pub struct Extent {
     name: &'static str,
     /// On `noop`, where frames are short, and on the adapter.
@@ -46,8 +45,8 @@ pub struct Extent {
     picture: [u32; 2],
     boxes: usize,
     lights: &'static [usize],
-    /// With how many lights at most everything is drawn once for each; likewise.
-    most_passes: [usize; 2],
+    /// The most lights that the pipeline with a pass per light is measured with; on `noop` and on the adapter.
+    max_passes: [usize; 2],
     shadow_maps: &'static [usize],
 }
 
@@ -58,17 +57,17 @@ impl Extent {
         picture: [640, 360],
         boxes: 1_000,
         lights: &[0, 1, 3, 10, 30, 100, 300, 1_000],
-        most_passes: [300, 100],
+        max_passes: [300, 100],
         shadow_maps: &[0, 1, 2, 4, 8, 16],
     };
-    const QUICK: Self = Self { name: "quick", rounds: [15, 5], most_passes: [100, 30], ..Self::FULL };
+    const QUICK: Self = Self { name: "quick", rounds: [15, 5], max_passes: [100, 30], ..Self::FULL };
     const TRIAL: Self = Self {
         name: "trial",
         rounds: [1, 1],
         picture: [64, 36],
         boxes: 50,
         lights: &[0, 1, 4],
-        most_passes: [4, 4],
+        max_passes: [4, 4],
         shadow_maps: &[0, 2],
     };
 
@@ -86,11 +85,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let extent = Extent::new(&arguments);
     let adapter = backends::adapter_name();
     if adapter.is_none() {
-        eprintln!("no graphics adapter found: what a device takes is left out");
+        eprintln!("no graphics adapter found: device times are left out");
     }
 
-    let progress = ProgressBar::new(0);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left  {msg}")?);
+    let progress = progress_bar("frames");
     let mut report = Report::new(&extent, adapter);
     for &backend in BackendName::available() {
         report.lights.extend(lights::measure(&extent, backend, &progress)?);
@@ -99,7 +97,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
     if arguments.bench && !arguments.quick {
         report.write()?;
     }

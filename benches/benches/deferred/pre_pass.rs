@@ -1,4 +1,4 @@
-//! With a depth pre-pass, and without.
+//! Cost with and without a depth pre-pass.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -14,12 +14,12 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::block::{Block, Setting};
 use crate::report::milliseconds;
-use crate::turns::{Setting, Turns};
 
-/// A line of the table.
+/// A row of the table.
 #[derive(Serialize)]
-pub struct Line {
+pub struct Row {
     backend: BackendName,
     scene: &'static str,
     depth_pre_pass: bool,
@@ -29,8 +29,8 @@ pub struct Line {
 }
 
 /// # Errors
-/// If a frame cannot be drawn.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Line>, Box<dyn Error>> {
+/// Returns an error if a frame cannot be drawn.
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut colonnade = demo::colonnade()?;
     for camera in &mut colonnade.cameras {
         camera.size = extent.picture;
@@ -40,46 +40,46 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         ("30 walls, back to front", walls(extent, Order::BackToFront)?),
         ("colonnade", colonnade),
     ];
-    let mut turns = Turns::new(backend, progress);
+    let mut block = Block::new(backend, progress);
     let mut names = Vec::new();
     for (name, scene) in scenes {
         let scene = Rc::new(scene);
         for depth_pre_pass in [false, true] {
             let deferred = Deferred::to_picture().depth_pre_pass(depth_pre_pass);
-            turns.add(Rc::clone(&scene), WORKERS, |builder| builder.deferred(deferred))?;
+            block.add(Rc::clone(&scene), WORKERS, |builder| builder.deferred(deferred))?;
             names.push((name, depth_pre_pass));
         }
     }
-    let settings = turns.take(extent, "depth pre-pass")?;
-    let line = |(setting, (scene, depth_pre_pass)): (&Setting, (&'static str, bool))| Line {
+    let settings = block.measure(extent, "depth pre-pass")?;
+    let row = |(setting, (scene, depth_pre_pass)): (&Setting, (&'static str, bool))| Row {
         backend,
         scene,
         depth_pre_pass,
         draws: setting.draws(),
-        processor_ms: milliseconds(setting.processor()),
+        processor_ms: milliseconds(setting.cpu()),
         device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
     };
-    Ok(settings.iter().zip(names).map(line).collect())
+    Ok(settings.iter().zip(names).map(row).collect())
 }
 
-/// One worker, so that it is the sum of the work that is compared.
+/// One worker, so that the times compare the sum of the work.
 const WORKERS: usize = 1;
 
-/// In which order walls are drawn.
+/// The order in which walls are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     FrontToBack,
     BackToFront,
 }
 
-/// Thirty walls one behind the other, each of which fills the picture. Objects are sorted by material before they are sorted
-/// by depth, so materials say the order.
+/// Thirty walls one behind the other, each of which fills the picture. Objects are sorted by material first and by depth second, so
+/// the materials determine the order.
 fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     const WALLS: usize = 30;
     let mut scene = Scene::new();
     let wall = scene.add(new_box(String::from("wall"), Vec3::new(60.0, 40.0, 0.05))?)?;
-    for place in 0..WALLS {
-        let behind = if order == Order::FrontToBack { place } else { WALLS - 1 - place };
+    for index in 0..WALLS {
+        let behind = if order == Order::FrontToBack { index } else { WALLS - 1 - index };
         let diffuse = Vec3::new(0.2, 0.5, 0.9).lerp(Vec3::new(0.9, 0.5, 0.2), behind as f32 / WALLS as f32);
         let material = scene.add(Material { name: format!("wall {behind}"), diffuse, ..Material::default() })?;
         scene.add_object(RenderObject::new(wall, material, DVec3::NEG_Z * (5.0 + behind as f64)))?;
@@ -89,17 +89,17 @@ fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-pub fn print(lines: &[Line]) {
+pub fn print(rows: &[Row]) {
     println!("The depth pre-pass, 1 worker.\n");
     let mut table = Table::new(&["backend", "scene", "pre-pass", "draws", "CPU ms", "device ms"]);
-    for line in lines {
-        table.line([
-            line.backend.name().to_owned(),
-            line.scene.to_owned(),
-            if line.depth_pre_pass { "on" } else { "off" }.to_owned(),
-            line.draws.to_string(),
-            format!("{:.3}", line.processor_ms),
-            line.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
+    for row in rows {
+        table.row([
+            row.backend.name().to_owned(),
+            row.scene.to_owned(),
+            if row.depth_pre_pass { "on" } else { "off" }.to_owned(),
+            row.draws.to_string(),
+            format!("{:.3}", row.processor_ms),
+            row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
         ]);
     }
     table.print();

@@ -1,4 +1,4 @@
-//! What was measured, as tables and as JSON.
+//! The results, as tables and as JSON.
 
 use std::io;
 use std::time::Duration;
@@ -8,18 +8,18 @@ use serde::Serialize;
 
 use crate::{Extent, lights, pre_pass, shadows};
 
-/// What was measured.
+/// The results.
 #[derive(Serialize)]
 pub struct Report {
     extent: &'static str,
-    /// On `noop`, and on the adapter.
+    /// On `noop` and on the adapter.
     rounds: [usize; 2],
     picture: [u32; 2],
     boxes: usize,
     adapter: Option<String>,
-    pub lights: Vec<lights::Line>,
-    pub shadows: Vec<shadows::Line>,
-    pub depth_pre_pass: Vec<pre_pass::Line>,
+    pub lights: Vec<lights::Row>,
+    pub shadows: Vec<shadows::Row>,
+    pub depth_pre_pass: Vec<pre_pass::Row>,
 }
 
 impl Report {
@@ -55,7 +55,7 @@ impl Report {
     }
 
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self) -> io::Result<()> {
         results::write_json("deferred.json", self)
     }

@@ -1,4 +1,4 @@
-//! By the number of shadow maps, each of which is a view of its own.
+//! Cost by the number of shadow maps, each of which is a view.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -11,71 +11,71 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::Extent;
+use crate::block::Block;
 use crate::field::Field;
 use crate::report::milliseconds;
-use crate::turns::Turns;
 
-/// A line of the table.
+/// A row of the table.
 #[derive(Serialize)]
-pub struct Line {
+pub struct Row {
     backend: BackendName,
     shadow_maps: usize,
     workers: usize,
     views: usize,
-    /// Objects drawn, over all views.
+    /// Objects drawn in all views.
     commands: usize,
     processor_ms: f64,
     device_ms: Option<f64>,
-    /// Of the processor's part, against one worker.
+    /// Of the CPU time, against one worker.
     speed_up: f64,
 }
 
 /// # Errors
-/// If a frame cannot be drawn.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Line>, Box<dyn Error>> {
+/// Returns an error if a frame cannot be drawn.
+pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
     let workers = [1, thread::available_parallelism()?.get().max(2)];
-    let mut turns = Turns::new(backend, progress);
+    let mut block = Block::new(backend, progress);
     for &shadow_maps in extent.shadow_maps {
         let scene = Rc::new(Field { shadow_maps, ..Field::default() }.scene(extent)?);
         for workers in workers {
-            turns.add(Rc::clone(&scene), workers, |builder| builder.deferred(Deferred::to_picture()))?;
+            block.add(Rc::clone(&scene), workers, |builder| builder.deferred(Deferred::to_picture()))?;
         }
     }
-    let settings = turns.take(extent, "shadows")?;
-    let mut lines = Vec::new();
+    let settings = block.measure(extent, "shadows")?;
+    let mut rows = Vec::new();
     for (settings, &shadow_maps) in settings.chunks(workers.len()).zip(extent.shadow_maps) {
         for (setting, workers) in settings.iter().zip(workers) {
-            lines.push(Line {
+            rows.push(Row {
                 backend,
                 shadow_maps,
                 workers,
                 views: setting.statistics().views.len(),
                 commands: setting.commands(),
-                processor_ms: milliseconds(setting.processor()),
+                processor_ms: milliseconds(setting.cpu()),
                 device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
-                speed_up: settings[0].processor().as_secs_f64() / setting.processor().as_secs_f64(),
+                speed_up: settings[0].cpu().as_secs_f64() / setting.cpu().as_secs_f64(),
             });
         }
     }
-    Ok(lines)
+    Ok(rows)
 }
 
-pub fn print(lines: &[Line]) {
+pub fn print(rows: &[Row]) {
     println!(
         "Spot lights that cast shadows over the same field. Objects: as often as they are drawn, over all views.\n"
     );
     let mut table =
         Table::new(&["backend", "shadow maps", "workers", "views", "objects", "CPU ms", "device ms", "speed-up"]);
-    for line in lines {
-        table.line([
-            line.backend.name().to_owned(),
-            line.shadow_maps.to_string(),
-            line.workers.to_string(),
-            line.views.to_string(),
-            line.commands.to_string(),
-            format!("{:.3}", line.processor_ms),
-            line.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
-            format!("{:.2}x", line.speed_up),
+    for row in rows {
+        table.row([
+            row.backend.name().to_owned(),
+            row.shadow_maps.to_string(),
+            row.workers.to_string(),
+            row.views.to_string(),
+            row.commands.to_string(),
+            format!("{:.3}", row.processor_ms),
+            row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
+            format!("{:.2}x", row.speed_up),
         ]);
     }
     table.print();

@@ -1,14 +1,13 @@
-//! What delta commands save and cost, beside the fixed form of commands.
+//! What delta commands save and cost, compared with the fixed form of commands.
 //!
 //!     cargo bench -p drawloom-benches --bench delta
 //!     cargo bench -p drawloom-benches --bench delta -- --quick
 //!
-//! All contenders take turns on the same sorted commands, so that whatever else the machine does meets them alike; what is
-//! shown is the median. They keep their memory from turn to turn, as they would from frame to frame. A copy of the fixed form is
-//! what storing a frame's commands costs otherwise, and comparing it with the last frame's is how to find out that
-//! nothing changed.
+//! Each round runs all operations in the order of their data flow, on the same sorted commands; the table shows medians. They keep their
+//! memory from round to round, as they would from frame to frame. Copying the fixed form is the alternative to storing deltas;
+//! comparing it with the last frame's detects that nothing changed.
 //!
-//! Written to `drawloom/delta.json` in the target folder too.
+//! `target/drawloom/delta.json` has the same.
 
 mod report;
 
@@ -23,20 +22,21 @@ use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
 use drawloom::demo;
 use drawloom::quality::Quality;
 use drawloom::scene::obj;
-use drawloom_benches::quick::Quick;
-use drawloom_benches::stopwatch::median;
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::progress_bar;
+use drawloom_benches::statistics::median_duration;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::random::Random;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use report::{Report, Row};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let quick = Quick::parse().is_quick();
+    let quick = ExtentArguments::parse().is_quick();
     let rounds = if quick { 15 } else { 1_001 };
     let cases = cases()?;
-    let progress = ProgressBar::new((cases.len() * rounds) as u64);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} rounds, {eta} left  {msg}")?);
+    let progress = progress_bar("rounds");
+    progress.set_length((cases.len() * rounds) as u64);
     let mut report = Report::new(rounds, quick);
     for case in &cases {
         progress.set_message(case.scene);
@@ -44,14 +44,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
     if !quick {
         report.write()?;
     }
     Ok(())
 }
 
-/// The sorted commands of a frame: a list for each process in each view.
+/// The sorted commands of a frame: one list per process and view.
 struct Case {
     scene: &'static str,
     lists: Vec<Vec<RenderCommand>>,
@@ -69,12 +68,12 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
         scene.duplicate_objects(20);
         cases.push(Case { scene: "sponza x 20", lists: draw_lists(&scene)? });
     } else {
-        eprintln!("sponza is left out: there is no {}", sponza.display());
+        eprintln!("sponza is left out: {} does not exist", sponza.display());
     }
     Ok(cases)
 }
 
-/// Objects of 64 meshes and 16 materials anywhere in a view, one in ten blended.
+/// Objects of 64 meshes and 16 materials at random depths, one in ten blended.
 fn scattered(objects: u32) -> Vec<RenderCommand> {
     let mut random = Random::new();
     let Quality { opaque_order, blended_order, .. } = Quality::balanced();
@@ -92,22 +91,22 @@ fn scattered(objects: u32) -> Vec<RenderCommand> {
     commands
 }
 
-/// Lets everything that can be done with a frame's commands take turns.
+/// Times all operations on a frame's commands.
 fn measure(case: &Case, rounds: usize, progress: &ProgressBar) -> Row {
     let Case { scene, lists } = case;
     let commands: usize = lists.iter().map(Vec::len).sum();
-    // A small frame is too short for the clock.
+    // One small frame is too short to be timed.
     let frames = (10_000 / commands).max(1);
     let mut coded: Vec<_> = lists.iter().map(|_| DeltaCommands::new()).collect();
     let (mut copies, mut decoded) = (lists.clone(), lists.clone());
     let mut times: [Vec<Duration>; 5] = Default::default();
     for _ in 0..rounds {
-        let mut turn = 0;
-        let mut time = |mut act: Box<dyn FnMut() + '_>| {
+        let mut operation = 0;
+        let mut time = |mut run: Box<dyn FnMut() + '_>| {
             let start = Instant::now();
-            (0..frames).for_each(|_| act());
-            times[turn].push(start.elapsed());
-            turn += 1;
+            (0..frames).for_each(|_| run());
+            times[operation].push(start.elapsed());
+            operation += 1;
         };
         time(Box::new(|| {
             for (coded, list) in coded.iter_mut().zip(lists) {
@@ -118,7 +117,7 @@ fn measure(case: &Case, rounds: usize, progress: &ProgressBar) -> Row {
         time(Box::new(|| {
             for coded in &mut coded {
                 let received = DeltaCommands::from_bytes(mem::take(coded).into_bytes());
-                *coded = received.expect("nothing has happened to them");
+                *coded = received.expect("the bytes are those that were encoded");
             }
         }));
         time(Box::new(|| {
@@ -136,10 +135,10 @@ fn measure(case: &Case, rounds: usize, progress: &ProgressBar) -> Row {
         time(Box::new(|| {
             assert!(black_box(lists) == black_box(&copies));
         }));
-        assert!(decoded == *lists, "commands come back as they were");
+        assert!(decoded == *lists, "decoding must return the encoded commands");
         progress.inc(1);
     }
-    let nanoseconds = |times: Vec<Duration>| median(times).as_secs_f64() * 1e9 / (frames * commands) as f64;
+    let nanoseconds = |times: Vec<Duration>| median_duration(times).as_secs_f64() * 1e9 / (frames * commands) as f64;
     let [encode, check, decode, copy, compare] = times.map(nanoseconds);
     let bytes: usize = coded.iter().map(|coded| coded.bytes().len()).sum();
     Row { scene, commands, bytes: bytes as f64 / commands as f64, encode, check, decode, copy, compare }

@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The results, as a table and as JSON.
 
 use std::io;
 
@@ -7,29 +7,29 @@ use drawloom_benches::results;
 use drawloom_benches::table::Table;
 use serde::Serialize;
 
-/// A scene's commands, in nanoseconds a command.
+/// A scene, with times in nanoseconds per command.
 #[derive(Serialize)]
 pub struct Row {
     pub scene: &'static str,
-    /// How many, over all processes and views.
+    /// Number of commands of all processes and views.
     pub commands: usize,
-    /// Bytes a delta command takes on average.
+    /// Mean bytes per delta command.
     pub bytes: f64,
-    /// Coding them.
+    /// Encodes them.
     pub encode: f64,
-    /// Checking bytes from elsewhere.
+    /// Validates bytes from another source.
     pub check: f64,
-    /// Turning them back into the fixed form.
+    /// Decodes them to the fixed form.
     pub decode: f64,
-    /// Copying the fixed form.
+    /// Copies the fixed form.
     pub copy: f64,
-    /// Comparing the fixed form with an equal one.
+    /// Compares the fixed form with an equal one.
     pub compare: f64,
 }
 
 impl Row {
-    /// Bytes a nanosecond, which are gigabytes a second, at which what delta commands save takes as long as they cost: coded,
-    /// checked and decoded, against a copy at either end.
+    /// The bandwidth in GB/s at which transferring the saved bytes takes as long as delta commands cost: encoding, validating and
+    /// decoding, against a copy at either end.
     fn break_even(&self) -> f64 {
         let saved = size_of::<RenderCommand>() as f64 - self.bytes;
         saved / (self.encode + self.check + self.decode - 2.0 * self.copy)
@@ -64,13 +64,13 @@ impl Report {
             let figures = [row.bytes, row.encode, row.check, row.decode, row.copy, row.compare, row.break_even()];
             let [bytes, encode, check, decode, copy, compare, even] = figures.map(|figure| format!("{figure:.2}"));
             let scene = row.scene.to_owned();
-            table.line([scene, row.commands.to_string(), bytes, encode, check, decode, copy, compare, even]);
+            table.row([scene, row.commands.to_string(), bytes, encode, check, decode, copy, compare, even]);
         }
         table.print();
     }
 
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self) -> io::Result<()> {
         results::write_json("delta.json", &self.rows)
     }

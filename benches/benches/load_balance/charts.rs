@@ -12,7 +12,7 @@ use crate::report::Row;
 use crate::scenes;
 
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     let mut panels = Vec::new();
     for &backend in BackendName::ALL {
@@ -64,7 +64,7 @@ fn predicted(rows: &[&Row], backend: BackendName, workers: usize) -> Lines {
     };
     Lines {
         title: format!("The same for adaptive by number of workers, {}; more than {workers} predicted", backend.name()),
-        across: "workers".to_owned(),
+        x_label: "workers".to_owned(),
         series: names(rows).map(line).collect(),
         first_color: 1,
         ticks: [1, 2].into_iter().chain(PREDICTED).map(|workers| workers as f64).collect(),

@@ -1,13 +1,13 @@
-//! The ways to cut a frame.
+//! The granularity modes.
 
 use drawloom::Granularity;
 
-/// A way to cut a frame.
+/// How finely a frame is cut, and on how many workers it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub name: &'static str,
     pub granularity: Granularity,
-    /// Whether it is one thread's.
+    /// Whether it runs on one thread.
     pub is_serial: bool,
 }
 
@@ -30,7 +30,7 @@ impl Mode {
         Self { name, granularity, is_serial: false }
     }
 
-    /// Whether it is the same whatever the scene. One thread is too.
+    /// Whether the granularity is the same for all scenes. The serial mode counts.
     pub fn is_fixed(index: usize) -> bool {
         index != Self::ADAPTIVE
     }

@@ -1,4 +1,4 @@
-//! What a frame would take with other numbers of workers.
+//! Predicted frame times with other numbers of workers.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -7,13 +7,14 @@ use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::report::{Prices, Replay};
 use drawloom::scene::SceneRef;
 use drawloom::{Renderer, Submitter};
-use drawloom_benches::stopwatch::{middle, timed_frame};
+use drawloom_benches::statistics::median;
+use drawloom_benches::stopwatch::timed_frame;
 
 /// More workers than most machines have.
 pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 
-/// Seconds a frame, by number of workers: of each frame that was replayed. Beside it, what the frame before it took, with
-/// everything as near in memory: what the replay for as many workers as there are is to be compared with.
+/// Predicted seconds of each replayed frame, by number of workers. `measured` has the time of the frame before each, with equally
+/// warm caches: the prediction for the actual number of workers is compared with it.
 #[derive(Clone)]
 pub struct Prediction {
     prices: Prices,
@@ -22,7 +23,7 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// For so many workers, for one, and for more.
+    /// Predicts for `workers` workers, for one, and for [`PREDICTED`].
     pub fn new(prices: Prices, workers: usize) -> Self {
         let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
         counts.sort_unstable();
@@ -33,7 +34,7 @@ impl Prediction {
     /// Draws two frames, and replays the second.
     ///
     /// # Errors
-    /// If it cannot be drawn.
+    /// Returns an error if a frame cannot be drawn or replayed.
     pub fn replay(
         &mut self,
         renderer: &mut Renderer<WgpuBackend>,
@@ -41,7 +42,7 @@ impl Prediction {
         scene: SceneRef<'_>,
     ) -> Result<(), Box<dyn Error>> {
         let (_, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
-        self.measured.push(time.processor.as_secs_f64());
+        self.measured.push(time.cpu.as_secs_f64());
         let timeline = Arc::clone(renderer.scheduler().timeline());
         timeline.start();
         let recorded = renderer.record(scene)?;
@@ -56,14 +57,14 @@ impl Prediction {
         Ok(())
     }
 
-    /// The median of the frames beside those that were replayed.
+    /// The median time of the frames before the replayed ones.
     pub fn measured(&self) -> f64 {
-        middle(self.measured.iter().copied())
+        median(self.measured.iter().copied())
     }
 
-    /// The median; `None` where it was not asked for.
+    /// The median prediction; `None` if there is none for this number of workers.
     pub fn of(&self, workers: usize) -> Option<f64> {
         let found = self.times.iter().find(|(count, _)| *count == workers);
-        found.map(|(_, times)| middle(times.iter().copied()))
+        found.map(|(_, times)| median(times.iter().copied()))
     }
 }

@@ -1,16 +1,16 @@
-//! What was measured, as tables, as JSON and as a picture.
+//! The results, as tables, JSON and a chart.
 
 use std::error::Error;
 
 use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::results;
-use drawloom_benches::stopwatch::middle;
+use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
 use serde::Serialize;
 
+use crate::block::{Block, Measured, Times};
 use crate::mode::Mode;
 use crate::prediction::{PREDICTED, Prediction};
-use crate::turns::{Block, Measured, Times};
 use crate::{Extent, charts};
 
 /// A mode on a scene, measured or predicted.
@@ -26,7 +26,7 @@ pub struct Row {
     pub predicted: bool,
 }
 
-/// What was measured.
+/// The results.
 pub struct Report {
     extent: &'static str,
     rounds: [usize; 2],
@@ -36,7 +36,7 @@ pub struct Report {
     against_per_camera: Vec<(BackendName, usize, f64)>,
 }
 
-/// What was predicted, against what was measured.
+/// A predicted time and the measured one.
 struct ReplayError {
     scene: &'static str,
     backend: BackendName,
@@ -60,23 +60,23 @@ impl Report {
 
     pub fn add(&mut self, block: &Block<'_>, measured: Measured) {
         let Measured { times, predictions } = measured;
-        let calibrated = |index: &usize| middle(times[*index].calibration.iter().copied());
+        let calibrated = |index: &usize| median(times[*index].calibration.iter().copied());
         let fixed = (0..Mode::ALL.len()).filter(|&index| Mode::is_fixed(index));
         let best = fixed.min_by(|one, other| calibrated(one).total_cmp(&calibrated(other))).unwrap_or(Mode::SERIAL);
-        let against = |base: usize, mode: usize| middle(ratios(&times[base], &times[mode]));
+        let against = |base: usize, mode: usize| median(ratios(&times[base], &times[mode]));
         let row = |mode: usize, workers| Row {
             scene: block.case.name,
             backend: block.backend,
             workers,
             mode: Mode::ALL[mode].name,
-            ns_per_object_view: middle(times[mode].measured.iter().copied()) * 1e9 / block.case.object_views() as f64,
+            ns_per_object_view: median(times[mode].measured.iter().copied()) * 1e9 / block.case.object_views() as f64,
             speedup_vs_serial: against(Mode::SERIAL, mode),
             ratio_to_best_mode: against(best, mode),
             predicted: false,
         };
         for (index, mode) in Mode::ALL.iter().enumerate() {
             let workers = if mode.is_serial { 1 } else { block.workers };
-            // One thread is measured again beside each number of workers; the first time is as good as the others.
+            // The serial mode is measured again for each number of workers; only the first is reported.
             let is_there = |row: &Row| {
                 !row.predicted
                     && (row.scene, row.backend, row.workers, row.mode)
@@ -144,14 +144,14 @@ impl Report {
         self.print_measured();
         self.print_predicted();
         self.print_errors();
-        self.print_marks();
+        self.print_targets();
     }
 
     fn print_measured(&self) {
         let mut table =
             Table::new(&["scene", "backend", "workers", "mode", "ns", "speed-up on serial", "of the best mode"]);
         for row in self.rows.iter().filter(|row| !row.predicted) {
-            table.line([
+            table.row([
                 row.scene.to_owned(),
                 row.backend.name().to_owned(),
                 row.workers.to_string(),
@@ -182,7 +182,7 @@ impl Report {
             };
             let [four, eight, sixteen, thirty_two, sixty_four] = PREDICTED.map(cell);
             let (scene, backend) = (row.scene.to_owned(), row.backend.name().to_owned());
-            table.line([scene, backend, four, eight, sixteen, thirty_two, sixty_four]);
+            table.row([scene, backend, four, eight, sixteen, thirty_two, sixty_four]);
         }
         table.print();
     }
@@ -191,7 +191,7 @@ impl Report {
         println!("The replay, for the workers that there are\n");
         let mut table = Table::new(&["scene", "backend", "workers", "mode", "predicted ms", "measured ms", "error %"]);
         for error in &self.errors {
-            table.line([
+            table.row([
                 error.scene.to_owned(),
                 error.backend.name().to_owned(),
                 error.workers.to_string(),
@@ -204,41 +204,43 @@ impl Report {
         table.print();
     }
 
-    /// What is to hold on `noop` with two workers, and what does.
-    fn print_marks(&self) {
+    /// Prints the targets on `noop` with two workers, and what was reached.
+    fn print_targets(&self) {
         println!("On noop, two workers: what is to be reached, and what was\n");
-        let mut table = Table::new(&["what", "scene", "at least", "reached"]);
-        let mut mark = |what: &str, scene: &str, least: f64, reached: f64| {
-            let verdict = if reached >= least { "" } else { ", short" };
-            table.line([what.to_owned(), scene.to_owned(), format!("{least:.2}"), format!("{reached:.3}{verdict}")]);
+        let mut table = Table::new(&["what", "scene", "at target", "reached"]);
+        let mut target_row = |what: &str, scene: &str, target: f64, reached: f64| {
+            let verdict = if reached >= target { "" } else { ", short" };
+            table.row([what.to_owned(), scene.to_owned(), format!("{target:.2}"), format!("{reached:.3}{verdict}")]);
         };
-        let judged = |row: &&Row| {
+        let is_judged = |row: &&Row| {
             row.backend == BackendName::Noop && row.workers == 2 && row.mode == "adaptive" && !row.predicted
         };
-        for row in self.rows.iter().filter(judged) {
-            let least = if ["small", "interrupted"].contains(&row.scene) { 0.90 } else { 0.97 };
-            mark("adaptive, of the best fixed mode", row.scene, least, row.ratio_to_best_mode);
-            mark("adaptive, of serial", row.scene, 0.97, row.speedup_vs_serial);
+        for row in self.rows.iter().filter(is_judged) {
+            let target = if ["small", "interrupted"].contains(&row.scene) { 0.90 } else { 0.97 };
+            target_row("adaptive, of the best fixed mode", row.scene, target, row.ratio_to_best_mode);
+            target_row("adaptive, of serial", row.scene, 0.97, row.speedup_vs_serial);
         }
-        for &(_, _, ratio) in self.against_per_camera.iter().filter(|mark| (mark.0, mark.1) == (BackendName::Noop, 2)) {
-            mark("adaptive, of per-camera", "uneven", 1.5, ratio);
+        for &(_, _, ratio) in
+            self.against_per_camera.iter().filter(|block| (block.0, block.1) == (BackendName::Noop, 2))
+        {
+            target_row("adaptive, of per-camera", "uneven", 1.5, ratio);
         }
-        let judged = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
-        let worst = self.errors.iter().filter(judged).map(|error| (error.predicted / error.measured - 1.0).abs());
+        let is_judged = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
+        let worst = self.errors.iter().filter(is_judged).map(|error| (error.predicted / error.measured - 1.0).abs());
         let worst = worst.fold(0.0, f64::max);
-        mark("the replay's worst, 1 − error", "all but interrupted", 0.95, 1.0 - worst);
+        target_row("the replay's worst, 1 − error", "all but interrupted", 0.95, 1.0 - worst);
         table.print();
     }
 
     /// # Errors
-    /// If a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         results::write_json("load_balance.json", &self.rows)?;
         charts::draw(&results::file("load_balance.svg")?, &self.rows)
     }
 }
 
-/// By round, how many times as long one takes as another.
+/// The ratio of two modes' times in each round.
 fn ratios<'a>(one: &'a Times, other: &'a Times) -> impl Iterator<Item = f64> + 'a {
     one.measured.iter().zip(&other.measured).map(|(one, other)| one / other)
 }

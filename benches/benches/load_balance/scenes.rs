@@ -6,37 +6,37 @@ use drawloom_benches::clouds::{around_one, back_to_back};
 /// In the order they are shown.
 pub const NAMES: [&str; 6] = ["even", "uneven", "single", "many", "small", "interrupted"];
 
-/// A scene, and what is to be seen in it.
+/// A scene, and what its cameras see.
 pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
-    /// How many objects each camera is to see.
-    pub seen: Vec<usize>,
-    /// Whether a foreign thread takes a core half of the time (the system's own events of M 10.5).
+    /// How many objects each camera must see.
+    pub visible: Vec<usize>,
+    /// Whether another thread occupies a core half of the time (the system events of M 10.5).
     pub is_interrupted: bool,
 }
 
 impl Case {
-    /// Summed over views.
+    /// Visible objects, summed over all views.
     pub fn object_views(&self) -> usize {
-        self.seen.iter().sum()
+        self.visible.iter().sum()
     }
 }
 
-/// All of them, with this share of their objects.
+/// All scenes, with their objects divided by `divisor`.
 ///
 /// # Errors
-/// If a scene cannot be.
-pub fn all(share: usize) -> Result<Vec<Case>, SceneError> {
-    let of = |objects: usize| (objects / share).max(1);
+/// Returns an error if a scene rejects a mesh, a material or an object.
+pub fn all(divisor: usize) -> Result<Vec<Case>, SceneError> {
+    let of = |objects: usize| (objects / divisor).max(1);
     let uneven = [20_000, 500, 1_000, 1_500].map(of);
     let round = |name, cameras, objects| {
         let scene = around_one(cameras, objects)?;
-        Ok::<_, SceneError>(Case { name, scene, seen: vec![objects; cameras], is_interrupted: false })
+        Ok::<_, SceneError>(Case { name, scene, visible: vec![objects; cameras], is_interrupted: false })
     };
     let turned = |name, is_interrupted| {
         let scene = back_to_back(uneven)?;
-        Ok::<_, SceneError>(Case { name, scene, seen: uneven.to_vec(), is_interrupted })
+        Ok::<_, SceneError>(Case { name, scene, visible: uneven.to_vec(), is_interrupted })
     };
     let [even, uneven, single, many, small, interrupted] = NAMES;
     Ok(vec![

@@ -1,16 +1,15 @@
-//! How much there is to be gained at most.
+//! The greatest possible speed-up.
 
-/// By Amdahl's law, with what it costs to have company at all. A frame of `frame` seconds on one thread has a part of
-/// `serial` seconds that no second worker can take: what `record` does before and after its jobs, and `submit`. The other
-/// worker has slept, and begins `wake` seconds after the jobs do, so that the two share what is left when it comes:
+/// Amdahl's law with a wake-up cost. A frame of `frame` seconds on one thread has a serial part of `serial` seconds: `record` before
+/// and after its jobs, and `submit`. The second worker sleeps, and begins `wake` seconds after the jobs begin. The two then share
+/// the rest:
 ///
 /// ```text
 /// ceiling = frame / (serial + (frame − serial + wake) / 2)
 /// ```
 ///
-/// Where the jobs are over before anybody could come it is 1. `frame` and `serial` are measured in the scenario *single*,
-/// `wake` by the scheduler of *multi*. Multi may do the same by a cheaper way, of which this knows nothing; so with instancing it
-/// may well be passed.
+/// It is 1 if the jobs end before the second worker begins. `frame` and `serial` are measured in the scenario *single*, `wake` by
+/// the scheduler of *multi*. A measured ratio may exceed the ceiling where *multi* records more cheaply, as with instancing.
 pub fn ceiling(frame: f64, serial: f64, wake: f64) -> f64 {
     let shared = frame - serial;
     if shared <= wake { 1.0 } else { frame / (serial + (shared + wake) / 2.0) }

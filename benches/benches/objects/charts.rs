@@ -1,4 +1,4 @@
-//! The picture: what two workers gain, and how many frames a second there are.
+//! The chart: the speed-up of two workers, and frames per second.
 
 use std::error::Error;
 use std::path::Path;
@@ -9,7 +9,7 @@ use drawloom_benches::chart::{self, Bars, Lines, Panel};
 use crate::scenario::Row;
 
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     let mut panels = Vec::new();
     for &backend in BackendName::ALL {
@@ -23,14 +23,14 @@ pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     chart::draw(path, &panels)
 }
 
-/// Those with instancing would leave no room for the others.
+/// Without instancing: the ratios with it are far greater.
 fn ratios(backend: BackendName, off: &[&Row]) -> Bars {
     Bars {
         title: format!("Multi against single by objects, instancing off, {}", backend.name()),
         series: vec!["L 6, on two cores of 2009".to_owned(), "2 workers".to_owned()],
         groups: off
             .iter()
-            .map(|row| (chart::grouped(row.objects as f64), vec![of_paper(row.objects), row.ratio]))
+            .map(|row| (chart::grouped(row.objects as f64), vec![paper_ratio(row.objects), row.ratio]))
             .collect(),
         marks: off.iter().map(|row| row.ceiling).collect(),
         mark_name: "ceiling".to_owned(),
@@ -38,8 +38,8 @@ fn ratios(backend: BackendName, off: &[&Row]) -> Bars {
     }
 }
 
-/// What L measured; with fewer objects, it says, two cores were slightly worse than one.
-fn of_paper(objects: usize) -> f64 {
+/// The ratio that L reports. For fewer objects L says that two cores were slightly worse than one.
+fn paper_ratio(objects: usize) -> f64 {
     match objects {
         1_006 => 119.0 / 71.0,
         2_006 => 1.71,
@@ -53,7 +53,7 @@ fn frames(backend: BackendName, off: &[&Row], on: &[&Row]) -> Lines {
     };
     Lines {
         title: format!("Frames a second, {}, without what the device takes", backend.name()),
-        across: "objects".to_owned(),
+        x_label: "objects".to_owned(),
         series: vec![
             line("single", off, |row| row.single_fps),
             line("multi", off, |row| row.multi_fps),

@@ -1,39 +1,38 @@
-//! What a second core gains, by the number of objects: the table of L 6 again, on this machine.
+//! The speed-up of a second core by the number of objects: the table of L 6, on this machine.
 //!
 //!     cargo bench -p drawloom-benches --bench objects
 //!     cargo bench -p drawloom-benches --bench objects -- --quick
 //!     cargo bench -p drawloom-benches --bench objects -- --backend noop
 //!
-//! L's scene holds 7 to 2,006 objects; those that are added stand where others stand already, so that the device has
-//! little to do with them. All of them move a little in every frame, and are drawn through the deferred pipeline with one
-//! hemispherical light that casts shadows, so each is drawn in two views.
+//! L's scene holds 7 to 2,006 objects; further objects stand where others stand already, so that they cost the device little.
+//! All of them move a little in every frame. The deferred pipeline draws them with one hemispherical light that casts shadows, so
+//! each is drawn in two views.
 //!
-//! - *single* is L's first scenario: the same processes on one thread, recorded straight into the passes, a draw an object.
-//! - *multi* is what this crate does on two workers, with instancing and without.
+//! - *single* is L's first scenario: the same processes on one thread, recorded directly into the passes, one draw per object.
+//! - *multi* is this crate on two workers, with instancing and without.
 //!
-//! They take turns, in an order drawn anew each round; a turn is as many frames as fill some milliseconds, each from
-//! hand-over to the return of submit. Frames a second are those of the median round, and a ratio is the median of the
-//! rounds' own. What the device takes is waited for, and not counted. The ceiling is explained in `objects/ceiling.rs`. The
-//! stall is how long the engine's world is held (L 3): until recording ends, of the whole frame.
+//! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
+//! the device's time. Frames per second are those of the median round, and a ratio is the median of the rounds' own ratios.
+//! `ceiling.rs` explains the ceiling. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
 //!
-//! Growth is what an object costs where there are many: two workers, no instancing.
+//! Growth is the cost of an object in scenes of many objects: two workers, no instancing.
 //!
-//! Written to `drawloom/objects.json` and `.svg` in the target folder too.
+//! `target/drawloom/objects.json` and `.svg` have the same.
 
 mod ceiling;
 mod charts;
 mod growth;
 mod report;
+mod runner;
 mod scenario;
-mod turns;
 mod world;
 
 use std::error::Error;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom_benches::trial::Trial;
-use indicatif::{ProgressBar, ProgressStyle};
+use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::harness::progress_bar;
 
 use report::Report;
 
@@ -41,19 +40,19 @@ use report::Report;
 #[derive(Parser)]
 struct Arguments {
     #[command(flatten)]
-    trial: Trial,
+    backend: BackendArguments,
 }
 
-/// How much is measured. Of two figures the first is for `noop`, where frames are short, the second for the adapter.
+/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
 pub struct Extent {
     name: &'static str,
-    /// Frames of each scenario that are not counted: tables grow, pipelines are made, and prices are learnt in them.
+    /// Warm-up frames of each scenario: tables grow, pipelines are created, and tuners measure costs in them.
     warm_up: [usize; 2],
     rounds: [usize; 2],
-    /// How long a turn takes at least.
-    turn: [Duration; 2],
+    /// Least duration of a sample.
+    sample: [Duration; 2],
     objects: &'static [usize],
-    /// Frames and rounds where there are more objects than in the table above.
+    /// The same for the table of growth.
     growth_warm_up: [usize; 2],
     growth_rounds: [usize; 2],
     growth: &'static [usize],
@@ -64,7 +63,7 @@ impl Extent {
         name: "full",
         warm_up: [60, 40],
         rounds: [41, 15],
-        turn: [Duration::from_millis(4), Duration::ZERO],
+        sample: [Duration::from_millis(4), Duration::ZERO],
         objects: &[7, 16, 106, 1_006, 2_006, 10_000, 100_000],
         growth_warm_up: [40, 5],
         growth_rounds: [15, 5],
@@ -74,7 +73,7 @@ impl Extent {
         name: "quick",
         warm_up: [3, 1],
         rounds: [3, 1],
-        turn: [Duration::ZERO; 2],
+        sample: [Duration::ZERO; 2],
         objects: &[7, 106, 1_006],
         growth_warm_up: [1, 1],
         growth_rounds: [3, 1],
@@ -84,11 +83,10 @@ impl Extent {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let extent = if arguments.trial.is_quick() { Extent::QUICK } else { Extent::FULL };
-    let progress = ProgressBar::new(0);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
+    let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
+    let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
-    for backend in arguments.trial.backends() {
+    for backend in arguments.backend.backends() {
         for &objects in extent.objects {
             report.scenarios.extend(scenario::measure(&extent, backend, objects, &progress)?);
         }
@@ -96,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
-    if !arguments.trial.is_quick() {
+    if !arguments.backend.is_quick() {
         report.write()?;
     }
     Ok(())

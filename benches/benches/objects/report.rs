@@ -1,4 +1,4 @@
-//! What was measured, as tables, as JSON and as a picture.
+//! The results, as tables, JSON and a chart.
 
 use std::error::Error;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::{Extent, charts, growth, scenario};
 
-/// What was measured.
+/// The results.
 pub struct Report {
     extent: &'static str,
     rounds: [usize; 2],
@@ -18,7 +18,7 @@ pub struct Report {
     pub growth: Vec<growth::Row>,
 }
 
-/// A row of the file: of one table or the other.
+/// A row of the JSON file: of either table.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Row<'a> {
@@ -52,7 +52,7 @@ impl Report {
             "multi held %",
         ]);
         for row in &self.scenarios {
-            table.line([
+            table.row([
                 row.objects.to_string(),
                 row.backend.name().to_owned(),
                 if row.instancing { "on" } else { "off" }.to_owned(),
@@ -71,44 +71,44 @@ impl Report {
         let mut table = Table::new(&["objects", "backend", "ns an object and view"]);
         for row in &self.growth {
             let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
-            table.line([objects, backend, format!("{:.1}", row.ns_per_object_view)]);
+            table.row([objects, backend, format!("{:.1}", row.ns_per_object_view)]);
         }
         table.print();
-        self.print_marks();
+        self.print_targets();
     }
 
-    /// What is to hold on `noop`, and what does.
-    fn print_marks(&self) {
+    /// Prints the targets on `noop`, and what was reached.
+    fn print_targets(&self) {
         println!("On noop, without instancing: what is to be reached, and what was\n");
         let mut table = Table::new(&["what", "objects", "bound", "reached"]);
-        let mut mark = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
+        let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
             let verdict = if is_reached { "" } else { ", short" };
-            table.line([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{verdict}")]);
+            table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{verdict}")]);
         };
         for row in self.scenarios.iter().filter(|row| row.backend == BackendName::Noop && !row.instancing) {
-            let least = match row.objects {
+            let target = match row.objects {
                 7 | 16 | 106 => 0.97,
                 1_006 => 1.70,
                 2_006 => 1.80,
                 10_000 => 1.90,
                 _ => continue,
             };
-            mark("ratio", row.objects, least, row.ratio, row.ratio >= least);
+            target_row("ratio", row.objects, target, row.ratio, row.ratio >= target);
             if row.objects >= 1_000 {
                 let of_ceiling = row.ratio / row.ceiling;
-                mark("ratio, of its ceiling", row.objects, 0.90, of_ceiling, of_ceiling >= 0.9);
+                target_row("ratio, of its ceiling", row.objects, 0.90, of_ceiling, of_ceiling >= 0.9);
             }
         }
         let growth: Vec<_> = self.growth.iter().filter(|row| row.backend == BackendName::Noop).collect();
         if let [first, .., last] = growth[..] {
             let grown = last.ns_per_object_view / first.ns_per_object_view;
-            mark("ns, of those of the fewest, at most", last.objects, 1.5, grown, grown <= 1.5);
+            target_row("ns, of those of the fewest, at most", last.objects, 1.5, grown, grown <= 1.5);
         }
         table.print();
     }
 
     /// # Errors
-    /// If a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         let scenarios = self.scenarios.iter().map(Row::Scenario);
         let rows: Vec<_> = scenarios.chain(self.growth.iter().map(Row::Growth)).collect();

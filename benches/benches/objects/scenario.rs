@@ -7,13 +7,13 @@ use std::time::Duration;
 use drawloom::backend::Record;
 use drawloom::task::Scheduler;
 use drawloom_benches::backends::BackendName;
-use drawloom_benches::stopwatch::middle;
-use drawloom_testing::random::Random;
+use drawloom_benches::harness::{Harness, Rounds};
+use drawloom_benches::statistics::median;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::ceiling::ceiling;
-use crate::turns::{Painter, Turn};
+use crate::runner::{Runner, Sample};
 use crate::{Extent, world};
 
 pub const WORKERS: usize = 2;
@@ -28,7 +28,7 @@ pub struct Row {
     pub multi_fps: f64,
     pub ratio: f64,
     pub ceiling: f64,
-    /// How long the world was held.
+    /// How long the world is borrowed.
     pub single_held_ms: f64,
     pub multi_held_ms: f64,
     /// The same as a share of the frame.
@@ -37,43 +37,38 @@ pub struct Row {
 }
 
 /// # Errors
-/// If a frame cannot be drawn.
+/// Returns an error if a frame cannot be drawn.
 pub fn measure(
     extent: &Extent,
     backend: BackendName,
     objects: usize,
     progress: &ProgressBar,
 ) -> Result<[Row; 2], Box<dyn Error>> {
-    let (warm_up, rounds, turn) = (backend.of(extent.warm_up), backend.of(extent.rounds), backend.of(extent.turn));
+    let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
     progress.set_message(format!("{objects} objects, {}", backend.name()));
     let (one, two) = (Arc::new(Scheduler::new(1)?), Arc::new(Scheduler::new(WORKERS)?));
-    let mut painters = [
-        Painter::new(backend.open()?.record(Record::Direct)?, &one, false)?,
-        Painter::new(backend.open()?, &two, false)?,
-        Painter::new(backend.open()?, &two, true)?,
+    let mut runners = [
+        Runner::new(backend.open()?.record(Record::Direct)?, &one, false)?,
+        Runner::new(backend.open()?, &two, false)?,
+        Runner::new(backend.open()?, &two, true)?,
     ];
-    progress.inc_length((rounds * painters.len()) as u64);
     let mut world = world::new(objects)?;
-    for _ in 0..warm_up {
-        for painter in &mut painters {
-            painter.turn(&mut world, Duration::ZERO)?;
-        }
-    }
-    let mut turns: [Vec<Turn>; 3] = Default::default();
+    let mut samples: [Vec<Sample>; 3] = Default::default();
     let mut serial = Vec::new();
-    let mut random = Random::new();
-    for _ in 0..rounds {
-        for index in random.order(painters.len()) {
-            turns[index].push(painters[index].turn(&mut world, turn)?);
-            progress.inc(1);
+    let mut harness = Harness::new(rounds, progress);
+    for round in harness.rounds(runners.len()) {
+        let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
+        let results = harness.round(&mut runners, |runner| runner.sample(&mut world, at_least))?;
+        if !round.is_warm_up() {
+            samples.iter_mut().zip(results).for_each(|(samples, result)| samples.push(result));
+            serial.push(runners[0].serial_part(&mut world)?);
         }
-        serial.push(painters[0].serial_part(&mut world)?);
     }
-    let frame = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.frame));
-    let held = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held));
-    let held_share = |turns: &[Turn]| middle(turns.iter().map(|turn| turn.held / turn.frame));
-    let [single, multi @ ..] = &turns;
-    let ceiling = ceiling(frame(single), middle(serial), two.wake_up_cost().as_secs_f64());
+    let frame = |samples: &[Sample]| median(samples.iter().map(|sample| sample.frame));
+    let borrowed = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed));
+    let borrowed_share = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed / sample.frame));
+    let [single, multi @ ..] = &samples;
+    let ceiling = ceiling(frame(single), median(serial), two.wake_up_cost().as_secs_f64());
     let row = |instancing: bool| {
         let multi = &multi[usize::from(instancing)];
         Row {
@@ -82,12 +77,12 @@ pub fn measure(
             instancing,
             single_fps: frame(single).recip(),
             multi_fps: frame(multi).recip(),
-            ratio: middle(single.iter().zip(multi).map(|(single, multi)| single.frame / multi.frame)),
+            ratio: median(single.iter().zip(multi).map(|(single, multi)| single.frame / multi.frame)),
             ceiling,
-            single_held_ms: held(single) * 1e3,
-            multi_held_ms: held(multi) * 1e3,
-            single_held_share: held_share(single),
-            multi_held_share: held_share(multi),
+            single_held_ms: borrowed(single) * 1e3,
+            multi_held_ms: borrowed(multi) * 1e3,
+            single_held_share: borrowed_share(single),
+            multi_held_share: borrowed_share(multi),
         }
     };
     Ok([row(false), row(true)])

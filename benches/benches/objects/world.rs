@@ -1,4 +1,4 @@
-//! The scene of L 6: a few things under a lamp, and as many more of them as are wanted, each where one stands already.
+//! The scene of L 6: a few objects under a light. Further objects stand where these stand already.
 
 use std::f64::consts::TAU;
 
@@ -8,19 +8,19 @@ use drawloom_benches::boxes::new_box;
 use drawloom_benches::moving::Moving;
 use drawloom_testing::random::Random;
 
-/// The main camera's, and the lamp's.
+/// The main camera's view, and the light's.
 pub const VIEWS: usize = 2;
-/// In pixels, to each side, of the picture and of the shadow map. What is measured is the processor's part; a device in
-/// software would share it.
+/// Width and height of the picture and the shadow map. They are small, as the CPU part is measured and a software device would share
+/// the cores.
 pub const PICTURE: u32 = 64;
 
-/// Things that stand beside each other.
+/// Objects that stand beside each other.
 const ORIGINALS: usize = 7;
-/// In metres. From there a box needs no subdivision to be drawn into the lamp's map: its edges are seen under 5° at most.
-const LAMP_HEIGHT: f64 = 20.0;
+/// In metres. From there a box needs no subdivision in the light's map: its edges subtend at most 5°.
+const LIGHT_HEIGHT: f64 = 20.0;
 
 /// # Errors
-/// If the scene cannot be.
+/// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn new(objects: usize) -> Result<Moving, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();
@@ -39,7 +39,7 @@ pub fn new(objects: usize) -> Result<Moving, SceneError> {
         .cameras
         .push(Camera { size: [PICTURE; 2], ..Camera::looking_at("main", DVec3::new(0.0, 6.0, 10.0), DVec3::ZERO) });
     scene.lights.push(Light::Hemispherical {
-        position: DVec3::Y * LAMP_HEIGHT,
+        position: DVec3::Y * LIGHT_HEIGHT,
         direction: Vec3::NEG_Y,
         intensity: Vec3::splat(300.0),
         range: 40.0,

@@ -5,18 +5,18 @@ use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
 use drawloom_benches::boxes::new_box;
 use drawloom_testing::random::Random;
 
-/// In metres: a lot is as wide as this to either side, and after so many of them comes a street.
+/// In metres: the side of a lot. A street follows after [`LOTS`] lots along each axis.
 const LOT: f64 = 14.0;
 const LOTS: [usize; 2] = [4, 6];
 const STREET: f64 = 16.0;
 
-/// Of all boxes, those that are houses: the others are as small as what stands in streets, half to five metres.
+/// The share of boxes that are houses. The others are objects in the streets, half a metre to five metres high.
 const HOUSES: f64 = 0.7;
 
-/// So many boxes, and cameras in streets, above roofs and above all.
+/// A city of `boxes` boxes, with cameras in streets, above roofs and high above.
 ///
 /// # Errors
-/// If the scene cannot be.
+/// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();
@@ -24,7 +24,7 @@ pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
     let material = scene.add(Material::default())?;
     let houses = (boxes as f64 * HOUSES) as usize;
     let side = (houses as f64).sqrt().ceil() as usize;
-    // Where lots are, to either side of streets, counted from the city's middle.
+    // The position of a lot along an axis, relative to the city's centre.
     let along = |lot: usize, axis: usize| {
         let streets = |lot: usize| (lot / LOTS[axis]) as f64 * STREET;
         (lot as f64 + 0.5 - (side / 2 / LOTS[axis] * LOTS[axis]) as f64) * LOT + streets(lot)
@@ -35,20 +35,20 @@ pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
         let is_house = index < houses;
         let (x, z, half, height) = if is_house {
             let half = [random.between(4.5, 6.9), random.between(4.5, 6.9)];
-            // Few are high.
+            // Only a few are high.
             let height = 6.0 + 22.0 * random.between(0.0, 1.0).powi(2) + 90.0 * random.between(0.0, 1.0).powi(40);
             (along(index % side, 0), along(index / side, 1), half, height)
         } else {
             let half = [random.between(0.25, 2.5), random.between(0.25, 2.5)];
             (random.between(-extent, extent), random.between(-extent, extent), half, random.between(0.5, 5.0))
         };
-        let is_turned = random.below(7) == 0;
-        let turn = if is_turned { random.between(0.0, 1.57) } else { 0.0 };
-        // Turned, it has to keep to its lot.
-        let half = half.map(|half| if is_turned { half * 0.7 } else { half });
+        let is_rotated = random.below(7) == 0;
+        let angle = if is_rotated { random.between(0.0, 1.57) } else { 0.0 };
+        // A rotated box must still fit into its lot.
+        let half = half.map(|half| if is_rotated { half * 0.7 } else { half });
         let object = RenderObject::new(mesh, material, DVec3::new(x, height * 0.5, z));
         let scale = Vec3::new(half[0] as f32, height as f32 * 0.5, half[1] as f32);
-        scene.add_object(RenderObject { scale, orientation: Quat::from_rotation_y(turn as f32), ..object })?;
+        scene.add_object(RenderObject { scale, orientation: Quat::from_rotation_y(angle as f32), ..object })?;
     }
     let street = -STREET * 0.5;
     let eye = DVec3::new(street, 1.7, street);

@@ -1,37 +1,36 @@
-//! Coarse occlusion in a city: what it finds, what it must not, and what it costs.
+//! Coarse occlusion culling in a city: how much it culls, whether it culls visible objects, and its cost.
 //!
 //!     cargo bench -p drawloom-benches --bench occlusion
 //!     cargo bench -p drawloom-benches --bench occlusion -- --quick
 //!
-//! A city of 20,000 boxes of all heights along streets, some turned, is seen from its streets, its roofs and from above. What is
-//! truly hidden there is found by drawing every triangle in f64 with 4 × 4 samples a pixel: of the objects that would show in a
-//! sample if nothing else were there, those that show in none. *False* are those left out that show in one. There must be none,
-//! or the bench fails.
+//! Cameras in the streets, above the roofs and high above see a city of 20,000 boxes of all heights, some of them rotated. An oracle
+//! draws every triangle in f64 with 4 × 4 samples per pixel. *Hidden* are the objects that would cover a sample if nothing else
+//! were there, and cover none. *False* are culled objects that cover a sample: the benchmark fails if there is one.
 //!
-//! *Naive* is what is usually done: occluders are drawn with one sample in the middle of each square, and objects are tested by a
-//! rectangle of squares. Written to `drawloom/occlusion.json` in the target folder too.
+//! *Naive* is the usual method: occluders are drawn with one sample in the centre of each tile, and objects are tested by a
+//! rectangle of tiles. `target/drawloom/occlusion.json` has the same.
 
 mod city;
-mod measured;
+mod measure;
 mod naive;
 
 use std::error::Error;
 
 use clap::Parser;
 use drawloom::quality::Quality;
-use drawloom_benches::quick::Quick;
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use measured::{Row, Sight};
+use measure::{Row, Sight};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let quick = Quick::parse().is_quick();
+    let quick = ExtentArguments::parse().is_quick();
     let (boxes, picture, rounds) = if quick { (1_500, [240, 136], 3) } else { (20_000, [960, 540], 31) };
     let city = city::new(boxes, picture)?;
     let scene = city.as_scene_ref();
-    let progress = ProgressBar::new((scene.cameras.len() * (1 + Quality::OCCLUSION_TILE_SIZES.len())) as u64);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left  {msg}")?);
+    let progress = progress_bar("pictures");
+    progress.set_length((scene.cameras.len() * (1 + Quality::OCCLUSION_TILE_SIZES.len())) as u64);
     let mut rows = Vec::new();
     for camera in scene.cameras {
         progress.set_message(camera.name.clone());
@@ -49,13 +48,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         "a city of {boxes} boxes, {} x {} pixels; times are medians of {rounds} rounds{note}\n",
         picture[0], picture[1]
     );
-    measured::print(&rows);
-    // A trial must not take the place of what was measured.
+    measure::print(&rows);
     if !quick {
         results::write_json("occlusion.json", &rows)?;
     }
     match rows.iter().map(|row| row.false_hidden).sum() {
         0_usize => Ok(()),
-        count => Err(format!("{count} objects that show were left out").into()),
+        count => Err(format!("{count} visible objects were culled").into()),
     }
 }

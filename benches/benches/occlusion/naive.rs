@@ -1,34 +1,35 @@
-//! The usual coarse occlusion, to compare with: one sample in the middle of each square.
+//! The usual coarse occlusion culling, for comparison: one sample in the centre of each tile.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, SceneRef};
 use drawloom_testing::samples::{Eye, Samples};
 
-/// For each of some objects, whether it seems to be hidden.
+/// For each object, whether the method takes it for hidden.
 pub fn hidden(scene: &SceneRef<'_>, camera: &Camera, side: u32, seen: &[bool]) -> Vec<bool> {
     let width = f64::from(side);
     let samples = Samples::new(scene, camera, width, |object| seen[object]);
     let eye = Eye::new(camera);
     let is_hidden = |object: usize| {
-        let [low, high] = scene.assets.get(scene.meshes[object]).expect("it is there").corners().map(Vec3::as_dvec3);
-        let place = |corner: u32| {
+        let [low, high] =
+            scene.assets.get(scene.meshes[object]).expect("the mesh of an object exists").corners().map(Vec3::as_dvec3);
+        let position = |corner: u32| {
             let choose = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
             let scaled = scene.scales[object].as_dvec3() * DVec3::new(choose(0), choose(1), choose(2));
             eye.relative(scene.positions[object] + scene.orientations[object].as_dquat() * scaled)
         };
-        let corners: Vec<_> = (0..8).map(place).collect();
+        let corners: Vec<_> = (0..8).map(position).collect();
         let depth = corners.iter().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
         if depth <= eye.near() {
             return false;
         }
-        let squares = |axis: usize| {
+        let tiles = |axis: usize| {
             let pixels = corners.iter().map(|&corner| eye.picture(corner)[axis]);
             let (first, last) =
                 pixels.fold((f64::INFINITY, 0.0), |(low, high), pixel| (pixel.min(low), pixel.max(high)));
             (first / width).max(0.0) as usize
                 ..((last / width).min(f64::from(camera.size[axis].div_ceil(side)) - 1.0)) as usize + 1
         };
-        let (columns, rows) = (squares(0), squares(1));
+        let (columns, rows) = (tiles(0), tiles(1));
         let nearness = eye.near() / depth;
         !columns.is_empty()
             && !rows.is_empty()

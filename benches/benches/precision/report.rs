@@ -1,4 +1,4 @@
-//! What was measured, as tables, as JSON and as a picture.
+//! The results, as a table, JSON and a chart.
 
 use std::error::Error;
 
@@ -9,7 +9,7 @@ use drawloom_testing::precision::cases::Kind;
 use drawloom_testing::precision::measure::{BOUND, Found, UNIT_ROUNDOFF, WORST_ANGLE};
 use serde::Serialize;
 
-/// What was measured.
+/// The results.
 #[derive(Default)]
 pub struct Report {
     pub rows: Vec<Row>,
@@ -19,7 +19,7 @@ pub struct Report {
 #[derive(Serialize)]
 pub struct Row {
     view: String,
-    /// In metres from the world's origin; anywhere up to 10⁹ m without.
+    /// In metres from the world's origin; `None` for random distances up to 10⁹ m.
     distance: Option<f64>,
     cases: usize,
     relative_max_px: f64,
@@ -28,7 +28,7 @@ pub struct Row {
     absolute_mean_px: f64,
     /// The greatest error as an angle.
     relative_max_radians: f64,
-    /// What the relative one is held to: pixels, or else an angle.
+    /// The bound of the relative error: pixels, or else an angle.
     bound_px: Option<f64>,
     bound_radians: Option<f64>,
 }
@@ -60,7 +60,7 @@ impl Report {
         println!("{} vertices; pixels of error\n", self.rows.iter().map(|row| row.cases).sum::<usize>());
         let mut table = Table::new(&["view", "m", "relative max", "mean", "absolute max", "mean", "bound", "held"]);
         for row in &self.rows {
-            table.line([
+            table.row([
                 row.view.clone(),
                 row.distance.map_or_else(|| "..1e9".to_owned(), |distance| format!("{distance:.0e}")),
                 format!("{:.2e}", row.relative_max_px),
@@ -78,7 +78,7 @@ impl Report {
     }
 
     /// # Errors
-    /// If a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         results::write_json("precision.json", &self.rows)?;
         let by_distance = || self.rows.iter().filter_map(|row| Some((row.distance?, row)));
@@ -88,7 +88,7 @@ impl Report {
         };
         let lines = Lines {
             title: "Pixels that vertices are off by, 1920 x 1080, 60°".to_owned(),
-            across: "metres from the world's origin".to_owned(),
+            x_label: "metres from the world's origin".to_owned(),
             series: vec![
                 line("absolute f32, greatest", |row| row.absolute_max_px),
                 line("absolute f32, mean", |row| row.absolute_mean_px),
@@ -102,7 +102,7 @@ impl Report {
     }
 
     /// # Errors
-    /// If a view does not keep its bound.
+    /// Returns an error if a view exceeds its bound.
     pub fn check(&self) -> Result<(), Box<dyn Error>> {
         let beyond: Vec<_> = self.rows.iter().filter(|row| !row.is_within()).map(|row| row.view.as_str()).collect();
         if beyond.is_empty() { Ok(()) } else { Err(format!("beyond their bound: {}", beyond.join("; ")).into()) }

@@ -1,16 +1,16 @@
-//! How often memory is asked for.
+//! Counts memory allocations.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// The system's allocator; while somebody counts, and only then, it notes how often any thread asks it for memory. Frames
-/// that are timed share no counter.
+/// The system's allocator, which counts allocations and reallocations of all threads inside [`requests_in`] only. Timed frames
+/// therefore share no counter.
 pub struct Counting;
 
 static IS_COUNTING: AtomicBool = AtomicBool::new(false);
 static REQUESTS: AtomicUsize = AtomicUsize::new(0);
 
-/// How often all threads ask for memory while `work` runs.
+/// Runs `work`, and returns how often all threads allocated meanwhile.
 pub fn requests_in<R>(work: impl FnOnce() -> R) -> (R, usize) {
     let before = REQUESTS.load(Ordering::Relaxed);
     IS_COUNTING.store(true, Ordering::Relaxed);
@@ -25,28 +25,28 @@ fn count() {
     }
 }
 
-// SAFETY: Everything is left to the system's allocator, which is one.
+// SAFETY: A `GlobalAlloc` must return valid memory and must not unwind: every method forwards to `System`, and counting cannot unwind.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: Whoever calls this has promised the same.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: Whoever calls this has promised the same.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by `System`.
         unsafe { System.realloc(memory, layout, size) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: Whoever calls this has promised the same, and the memory is the system's.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by `System`.
         unsafe { System.dealloc(memory, layout) }
     }
 }

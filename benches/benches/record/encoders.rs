@@ -1,4 +1,4 @@
-//! A thread for each camera, and on each an encoder of its own.
+//! One thread per camera, each with an encoder of its own.
 
 use drawloom::scene::{Camera, SceneRef};
 use drawloom::view::Frustum;
@@ -13,7 +13,7 @@ use crate::technique::{Failure, Technique};
 
 pub struct EncoderPerThread {
     shared: DrawOnly,
-    /// They stay from frame to frame.
+    /// Kept over all frames.
     threads: ThreadPool,
     drawn: usize,
 }
@@ -35,13 +35,13 @@ impl Technique for EncoderPerThread {
             cameras.map(encode).collect()
         });
         let (commands, counts): (Vec<_>, Vec<usize>) = encoded.into_iter().unzip();
-        shared.studio.queue.submit(commands);
+        shared.fixture.queue.submit(commands);
         *drawn = counts.iter().sum();
         Ok(())
     }
 
     fn wait(&mut self) -> Result<(), Failure> {
-        self.shared.studio.wait()
+        self.shared.fixture.wait()
     }
 
     fn drawn(&self) -> usize {
@@ -49,16 +49,16 @@ impl Technique for EncoderPerThread {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        self.shared.studio.read(camera)
+        self.shared.fixture.read(camera)
     }
 }
 
-/// Culls and records a camera's objects; returns how many there are, too.
+/// Culls and records a camera's objects; also returns their number.
 fn encode(shared: &DrawOnly, scene: &SceneRef<'_>, index: usize, camera: &Camera) -> (wgpu::CommandBuffer, usize) {
     shared.write_camera(index, &clip_from_world(camera));
     let frustum = Frustum::new(camera);
-    let mut encoder = shared.studio.encoder();
-    let mut pass = shared.studio.pass(&mut encoder, index);
+    let mut encoder = shared.fixture.encoder();
+    let mut pass = shared.fixture.pass(&mut encoder, index);
     shared.set(&mut pass, index);
     let mut drawn = 0;
     for object in (0..scene.object_count()).filter(|&object| shared.spheres[object].is_seen(&frustum)) {

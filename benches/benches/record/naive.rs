@@ -1,4 +1,4 @@
-//! As a plain engine does it: for each object it sees, everything is set, in the order of the scene, and it is drawn.
+//! A plain engine: draws the visible objects in the order of the scene, and sets all state for each.
 
 use std::num::NonZeroU64;
 
@@ -8,21 +8,21 @@ use drawloom::view::Frustum;
 use drawloom::wgpu;
 use drawloom::wgpu::util::DeviceExt;
 
-use crate::objects::{ObjectRecord, Sphere, clip_from_world, colors};
-use crate::studio::Studio;
+use crate::fixture::Fixture;
+use crate::objects::{GpuObject, Sphere, clip_from_world, colors};
 use crate::technique::{Failure, Technique};
 
 pub struct Naive {
-    studio: Studio,
+    fixture: Fixture,
     pipeline: wgpu::RenderPipeline,
-    /// By slot: vertices, indices, and how many.
+    /// By slot: vertices, indices, and the number of indices.
     meshes: Vec<(wgpu::Buffer, wgpu::Buffer, u32)>,
     /// By camera.
     cameras: Vec<(wgpu::Buffer, wgpu::BindGroup)>,
     /// By slot.
     materials: Vec<wgpu::BindGroup>,
     objects: wgpu::Buffer,
-    /// All of them; where an object begins is said with each draw.
+    /// All objects; each draw passes the dynamic offset of its object.
     object_group: wgpu::BindGroup,
     /// Bytes from one object to the next.
     stride: usize,
@@ -32,13 +32,14 @@ pub struct Naive {
 }
 
 impl Naive {
-    pub fn new(studio: Studio, scene: &SceneRef<'_>) -> Self {
-        let device = &studio.device;
+    pub fn new(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
+        let device = &fixture.device;
         let layout = |has_dynamic_offset, visibility| uniform_layout(device, has_dynamic_offset, visibility);
         let camera_layout = layout(false, wgpu::ShaderStages::VERTEX);
         let material_layout = layout(false, wgpu::ShaderStages::FRAGMENT);
         let object_layout = layout(true, wgpu::ShaderStages::VERTEX);
-        let pipeline = studio.pipeline(&[&camera_layout, &material_layout, &object_layout], include_str!("naive.wgsl"));
+        let pipeline =
+            fixture.pipeline(&[&camera_layout, &material_layout, &object_layout], include_str!("naive.wgsl"));
 
         let buffer = |usage: wgpu::BufferUsages, contents: &[u8]| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
@@ -70,31 +71,31 @@ impl Naive {
         let materials = colors(scene).into_iter().map(material).collect();
 
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
-        let stride = size_of::<ObjectRecord>().next_multiple_of(alignment);
+        let stride = size_of::<GpuObject>().next_multiple_of(alignment);
         let bytes = vec![0; stride * scene.object_count()];
         let objects = uniform(&bytes);
-        let object_group = group(&object_layout, &objects, size_of::<ObjectRecord>());
+        let object_group = group(&object_layout, &objects, size_of::<GpuObject>());
         let spheres = Vec::new();
-        Self { pipeline, meshes, cameras, materials, objects, object_group, stride, bytes, spheres, drawn: 0, studio }
+        Self { pipeline, meshes, cameras, materials, objects, object_group, stride, bytes, spheres, drawn: 0, fixture }
     }
 }
 
 impl Technique for Naive {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
-        let Studio { queue, .. } = &self.studio;
+        let Fixture { queue, .. } = &self.fixture;
         self.spheres.clear();
         for (object, bytes) in self.bytes.chunks_exact_mut(self.stride).enumerate() {
-            let record = ObjectRecord::new(&scene, object);
-            bytes[..size_of::<ObjectRecord>()].copy_from_slice(bytemuck::bytes_of(&record));
+            let gpu_object = GpuObject::new(&scene, object);
+            bytes[..size_of::<GpuObject>()].copy_from_slice(bytemuck::bytes_of(&gpu_object));
             self.spheres.push(Sphere::new(&scene, object));
         }
         queue.write_buffer(&self.objects, 0, &self.bytes);
-        let mut encoder = self.studio.encoder();
+        let mut encoder = self.fixture.encoder();
         self.drawn = 0;
         for (index, (camera, (buffer, camera_group))) in scene.cameras.iter().zip(&self.cameras).enumerate() {
             queue.write_buffer(buffer, 0, bytemuck::bytes_of(&clip_from_world(camera)));
             let frustum = Frustum::new(camera);
-            let mut pass = self.studio.pass(&mut encoder, index);
+            let mut pass = self.fixture.pass(&mut encoder, index);
             for object in (0..scene.object_count()).filter(|&object| self.spheres[object].is_seen(&frustum)) {
                 let (vertices, indices, count) = &self.meshes[scene.meshes[object].index() as usize];
                 pass.set_pipeline(&self.pipeline);
@@ -112,7 +113,7 @@ impl Technique for Naive {
     }
 
     fn wait(&mut self) -> Result<(), Failure> {
-        self.studio.wait()
+        self.fixture.wait()
     }
 
     fn drawn(&self) -> usize {
@@ -120,7 +121,7 @@ impl Technique for Naive {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        self.studio.read(camera)
+        self.fixture.read(camera)
     }
 }
 

@@ -1,21 +1,21 @@
-//! What techniques by hand work out for each object and each camera.
+//! What the hand-written techniques compute for each object and each camera.
 
 use bytemuck::{Pod, Zeroable};
 use drawloom::glam::{DVec3, Mat4};
 use drawloom::scene::{Camera, Material, SceneRef};
 use drawloom::view::{Frustum, RenderView};
 
-/// An object as shaders read it.
+/// An object's layout in shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct ObjectRecord {
+pub struct GpuObject {
     world_from_object: Mat4,
     material: u32,
-    /// To a multiple of 16 bytes.
+    /// Pads to a multiple of 16 bytes.
     padding: [u32; 3],
 }
 
-impl ObjectRecord {
+impl GpuObject {
     pub fn new(scene: &SceneRef<'_>, object: usize) -> Self {
         let position = scene.positions[object].as_vec3();
         Self {
@@ -30,7 +30,7 @@ impl ObjectRecord {
     }
 }
 
-/// Where an object is: a sphere around it, as all techniques cull by it.
+/// A bounding sphere, by which all techniques cull.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sphere {
     center: DVec3,
@@ -49,7 +49,7 @@ impl Sphere {
     }
 }
 
-/// What a camera's shaders read.
+/// The matrix that the shaders read for a camera.
 pub fn clip_from_world(camera: &Camera) -> Mat4 {
     RenderView::new(camera).clip_from_relative() * Mat4::from_translation(-camera.position.as_vec3())
 }

@@ -1,4 +1,4 @@
-//! Chunks of objects, each culled and recorded as a bundle by whichever thread is free.
+//! Chunks of objects. Any free thread of a rayon pool culls a chunk and records it as a bundle.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -12,7 +12,7 @@ use crate::draw_only::DrawOnly;
 use crate::objects::clip_from_world;
 use crate::technique::{Failure, Technique};
 
-/// Objects: fewer make bundles dear, more leave threads without work at the end.
+/// Objects per chunk: fewer make bundles costly, more leave threads without work at the end.
 const CHUNK: usize = 256;
 
 pub struct Parallel {
@@ -42,7 +42,7 @@ impl Technique for Parallel {
     }
 
     fn wait(&mut self) -> Result<(), Failure> {
-        self.shared.studio.wait()
+        self.shared.fixture.wait()
     }
 
     fn drawn(&self) -> usize {
@@ -50,18 +50,18 @@ impl Technique for Parallel {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        self.shared.studio.read(camera)
+        self.shared.fixture.read(camera)
     }
 }
 
-/// Returns how many objects are drawn.
+/// Returns the number of objects drawn.
 fn record(shared: &DrawOnly, scene: &SceneRef<'_>) -> usize {
     let drawn = AtomicUsize::new(0);
     let frustums: Vec<_> = scene.cameras.iter().map(Frustum::new).collect();
     let chunks = shared.spheres.len().div_ceil(CHUNK);
     let bundle = |index: usize| {
         let (camera, chunk) = (index / chunks, index % chunks);
-        let mut encoder = shared.studio.bundle_encoder();
+        let mut encoder = shared.fixture.bundle_encoder();
         shared.set(&mut encoder, camera);
         let mut count = 0;
         for object in (chunk * CHUNK..shared.spheres.len()).take(CHUNK) {
@@ -75,11 +75,11 @@ fn record(shared: &DrawOnly, scene: &SceneRef<'_>) -> usize {
     };
     let bundles: Vec<_> = (0..chunks * frustums.len()).into_par_iter().map(bundle).collect();
     let encode = |(camera, bundles): (usize, &[wgpu::RenderBundle])| {
-        let mut encoder = shared.studio.encoder();
-        shared.studio.pass(&mut encoder, camera).execute_bundles(bundles);
+        let mut encoder = shared.fixture.encoder();
+        shared.fixture.pass(&mut encoder, camera).execute_bundles(bundles);
         encoder.finish()
     };
     let commands: Vec<_> = bundles.par_chunks(chunks).enumerate().map(encode).collect();
-    shared.studio.queue.submit(commands);
+    shared.fixture.queue.submit(commands);
     drawn.into_inner()
 }

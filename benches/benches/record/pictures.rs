@@ -1,4 +1,4 @@
-//! Whether all techniques draw the same.
+//! Compares the pictures of all techniques.
 
 use std::sync::mpsc;
 
@@ -7,10 +7,10 @@ use drawloom::wgpu;
 
 use crate::technique::{Contender, Failure};
 
-/// What a texture of four bytes a pixel looks like.
+/// Reads a texture of four bytes per pixel.
 ///
 /// # Errors
-/// If it cannot be read.
+/// Returns an error if it cannot be read.
 pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Result<Vec<u8>, Failure> {
     let size = texture.size();
     let row = size.width * 4;
@@ -38,11 +38,11 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
     Ok(buffer.get_mapped_range(..)?.to_vec())
 }
 
-/// Has each draw a frame, and compares it with the first one's. By hand positions are rounded, so that a pixel at an edge may
-/// be another's.
+/// Has each contender draw a frame, and compares its pictures with those of the first. The hand-written techniques round positions
+/// to f32, so a pixel at an edge may differ.
 ///
 /// # Errors
-/// If one does not draw all there is, or draws another picture.
+/// Returns an error if one does not draw all objects, or draws another picture.
 pub fn compare(contenders: &mut [Contender], scene: SceneRef<'_>, has_pictures: bool) -> Result<(), Failure> {
     let mut first = Vec::new();
     for contender in contenders {
@@ -62,14 +62,16 @@ pub fn compare(contenders: &mut [Contender], scene: SceneRef<'_>, has_pictures: 
             }
             continue;
         }
-        let differ = first.iter().zip(pictures.concat()).filter(|(one, other)| one.abs_diff(*other) > CLOSE).count();
-        if differ > first.len() / MOST {
+        let differ =
+            first.iter().zip(pictures.concat()).filter(|(one, other)| one.abs_diff(*other) > TOLERANCE).count();
+        if differ > first.len() / BYTES_PER_DIFFERENCE {
             return Err(format!("{name} draws another picture: {differ} of {} bytes differ", first.len()).into());
         }
     }
     Ok(())
 }
 
-/// Bytes that differ by no more are the same, and one in so many may not be.
-const CLOSE: u8 = 2;
-const MOST: usize = 500;
+/// Bytes that differ by at most this count as the same.
+const TOLERANCE: u8 = 2;
+/// One in this many bytes may differ by more.
+const BYTES_PER_DIFFERENCE: usize = 500;

@@ -1,33 +1,33 @@
-//! What was measured, as a table, as JSON and as a picture.
+//! The results, as a table, JSON and a chart.
 
 use std::error::Error;
 
 use drawloom_benches::backends::{BackendName, adapter_name};
-use drawloom_benches::chart::{self, Panel, Ranks};
+use drawloom_benches::chart::{self, HorizontalBars, Panel};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
 use serde::Serialize;
 
 use crate::Extent;
-use crate::turns::Measured;
+use crate::measure::Measured;
 
-/// A technique.
+/// A technique on a number of workers.
 #[derive(Serialize)]
 pub struct Row {
     pub technique: &'static str,
     pub backend: BackendName,
     pub workers: usize,
     pub ns_per_object_view: f64,
-    /// How many times as fast as naive.
+    /// Speed-up over naive.
     #[serde(skip)]
-    pub of_naive: f64,
+    pub speed_up_over_naive: f64,
     pub allocations_per_frame: usize,
-    /// Of those, the crate's own, without its wgpu backend's: what it asks for where the backend does nothing.
+    /// The renderer's own, without those of the wgpu backend: measured on the no-op backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own_allocations_per_frame: Option<usize>,
 }
 
-/// What was measured.
+/// The results.
 pub struct Report {
     extent: &'static str,
     rounds: [usize; 2],
@@ -51,33 +51,33 @@ impl Report {
         let headings = ["technique", "backend", "workers", "ns", "of naive", "requests", "own requests"];
         let mut table = Table::new(&headings);
         for row in self.rows() {
-            table.line([
+            table.row([
                 row.technique.to_owned(),
                 row.backend.name().to_owned(),
                 row.workers.to_string(),
                 format!("{:.1}", row.ns_per_object_view),
-                format!("1/{:.1}", row.of_naive),
+                format!("1/{:.1}", row.speed_up_over_naive),
                 row.allocations_per_frame.to_string(),
                 row.own_allocations_per_frame.map_or_else(String::new, |own| own.to_string()),
             ]);
         }
         table.print();
-        for Measured { backend, apart, speed_ups, .. } in &self.measured {
+        for Measured { backend, independent, speed_ups, .. } in &self.measured {
             println!(
-                "{}: two threads that draw a frame each, and share nothing, take {apart:.1} ns: {:.2} times as fast as one",
+                "{}: two threads that draw a frame each, and share nothing, take {independent:.1} ns: {:.2} times as fast as one",
                 backend.name(),
                 speed_ups[1]
             );
         }
         println!();
-        self.print_marks();
+        self.print_targets();
     }
 
-    /// What is to hold on `noop`, and what does.
-    fn print_marks(&self) {
+    /// Prints the targets on `noop`, and what was reached.
+    fn print_targets(&self) {
         let Some(noop) = self.measured.iter().find(|measured| measured.backend == BackendName::Noop) else { return };
         let two = noop.rows.iter().find(|row| (row.technique, row.workers) == ("drawloom", 2));
-        let of_naive = two.map_or(f64::NAN, |two| two.of_naive);
+        let of_naive = two.map_or(f64::NAN, |two| two.speed_up_over_naive);
         println!("On noop: what is to be reached, and what was\n");
         let mut table = Table::new(&["what", "at least", "reached"]);
         for (what, least, reached) in [
@@ -85,7 +85,7 @@ impl Report {
             ("drawloom with 1 worker, of 2", 1.8, noop.speed_ups[0]),
         ] {
             let verdict = if reached >= least { "" } else { ", short" };
-            table.line([what.to_owned(), format!("{least:.1}"), format!("{reached:.2}{verdict}")]);
+            table.row([what.to_owned(), format!("{least:.1}"), format!("{reached:.2}{verdict}")]);
         }
         table.print();
     }
@@ -95,7 +95,7 @@ impl Report {
     }
 
     /// # Errors
-    /// If a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         results::write_json("record.json", &self.rows().collect::<Vec<_>>())?;
         let panel = |&backend: &BackendName| {
@@ -103,20 +103,20 @@ impl Report {
             let mut bars: Vec<_> = rows.map(bar).collect();
             bars.sort_by(|one, other| other.1.total_cmp(&one.1));
             let title = format!("ns an object and view, from visibility to submit, {}", backend.name());
-            (!bars.is_empty()).then_some(Panel::Ranks(Ranks { title, bars }))
+            (!bars.is_empty()).then_some(Panel::HorizontalBars(HorizontalBars { title, bars }))
         };
         let panels: Vec<_> = BackendName::ALL.iter().filter_map(panel).collect();
         chart::draw(&results::file("record.svg")?, &panels)
     }
 }
 
-/// Those by hand are grey; ours are blue, and as they come, green.
+/// Hand-written techniques are grey; this crate's are blue, and its default is green.
 fn bar(row: &Row) -> (String, f64, usize) {
     let Row { technique, workers, .. } = row;
     let plural = if *workers == 1 { "" } else { "s" };
     let color = match *technique {
         "drawloom" => 6,
-        ours if ours.starts_with("drawloom") => 3,
+        name if name.starts_with("drawloom") => 3,
         _ => 0,
     };
     (format!("{technique}, {workers} thread{plural}"), row.ns_per_object_view, color)

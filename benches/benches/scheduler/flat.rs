@@ -1,19 +1,20 @@
-//! Row `flat`: many empty jobs, each spawned by itself, and a wait for all of them.
+//! Row `flat`: spawns many empty jobs one by one, and waits for all of them.
 
 use std::thread;
 
 use drawloom::task::Scheduler;
 use drawloom_benches::work::Work;
 
-use crate::turns::{Contender, Row};
+use crate::row::{Contender, Row};
 use crate::{Extent, WORKERS, pools};
 
-/// chili cannot spawn, so it halves all jobs at once, which is less to do. std's threads are one a job, and [`Extent::threads`] jobs: more would take long.
+/// chili cannot spawn: it splits the range of jobs by joins, which is less work. `std threads` starts one thread per job, and only
+/// [`Extent::threads`] of them, as more would take long.
 pub fn row(extent: &Extent) -> Row {
     let jobs = extent.flat;
-    let drawloom = Contender::new("drawloom", move |work, watch| {
+    let drawloom = Contender::new("drawloom", move |work, timer| {
         let scheduler = Scheduler::new(WORKERS)?;
-        watch.frames(|| {
+        timer.frames(|| {
             Ok(scheduler.scope(|scope| {
                 for job in 0..jobs {
                     scope.spawn(move |_scope, _worker| work.job(job));
@@ -21,9 +22,9 @@ pub fn row(extent: &Extent) -> Row {
             })?)
         })
     });
-    let rayon = Contender::new("rayon", move |work, watch| {
+    let rayon = Contender::new("rayon", move |work, timer| {
         pools::rayon()?.install(|| {
-            watch.frames(|| {
+            timer.frames(|| {
                 rayon::scope(|scope| {
                     for job in 0..jobs {
                         scope.spawn(move |_scope| work.job(job));
@@ -33,9 +34,9 @@ pub fn row(extent: &Extent) -> Row {
             })
         })
     });
-    let bevy_tasks = Contender::new("bevy_tasks", move |work, watch| {
+    let bevy_tasks = Contender::new("bevy_tasks", move |work, timer| {
         let pool = pools::bevy_tasks();
-        watch.frames(|| {
+        timer.frames(|| {
             pool.scope(|scope| {
                 for job in 0..jobs {
                     scope.spawn(async move { work.job(job) });
@@ -44,17 +45,17 @@ pub fn row(extent: &Extent) -> Row {
             Ok(())
         })
     });
-    let chili = Contender::new("chili join", move |work, watch| {
+    let chili = Contender::new("chili join", move |work, timer| {
         let pool = pools::chili();
         let mut scope = pool.scope();
-        watch.frames(|| {
-            pools::halve::<64>(&mut scope, 0..jobs, work);
+        timer.frames(|| {
+            pools::join_halves::<64>(&mut scope, 0..jobs, work);
             Ok(())
         })
     });
     let threads = extent.threads;
-    let std_threads = Contender::new("std threads", move |work, watch| {
-        watch.frames(|| {
+    let std_threads = Contender::new("std threads", move |work, timer| {
+        timer.frames(|| {
             thread::scope(|scope| {
                 for job in 0..threads {
                     scope.spawn(move || work.job(job));
@@ -67,18 +68,18 @@ pub fn row(extent: &Extent) -> Row {
         name: "flat",
         unit: "ns a job",
         scale: 1e9,
-        pace: extent.hot(),
+        pace: extent.back_to_back(),
         work: Work::empty(),
         jobs,
         order: Box::new(|_record| Ok(())),
         contenders: vec![
-            Contender::plain_loop(jobs).split(jobs),
-            Contender::ideal(jobs).split(jobs),
-            drawloom.split(jobs),
-            rayon.split(jobs),
-            bevy_tasks.split(jobs),
-            chili.split(jobs).with_easier_task(),
-            std_threads.split(threads).with_jobs(threads),
+            Contender::plain_loop(jobs).per(jobs),
+            Contender::ideal(jobs).per(jobs),
+            drawloom.per(jobs),
+            rayon.per(jobs),
+            bevy_tasks.per(jobs),
+            chili.per(jobs).with_easier_task(),
+            std_threads.per(threads).with_jobs(threads),
         ],
     }
 }

@@ -1,4 +1,4 @@
-//! Rows `graph_1k`, `graph_4k` and `graph_10k`: many empty nodes, each of which waits for others.
+//! Rows `graph_1k`, `graph_4k` and `graph_10k`: a graph of many empty nodes.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,23 +10,23 @@ use drawloom::task::{Scheduler, Worker};
 use drawloom_benches::work::{Record, Work};
 use drawloom_testing::random::Random;
 
-use crate::crew::Crew;
-use crate::turns::{Contender, Order, Row};
+use crate::row::{Contender, Order, Row};
+use crate::thread_team::ThreadTeam;
 use crate::{Extent, Failure, WORKERS, pools};
 
 const LAYER: usize = 64;
 
-/// All of these must be of the same graph: layers of [`LAYER`] nodes, of which each waits for 1 to 4 of the layer before.
+/// All contenders run the same graph: layers of [`LAYER`] nodes, each of which depends on 1 to 4 nodes of the layer before.
 ///
-/// chili has no way to wait for anything but a half, and std's threads would need what this bench is about, so these two go
-/// layer by layer, as the loop goes node by node: they need not find out which node is ready.
+/// chili and std's threads have no dependencies between jobs. They run layer by layer, and the plain loop runs node by node:
+/// none of these has to find out which node is ready.
 pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
     let graph = Arc::new(Graph::new(nodes));
     Row {
         name,
         unit: "ns a node",
         scale: 1e9 / nodes as f64,
-        pace: extent.hot(),
+        pace: extent.back_to_back(),
         work: Work::empty(),
         jobs: nodes,
         order: order(&graph),
@@ -35,7 +35,7 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
             Contender::ideal(nodes),
             drawloom("drawloom", WORKERS, &graph),
             drawloom("drawloom", 1, &graph),
-            drawloom(ALWAYS_SHARED, WORKERS, &graph),
+            drawloom(ALWAYS_PARALLEL, WORKERS, &graph),
             rayon_inline(&graph),
             rayon(&graph),
             bevy_tasks(&graph),
@@ -45,67 +45,68 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
     }
 }
 
-/// Who waits for whom, in flat arrays.
+/// The dependencies, in flat arrays.
 struct Graph {
-    /// Each on a cache line of its own, with all that its run reads: neighbours are counted down by different threads.
+    /// Each on a cache line of its own, as different threads decrement the counters of neighbours.
     nodes: Vec<CachePadded<GraphNode>>,
-    waiting: Vec<u32>,
+    /// The successors of all nodes.
+    successors: Vec<u32>,
 }
 
 struct GraphNode {
-    /// For how many others it still waits. Whoever runs it makes that ready for the next frame.
-    counter: AtomicU32,
-    waits_for: u32,
-    /// Those that wait for it are there in `waiting`.
-    waiting: Range<u32>,
+    /// How many dependencies have not run yet. The thread that runs the node resets it for the next frame.
+    pending: AtomicU32,
+    dependencies: u32,
+    /// Its successors' range in [`Graph::successors`].
+    successors: Range<u32>,
 }
 
 impl Graph {
     fn new(count: usize) -> Self {
         let mut random = Random::new();
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); count];
-        let mut waits_for = vec![0; count];
-        for (node, waits_for) in waits_for.iter_mut().enumerate().skip(LAYER) {
+        let mut dependencies = vec![0; count];
+        for (node, dependencies) in dependencies.iter_mut().enumerate().skip(LAYER) {
             let above = (node / LAYER - 1) * LAYER;
-            let dependencies = 1 + random.below(4) as u32;
-            while *waits_for < dependencies {
+            let wanted = 1 + random.below(4) as u32;
+            while *dependencies < wanted {
                 let list = &mut lists[above + random.below(LAYER)];
                 if list.last() != Some(&(node as u32)) {
                     list.push(node as u32);
-                    *waits_for += 1;
+                    *dependencies += 1;
                 }
             }
         }
-        let mut waiting = Vec::new();
-        let new_node = |(list, waits_for): (Vec<u32>, u32)| {
-            let begin = waiting.len() as u32;
-            waiting.extend(list);
-            let waiting = begin..waiting.len() as u32;
-            CachePadded::new(GraphNode { counter: AtomicU32::new(waits_for), waits_for, waiting })
+        let mut successors = Vec::new();
+        let new_node = |(list, dependencies): (Vec<u32>, u32)| {
+            let begin = successors.len() as u32;
+            successors.extend(list);
+            let successors = begin..successors.len() as u32;
+            CachePadded::new(GraphNode { pending: AtomicU32::new(dependencies), dependencies, successors })
         };
-        let nodes = lists.into_iter().zip(waits_for).map(new_node).collect();
-        Self { nodes, waiting }
+        let nodes = lists.into_iter().zip(dependencies).map(new_node).collect();
+        Self { nodes, successors }
     }
 
-    /// The nodes that wait for nothing.
+    /// The nodes without dependencies.
     fn roots(&self) -> Range<u32> {
         0..LAYER.min(self.nodes.len()) as u32
     }
 
-    fn waiting_for(&self, node: u32) -> &[u32] {
-        let Range { start, end } = self.nodes[node as usize].waiting;
-        &self.waiting[start as usize..end as usize]
+    fn successors(&self, node: u32) -> &[u32] {
+        let Range { start, end } = self.nodes[node as usize].successors;
+        &self.successors[start as usize..end as usize]
     }
 
-    /// Runs a node, and returns those that are ready then.
+    /// Runs a node, and returns the successors that become ready.
     #[inline]
     fn run(&self, node: u32, work: &Work) -> impl Iterator<Item = u32> {
         work.job(node as usize);
-        let GraphNode { counter, waits_for, .. } = &*self.nodes[node as usize];
-        // Nobody counts it down before the next frame.
-        counter.store(*waits_for, Ordering::Relaxed);
-        let is_ready = |next: &u32| self.nodes[*next as usize].counter.fetch_sub(1, Ordering::AcqRel) == 1;
-        self.waiting_for(node).iter().copied().filter(is_ready)
+        let GraphNode { pending, dependencies, .. } = &*self.nodes[node as usize];
+        // No thread decrements it before the next frame.
+        pending.store(*dependencies, Ordering::Relaxed);
+        let is_ready = |next: &u32| self.nodes[*next as usize].pending.fetch_sub(1, Ordering::AcqRel) == 1;
+        self.successors(node).iter().copied().filter(is_ready)
     }
 
     /// Where each layer ends.
@@ -118,8 +119,8 @@ fn order(graph: &Arc<Graph>) -> Order {
     let graph = Arc::clone(graph);
     Box::new(move |record: &Record| {
         for before in 0..graph.nodes.len() {
-            let waiting = graph.waiting_for(before as u32).iter().map(|&after| after as usize);
-            for after in waiting {
+            let successors = graph.successors(before as u32).iter().map(|&after| after as usize);
+            for after in successors {
                 if !record.in_order(before, after) {
                     return Err(format!("node {after} began before node {before} had ended"));
                 }
@@ -144,17 +145,17 @@ impl Node<Work> for Empty {
     }
 }
 
-/// A schedule of so little work is run by one thread, unless it is told otherwise.
-const ALWAYS_SHARED: &str = "drawloom always shared";
+/// By default one thread runs a schedule of so little work.
+const ALWAYS_PARALLEL: &str = "drawloom always shared";
 
-/// The schedule knows nothing at the start of a turn, as what it has learnt is of that turn's pool.
+/// The schedule is compiled for each sample, so that it has no measurements of an earlier pool.
 fn drawloom(name: &'static str, workers: usize, graph: &Arc<Graph>) -> Contender {
     let graph = Arc::clone(graph);
-    let contender = Contender::new(name, move |work, watch| {
+    let contender = Contender::new(name, move |work, timer| {
         let mut schedule = schedule(&graph)?;
-        schedule.always_parallel(name == ALWAYS_SHARED);
+        schedule.always_parallel(name == ALWAYS_PARALLEL);
         let scheduler = Scheduler::new(workers)?;
-        watch.frames(|| Ok(schedule.run(&scheduler, work)?))
+        timer.frames(|| Ok(schedule.run(&scheduler, work)?))
     });
     contender.with_workers(workers)
 }
@@ -165,14 +166,14 @@ fn schedule(graph: &Graph) -> Result<Schedule<Empty>, Failure> {
         (0..graph.nodes.len()).map(|index| frame_graph.add(index.to_string(), Empty { index })).collect();
     for (before, &node) in nodes.iter().enumerate() {
         frame_graph.keep(node);
-        for &after in graph.waiting_for(before as u32) {
+        for &after in graph.successors(before as u32) {
             frame_graph.order(node, nodes[after as usize]);
         }
     }
     Ok(frame_graph.compile()?)
 }
 
-/// The first node that is ready is run in place, all others are spawned: as fast as it gets by hand.
+/// Runs the first node that becomes ready in place and spawns the others: the fastest way by hand.
 fn rayon_inline(graph: &Arc<Graph>) -> Contender {
     fn run_on<'scope>(graph: &'scope Graph, mut node: u32, work: &'scope Work, scope: &rayon::Scope<'scope>) {
         loop {
@@ -185,10 +186,10 @@ fn rayon_inline(graph: &Arc<Graph>) -> Contender {
         }
     }
     let graph = Arc::clone(graph);
-    Contender::new("rayon inline", move |work, watch| {
+    Contender::new("rayon inline", move |work, timer| {
         let graph = &*graph;
         pools::rayon()?.install(|| {
-            watch.frames(|| {
+            timer.frames(|| {
                 rayon::scope(|scope| {
                     for root in graph.roots() {
                         scope.spawn(move |scope| run_on(graph, root, work, scope));
@@ -200,7 +201,7 @@ fn rayon_inline(graph: &Arc<Graph>) -> Contender {
     })
 }
 
-/// All nodes that are ready are spawned.
+/// Spawns all nodes that become ready.
 fn rayon(graph: &Arc<Graph>) -> Contender {
     fn run<'scope>(graph: &'scope Graph, node: u32, work: &'scope Work, scope: &rayon::Scope<'scope>) {
         for ready in graph.run(node, work) {
@@ -208,10 +209,10 @@ fn rayon(graph: &Arc<Graph>) -> Contender {
         }
     }
     let graph = Arc::clone(graph);
-    Contender::new("rayon", move |work, watch| {
+    Contender::new("rayon", move |work, timer| {
         let graph = &*graph;
         pools::rayon()?.install(|| {
-            watch.frames(|| {
+            timer.frames(|| {
                 rayon::scope(|scope| {
                     for root in graph.roots() {
                         scope.spawn(move |scope| run(graph, root, work, scope));
@@ -223,7 +224,7 @@ fn rayon(graph: &Arc<Graph>) -> Contender {
     })
 }
 
-/// The first node that is ready is run in place, all others are spawned.
+/// Runs the first node that becomes ready in place and spawns the others.
 fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
     fn spawn<'scope, 'env>(
         graph: &'env Graph,
@@ -243,10 +244,10 @@ fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
         });
     }
     let graph = Arc::clone(graph);
-    Contender::new("bevy_tasks", move |work, watch| {
+    Contender::new("bevy_tasks", move |work, timer| {
         let graph = &*graph;
         let pool = pools::bevy_tasks();
-        watch.frames(|| {
+        timer.frames(|| {
             pool.scope(|scope| {
                 for root in graph.roots() {
                     spawn(graph, root, work, scope);
@@ -259,13 +260,13 @@ fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
 
 fn chili(graph: &Arc<Graph>) -> Contender {
     let ends: Vec<_> = graph.ends().collect();
-    Contender::new("chili by layers", move |work, watch| {
+    Contender::new("chili by layers", move |work, timer| {
         let pool = pools::chili();
         let mut scope = pool.scope();
-        watch.frames(|| {
+        timer.frames(|| {
             let mut begin = 0;
             for &end in &ends {
-                pools::halve::<64>(&mut scope, begin..end, work);
+                pools::join_halves::<64>(&mut scope, begin..end, work);
                 begin = end;
             }
             Ok(())
@@ -274,8 +275,8 @@ fn chili(graph: &Arc<Graph>) -> Contender {
     .with_easier_task()
 }
 
-/// A ticket is good for 8 nodes, as taking one costs far more than a node.
+/// A ticket claims 8 nodes, as it costs far more than a node.
 fn std_threads(graph: &Arc<Graph>) -> Contender {
-    let crew = Crew::new(graph.ends().collect(), 8);
-    Contender::new("std threads by layers", move |work, watch| crew.frames(work, watch)).with_easier_task()
+    let team = ThreadTeam::new(graph.ends().collect(), 8);
+    Contender::new("std threads by layers", move |work, timer| team.frames(work, timer)).with_easier_task()
 }

@@ -4,75 +4,71 @@
 //!     cargo bench -p drawloom-benches --bench scheduler -- --quick
 //!     cargo bench -p drawloom-benches --bench scheduler -- --row frame --row fine
 //!
-//! In a round all contenders of a row take turns, in an order drawn anew, and then those of the next row, so that whatever
-//! else the machine does meets them alike. A turn builds a pool of two workers, warms it up, measures, and drops it, so that
-//! pools do not disturb each other. What a contender does is checked before it is measured. Each row's file says what the
-//! row is; what is shown are medians. What was measured is written to `drawloom/scheduler.json` in the target folder too.
+//! Contenders are interleaved: in each round those of one row run once in random order, then those of the next row. A run
+//! builds a pool of two workers, warms it up, measures, and drops it, so that pools do not disturb each other. Each contender
+//! is checked before it is measured. Each row's file explains the row. The table shows medians; `target/drawloom/scheduler.json`
+//! has the same.
 
-mod crew;
+mod chains;
 mod flat;
 mod graph;
 mod idle;
-mod passes;
 mod pools;
 mod report;
+mod row;
+mod thread_team;
+mod timer;
 mod tiny;
-mod turns;
 mod wake;
-mod watch;
 
 use std::error::Error;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom_testing::random::Random;
-use indicatif::{ProgressBar, ProgressStyle};
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::{Harness, Rounds, progress_bar};
 
 use report::Report;
-use turns::Row;
-use watch::Pace;
+use row::Row;
+use timer::Pace;
 
-/// Of everybody who runs jobs: the thread that has them, and one more.
+/// Threads that run jobs: the calling thread, and one more.
 pub const WORKERS: usize = 2;
 
-/// Why a contender failed; from whichever thread.
+/// Why a contender failed.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// Compares ways to run jobs.
+/// Compares executors.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds and small sizes, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Measures this row only; may be given several times.
+    #[command(flatten)]
+    extent: ExtentArguments,
+    /// Measures this row only. May be repeated.
     #[arg(long = "row", value_parser = ROWS)]
     rows: Vec<String>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// In the order they are shown.
 const ROWS: [&str; 11] =
     ["graph_1k", "graph_4k", "graph_10k", "frame", "frame_cold", "fine", "flat", "wake", "idle", "asleep", "tiny"];
 
-/// How much is measured.
+/// The size of the measurement.
 pub struct Extent {
     name: &'static str,
     rounds: usize,
-    /// How long the frames of a turn take together, where they come back to back.
-    turn: Duration,
-    /// Nodes of the three graphs.
+    /// Duration of a sample of frames back to back.
+    sample: Duration,
+    /// Nodes of each of the three graphs.
     graphs: [usize; 3],
-    /// Frames a turn.
+    /// Frames per run.
     cold_frames: usize,
     idle_frames: usize,
-    /// Jobs of the row of that name, and how many threads start in it.
+    /// Jobs and threads of the row of that name.
     flat: usize,
     threads: usize,
-    /// Jobs a turn.
+    /// Jobs per run.
     wakes: usize,
-    /// How long nothing is to be done.
+    /// Duration of the idle phase.
     asleep: Duration,
 }
 
@@ -80,7 +76,7 @@ impl Extent {
     const FULL: Self = Self {
         name: "full",
         rounds: 15,
-        turn: Duration::from_millis(15),
+        sample: Duration::from_millis(15),
         graphs: [1_000, 4_000, 10_000],
         cold_frames: 20,
         idle_frames: 30,
@@ -92,7 +88,7 @@ impl Extent {
     const QUICK: Self = Self {
         name: "quick",
         rounds: 3,
-        turn: Duration::from_millis(2),
+        sample: Duration::from_millis(2),
         graphs: [200, 400, 1_000],
         cold_frames: 2,
         idle_frames: 3,
@@ -102,8 +98,8 @@ impl Extent {
         asleep: Duration::from_millis(50),
     };
 
-    fn hot(&self) -> Pace<'static> {
-        Pace::Hot { turn: self.turn }
+    fn back_to_back(&self) -> Pace<'static> {
+        Pace::BackToBack { duration: self.sample }
     }
 
     fn row(&self, name: &str) -> Result<Row, Failure> {
@@ -111,9 +107,9 @@ impl Extent {
             "graph_1k" => Ok(graph::row("graph_1k", self.graphs[0], self)),
             "graph_4k" => Ok(graph::row("graph_4k", self.graphs[1], self)),
             "graph_10k" => Ok(graph::row("graph_10k", self.graphs[2], self)),
-            "frame" => Ok(passes::frame(self)),
-            "frame_cold" => Ok(passes::frame_cold(self)),
-            "fine" => Ok(passes::fine(self)),
+            "frame" => Ok(chains::frame(self)),
+            "frame_cold" => Ok(chains::frame_cold(self)),
+            "fine" => Ok(chains::fine(self)),
             "flat" => Ok(flat::row(self)),
             "wake" => Ok(wake::row(self)),
             "idle" => Ok(idle::idle(self)),
@@ -126,30 +122,28 @@ impl Extent {
 
 fn main() -> Result<(), Failure> {
     let arguments = Arguments::parse();
-    let quick = arguments.quick || !arguments.bench;
+    let quick = arguments.extent.is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
-    let is_asked = |name: &str| arguments.rows.is_empty() || arguments.rows.iter().any(|row| row == name);
-    // Processor time is known there only.
-    let is_known = |name: &str| cfg!(target_os = "linux") || !["idle", "asleep"].contains(&name);
-    // A cold frame is judged by what a wake takes.
-    let is_needed = |name: &str| is_asked(name) || name == "wake" && is_asked("frame_cold");
-    let rows = ROWS.into_iter().filter(|name| is_needed(name) && is_known(name));
+    let is_requested = |name: &str| arguments.rows.is_empty() || arguments.rows.iter().any(|row| row == name);
+    // CPU time is read on Linux only.
+    let is_available = |name: &str| cfg!(target_os = "linux") || !["idle", "asleep"].contains(&name);
+    // The report compares a cold frame with the time of a wake-up.
+    let is_needed = |name: &str| is_requested(name) || name == "wake" && is_requested("frame_cold");
+    let rows = ROWS.into_iter().filter(|name| is_needed(name) && is_available(name));
     let mut rows: Vec<Row> = rows.map(|name| extent.row(name)).collect::<Result<_, _>>()?;
 
-    let turns: usize = rows.iter().map(|row| extent.rounds * row.contenders.len()).sum();
-    let progress = ProgressBar::new(turns as u64);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} turns, {eta} left  {msg}")?);
+    let progress = progress_bar("runs");
     rows.iter_mut().try_for_each(Row::check)?;
-    let mut random = Random::new();
-    // All rows once, and then again: what else the machine does for some seconds spoils a round of each, and no row.
-    for _ in 0..extent.rounds {
-        rows.iter_mut().try_for_each(|row| row.round(&mut random, &progress))?;
+    let contenders = rows.iter().map(|row| row.contenders.len()).sum();
+    let mut harness = Harness::new(Rounds { warm_up: 0, measured: extent.rounds }, &progress);
+    // Rounds are the outer loop: a disturbance of some seconds spoils one round of each row, rather than all of one row.
+    for _ in harness.rounds(contenders) {
+        rows.iter_mut().try_for_each(|row| row.round(&mut harness, &progress))?;
     }
     let mut report = Report::new(&extent);
     rows.iter().for_each(|row| report.add(row));
     progress.finish_and_clear();
     report.print();
-    // A trial must not take the place of what was measured.
     if !quick {
         report.write()?;
     }

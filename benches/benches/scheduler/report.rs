@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The results, as a table and as JSON.
 
 use std::io;
 
@@ -7,9 +7,9 @@ use drawloom_benches::table::Table;
 use serde::Serialize;
 
 use crate::Extent;
-use crate::turns::Row;
+use crate::row::Row;
 
-/// What was measured.
+/// The results.
 pub struct Report {
     extent: &'static str,
     rounds: usize,
@@ -25,7 +25,7 @@ struct Line {
     median: f64,
     p95: f64,
     unit: &'static str,
-    /// Whether it is somebody else's way to do the same.
+    /// Whether another executor does the same task.
     #[serde(skip)]
     is_peer: bool,
 }
@@ -68,7 +68,7 @@ impl Report {
             let ratio = self.best_peer(row).map_or(String::new(), |best| format!("{:.2}", median / best));
             let figures = [median, p95].map(|figure| format!("{figure:.decimals$}", decimals = decimals(*figure)));
             let [median, p95] = figures;
-            table.line([
+            table.row([
                 row.to_string(),
                 executor.to_string(),
                 workers.to_string(),
@@ -82,7 +82,7 @@ impl Report {
         self.print_cold_target();
     }
 
-    /// A frame that finds everybody asleep cannot do without waking them: what it may take is set beside it.
+    /// A frame that finds all workers asleep has to wake them: prints how far it is from the ideal plus that.
     fn print_cold_target(&self) {
         let (Some(wake), Some(ideal)) = (self.median("wake", "drawloom"), self.median("frame_cold", "ideal")) else {
             return;
@@ -106,13 +106,13 @@ impl Report {
     }
 
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self) -> io::Result<()> {
         results::write_json("scheduler.json", &self.lines)
     }
 }
 
-/// So many that there are three figures, of small numbers.
+/// Decimals that make three digits of small numbers.
 fn decimals(figure: f64) -> usize {
     match figure {
         ..10.0 => 2,

@@ -1,26 +1,26 @@
-//! Row `tiny`: so little that a plain loop may be the best of all.
+//! Row `tiny`: so little work that a plain loop may be fastest.
 
 use std::time::Duration;
 
 use drawloom_benches::work::Work;
 
 use crate::Extent;
-use crate::passes::Shape;
-use crate::turns::{Contender, Row};
+use crate::chains::Chain;
+use crate::row::{Contender, Row};
 
-/// A frame is 7 jobs of 1 µs.
+/// 7 jobs of 1 µs.
 pub fn row(extent: &Extent) -> Row {
-    let shape = Shape { passes: 1, jobs: 7 };
-    let mut contenders = vec![Contender::plain_loop(shape.all()), Contender::ideal(shape.all())];
-    contenders.extend(shape.contenders());
+    let chain = Chain { nodes: 1, jobs: 7 };
+    let mut contenders = vec![Contender::plain_loop(chain.all()), Contender::ideal(chain.all())];
+    contenders.extend(chain.contenders());
     Row {
         name: "tiny",
         unit: "µs a frame",
         scale: 1e6,
-        pace: extent.hot(),
+        pace: extent.back_to_back(),
         work: Work::busy(Duration::from_micros(1)),
-        jobs: shape.all(),
-        order: shape.order(),
+        jobs: chain.all(),
+        order: chain.order(),
         contenders,
     }
 }

@@ -1,7 +1,7 @@
-//! Row `wake`: how long a job waits for a worker that sleeps, while who submitted it goes on with something else.
+//! Row `wake`: the time from the submission of a job until a sleeping worker begins it, while the submitter is busy.
 //!
-//! Another thread is not always another core: a system may let the woken thread take the submitter's own core, where it begins
-//! sooner than on one that has to be woken as well.
+//! Another thread is not always another core: a system may run the woken thread on the submitter's core, where it begins
+//! sooner than on a core that has to be woken too.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,52 +11,52 @@ use std::time::Duration;
 use drawloom::task::Scheduler;
 use drawloom_benches::work::Work;
 
-use crate::turns::{Contender, Row};
-use crate::watch::{Arrival, Pace};
+use crate::row::{Contender, Row};
+use crate::timer::{Pace, WakeLatency};
 use crate::{Extent, WORKERS, pools};
 
-/// chili is left out: it passes a job on only when its owner joins something else, so nobody can submit a job and go on.
+/// chili is left out: it hands over a job only at a join, so a thread cannot submit a job and go on.
 pub fn row(extent: &Extent) -> Row {
-    let drawloom = Contender::new("drawloom", |_work, watch| {
+    let drawloom = Contender::new("drawloom", |_work, timer| {
         let scheduler = Scheduler::new(WORKERS)?;
-        watch.wakes(|arrival| {
+        timer.wakes(|latency| {
             Ok(scheduler.scope(|scope| {
-                arrival.submit();
-                scope.spawn(|_scope, _worker| arrival.begin());
-                arrival.wait();
+                latency.mark_submitted();
+                scope.spawn(|_scope, _worker| latency.mark_begun());
+                latency.wait();
             })?)
         })
     });
-    let rayon = Contender::new("rayon", |_work, watch| {
+    let rayon = Contender::new("rayon", |_work, timer| {
         pools::rayon()?.install(|| {
-            watch.wakes(|arrival| {
+            timer.wakes(|latency| {
                 rayon::scope(|scope| {
-                    arrival.submit();
-                    scope.spawn(|_scope| arrival.begin());
-                    arrival.wait();
+                    latency.mark_submitted();
+                    scope.spawn(|_scope| latency.mark_begun());
+                    latency.wait();
                 });
                 Ok(())
             })
         })
     });
-    let rayon_in_place = Contender::new("rayon in_place_scope", |_work, watch| {
+    let rayon_in_place = Contender::new("rayon in_place_scope", |_work, timer| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(WORKERS - 1).build()?;
-        watch.wakes(|arrival| {
+        timer.wakes(|latency| {
             pool.in_place_scope(|scope| {
-                arrival.submit();
-                scope.spawn(|_scope| arrival.begin());
-                arrival.wait();
+                latency.mark_submitted();
+                scope.spawn(|_scope| latency.mark_begun());
+                latency.wait();
             });
             Ok(())
         })
     });
-    let bevy_tasks = Contender::new("bevy_tasks", |_work, watch| {
+    let bevy_tasks = Contender::new("bevy_tasks", |_work, timer| {
         let pool = pools::bevy_tasks();
-        watch.wakes(|arrival| {
+        timer.wakes(|latency| {
             pool.scope(|scope| {
-                arrival.submit();
-                scope.spawn(async { arrival.begin() });
-                arrival.wait();
+                latency.mark_submitted();
+                scope.spawn(async { latency.mark_begun() });
+                latency.wait();
             });
             Ok(())
         })
@@ -65,7 +65,7 @@ pub fn row(extent: &Extent) -> Row {
         name: "wake",
         unit: "µs",
         scale: 1e6,
-        pace: Pace::Wakes { still: Duration::from_millis(3), jobs: extent.wakes },
+        pace: Pace::Wakes { idle: Duration::from_millis(3), jobs: extent.wakes },
         work: Work::empty(),
         jobs: 0,
         order: Box::new(|_record| Ok(())),
@@ -73,26 +73,26 @@ pub fn row(extent: &Extent) -> Row {
     }
 }
 
-/// A thread that parks until there is a job for it.
+/// A thread that parks until it has a job.
 fn std_threads() -> Contender {
-    Contender::new("std threads", |_work, watch| {
-        let submitted: Mutex<Option<Arc<Arrival>>> = Mutex::new(None);
+    Contender::new("std threads", |_work, timer| {
+        let submitted: Mutex<Option<Arc<WakeLatency>>> = Mutex::new(None);
         let is_over = AtomicBool::new(false);
         let take = || submitted.lock().unwrap_or_else(PoisonError::into_inner).take();
         thread::scope(|scope| {
             let worker = scope.spawn(|| {
                 while !is_over.load(Ordering::Acquire) {
                     match take() {
-                        Some(arrival) => arrival.begin(),
+                        Some(latency) => latency.mark_begun(),
                         None => thread::park(),
                     }
                 }
             });
-            let outcome = watch.wakes(|arrival| {
-                arrival.submit();
-                *submitted.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(arrival));
+            let outcome = timer.wakes(|latency| {
+                latency.mark_submitted();
+                *submitted.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(latency));
                 worker.thread().unpark();
-                arrival.wait();
+                latency.wait();
                 Ok(())
             });
             is_over.store(true, Ordering::Release);

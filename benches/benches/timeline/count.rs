@@ -1,4 +1,4 @@
-//! Instructions a chunk, with the recorder off and without one.
+//! Counts instructions per chunk, with the recorder off and without one.
 
 use std::env;
 use std::error::Error;
@@ -14,17 +14,17 @@ use crate::shape::{CHUNKS, Shape};
 
 type Failure = Box<dyn Error + Send + Sync>;
 
-/// How many frames are run, few and many: what start and end of the program take is in both, and in no difference. Few are
-/// enough for a schedule to have learnt what its processes cost.
+/// Counts are differences of two numbers of frames, so that start and end of the program cancel out. The lower number suffices for a
+/// schedule to have measured its nodes.
 const FRAMES: [usize; 2] = [100, 300];
 
-/// How often each is counted. How many chunks are taken at once depends on the clock, so of several counts the least is right.
-const TRIES: usize = 5;
+/// Runs of each count, of which the minimum is taken: the size of tickets depends on the clock.
+const RUNS: usize = 5;
 
-/// Counts all shapes, in a program with a recorder and in one that was built without.
+/// Counts all shapes in a program with a recorder and in one without.
 ///
 /// # Errors
-/// If there is no valgrind, if the other program does not build, or if one of them fails.
+/// Returns an error if valgrind is missing, or if a program does not build or fails.
 pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
     progress.set_message("building with a recorder");
     let with = build("with_timeline", "")?;
@@ -33,14 +33,14 @@ pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
     let mut counted = Vec::new();
     for &shape in Shape::ALL {
         progress.set_message(format!("counting {}", shape.name()));
-        let [off, without] = [&with, &without].map(|program| instructions_a_chunk(program, shape));
+        let [off, without] = [&with, &without].map(|program| instructions_per_chunk(program, shape));
         counted.push(Counted { shape, off: off?, without: without? });
     }
     Ok(counted)
 }
 
-/// Builds this program once more with these flags, and says where it is. Both are built alike but for that, and in one piece:
-/// how the compiler cuts a crate to pieces decides what it inlines, and that is not to be in the difference.
+/// Builds this program with these flags, and returns its path. It is built as a single codegen unit, as the split into units affects
+/// inlining and would show in the difference.
 fn build(folder: &str, flag: &str) -> Result<PathBuf, Failure> {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
     let flags = env::var("RUSTFLAGS").unwrap_or_default() + " " + flag;
@@ -59,13 +59,13 @@ fn build(folder: &str, flag: &str) -> Result<PathBuf, Failure> {
     programs.next().ok_or_else(|| "cargo built no program".into())
 }
 
-fn instructions_a_chunk(program: &Path, shape: Shape) -> Result<f64, Failure> {
-    let [few, many] = FRAMES.map(|frames| least_instructions(program, shape, frames));
+fn instructions_per_chunk(program: &Path, shape: Shape) -> Result<f64, Failure> {
+    let [few, many] = FRAMES.map(|frames| min_instructions(program, shape, frames));
     Ok((many? - few?) as f64 / ((FRAMES[1] - FRAMES[0]) * CHUNKS) as f64)
 }
 
-fn least_instructions(program: &Path, shape: Shape, frames: usize) -> Result<u64, Failure> {
-    let counts = (0..TRIES).map(|_| instructions(program, shape, frames));
+fn min_instructions(program: &Path, shape: Shape, frames: usize) -> Result<u64, Failure> {
+    let counts = (0..RUNS).map(|_| instructions(program, shape, frames));
     Ok(counts.collect::<Result<Vec<_>, _>>()?.into_iter().min().unwrap_or_default())
 }
 
@@ -76,18 +76,18 @@ fn instructions(program: &Path, shape: Shape, frames: usize) -> Result<u64, Fail
         .args(["--shape", shape.name(), "--frames", &frames.to_string()]))?;
     let text = String::from_utf8_lossy(&output.stderr);
     let collected = text.lines().find_map(|line| line.split("Collected :").nth(1));
-    let count = collected.ok_or("valgrind says nothing of what it has counted")?;
+    let count = collected.ok_or("valgrind printed no count")?;
     Ok(count.trim().parse()?)
 }
 
 /// # Errors
-/// If the program is not there, or ends with another status than 0.
+/// Returns an error if the program does not exist or fails.
 fn run(command: &mut Command) -> Result<Output, Failure> {
     let name = Path::new(command.get_program()).file_name().unwrap_or(OsStr::new("?")).display().to_string();
     let output = command.output().map_err(|error| format!("{name} could not be started: {error}"))?;
     if output.status.success() {
         return Ok(output);
     }
-    let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    Err(format!("{name} failed, {}:\n{words}", output.status).into())
+    let output_text = String::from_utf8_lossy(&output.stderr).into_owned();
+    Err(format!("{name} failed, {}:\n{output_text}", output.status).into())
 }

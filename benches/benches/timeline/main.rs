@@ -1,43 +1,39 @@
-//! What it costs to record timelines, and to have the recorder there while it is off.
+//! The cost of recording timelines, and of a recorder that is off.
 //!
 //!     cargo bench -p drawloom-benches --bench timeline
 //!     cargo bench -p drawloom-benches --bench timeline -- --quick
 //!
-//! *Off* is counted rather than timed: instructions a chunk, under callgrind, of this build and of one that is built with
-//! `--cfg drawloom_without_timeline`, so without a recorder. That wants valgrind and builds the crate twice more. *On* is timed: frames
-//! with the recorder off and on take turns, in the scheduler benchmark's row `frame` and with chunks that do nothing. A *span*
-//! is what a process gives subscribers of `tracing`, where there is none. What was measured is written to
-//! `drawloom/timeline.json` in the target folder too.
+//! *Off* is counted rather than timed: instructions per chunk, under callgrind, of this build and of one without a recorder, built
+//! with `--cfg drawloom_without_timeline`. It requires valgrind and builds the crate twice more. *On* is timed: frames with the
+//! recorder off and on are interleaved, for the scheduler benchmark's row `frame` and for empty chunks. A *span* is the cost of a
+//! node's `tracing` span without a subscriber. `target/drawloom/timeline.json` has the same.
 
 mod count;
+mod recording;
 mod report;
 mod shape;
 mod spans;
-mod turns;
 
 use std::error::Error;
 
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::{Harness, Rounds, progress_bar};
 
+use recording::Timed;
 use report::{Figures, Report};
 use shape::Shape;
-use turns::Timed;
 
-/// Measures what timelines cost.
+/// Measures the cost of timelines.
 #[derive(Parser)]
 struct Arguments {
-    /// Few rounds, and nothing is counted, to see that it works.
-    #[arg(long)]
-    quick: bool,
-    /// Runs frames of this shape and nothing else: what is counted.
+    #[command(flatten)]
+    extent: ExtentArguments,
+    /// Runs frames of this shape and nothing else, to be counted.
     #[arg(long, value_enum, requires = "frames", hide = true)]
     shape: Option<Shape>,
     #[arg(long, requires = "shape", hide = true)]
     frames: Option<usize>,
-    /// Given by `cargo bench`; without it, as under `cargo test --benches`, the run is a quick one.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
@@ -45,14 +41,13 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     if let (Some(shape), Some(frames)) = (arguments.shape, arguments.frames) {
         return shape.run(frames);
     }
-    let quick = arguments.quick || !arguments.bench;
+    let quick = arguments.extent.is_quick();
     let rounds = if quick { 5 } else { 101 };
-    let progress = ProgressBar::new(rounds);
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} rounds, {eta} left  {msg}")?);
+    let progress = progress_bar("runs");
     let mut timed = Timed::all()?;
-    for _ in 0..rounds {
-        timed.iter_mut().try_for_each(Timed::round)?;
-        progress.inc(1);
+    let mut harness = Harness::new(Rounds { warm_up: 0, measured: rounds }, &progress);
+    for _ in harness.rounds(2 * timed.len()) {
+        timed.iter_mut().try_for_each(|timed| timed.round(&mut harness))?;
     }
     let span = spans::measure(if quick { 3 } else { 31 });
     let counted = if quick { Ok(Vec::new()) } else { count::count(&progress) };
@@ -62,7 +57,6 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let timed = timed.iter().map(Timed::figures).collect();
     let report = Report::new(Figures { rounds, timed, span, counted: counted?, ring_bytes });
     report.print(quick);
-    // A trial must not take the place of what was measured.
     if !quick {
         report.write()?;
     }

@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The results, as a table and as JSON.
 
 use std::io;
 
@@ -8,16 +8,16 @@ use serde::Serialize;
 
 use crate::shape::Shape;
 
-/// What was measured.
+/// The results.
 #[derive(Serialize)]
 pub struct Figures {
-    pub rounds: u64,
+    pub rounds: usize,
     pub timed: Vec<TimedFigures>,
-    /// Nanoseconds a span without a subscriber.
+    /// Nanoseconds per span without a subscriber.
     pub span: f64,
-    /// Instructions a chunk; none in a quick run.
+    /// Empty in a quick run.
     pub counted: Vec<Counted>,
-    /// What the rings take, a worker.
+    /// Memory of the rings per worker.
     pub ring_bytes: usize,
 }
 
@@ -25,23 +25,23 @@ pub struct Figures {
 #[derive(Serialize)]
 pub struct TimedFigures {
     pub row: &'static str,
-    /// In a frame.
+    /// Chunks in a frame.
     pub chunks: usize,
     /// A frame with the recorder off.
     pub frame: f64,
-    /// What recording adds to a chunk: what the frame is longer by, times the workers, divided by the chunks.
+    /// What recording adds to a chunk: the difference of the frame times, times the workers, divided by the chunks.
     pub a_chunk: f64,
-    /// What it adds to the frame.
+    /// What recording adds to the frame, as a share.
     pub share: f64,
 }
 
-/// Instructions a chunk.
+/// Instructions per chunk.
 #[derive(Serialize)]
 pub struct Counted {
     pub shape: Shape,
     /// With the recorder off.
     pub off: f64,
-    /// Without one.
+    /// Without a recorder.
     pub without: f64,
 }
 
@@ -63,7 +63,7 @@ impl Report {
             let (frame, share) = (row.frame / 1e3, row.share * 100.0);
             let figures = [format!("{frame:.1}"), format!("{:.1}", row.a_chunk), format!("{share:.2}")];
             let [frame, a_chunk, share] = figures;
-            table.line([row.row.to_owned(), row.chunks.to_string(), frame, a_chunk, share]);
+            table.row([row.row.to_owned(), row.chunks.to_string(), frame, a_chunk, share]);
         }
         table.print();
         if !counted.is_empty() {
@@ -71,7 +71,7 @@ impl Report {
             for Counted { shape, off, without } in counted {
                 let figures = [*without, *off, off - without].map(|figure| format!("{figure:.2}"));
                 let [without, off, more] = figures;
-                table.line([shape.name().to_owned(), without, off, more]);
+                table.row([shape.name().to_owned(), without, off, more]);
             }
             table.print();
         }
@@ -82,7 +82,7 @@ impl Report {
     }
 
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self) -> io::Result<()> {
         results::write_json("timeline.json", &self.figures)
     }

@@ -1,4 +1,4 @@
-//! Schedules of many chunks that do nothing, so that all there is to count is the scheduler's own doing.
+//! Schedules of many empty chunks, so that only the scheduler's own instructions are counted.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -11,48 +11,48 @@ use serde::Serialize;
 /// Chunks in a frame.
 pub const CHUNKS: usize = 1_024;
 
-/// How a frame's chunks are arranged. All is run by one worker, so that counts are the same each time.
+/// How a frame's chunks are arranged. One worker runs them all, so that counts are reproducible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// One process, as it is run where it is not shared.
-    Alone,
-    /// One process of many chunks, as it is run where workers share it.
-    Shared,
-    /// A chain of processes of one chunk, as it is run where it is not shared.
-    Chain,
-    /// The same, as it is run where workers share it.
-    SharedChain,
+    /// One node of many chunks in a serial run.
+    Serial,
+    /// One node of many chunks in a parallel run.
+    Parallel,
+    /// A chain of nodes of one chunk each in a serial run.
+    SerialChain,
+    /// The same chain in a parallel run.
+    ParallelChain,
 }
 
 impl Shape {
-    pub const ALL: &[Self] = &[Self::Alone, Self::Shared, Self::Chain, Self::SharedChain];
+    pub const ALL: &[Self] = &[Self::Serial, Self::Parallel, Self::SerialChain, Self::ParallelChain];
 
-    /// As it is written on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Alone => "alone",
-            Self::Shared => "shared",
-            Self::Chain => "chain",
-            Self::SharedChain => "shared-chain",
+            Self::Serial => "serial",
+            Self::Parallel => "parallel",
+            Self::SerialChain => "serial-chain",
+            Self::ParallelChain => "parallel-chain",
         }
     }
 
-    /// Runs so many frames.
+    /// Runs this many frames.
     ///
     /// # Errors
-    /// If they cannot be run.
+    /// Returns an error if a frame fails.
     pub fn run(self, frames: usize) -> Result<(), Box<dyn Error + Send + Sync>> {
-        // With a seed even a single worker goes the way of those that share.
+        // A shuffled scheduler runs every schedule in parallel, even on one worker.
         let builder = Scheduler::builder().workers(1);
         let scheduler = match self {
-            Self::Alone | Self::Chain => builder,
-            Self::Shared | Self::SharedChain => builder.shuffle(1),
+            Self::Serial | Self::SerialChain => builder,
+            Self::Parallel | Self::ParallelChain => builder.shuffle(1),
         }
         .build()?;
         let mut schedule = match self {
-            Self::Alone | Self::Shared => pass(CHUNKS)?,
-            Self::Chain | Self::SharedChain => chain(CHUNKS)?,
+            Self::Serial | Self::Parallel => one_node(CHUNKS)?,
+            Self::SerialChain | Self::ParallelChain => chain(CHUNKS)?,
         };
         for _ in 0..frames {
             schedule.run(&scheduler, &())?;
@@ -61,22 +61,19 @@ impl Shape {
     }
 }
 
-/// One process of so many empty chunks.
-///
-/// # Errors
-/// If it does not compile.
-pub fn pass(chunks: usize) -> Result<Schedule<Closure<'static, ()>>, Box<dyn Error + Send + Sync>> {
+/// One node of this many empty chunks.
+fn one_node(chunks: usize) -> Result<Schedule<Closure<'static, ()>>, Box<dyn Error + Send + Sync>> {
     let mut graph = FrameGraph::new();
-    let process = graph.add("pass", empty().with_width(move |_| chunks));
-    graph.keep(process);
+    let node = graph.add("node", empty().with_width(move |_| chunks));
+    graph.keep(node);
     Ok(graph.compile()?)
 }
 
-fn chain(processes: usize) -> Result<Schedule<Closure<'static, ()>>, Box<dyn Error + Send + Sync>> {
+fn chain(nodes: usize) -> Result<Schedule<Closure<'static, ()>>, Box<dyn Error + Send + Sync>> {
     let mut graph = FrameGraph::new();
-    let chain: Vec<_> = (0..processes).map(|index| graph.add(index.to_string(), empty())).collect();
+    let chain: Vec<_> = (0..nodes).map(|index| graph.add(index.to_string(), empty())).collect();
     chain.windows(2).for_each(|pair| graph.order(pair[0], pair[1]));
-    chain.iter().for_each(|&process| graph.keep(process));
+    chain.iter().for_each(|&node| graph.keep(node));
     Ok(graph.compile()?)
 }
 

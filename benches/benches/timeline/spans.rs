@@ -1,13 +1,13 @@
-//! What a process' span costs where nobody subscribes.
+//! The cost of a node's span without a subscriber.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-use drawloom_benches::stopwatch::middle;
+use drawloom_benches::statistics::median;
 
 const SPANS: u32 = 1_000_000;
 
-/// Nanoseconds a span that is opened, entered and closed, with the fields that a process has. Of so many rounds.
+/// Nanoseconds to open, enter and close a span with a node's fields: the median of `rounds`.
 pub fn measure(rounds: usize) -> f64 {
     let parent = tracing::Span::current();
     let (name, view) = (black_box("geometry buffer, view 0, record"), black_box(Some("main")));
@@ -16,7 +16,7 @@ pub fn measure(rounds: usize) -> f64 {
         drop(black_box(span.entered()));
     };
     let without = || _ = black_box((name, view));
-    middle((0..rounds).map(|_| time(with) - time(without)))
+    median((0..rounds).map(|_| time(with) - time(without)))
 }
 
 fn time(call: impl Fn()) -> f64 {

@@ -1,4 +1,4 @@
-//! Every setting at every place of the path: its pictures, then its times, in turns.
+//! Draws every setting at every position of the path, first for its pictures, and then interleaved for its times.
 
 use std::time::Duration;
 
@@ -6,8 +6,8 @@ use drawloom::backend::Picture;
 use drawloom::command::RenderCommand;
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Scene, SceneRef};
-use drawloom_testing::random::Random;
-use indicatif::{ProgressBar, ProgressStyle};
+use drawloom_benches::harness::{Harness, Rounds, progress_bar};
+use drawloom_benches::statistics::median_duration;
 
 use crate::Failure;
 use crate::arguments::Arguments;
@@ -90,9 +90,8 @@ impl Measurements {
         arguments: &Arguments,
     ) -> Result<Self, Failure> {
         let rounds = arguments.rounds as usize;
-        let steps = path.len() + settings.len() * (1 + rounds);
-        let progress = ProgressBar::new(steps as u64);
-        progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}, {eta} left")?);
+        let progress = progress_bar("steps");
+        progress.set_length((path.len() + settings.len()) as u64);
 
         let mut reference = Vec::new();
         let mut judge = stage::reference()?;
@@ -116,15 +115,16 @@ impl Measurements {
             progress.inc(1);
         }
 
-        // In turns, so that what else the machine does hits all of them alike.
-        let mut random = Random::new();
-        for _ in 0..rounds {
-            for index in random.order(settings.len()) {
-                let setting = &settings[index];
+        let mut contenders: Vec<_> = settings.iter().collect();
+        let times = Harness::new(Rounds { warm_up: 0, measured: rounds }, &progress).measure(
+            &mut contenders,
+            |setting, _round| {
                 progress.set_message(format!("times of {}: {}", setting.knob.name(), setting.name));
-                of_settings[index].times.push(time_along(stage, scene, path, &setting.quality)?);
-                progress.inc(1);
-            }
+                time_along(stage, scene, path, &setting.quality)
+            },
+        )?;
+        for (measurement, times) in of_settings.iter_mut().zip(times) {
+            measurement.times.extend(times);
         }
         progress.finish_and_clear();
         Ok(Self { of_settings, reference })
@@ -134,12 +134,12 @@ impl Measurements {
 impl Measurement {
     /// From the scene's hand-over to the return of submit, in the round in the middle.
     pub fn cpu(&self) -> Duration {
-        median(self.times.iter().map(|time| time.cpu))
+        median_duration(self.times.iter().map(|time| time.cpu))
     }
 
     /// Until it is drawn, in the round in the middle.
     pub fn frame(&self) -> Duration {
-        median(self.times.iter().map(|time| time.frame))
+        median_duration(self.times.iter().map(|time| time.frame))
     }
 }
 
@@ -218,13 +218,6 @@ pub fn time_along(
 /// The scene with this camera and no other.
 fn seen_from<'a>(scene: &'a Scene, camera: &'a Camera) -> SceneRef<'a> {
     SceneRef { cameras: std::slice::from_ref(camera), ..scene.as_scene_ref() }
-}
-
-/// The time in the middle; of an even number, the upper of two.
-fn median(times: impl Iterator<Item = Duration>) -> Duration {
-    let mut times: Vec<_> = times.collect();
-    times.sort();
-    times.get(times.len() / 2).copied().unwrap_or_default()
 }
 
 fn distance(pictures: &[Picture], others: &[Picture]) -> Result<Distance, Failure> {

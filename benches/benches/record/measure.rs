@@ -1,109 +1,101 @@
-//! Techniques that take turns.
+//! Measures all techniques on one backend, interleaved.
 
 use std::time::{Duration, Instant};
 
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::clouds::around_one;
+use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::moving::Moving;
-use drawloom_benches::stopwatch::middle;
-use drawloom_testing::random::Random;
+use drawloom_benches::statistics::median;
+use drawloom_benches::stopwatch::mean_frame;
 use indicatif::ProgressBar;
 
 use crate::allocations::requests_in;
-use crate::apart::Apart;
-use crate::nobody::Nobody;
-use crate::ours::renderer;
+use crate::independent_threads::IndependentThreads;
+use crate::noop_backend::NoopBackend;
+use crate::renderer::renderer;
 use crate::report::Row;
 use crate::technique::{Contender, Failure};
 use crate::{CAMERAS, Extent, pictures};
 
-/// Frames in which requests for memory are counted.
+/// Frames whose allocations are counted.
 const COUNTED: usize = 8;
 
-/// What was measured on one backend.
+/// The results on one backend.
 pub struct Measured {
     pub backend: BackendName,
     pub rows: Vec<Row>,
-    /// Nanoseconds an object and view of two threads that draw a frame each at the same time.
-    pub apart: f64,
-    /// How many times as fast two workers are as one; and the two threads that share nothing.
+    /// Nanoseconds per object and view of two independent threads.
+    pub independent: f64,
+    /// The speed-up of two workers over one, and of two independent threads over one worker.
     pub speed_ups: [f64; 2],
 }
 
 /// # Errors
-/// If a frame cannot be drawn, or is not the others'.
+/// Returns an error if a frame cannot be drawn, or if a technique draws another picture.
 pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Measured, Failure> {
-    let (warm_up, rounds, turn) = (backend.of(extent.warm_up), backend.of(extent.rounds), backend.of(extent.turn));
+    let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
     let mut world = Moving::new(around_one(CAMERAS, extent.objects)?);
     let mut contenders = Contender::all(backend, &world.as_scene_ref())?;
     progress.set_message(backend.name());
-    progress.inc_length(((warm_up + rounds) * contenders.len()) as u64);
     pictures::compare(&mut contenders, world.as_scene_ref(), backend == BackendName::Adapter)?;
 
-    let apart = Apart::new(backend, extent.objects);
-    let mut times_apart = Vec::new();
+    let independent = IndependentThreads::new(backend, extent.objects);
+    let mut independent_times = Vec::new();
     let mut times = vec![Vec::new(); contenders.len()];
-    let mut random = Random::new();
-    for round in 0..warm_up + rounds {
-        for index in random.order(contenders.len()) {
-            let is_counted = round >= warm_up;
-            let least = if is_counted { turn } else { Duration::ZERO };
-            let time = take_turn(&mut contenders[index], &mut world, least)?;
-            if is_counted {
-                times[index].push(time);
-            }
-            progress.inc(1);
-        }
-        let time = apart.take_turn()?;
-        if round >= warm_up {
-            times_apart.push(time);
+    let mut harness = Harness::new(rounds, progress);
+    for round in harness.rounds(contenders.len()) {
+        let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
+        let samples = harness.round(&mut contenders, |contender| sample(contender, &mut world, at_least))?;
+        let independent_time = independent.sample()?;
+        if !round.is_warm_up() {
+            times.iter_mut().zip(samples).for_each(|(times, sample)| times.push(sample));
+            independent_times.push(independent_time);
         }
     }
     let nanoseconds = |seconds: f64| seconds * 1e9 / (CAMERAS * extent.objects) as f64;
     let mut rows = Vec::new();
     let find = |name, workers| contenders.iter().position(|one| (one.name, one.workers) == (name, workers));
     let [naive, one, two] = [("naive", 1), ("drawloom", 1), ("drawloom", 2)].map(|(name, workers)| find(name, workers));
-    // Of the same round each: what the machine does meanwhile meets both.
-    let faster = |slow: Option<usize>, fast: &[f64]| {
+    // The ratio of two samples of the same round, so that a disturbance meets both.
+    let speed_up = |slow: Option<usize>, fast: &[f64]| {
         let slow = slow.map_or(&[][..], |index| &times[index]);
-        middle(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
+        median(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
     };
-    let speed_ups = [faster(one, two.map_or(&[][..], |two| &times[two])), faster(one, &times_apart)];
+    let speed_ups = [speed_up(one, two.map_or(&[][..], |two| &times[two])), speed_up(one, &independent_times)];
     for (contender, times) in contenders.iter_mut().zip(&times) {
-        let own = contender.is_ours().then(|| own_requests(contender.workers, warm_up, &mut world)).transpose()?;
+        let own = contender.is_drawloom().then(|| own_requests(contender.workers, rounds.warm_up, &mut world));
         rows.push(Row {
             technique: contender.name,
             backend,
             workers: contender.workers,
-            ns_per_object_view: nanoseconds(middle(times.iter().copied())),
-            of_naive: faster(naive, times),
+            ns_per_object_view: nanoseconds(median(times.iter().copied())),
+            speed_up_over_naive: speed_up(naive, times),
+            own_allocations_per_frame: own.transpose()?,
             allocations_per_frame: requests(&mut world, |world| {
                 let (result, requests) = requests_in(|| contender.technique.frame(world.as_scene_ref()));
                 result?;
                 contender.technique.wait()?;
                 Ok(requests)
             })?,
-            own_allocations_per_frame: own,
         });
     }
-    Ok(Measured { backend, rows, apart: nanoseconds(middle(times_apart)), speed_ups })
+    Ok(Measured { backend, rows, independent: nanoseconds(median(independent_times)), speed_ups })
 }
 
-/// As many frames as take so long, and one at least; returns seconds a frame.
-fn take_turn(contender: &mut Contender, world: &mut Moving, least: Duration) -> Result<f64, Failure> {
-    let (mut elapsed, mut frames) = (Duration::ZERO, 0);
-    while frames == 0 || elapsed < least {
+/// Draws one frame, and more until they have taken `at_least`; returns seconds per frame.
+fn sample(contender: &mut Contender, world: &mut Moving, at_least: Duration) -> Result<f64, Failure> {
+    mean_frame(at_least, || {
         world.step();
         let start = Instant::now();
         contender.technique.frame(world.as_scene_ref())?;
-        elapsed += start.elapsed();
+        let elapsed = start.elapsed();
         contender.technique.wait()?;
-        frames += 1;
-    }
-    Ok(elapsed.as_secs_f64() / f64::from(frames))
+        Ok(elapsed)
+    })
 }
 
-/// The median of some frames.
+/// The median number of allocations of some frames.
 fn requests(world: &mut Moving, mut frame: impl FnMut(&Moving) -> Result<usize, Failure>) -> Result<usize, Failure> {
     let mut counts = Vec::new();
     for _ in 0..COUNTED {
@@ -114,9 +106,9 @@ fn requests(world: &mut Moving, mut frame: impl FnMut(&Moving) -> Result<usize, 
     Ok(counts[COUNTED / 2])
 }
 
-/// How often a frame of this crate asks for memory where no device does.
+/// How often a frame of this crate allocates on the no-op backend.
 fn own_requests(workers: usize, warm_up: usize, world: &mut Moving) -> Result<usize, Failure> {
-    let (mut renderer, submitter) = renderer(Nobody, workers)?;
+    let (mut renderer, submitter) = renderer(NoopBackend, workers)?;
     for _ in 0..warm_up {
         world.step();
         submitter.submit(renderer.record(world.as_scene_ref())?)?;

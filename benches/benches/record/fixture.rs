@@ -1,4 +1,4 @@
-//! What all techniques by hand have in common: a device, and a picture a camera.
+//! What all hand-written techniques share: a device, and the targets of each camera.
 
 use drawloom::backend::WgpuBackend;
 use drawloom::scene::{Camera, SceneRef, Vertex};
@@ -10,8 +10,8 @@ use crate::technique::Failure;
 pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// A device, and a picture a camera.
-pub struct Studio {
+/// A device, and the targets of each camera.
+pub struct Fixture {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pictures: Vec<Picture>,
@@ -23,8 +23,8 @@ struct Picture {
     depth: wgpu::TextureView,
 }
 
-impl Studio {
-    /// On the backend's device, for the scene's cameras.
+impl Fixture {
+    /// Creates targets on the backend's device for the scene's cameras.
     pub fn new(backend: &WgpuBackend, scene: &SceneRef<'_>) -> Result<Self, Failure> {
         let device = backend.device().clone();
         let picture = |camera: &Camera| {
@@ -50,7 +50,7 @@ impl Studio {
         Ok(Self { queue: backend.queue().clone(), pictures, device })
     }
 
-    /// A pipeline for vertices as the scene has them.
+    /// A pipeline for the scene's vertex format.
     pub fn pipeline(&self, layouts: &[&wgpu::BindGroupLayout], shader: &str) -> wgpu::RenderPipeline {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
@@ -97,7 +97,7 @@ impl Studio {
         })
     }
 
-    /// What a bundle must know of the passes it is for.
+    /// An encoder of bundles for [`pass`](Self::pass).
     pub fn bundle_encoder(&self) -> wgpu::RenderBundleEncoder<'_> {
         self.device.create_render_bundle_encoder(&wgpu::RenderBundleEncoderDescriptor {
             label: None,
@@ -112,7 +112,7 @@ impl Studio {
         })
     }
 
-    /// A camera's pass, on a picture without anything.
+    /// Begins a camera's pass, which clears its targets.
     pub fn pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, camera: usize) -> wgpu::RenderPass<'a> {
         let picture = &self.pictures[camera];
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -134,7 +134,6 @@ impl Studio {
         })
     }
 
-    /// An encoder of its own.
     pub fn encoder(&self) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
@@ -145,7 +144,7 @@ impl Studio {
         Ok(())
     }
 
-    /// What a camera's picture looks like.
+    /// Reads a camera's picture.
     pub fn read(&self, camera: usize) -> Result<Vec<u8>, Failure> {
         pictures::read(&self.device, &self.queue, &self.pictures[camera].texture)
     }

@@ -1,44 +1,45 @@
-//! What a camera sees, what is found to be hidden from it, and what that takes.
+//! What occlusion culling finds for a camera, and its cost.
 
 use std::time::Instant;
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, SceneRef};
 use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
+use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
 use drawloom_testing::samples::Samples;
 use serde::Serialize;
 
 use crate::naive;
 
-/// A camera's picture at one coarseness, or all of them.
+/// A camera at one tile size, or the totals of all cameras.
 #[derive(Clone, Default, Serialize)]
 pub struct Row {
     pub camera: String,
-    /// Pixels to a square's side.
+    /// Pixels of a tile's side.
     pub side: u32,
-    /// Objects the frustum holds.
+    /// Objects in the frustum.
     pub seen: usize,
-    /// Of those, the ones that would show if nothing were before them, and do not.
+    /// Of those, the hidden ones: they would cover a sample alone, but do not.
     pub truly_hidden: usize,
-    /// Of those, the ones that were found.
+    /// Of those, the culled ones.
     pub found: usize,
-    /// Left out, and show.
+    /// Visible objects that were culled.
     pub false_hidden: usize,
     pub naive_found: usize,
     pub naive_false: usize,
-    /// Convex parts drawn.
+    /// Convex parts of occluders drawn.
     pub parts: usize,
-    /// Choosing and projecting occluders, in microseconds.
+    /// Selection and projection of occluders, in microseconds.
     pub choose_us: f64,
-    /// Drawing the coarse depth, on one core, in microseconds.
+    /// Drawing of the coarse depth buffer on one core, in microseconds.
     pub draw_us: f64,
-    /// Asking for one object, in nanoseconds.
+    /// Test of one object, in nanoseconds.
     pub object_ns: f64,
 }
 
 impl Row {
-    /// A row for each coarseness, over all cameras; times are means over cameras.
+    /// A row for each tile size: sums over all cameras, and mean times.
     pub fn totals(rows: &[Self]) -> Vec<Self> {
         let total = |side: u32| {
             let rows = rows.iter().filter(|row| row.side == side);
@@ -92,7 +93,7 @@ impl<'a> Sight<'a> {
         Self { scene, view, table, meshes, seen, truth }
     }
 
-    /// Lets occlusion look for what is hidden, in squares of so many pixels.
+    /// Culls with tiles of `side` pixels.
     pub fn measure(&self, side: u32, rounds: usize) -> Row {
         let Self { scene, view, table, meshes, seen, truth } = self;
         let count = seen.len();
@@ -101,7 +102,7 @@ impl<'a> Sight<'a> {
         let mut times: [Vec<f64>; 3] = Default::default();
         for _ in 0..rounds {
             visible.reset(count);
-            let bits = |(place, object): (usize, usize)| u64::from(seen[object]) << place;
+            let bits = |(bit, object): (usize, usize)| u64::from(seen[object]) << bit;
             visible.test(0..count, |objects| objects.enumerate().fold(0, |all, object| all | bits(object)));
             occlusion.reset(view, side);
             let start = Instant::now();
@@ -119,10 +120,7 @@ impl<'a> Sight<'a> {
         let number = |of: &dyn Fn(usize) -> bool| (0..count).filter(|&object| of(object)).count();
         let is_truly_hidden = |object: usize| truth.alone[object] && !truth.shown[object];
         let sights = number(&|object| seen[object]);
-        let [choose, draw, ask] = times.map(|mut times| {
-            times.sort_by(f64::total_cmp);
-            times[times.len() / 2]
-        });
+        let [choose, draw, test] = times.map(median);
         Row {
             camera: view.name().to_owned(),
             side,
@@ -135,7 +133,7 @@ impl<'a> Sight<'a> {
             parts: occlusion.part_count(),
             choose_us: choose * 1e6,
             draw_us: draw * 1e6,
-            object_ns: ask * 1e9 / sights.max(1) as f64,
+            object_ns: test * 1e9 / sights.max(1) as f64,
         }
     }
 }
@@ -157,7 +155,7 @@ pub fn print(rows: &[Row]) {
     let mut table = Table::new(&headings);
     let percent = |part: usize, whole: usize| format!("{:.1}", part as f64 / whole.max(1) as f64 * 100.0);
     for row in rows {
-        table.line([
+        table.row([
             row.camera.clone(),
             row.side.to_string(),
             row.seen.to_string(),

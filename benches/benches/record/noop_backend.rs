@@ -1,4 +1,4 @@
-//! A backend that does nothing and asks for no memory: what is left is the frame's own part.
+//! A backend that does nothing and allocates nothing, which leaves the allocations of the renderer itself.
 
 use std::ops::Range;
 
@@ -7,17 +7,17 @@ use drawloom::process::Pass;
 use drawloom::task::Worker;
 use drawloom::view::ObjectTable;
 
-/// It takes everything, and keeps nothing.
-pub struct Nobody;
+/// Ignores all that it receives.
+pub struct NoopBackend;
 
-impl Backend for Nobody {
+impl Backend for NoopBackend {
     type Frame = ();
     type Part = ();
     type Commands = ();
     type Submission = ();
 
     fn adapter(&self) -> String {
-        "nobody".to_owned()
+        "no-op backend".to_owned()
     }
 
     fn begin(&self, _request: &FrameRequest<'_>) -> Result<(), BackendError> {

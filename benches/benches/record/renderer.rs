@@ -1,4 +1,4 @@
-//! This crate: one process a camera, with the same targets and the same picture as the others'.
+//! The techniques of this crate: one process with the same targets and the same picture as the other techniques.
 
 use std::sync::Arc;
 
@@ -11,26 +11,26 @@ use drawloom::{Renderer, Submitter};
 use crate::pictures;
 use crate::technique::{Failure, Technique};
 
-pub struct Ours {
+pub struct Drawloom {
     renderer: Renderer<WgpuBackend>,
     submitter: Submitter<WgpuBackend>,
     last: Option<WgpuSubmission>,
     drawn: usize,
 }
 
-impl Ours {
+impl Drawloom {
     pub fn new(backend: WgpuBackend, workers: usize) -> Result<Self, Failure> {
         let (renderer, submitter) = renderer(backend, workers)?;
         Ok(Self { renderer, submitter, last: None, drawn: 0 })
     }
 }
 
-/// What draws, on any backend.
+/// A renderer with that process, on any backend.
 pub fn renderer<B: Backend>(backend: B, workers: usize) -> Result<(Renderer<B>, Submitter<B>), Failure> {
     Ok(Renderer::builder(backend).process(Surfaces).output(COLOR).build(Arc::new(Scheduler::new(workers)?))?)
 }
 
-impl Technique for Ours {
+impl Technique for Drawloom {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
         let recorded = self.renderer.record(scene)?;
         let submitted = self.submitter.submit(recorded)?;

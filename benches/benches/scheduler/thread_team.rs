@@ -1,4 +1,4 @@
-//! Threads that go from pass to pass together, as they do without a job system.
+//! Threads that run node after node together, with a barrier between them: parallelism without a job system.
 
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -7,30 +7,30 @@ use std::thread;
 use crossbeam_utils::CachePadded;
 use drawloom_benches::work::Work;
 
-use crate::watch::Watch;
+use crate::timer::Timer;
 use crate::{Failure, WORKERS};
 
-/// The caller's thread, and others that stay for a turn. A ticket says which jobs of a pass a thread takes next.
-pub struct Crew {
-    /// Where each pass ends.
+/// The calling thread, and others that live for one sample. A thread claims the next jobs of a node by a ticket.
+pub struct ThreadTeam {
+    /// Where each node's jobs end.
     ends: Vec<usize>,
-    jobs_a_ticket: usize,
+    jobs_per_ticket: usize,
     tickets: Vec<CachePadded<AtomicUsize>>,
     barrier: Barrier,
     is_over: AtomicBool,
 }
 
-impl Crew {
-    /// `ends` is where each pass ends, which begins where the one before it ends.
-    pub fn new(ends: Vec<usize>, jobs_a_ticket: usize) -> Self {
+impl ThreadTeam {
+    /// `ends` is where each node's jobs end; they begin where those of the node before it end.
+    pub fn new(ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
         let tickets = ends.iter().map(|_| CachePadded::default()).collect();
         let (barrier, is_over) = (Barrier::new(WORKERS), AtomicBool::new(false));
-        Self { ends, jobs_a_ticket, tickets, barrier, is_over }
+        Self { ends, jobs_per_ticket, tickets, barrier, is_over }
     }
 
     /// # Errors
-    /// If a frame fails.
-    pub fn frames(&self, work: &Work, watch: &mut Watch) -> Result<(), Failure> {
+    /// Returns an error if a frame fails.
+    pub fn frames(&self, work: &Work, timer: &mut Timer) -> Result<(), Failure> {
         thread::scope(|scope| {
             self.is_over.store(false, Ordering::Relaxed);
             for _ in 1..WORKERS {
@@ -40,13 +40,13 @@ impl Crew {
                         if self.is_over.load(Ordering::Relaxed) {
                             break;
                         }
-                        self.take_part(work);
+                        self.run_jobs(work);
                     }
                 });
             }
-            let outcome = watch.frames(|| {
+            let outcome = timer.frames(|| {
                 self.barrier.wait();
-                self.take_part(work);
+                self.run_jobs(work);
                 Ok(())
             });
             self.is_over.store(true, Ordering::Relaxed);
@@ -55,17 +55,17 @@ impl Crew {
         })
     }
 
-    fn take_part(&self, work: &Work) {
+    fn run_jobs(&self, work: &Work) {
         let mut begin = 0;
         for (&end, ticket) in self.ends.iter().zip(&self.tickets) {
             loop {
-                let first = begin + ticket.fetch_add(self.jobs_a_ticket, Ordering::Relaxed);
+                let first = begin + ticket.fetch_add(self.jobs_per_ticket, Ordering::Relaxed);
                 if first >= end {
                     break;
                 }
-                (first..end.min(first + self.jobs_a_ticket)).for_each(|job| work.job(job));
+                (first..end.min(first + self.jobs_per_ticket)).for_each(|job| work.job(job));
             }
-            // The pass comes again after at least one more barrier.
+            // No thread uses this ticket again before one more barrier.
             if self.barrier.wait().is_leader() {
                 ticket.store(0, Ordering::Relaxed);
             }

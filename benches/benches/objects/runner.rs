@@ -1,4 +1,4 @@
-//! A renderer's turns.
+//! A renderer, and the times of its frames.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -11,27 +11,27 @@ use drawloom::timeline::Run;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, RendererBuilder, Submitter};
 use drawloom_benches::moving::Moving;
-use drawloom_benches::stopwatch::timed_frame;
+use drawloom_benches::stopwatch::{mean_frame, timed_frame};
 
 use crate::world::{PICTURE, VIEWS};
 
-/// Somebody who draws.
-pub struct Painter {
+/// A renderer whose frames are timed.
+pub struct Runner {
     renderer: Renderer<WgpuBackend>,
     submitter: Submitter<WgpuBackend>,
 }
 
-/// What a turn took, in seconds a frame.
+/// Mean times of several frames, in seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn {
+pub struct Sample {
     pub frame: f64,
-    /// How much of it the world was held.
-    pub held: f64,
+    /// The part of the frame in which the world is borrowed.
+    pub borrowed: f64,
 }
 
-impl Painter {
+impl Runner {
     /// # Errors
-    /// If there is no such renderer.
+    /// Returns an error if the renderer cannot be built.
     pub fn new(backend: WgpuBackend, scheduler: &Arc<Scheduler>, instancing: bool) -> Result<Self, Box<dyn Error>> {
         let shadow_maps = Some(ShadowMaps { side: PICTURE, ..ShadowMaps::default() });
         let builder: RendererBuilder<_> =
@@ -40,34 +40,33 @@ impl Painter {
         Ok(Self { renderer, submitter })
     }
 
-    /// As many frames as take so long, and one at least.
+    /// Draws one frame, and more until they have taken `at_least`.
     ///
     /// # Errors
-    /// If a frame cannot be drawn, or a view does not see all there is.
-    pub fn turn(&mut self, world: &mut Moving, least: Duration) -> Result<Turn, Box<dyn Error>> {
-        let (mut elapsed, mut held, mut frames) = (Duration::ZERO, Duration::ZERO, 0);
-        while frames == 0 || elapsed < least {
+    /// Returns an error if a frame cannot be drawn, or if a view does not see all objects.
+    pub fn sample(&mut self, world: &mut Moving, at_least: Duration) -> Result<Sample, Box<dyn Error>> {
+        let (mut borrowed, mut frames) = (Duration::ZERO, 0);
+        let frame = mean_frame(at_least, || {
             world.step();
             let scene = world.as_scene_ref();
             let Self { renderer, submitter } = self;
             let (submitted, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
-            let seen = submitted.statistics.views.iter().map(|view| view.visible);
-            if !seen.clone().eq([scene.object_count(); VIEWS]) {
-                let seen: Vec<_> = seen.collect();
-                return Err(format!("of {} objects, views see {seen:?}", scene.object_count()).into());
+            let visible = submitted.statistics.views.iter().map(|view| view.visible);
+            if !visible.clone().eq([scene.object_count(); VIEWS]) {
+                let visible: Vec<_> = visible.collect();
+                return Err(format!("of {} objects, views see {visible:?}", scene.object_count()).into());
             }
-            elapsed += time.processor;
-            held += time.held;
+            borrowed += time.borrowed;
             frames += 1;
-        }
-        let share = |time: Duration| time.as_secs_f64() / f64::from(frames);
-        Ok(Turn { frame: share(elapsed), held: share(held) })
+            Ok::<_, Box<dyn Error>>(time.cpu)
+        })?;
+        Ok(Sample { frame, borrowed: borrowed.as_secs_f64() / f64::from(frames) })
     }
 
-    /// What of a frame goes before and after its jobs, in seconds: a part of `record`, and `submit`.
+    /// The time of a frame outside its jobs, in seconds: a part of `record`, and `submit`.
     ///
     /// # Errors
-    /// If the frame cannot be drawn.
+    /// Returns an error if the frame cannot be drawn.
     pub fn serial_part(&mut self, world: &mut Moving) -> Result<f64, Box<dyn Error>> {
         world.step();
         let timeline = Arc::clone(self.renderer.scheduler().timeline());

@@ -1,4 +1,4 @@
-//! Rows `frame`, `frame_cold` and `fine`: passes of busy jobs, each pass after the one before.
+//! Rows `frame`, `frame_cold` and `fine`: a chain of nodes with busy jobs.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -8,28 +8,28 @@ use drawloom::task::{Scheduler, Worker};
 use drawloom_benches::work::{Record, Work};
 use rayon::prelude::*;
 
-use crate::crew::Crew;
-use crate::turns::{Contender, Order, Row};
-use crate::watch::Pace;
+use crate::row::{Contender, Order, Row};
+use crate::thread_team::ThreadTeam;
+use crate::timer::Pace;
 use crate::{Extent, Failure, WORKERS, pools};
 
-const PASSES: usize = 24;
+const NODES: usize = 24;
 
 pub fn frame(extent: &Extent) -> Row {
-    row("frame", Shape { passes: PASSES, jobs: 24 }, Duration::from_nanos(2_900), extent.hot())
+    row("frame", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), extent.back_to_back())
 }
 
-/// The same, but a frame every 5 ms: workers and caches are cold.
+/// The same with one frame every 5 ms, so that workers sleep and caches are cold.
 pub fn frame_cold(extent: &Extent) -> Row {
-    let pace = Pace::Cold { every: Duration::from_millis(5), frames: extent.cold_frames };
-    row("frame_cold", Shape { passes: PASSES, jobs: 24 }, Duration::from_nanos(2_900), pace)
+    let pace = Pace::Paced { interval: Duration::from_millis(5), frames: extent.cold_frames };
+    row("frame_cold", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), pace)
 }
 
 pub fn fine(extent: &Extent) -> Row {
-    row("fine", Shape { passes: PASSES, jobs: 192 }, Duration::from_nanos(300), extent.hot())
+    row("fine", Chain { nodes: NODES, jobs: 192 }, Duration::from_nanos(300), extent.back_to_back())
 }
 
-fn row(name: &'static str, shape: Shape, job: Duration, pace: Pace<'static>) -> Row {
+fn row(name: &'static str, shape: Chain, job: Duration, pace: Pace<'static>) -> Row {
     let mut contenders = vec![Contender::plain_loop(shape.all()), Contender::ideal(shape.all())];
     contenders.extend(shape.contenders());
     Row {
@@ -44,38 +44,38 @@ fn row(name: &'static str, shape: Shape, job: Duration, pace: Pace<'static>) -> 
     }
 }
 
-/// So many passes of so many jobs, each job a chunk of its own.
+/// A chain of nodes of as many jobs each. Each job is a chunk of its own.
 #[derive(Clone, Copy)]
-pub struct Shape {
-    pub passes: usize,
+pub struct Chain {
+    pub nodes: usize,
     pub jobs: usize,
 }
 
-impl Shape {
+impl Chain {
     pub fn all(self) -> usize {
-        self.passes * self.jobs
+        self.nodes * self.jobs
     }
 
-    /// The jobs of each pass.
+    /// The jobs of each node.
     fn ranges(self) -> impl Iterator<Item = Range<usize>> + Clone {
-        (0..self.passes).map(move |pass| pass * self.jobs..(pass + 1) * self.jobs)
+        (0..self.nodes).map(move |node| node * self.jobs..(node + 1) * self.jobs)
     }
 
-    /// A pass begins when the one before it has ended.
+    /// Checks that each node begins after the one before it has ended.
     pub fn order(self) -> Order {
         Box::new(move |record: &Record| {
             for (before, after) in self.ranges().zip(self.ranges().skip(1)) {
                 let ended = before.map(|job| record.ended(job)).max();
                 let began = after.clone().map(|job| record.began(job)).min();
                 if ended >= began {
-                    return Err(format!("the pass of jobs {after:?} began before the one before it had ended"));
+                    return Err(format!("the node of jobs {after:?} began before the node before it had ended"));
                 }
             }
             Ok(())
         })
     }
 
-    /// All that can run passes, but for the plain loop.
+    /// All contenders but the plain loop.
     pub fn contenders(self) -> Vec<Contender> {
         vec![
             self.drawloom(),
@@ -88,12 +88,12 @@ impl Shape {
         ]
     }
 
-    /// A chain of nodes. Its schedule knows nothing at the start of a turn, as what it has learnt is of that turn's pool.
+    /// The schedule is compiled for each sample, so that it has no measurements of an earlier pool.
     pub fn drawloom(self) -> Contender {
-        Contender::new("drawloom", move |work, watch| {
+        Contender::new("drawloom", move |work, timer| {
             let mut schedule = self.schedule()?;
             let scheduler = Scheduler::new(WORKERS)?;
-            watch.frames(|| Ok(schedule.run(&scheduler, work)?))
+            timer.frames(|| Ok(schedule.run(&scheduler, work)?))
         })
     }
 
@@ -108,9 +108,9 @@ impl Shape {
     }
 
     pub fn drawloom_parallel_for(self) -> Contender {
-        Contender::new("drawloom parallel_for", move |work, watch| {
+        Contender::new("drawloom parallel_for", move |work, timer| {
             let scheduler = Scheduler::new(WORKERS)?;
-            watch.frames(|| {
+            timer.frames(|| {
                 for jobs in self.ranges() {
                     scheduler.parallel_for(jobs.len(), 1, |range, _worker| {
                         range.for_each(|job| work.job(jobs.start + job));
@@ -121,11 +121,11 @@ impl Shape {
         })
     }
 
-    /// As rayon itself splits a pass.
+    /// As rayon itself splits a node's jobs.
     pub fn rayon(self) -> Contender {
-        Contender::new("rayon", move |work, watch| {
+        Contender::new("rayon", move |work, timer| {
             pools::rayon()?.install(|| {
-                watch.frames(|| {
+                timer.frames(|| {
                     self.ranges().for_each(|jobs| jobs.into_par_iter().for_each(|job| work.job(job)));
                     Ok(())
                 })
@@ -135,9 +135,9 @@ impl Shape {
 
     /// Split down to single jobs.
     pub fn rayon_single(self) -> Contender {
-        Contender::new("rayon max_len 1", move |work, watch| {
+        Contender::new("rayon max_len 1", move |work, timer| {
             pools::rayon()?.install(|| {
-                watch.frames(|| {
+                timer.frames(|| {
                     self.ranges().for_each(|jobs| jobs.into_par_iter().with_max_len(1).for_each(|job| work.job(job)));
                     Ok(())
                 })
@@ -145,11 +145,11 @@ impl Shape {
         })
     }
 
-    /// A scope a pass, a task a job.
+    /// One scope per node, one task per job.
     pub fn bevy_tasks(self) -> Contender {
-        Contender::new("bevy_tasks", move |work, watch| {
+        Contender::new("bevy_tasks", move |work, timer| {
             let pool = pools::bevy_tasks();
-            watch.frames(|| {
+            timer.frames(|| {
                 for jobs in self.ranges() {
                     pool.scope(|scope| jobs.for_each(|job| scope.spawn(async move { work.job(job) })));
                 }
@@ -158,39 +158,38 @@ impl Shape {
         })
     }
 
-    /// With a scope for all frames, which keeps heartbeats going between them.
+    /// With one scope for all frames, which keeps the heartbeat going between them.
     ///
-    /// Looks at every join whether somebody wants a half: it costs little beside such jobs.
+    /// It checks for idle threads at every join, which costs little beside such jobs.
     pub fn chili(self) -> Contender {
-        Contender::new("chili", move |work, watch| {
+        Contender::new("chili", move |work, timer| {
             let pool = pools::chili();
             let mut scope = pool.scope();
-            watch.frames(|| {
-                self.ranges().for_each(|jobs| pools::halve::<1>(&mut scope, jobs, work));
+            timer.frames(|| {
+                self.ranges().for_each(|jobs| pools::join_halves::<1>(&mut scope, jobs, work));
                 Ok(())
             })
         })
     }
 
-    /// With a scope for each frame: between frames nothing goes on.
-    pub fn chili_scope_a_frame(self) -> Contender {
-        Contender::new("chili", move |work, watch| {
+    /// With one scope per frame: no heartbeat between frames.
+    pub fn chili_scope_per_frame(self) -> Contender {
+        Contender::new("chili", move |work, timer| {
             let pool = pools::chili();
-            watch.frames(|| {
+            timer.frames(|| {
                 let mut scope = pool.scope();
-                self.ranges().for_each(|jobs| pools::halve::<1>(&mut scope, jobs, work));
+                self.ranges().for_each(|jobs| pools::join_halves::<1>(&mut scope, jobs, work));
                 Ok(())
             })
         })
     }
 
     pub fn std_threads(self) -> Contender {
-        let crew = Crew::new(self.ranges().map(|jobs| jobs.end).collect(), 1);
-        Contender::new("std threads", move |work, watch| crew.frames(work, watch))
+        let team = ThreadTeam::new(self.ranges().map(|jobs| jobs.end).collect(), 1);
+        Contender::new("std threads", move |work, timer| team.frames(work, timer))
     }
 }
 
-/// A pass.
 struct Chunks {
     jobs: Range<usize>,
 }

@@ -1,4 +1,4 @@
-//! Frames with the recorder off and on, in turns.
+//! Frames with the recorder off and on, interleaved.
 
 use std::error::Error;
 use std::ops::Range;
@@ -6,17 +6,18 @@ use std::time::{Duration, Instant};
 
 use drawloom::graph::{FrameGraph, Node, NodeError, Schedule};
 use drawloom::task::{Scheduler, Worker};
-use drawloom_benches::stopwatch::middle;
+use drawloom_benches::harness::Harness;
+use drawloom_benches::statistics::median;
 use drawloom_benches::work::Work;
 
 use crate::report::TimedFigures;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
-/// How long frames are run in a turn.
-const TURN: Duration = Duration::from_millis(15);
+/// How long a run lasts, at least.
+const RUN: Duration = Duration::from_millis(15);
 
-/// Something that is run with the recorder off and on.
+/// A schedule that runs with the recorder off and on.
 pub struct Timed {
     name: &'static str,
     chunks: usize,
@@ -29,10 +30,10 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// The scheduler benchmark's row `frame`, and chunks that do nothing, on one worker and shared by two.
+    /// The scheduler benchmark's row `frame`, and empty chunks on one worker and on two.
     ///
     /// # Errors
-    /// If a scheduler cannot be started.
+    /// Returns an error if a scheduler cannot be started.
     pub fn all() -> Result<Vec<Self>, Failure> {
         Ok(vec![
             Self::new("frame", 24, 24, Work::busy(Duration::from_nanos(2_900)), 2)?,
@@ -47,37 +48,38 @@ impl Timed {
         nodes.windows(2).for_each(|pair| graph.order(pair[0], pair[1]));
         nodes.iter().for_each(|&node| graph.keep(node));
         let mut schedule = graph.compile()?;
-        // What is to be compared is one way of running, not two.
+        // Both runs must use the same run mode to be comparable.
         schedule.always_parallel(workers > 1);
         let scheduler = Scheduler::new(workers)?;
         let mut timed =
             Self { name, chunks: passes * chunks, schedule, scheduler, work, off: Vec::new(), on: Vec::new() };
-        // Caches, job sizes, and the memory of the rings.
-        timed.turn(false)?;
-        timed.turn(true)?;
-        (timed.off, timed.on) = (Vec::new(), Vec::new());
+        // Warms up caches, job sizes, and the memory of the rings.
+        timed.run(false)?;
+        timed.run(true)?;
         Ok(timed)
     }
 
-    /// A turn each, the first of which is another one each time.
+    /// Runs once with the recorder off and once with it on.
     ///
     /// # Errors
-    /// If a frame fails, or if something was dropped rather than recorded.
-    pub fn round(&mut self) -> Result<(), Failure> {
-        let on_first = self.off.len() % 2 == 1;
-        self.turn(on_first)?;
-        self.turn(!on_first)
+    /// Returns an error if a frame fails, or if the recorder drops a chunk.
+    pub fn round(&mut self, harness: &mut Harness) -> Result<(), Failure> {
+        let frames = harness.round(&mut [false, true], |&mut is_on| self.run(is_on))?;
+        self.off.push(frames[0]);
+        self.on.push(frames[1]);
+        Ok(())
     }
 
-    fn turn(&mut self, is_on: bool) -> Result<(), Failure> {
+    /// Returns nanoseconds per frame.
+    fn run(&mut self, is_on: bool) -> Result<f64, Failure> {
         let timeline = self.scheduler.timeline();
         if is_on {
             timeline.start();
         }
-        // What a worker has room for, with some to spare for its idle times.
-        let most = ((1 << 16) * 3 / 4 / self.chunks).max(1);
+        // What a worker's ring has room for, less a quarter for its idle times.
+        let max_frames = ((1 << 16) * 3 / 4 / self.chunks).max(1);
         let (start, mut frames) = (Instant::now(), 0);
-        while frames < most && start.elapsed() < TURN {
+        while frames < max_frames && start.elapsed() < RUN {
             self.schedule.run(&self.scheduler, &self.work)?;
             frames += 1;
         }
@@ -89,19 +91,18 @@ impl Timed {
         if (chunks, log.all_dropped()) != (expected, 0) {
             return Err(format!("{}: {chunks} of {expected} chunks were recorded", self.name).into());
         }
-        if is_on { &mut self.on } else { &mut self.off }.push(frame);
-        Ok(())
+        Ok(frame)
     }
 
-    /// What the recorder has asked for, a worker.
+    /// Bytes that the recorder has allocated per worker.
     pub fn ring_bytes(&self) -> usize {
         self.scheduler.timeline().bytes() / self.scheduler.workers()
     }
 
-    /// What was measured so far.
+    /// The medians so far.
     pub fn figures(&self) -> TimedFigures {
         let differences = self.on.iter().zip(&self.off).map(|(on, off)| on - off);
-        let (frame, difference) = (middle(self.off.iter().copied()), middle(differences));
+        let (frame, difference) = (median(self.off.iter().copied()), median(differences));
         TimedFigures {
             row: self.name,
             chunks: self.chunks,

@@ -1,4 +1,4 @@
-//! Settings that take turns.
+//! A block of settings, which are measured interleaved.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -11,21 +11,22 @@ use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Renderer, RendererBuilder, Submitter};
 use drawloom_benches::backends::BackendName;
-use drawloom_benches::stopwatch::{FrameTime, WARM_UP, median, timed_frame};
-use drawloom_testing::random::Random;
+use drawloom_benches::harness::{Harness, Rounds, WARM_UP};
+use drawloom_benches::statistics::median_duration;
+use drawloom_benches::stopwatch::{FrameTime, timed_frame};
 use indicatif::ProgressBar;
 
 use crate::Extent;
 
-/// Those of one block, all on one backend.
-pub struct Turns<'a> {
+/// The settings of one table on one backend.
+pub struct Block<'a> {
     backend: BackendName,
     progress: &'a ProgressBar,
     schedulers: Vec<Arc<Scheduler>>,
     settings: Vec<Setting>,
 }
 
-/// A pipeline that draws a scene, and what its frames took.
+/// A pipeline that draws a scene, and its frame times.
 pub struct Setting {
     scene: Rc<Scene>,
     renderer: Renderer<WgpuBackend>,
@@ -35,15 +36,15 @@ pub struct Setting {
     submission: Option<WgpuSubmission>,
 }
 
-impl<'a> Turns<'a> {
+impl<'a> Block<'a> {
     pub fn new(backend: BackendName, progress: &'a ProgressBar) -> Self {
         Self { backend, progress, schedulers: Vec::new(), settings: Vec::new() }
     }
 
-    /// Adds a setting: on a device of its own, and a scheduler that it shares with the others of as many workers.
+    /// Adds a setting with a device of its own. Settings with equally many workers share a scheduler.
     ///
     /// # Errors
-    /// If it cannot be built.
+    /// Returns an error if the renderer cannot be built.
     pub fn add(
         &mut self,
         scene: Rc<Scene>,
@@ -62,50 +63,42 @@ impl<'a> Turns<'a> {
         Ok(())
     }
 
-    /// Lets them take turns, a frame each, and returns them in the order they were added. Each round has an order of its own:
-    /// a frame takes longer after one that filled the caches, or kept a device in software busy beyond its end, and it must
-    /// not be the same one that always comes after it.
+    /// Measures all settings, one frame of each per round, and returns them in the order they were added.
     ///
     /// # Errors
-    /// If a frame cannot be drawn.
-    pub fn take(mut self, extent: &Extent, block: &str) -> Result<Vec<Setting>, Box<dyn Error>> {
-        let rounds = self.backend.of(extent.rounds);
+    /// Returns an error if a frame cannot be drawn.
+    pub fn measure(mut self, extent: &Extent, block: &str) -> Result<Vec<Setting>, Box<dyn Error>> {
         self.progress.set_message(format!("{block}, {}", self.backend.name()));
-        self.progress.inc_length(((WARM_UP + rounds) * self.settings.len()) as u64);
-        let mut random = Random::new();
-        for round in 0..WARM_UP + rounds {
-            for index in random.order(self.settings.len()) {
-                let Setting { scene, renderer, submitter, times, statistics, submission } = &mut self.settings[index];
-                let (submitted, time) = timed_frame(renderer, submitter, scene.as_scene_ref(), WgpuSubmission::wait)?;
-                if round >= WARM_UP {
-                    times.push(time);
-                }
-                *statistics = submitted.statistics;
-                *submission = Some(submitted.submission);
-                self.progress.inc(1);
-            }
-        }
+        let rounds = Rounds { warm_up: WARM_UP, measured: self.backend.of(extent.rounds) };
+        let times = Harness::new(rounds, self.progress).measure(&mut self.settings, |setting, _round| {
+            let Setting { scene, renderer, submitter, statistics, submission, .. } = setting;
+            let (submitted, time) = timed_frame(renderer, submitter, scene.as_scene_ref(), WgpuSubmission::wait)?;
+            *statistics = submitted.statistics;
+            *submission = Some(submitted.submission);
+            Ok::<_, Box<dyn Error>>(time)
+        })?;
+        self.settings.iter_mut().zip(times).for_each(|(setting, times)| setting.times = times);
         Ok(self.settings)
     }
 }
 
 impl Setting {
-    /// From the scene's hand-over to the return of submit; the median.
-    pub fn processor(&self) -> Duration {
-        median(self.times.iter().map(|time| time.processor))
+    /// From the hand-over of the scene to the return of submit; the median.
+    pub fn cpu(&self) -> Duration {
+        median_duration(self.times.iter().map(|time| time.cpu))
     }
 
     /// From the call of submit until the device has drawn the frame; the median.
     pub fn device(&self) -> Duration {
-        median(self.times.iter().map(|time| time.device))
+        median_duration(self.times.iter().map(|time| time.device))
     }
 
-    /// What the last frame was.
+    /// Statistics of the last frame.
     pub fn statistics(&self) -> &FrameStatistics {
         &self.statistics
     }
 
-    /// Over all views.
+    /// Commands of the last frame in all views.
     pub fn commands(&self) -> usize {
         self.statistics.views.iter().map(|view| view.commands).sum()
     }
@@ -114,8 +107,7 @@ impl Setting {
         self.renderer.plan().processes().len()
     }
 
-    /// Instanced draws: those of objects over all views, and one for each process that draws lights, of each of whose class
-    /// there is one in sight.
+    /// Instanced draws: all batches of objects, and one for each process that draws lights. Every class of lights must be in view.
     pub fn draws(&self) -> usize {
         let batches: usize = self.statistics.views.iter().map(|view| view.batches).sum();
         let draws_lights = |draws: Draws<'_>| matches!(draws, Draws::Lights(_));
@@ -123,10 +115,10 @@ impl Setting {
         batches + processes.filter(|planned| draws_lights(planned.process.draws())).count()
     }
 
-    /// What the last frame looks like.
+    /// The picture of the last frame.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// Returns an error if no frame was drawn, or if the picture cannot be read.
     pub fn picture(&self) -> Result<Picture, Box<dyn Error>> {
         let submission = self.submission.as_ref().ok_or("no frame was drawn")?;
         Ok(submission.read(0, "picture")?)

@@ -1,0 +1,80 @@
+//! The most that two threads can do on this machine: each draws frames of its own, and they share nothing but the hardware.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+use std::time::Instant;
+
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::clouds::around_one;
+use drawloom_benches::moving::Moving;
+
+use crate::CAMERAS;
+use crate::renderer::Drawloom;
+use crate::technique::{Failure, Technique};
+
+/// Two threads that draw at the same time.
+pub struct IndependentThreads {
+    threads: [Runner; 2],
+}
+
+/// A thread that draws some frames on each request, and returns the seconds per frame.
+struct Runner {
+    begin: Sender<()>,
+    times: Receiver<Result<f64, String>>,
+}
+
+/// Frames per request: enough that it does not matter if the threads begin at slightly different times.
+const FRAMES: u32 = 8;
+
+impl IndependentThreads {
+    pub fn new(backend: BackendName, objects: usize) -> Self {
+        Self { threads: [(); 2].map(|()| Runner::new(backend, objects)) }
+    }
+
+    /// Has both draw; returns the seconds per frame of both together.
+    ///
+    /// # Errors
+    /// Returns an error if one cannot draw.
+    pub fn sample(&self) -> Result<f64, Failure> {
+        for runner in &self.threads {
+            runner.begin.send(())?;
+        }
+        let mut rate = 0.0;
+        for runner in &self.threads {
+            rate += 1.0 / runner.times.recv()??;
+        }
+        Ok(1.0 / rate)
+    }
+}
+
+impl Runner {
+    fn new(backend: BackendName, objects: usize) -> Self {
+        let ((begin, requests), (send_time, times)) = (channel(), channel());
+        thread::spawn(move || {
+            let mut state = None;
+            for () in requests {
+                let time = draw(backend, objects, &mut state).map_err(|error| error.to_string());
+                if send_time.send(time).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { begin, times }
+    }
+}
+
+fn draw(backend: BackendName, objects: usize, state: &mut Option<(Moving, Drawloom)>) -> Result<f64, Failure> {
+    let (world, drawloom) = match state {
+        Some(state) => state,
+        None => state.insert((Moving::new(around_one(CAMERAS, objects)?), Drawloom::new(backend.open()?, 1)?)),
+    };
+    let mut elapsed = 0.0;
+    for _ in 0..FRAMES {
+        world.step();
+        let start = Instant::now();
+        drawloom.frame(world.as_scene_ref())?;
+        elapsed += start.elapsed().as_secs_f64();
+        drawloom.wait()?;
+    }
+    Ok(elapsed / f64::from(FRAMES))
+}
