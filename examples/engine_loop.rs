@@ -15,7 +15,9 @@ use drawloom::backend::WgpuBackend;
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RawPass, RenderProcess, Resolved, ToneMapping};
+use drawloom::process::{
+    CommandDraws, Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess, ToneMapping,
+};
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
@@ -223,7 +225,7 @@ impl RawPass for Present {
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &Resolved<'_>,
+        resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         let picture = resources.target("picture").ok_or("there is no picture to present")?;
         let shown = self.surface.texture.lock();

@@ -187,15 +187,15 @@ pub enum BackendError {
         /// The view.
         view: String,
     },
-    /// The software backend has nothing to run in the place of a process's WGSL.
-    #[error("process {process:?} has no twin on the CPU, so the software backend cannot draw it")]
-    NoTwin {
+    /// A process has no CPU shader to run in place of its WGSL on the software backend.
+    #[error("process {process:?} has no CPU shader, so the software backend cannot draw it")]
+    NoCpuShader {
         /// The process.
         process: String,
     },
-    /// A process's twin panicked.
-    #[error("the twin of process {process:?} panicked: {message}")]
-    TwinPanicked {
+    /// A process's CPU shader panicked.
+    #[error("the CPU shader of process {process:?} panicked: {message}")]
+    CpuShaderPanicked {
         /// The process.
         process: String,
         /// What the panic said.

@@ -1,67 +1,43 @@
-//! Render processes: what an engine adds to the graph, and the ones that come with the crate (L 3.3).
+//! Render processes: what an engine adds to a frame, and the processes that come with the crate (L 3.3).
 //!
-//! A process says which views it is for, which targets it reads and writes, and what it draws. Everything it says is data;
-//! a backend turns it into pipelines, bundles and passes.
+//! A process says which views it draws in, which targets it reads and writes, and what it draws. All of that is data; a
+//! backend turns it into pipelines, bundles and passes.
+//!
+//! - the interface: [`RenderProcess`], [`Declare`], [`Draws`], and [`CpuShader`] for the software backend;
+//! - the plan: [`FramePlan`] orders a frame's processes and lists their targets;
+//! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
+//!   post-processing.
 
-mod built_in;
-mod declare;
+mod cpu_shader;
+mod declaration;
 mod deferred;
-mod depth_pre_pass;
-mod depth_pre_pass_twin;
-mod drawloom_twin;
 mod draws;
-mod error;
 mod format;
-mod geometry_buffer;
-mod geometry_buffer_twin;
-mod illumination_twin;
-#[cfg(feature = "wgpu")]
-mod light_volume;
-mod light_volumes;
-mod light_volumes_twin;
 mod plan;
-mod planned_target;
 mod post;
+mod prelude;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
-mod requirements;
-mod shadow;
-mod shadow_casters;
-mod shadow_map_twin;
-mod shadow_twin;
-mod stored_normal;
-mod surface_twin;
-mod transparency;
-mod transparency_twin;
-mod twin;
-#[cfg(all(test, not(drawloom_loom)))]
-mod twin_samples;
 
-pub use declare::{Access, ClearColor, Declaration, Declare};
-pub use deferred::Deferred;
-pub use depth_pre_pass::DepthPrePass;
-pub use drawloom_twin::{direction_from_octahedral, octahedral_from_direction};
-pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
-pub use error::{PlanError, ProcessError};
-pub use format::Format;
-pub use geometry_buffer::{GeometryBuffer, GeometryFormats};
-pub use light_volumes::LightVolumes;
-pub use plan::{FramePlan, Pass, Place, PlannedProcess};
-pub use planned_target::PlannedTarget;
-pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
-#[cfg(feature = "wgpu")]
-pub use raw_pass::{RawPass, Resolved};
-pub use render_process::{RenderProcess, SHADER_PRELUDE};
-pub use requirements::Requirements;
-pub use shadow_casters::ShadowCasters;
-pub use transparency::Transparency;
-pub use twin::{
-    Corner, FullScreenPixel, FullScreenTwin, LightTwin, LightValues, MaterialValues, Materials, ObjectPixel,
-    ObjectTwin, ObjectValues, PassValues, Sampled, Twin, VARYINGS, VertexValues, ViewValues,
+pub use cpu_shader::{
+    CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, Materials, ObjectCpuShader, ObjectPixel,
+    PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput,
+    VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
-
-pub(crate) use twin::TwinShader;
-
+pub use declaration::{Access, ClearColor, Declaration, Declare};
+pub use deferred::{
+    Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Requirements, ShadowCasters, Transparency,
+};
+pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
+pub use format::Format;
+pub use plan::{ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError};
+pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
+pub use prelude::SHADER_PRELUDE;
 #[cfg(feature = "wgpu")]
-pub(crate) use light_volume::LightVolume;
+pub use raw_pass::{RawPass, RawPassResources};
+pub use render_process::RenderProcess;
+
+pub(crate) use cpu_shader::TypedCpuShader;
+#[cfg(feature = "wgpu")]
+pub(crate) use prelude::LightVolume;

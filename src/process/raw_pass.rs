@@ -15,12 +15,12 @@ pub trait RawPass: Send + Sync {
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &Resolved<'_>,
+        resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>>;
 }
 
 /// What a raw pass can use.
-pub struct Resolved<'a> {
+pub struct RawPassResources<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
     /// The view's index among the frame's views.
@@ -31,7 +31,7 @@ pub struct Resolved<'a> {
     pub(crate) layered: &'a dyn Fn(ViewKind, &str) -> Option<&'a wgpu::Texture>,
 }
 
-impl Resolved<'_> {
+impl RawPassResources<'_> {
     /// The view's target of this name; `None` where no process declares one.
     pub fn target(&self, name: &str) -> Option<&wgpu::Texture> {
         (self.textures)(name)

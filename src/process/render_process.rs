@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Declare, Draws, Twin};
+use super::{CpuShader, Declare, Draws};
 
 /// A step of the frame: it owns its trip from the objects a view sees to a recorded pass.
 ///
@@ -53,7 +53,7 @@ pub trait RenderProcess: Send + Sync {
 
     /// What the software backend runs in the place of the process's WGSL; without one, frames with this process fail there, and
     /// say so. Asked once a frame, by that backend alone.
-    fn twin(&self) -> Option<Twin> {
+    fn cpu_shader(&self) -> Option<CpuShader> {
         None
     }
 }
@@ -72,16 +72,7 @@ impl<P: RenderProcess + ?Sized> RenderProcess for Arc<P> {
         (**self).draws()
     }
 
-    fn twin(&self) -> Option<Twin> {
-        (**self).twin()
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        (**self).cpu_shader()
     }
 }
-
-/// What every shader begins with: the bindings, the structures and the functions that Drawloom provides.
-///
-/// A process's own WGSL is appended to it. See the file `drawloom.wgsl` for what it may use.
-///
-/// It is not whole by itself: before it belongs `const ABSOLUTE_TRANSFORMS: bool = false;`, or `true` for
-/// [`TransformPrecision::Absolute`](crate::quality::TransformPrecision::Absolute). Of a frame's processes the backend sees to
-/// that; whoever compiles it alone does so on their own.
-pub const SHADER_PRELUDE: &str = concat!(include_str!("drawloom.wgsl"), "\n", include_str!("light_volume.wgsl"));

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::{Backend, BackendError, DeviceClock, Encode, PassTimes, Record, WgpuBackend, WgpuSubmission};
-use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RenderProcess, Resolved};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess,
+};
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::DeviceLog;
@@ -195,7 +197,7 @@ impl RawPass for Own {
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &Resolved<'_>,
+        resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         let target = resources.target("raw").ok_or("the target is missing")?;
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {

@@ -9,7 +9,7 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Deferred, Draws, Exposure, Format, FullScreen, GeometryBuffer, GeometryFormats,
-    RawPass, RenderProcess, Resolved, ToneMapping,
+    RawPass, RawPassResources, RenderProcess, ToneMapping,
 };
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Topology};
 use drawloom::{FrameError, wgpu};
@@ -205,7 +205,7 @@ impl RawPass for RawProcess {
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &Resolved<'_>,
+        resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         let target = resources.target("raw").ok_or("the target is missing")?;
         match self.deed {

@@ -1,4 +1,4 @@
-//! What cannot be drawn is an error that names it, and the next frame is whole.
+//! A frame that cannot be drawn returns an error that names the cause, and the next frame is complete.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use drawloom::backend::BackendError;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    ClearColor, CommandDraws, Corner, Declare, Draws, Format, FullScreen, FullScreenPixel, FullScreenTwin, ObjectPixel,
-    ObjectTwin, ObjectValues, PassValues, RenderProcess, Twin, VertexValues, ViewValues,
+    ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader, FullScreenPixel,
+    ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess, ShaderObject, ShaderView, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector4};
 use drawloom::{FrameError, SubmitError};
@@ -15,25 +15,25 @@ use drawloom_testing::scenes::field;
 
 use crate::{Studio, deferred};
 
-/// Where a twin panics.
-const NOWHERE: usize = 0;
-const ASKED: usize = 1;
+/// The function of the CPU shader that panics.
+const NONE: usize = 0;
+const CPU_SHADER: usize = 1;
 const VERTEX: usize = 2;
 const FRAGMENT: usize = 3;
 
-/// A process whose twin panics where it is told to.
+/// A process whose CPU shader panics in a chosen function.
 #[derive(Clone)]
-struct Fragile(Arc<AtomicUsize>);
+struct PanickingProcess(Arc<AtomicUsize>);
 
-impl Fragile {
-    fn is_at(&self, place: usize) {
-        assert!(self.0.load(Ordering::Relaxed) != place, "the glass is broken");
+impl PanickingProcess {
+    fn panic_in(&self, function: usize) {
+        assert!(self.0.load(Ordering::Relaxed) != function, "a deliberate panic");
     }
 }
 
-impl RenderProcess for Fragile {
+impl RenderProcess for PanickingProcess {
     fn name(&self) -> &str {
-        "fragile"
+        "panicking"
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -44,68 +44,68 @@ impl RenderProcess for Fragile {
         Draws::Commands(CommandDraws::default())
     }
 
-    fn twin(&self) -> Option<Twin> {
-        self.is_at(ASKED);
-        Some(Twin::objects(self.clone()))
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        self.panic_in(CPU_SHADER);
+        Some(CpuShader::objects(self.clone()))
     }
 }
 
-impl<R: Real> ObjectTwin<R> for Fragile {
-    fn vertex(&self, view: &ViewValues<R>, object: &ObjectValues<R>, vertex: &VertexValues<R>) -> Corner<R> {
-        self.is_at(VERTEX);
-        let place = object.origin + object.orientation.rotate(object.scale * vertex.position);
+impl<R: Real> ObjectCpuShader<R> for PanickingProcess {
+    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        self.panic_in(VERTEX);
+        let relative = object.origin + object.orientation.rotate(object.scale * vertex.position);
         let [x, y, z, w] = view.clip_from_relative;
-        let clip = x * place[0] + y * place[1] + z * place[2] + w;
-        Corner { clip, varyings: [R::zero(); drawloom::process::VARYINGS] }
+        let clip = x * relative[0] + y * relative[1] + z * relative[2] + w;
+        VertexOutput { clip, varyings: [R::zero(); drawloom::process::VARYINGS] }
     }
 
-    fn fragment(&self, _pass: &PassValues<'_, R>, _pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        self.is_at(FRAGMENT);
+    fn fragment(&self, _pass: &PassInputs<'_, R>, _pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
+        self.panic_in(FRAGMENT);
         targets[0] = Vector4::splat(R::one());
         true
     }
 }
 
 #[test]
-fn a_panic_in_a_twin_names_the_process_and_the_next_frame_is_whole() {
-    let place = Arc::new(AtomicUsize::new(NOWHERE));
-    let fragile = Fragile(Arc::clone(&place));
-    let mut studio = Studio::new(3, |builder| builder.process(fragile).output("own"));
+fn a_panic_in_a_cpu_shader_names_the_process_and_the_next_frame_is_complete() {
+    let panicking_function = Arc::new(AtomicUsize::new(NONE));
+    let process = PanickingProcess(Arc::clone(&panicking_function));
+    let mut studio = Studio::new(3, |builder| builder.process(process).output("own"));
     let scene = field(200);
-    let whole = studio.draw(&scene).read(0, "own").unwrap();
-    assert!(whole.bytes.contains(&255) && whole.bytes.contains(&0));
-    for broken in [ASKED, VERTEX, FRAGMENT, ASKED, FRAGMENT] {
-        place.store(broken, Ordering::Relaxed);
+    let expected = studio.draw(&scene).read(0, "own").unwrap();
+    assert!(expected.bytes.contains(&255) && expected.bytes.contains(&0));
+    for function in [CPU_SHADER, VERTEX, FRAGMENT, CPU_SHADER, FRAGMENT] {
+        panicking_function.store(function, Ordering::Relaxed);
         let error = match studio.renderer.record(scene.as_scene_ref()) {
-            Err(FrameError::Backend(error)) if broken == ASKED => error,
-            Ok(recorded) if broken != ASKED => match studio.submitter.submit(recorded) {
+            Err(FrameError::Backend(error)) if function == CPU_SHADER => error,
+            Ok(recorded) if function != CPU_SHADER => match studio.submitter.submit(recorded) {
                 Err(SubmitError::Backend(error)) => error,
-                other => panic!("{broken}: {:?}", other.err()),
+                other => panic!("{function}: {:?}", other.err()),
             },
-            other => panic!("{broken}: {:?}", other.err()),
+            other => panic!("{function}: {:?}", other.err()),
         };
-        let BackendError::TwinPanicked { process, message } = error else { panic!("{broken}: {error}") };
-        assert_eq!((process.as_str(), message.as_str()), ("fragile", "the glass is broken"));
-        place.store(NOWHERE, Ordering::Relaxed);
-        assert!(studio.draw(&scene).read(0, "own").unwrap() == whole);
+        let BackendError::CpuShaderPanicked { process, message } = error else { panic!("{function}: {error}") };
+        assert_eq!((process.as_str(), message.as_str()), ("panicking", "a deliberate panic"));
+        panicking_function.store(NONE, Ordering::Relaxed);
+        assert!(studio.draw(&scene).read(0, "own").unwrap() == expected);
     }
 }
 
-/// A process with no twin, or with one of the wrong kind.
-struct Mistaken {
-    twin: Option<Twin>,
-    reads_what_it_writes: bool,
+/// A process with no CPU shader, or with one of the wrong kind.
+struct InvalidProcess {
+    cpu_shader: Option<CpuShader>,
+    samples_its_target: bool,
 }
 
-impl RenderProcess for Mistaken {
+impl RenderProcess for InvalidProcess {
     fn name(&self) -> &str {
-        "mistaken"
+        "invalid"
     }
 
     fn declare(&self, declare: &mut Declare) {
         declare.draws_over("radiance");
         declare.after("transparency");
-        if self.reads_what_it_writes {
+        if self.samples_its_target {
             declare.samples("radiance");
         }
     }
@@ -114,15 +114,15 @@ impl RenderProcess for Mistaken {
         Draws::FullScreen(FullScreen::default())
     }
 
-    fn twin(&self) -> Option<Twin> {
-        self.twin.clone()
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        self.cpu_shader.clone()
     }
 }
 
-struct Nothing;
+struct DiscardAll;
 
-impl<R: Real> FullScreenTwin<R> for Nothing {
-    fn fragment(&self, _: &PassValues<'_, R>, _: &FullScreenPixel<R>, _: &mut [Vector4<R>]) -> bool {
+impl<R: Real> FullScreenCpuShader<R> for DiscardAll {
+    fn fragment(&self, _: &PassInputs<'_, R>, _: &FullScreenPixel<R>, _: &mut [Vector4<R>]) -> bool {
         false
     }
 }
@@ -136,28 +136,29 @@ fn error_of(process: impl RenderProcess + 'static) -> BackendError {
 }
 
 #[test]
-fn a_process_without_a_twin_is_named() {
-    let error = error_of(Mistaken { twin: None, reads_what_it_writes: false });
-    assert!(matches!(&error, BackendError::NoTwin { process } if process == "mistaken"), "{error}");
+fn the_error_names_a_process_without_a_cpu_shader() {
+    let error = error_of(InvalidProcess { cpu_shader: None, samples_its_target: false });
+    assert!(matches!(&error, BackendError::NoCpuShader { process } if process == "invalid"), "{error}");
 }
 
 #[test]
-fn a_twin_of_another_kind_is_refused() {
-    let twin = Some(Twin::objects(Fragile(Arc::default())));
-    let error = error_of(Mistaken { twin, reads_what_it_writes: false });
-    assert!(matches!(&error, BackendError::Validation { label, .. } if label == "mistaken"), "{error}");
+fn a_cpu_shader_of_another_kind_is_refused() {
+    let cpu_shader = Some(CpuShader::objects(PanickingProcess(Arc::default())));
+    let error = error_of(InvalidProcess { cpu_shader, samples_its_target: false });
+    assert!(matches!(&error, BackendError::Validation { label, .. } if label == "invalid"), "{error}");
 }
 
 #[test]
-fn a_target_that_is_read_as_it_is_written_is_refused() {
-    let error = error_of(Mistaken { twin: Some(Twin::full_screen(Nothing)), reads_what_it_writes: true });
-    assert!(matches!(&error, BackendError::Validation { label, .. } if label == "mistaken"), "{error}");
+fn a_process_that_samples_a_target_that_it_writes_is_refused() {
+    let error =
+        error_of(InvalidProcess { cpu_shader: Some(CpuShader::full_screen(DiscardAll)), samples_its_target: true });
+    assert!(matches!(&error, BackendError::Validation { label, .. } if label == "invalid"), "{error}");
 }
 
 #[test]
-fn pictures_and_places_have_limits() {
+fn picture_sizes_and_camera_positions_have_limits() {
     let mut studio = Studio::new(2, |builder| builder.deferred(deferred()));
-    let whole = studio.picture(&field(10));
+    let expected = studio.picture(&field(10));
     let mut large = field(10);
     large.cameras[1].size = [16_385, 1];
     match studio.renderer.record(large.as_scene_ref()) {
@@ -170,11 +171,11 @@ fn pictures_and_places_have_limits() {
         Err(FrameError::Backend(BackendError::ViewOutOfReach { view })) => assert_eq!(view, "side"),
         other => panic!("{:?}", other.err()),
     }
-    assert!(studio.picture(&field(10)) == whole);
+    assert!(studio.picture(&field(10)) == expected);
 }
 
 #[test]
-fn a_target_that_is_not_there_is_named() {
+fn the_error_names_a_missing_target() {
     let submission = Studio::new(2, |builder| builder.deferred(deferred())).draw(&field(10));
     for (view, target) in [(0, "pictures"), (2, "picture")] {
         match submission.read(view, target) {

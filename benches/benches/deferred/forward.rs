@@ -31,7 +31,10 @@ impl RenderProcess for WithoutLights {
     }
 
     fn draws(&self) -> Draws<'_> {
-        let shader = concat!(include_str!("../../../src/process/surface.wgsl"), include_str!("without_lights.wgsl"));
+        let shader = concat!(
+            include_str!("../../../src/process/deferred/shading/surface.wgsl"),
+            include_str!("without_lights.wgsl")
+        );
         Draws::Commands(CommandDraws { shader, ..CommandDraws::default() })
     }
 }
@@ -66,8 +69,8 @@ impl RenderProcess for OneLight {
 
     fn draws(&self) -> Draws<'_> {
         let shader = concat!(
-            include_str!("../../../src/process/surface.wgsl"),
-            include_str!("../../../src/process/illumination.wgsl"),
+            include_str!("../../../src/process/deferred/shading/surface.wgsl"),
+            include_str!("../../../src/process/deferred/shading/illumination.wgsl"),
             include_str!("one_light.wgsl")
         );
         let parameters = [self.light, 0, 0, 0].map(u32::to_le_bytes).concat();
@@ -94,8 +97,8 @@ impl RenderProcess for AllLights {
 
     fn draws(&self) -> Draws<'_> {
         let shader = concat!(
-            include_str!("../../../src/process/surface.wgsl"),
-            include_str!("../../../src/process/illumination.wgsl"),
+            include_str!("../../../src/process/deferred/shading/surface.wgsl"),
+            include_str!("../../../src/process/deferred/shading/illumination.wgsl"),
             include_str!("all_lights.wgsl")
         );
         Draws::Commands(CommandDraws { shader, ..CommandDraws::default() })

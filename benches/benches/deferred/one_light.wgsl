@@ -8,7 +8,7 @@ fn fragment(in: Surface) -> @location(0) vec4<f32> {
     let gradient_y = dpdy(in.uv);
     let material = materials[in.material];
 
-    let illuminance = illuminance_from(lights[chosen.x], in.relative, seen_normal(in, material));
+    let illuminance = illuminance_from(lights[chosen.x], in.relative, shading_normal(in, material));
     // As the deferred pipeline does.
     if all(illuminance == vec3<f32>(0.0)) {
         discard;

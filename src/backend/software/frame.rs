@@ -1,120 +1,62 @@
-//! A frame on its way through the software backend.
+//! A frame in one precision.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::engine::Engine;
+use super::SoftwareSubmission;
+use super::commands::SoftwareCommands;
+use super::draw_context::DrawContext;
+use super::frame_recording::FrameRecording;
 use super::materials::MaterialTable;
-use super::meshes::{Meshes, fetched};
-use super::number::{CameraPlace, Number};
+use super::meshes::{Meshes, as_fetched};
 use super::object_pass::ObjectPass;
-use super::pass::{Attachments, DrawingPass};
-use super::picture_pass::{draw_full_screen, draw_lights};
-use super::pieces::{PassDraw, pieces};
-use super::submission::SoftwareSubmission;
-use super::targets::FrameTargets;
+use super::pass_context::PassContext;
+use super::precision::Precision;
+use super::screen_pass::{draw_full_screen, draw_lights};
+use super::software_pass::{SoftwareDraws, SoftwarePass};
+use super::targets::SoftwareTargets;
+use super::triangle_setup::setup_chunks;
+use super::view_state::ViewState;
 use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, PassRequest};
-use crate::command::{Batch, DrawList};
-use crate::process::{FullScreenTwin, LightTwin, LightValues, ObjectTwin, Pass, ViewValues};
+use crate::command::Batch;
+use crate::process::Pass;
 use crate::quality::VertexFormat;
-use crate::scene::{Blend, Mesh};
+use crate::scene::Mesh;
 use crate::view::ObjectTable;
 
-/// A frame on its way, in either kind of number.
-pub(super) trait Recording: Send + Sync {
-    /// Takes in blocks of objects.
-    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>);
-
-    /// Subdivides the meshes that a pass draws so.
-    ///
-    /// # Errors
-    /// If it draws what is no mesh: an error of Drawloom's own.
-    fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
-
-    /// Draws everything.
-    ///
-    /// # Errors
-    /// If a twin panics.
-    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError>;
-}
-
-/// A recorded pass: what it draws.
-#[derive(Debug)]
-pub struct SoftwareCommands {
-    draws: Vec<PassDraw>,
-    objects: Vec<u32>,
-    /// Of what remains of those that do not draw their mesh whole.
-    indices: Arc<[u32]>,
-}
-
-impl SoftwareCommands {
-    pub(super) fn new(list: &DrawList) -> Self {
-        let draws = list.batches.iter().enumerate();
-        Self {
-            draws: draws.map(|(place, &batch)| (batch, list.remaining(place))).collect(),
-            objects: list.objects.clone(),
-            indices: list.remaining_indices().into(),
-        }
-    }
-}
-
-/// A frame on its way.
-pub(super) struct Frame<R: Number> {
-    pub(super) engine: Arc<Engine<R>>,
+/// A frame in one precision, from `begin` until it was submitted.
+pub(super) struct TypedFrame<R: Precision> {
+    pub(super) context: Arc<DrawContext>,
     pub(super) views: Vec<ViewState<R>>,
     /// In the order they are submitted.
-    pub(super) passes: Vec<FramePass<R>>,
+    pub(super) passes: Vec<SoftwarePass<R>>,
     pub(super) objects: R::Objects,
-    /// How the vertices lie that it draws from.
+    /// The format of the vertices that it draws.
     pub(super) vertices: VertexFormat,
     pub(super) meshes: Meshes,
-    /// By the mesh's slot, and how often its edges are halved.
+    /// By mesh slot and subdivision level.
     pub(super) subdivided: Mutex<SubdividedMeshes<Arc<Mesh>>>,
     pub(super) materials: Arc<MaterialTable>,
-    pub(super) targets: Arc<FrameTargets<R>>,
+    pub(super) targets: Arc<SoftwareTargets<R>>,
 }
 
-/// A view, as twins read it.
-pub(super) struct ViewState<R> {
-    pub(super) values: ViewValues<R>,
-    /// Those that reach it.
-    pub(super) lights: Vec<LightValues<R>>,
-    pub(super) camera: CameraPlace,
-}
-
-/// One process in one view.
-pub(super) struct FramePass<R: Number> {
-    pub(super) pass: Pass,
-    /// The process's name.
-    pub(super) process: String,
-    pub(super) draws: PassDraws<R>,
-    pub(super) attachments: Attachments<R>,
-}
-
-/// What a pass draws.
-pub(super) enum PassDraws<R: Number> {
-    Objects { twin: Arc<dyn ObjectTwin<R>>, writes_depth: bool },
-    FullScreen { twin: Arc<dyn FullScreenTwin<R>>, blend: Blend },
-    Lights { twin: Arc<dyn LightTwin<R>>, lights: Range<usize> },
-}
-
-impl<R: Number> Recording for Frame<R> {
+impl<R: Precision> FrameRecording for TypedFrame<R> {
     fn upload(&self, objects: &ObjectTable, blocks: Range<usize>) {
         R::upload(&self.objects, objects, blocks);
     }
 
     fn prepare(&self, &PassRequest { frame: request, list, .. }: &PassRequest<'_>) -> Result<(), BackendError> {
-        let make = |mesh| Ok(Arc::new(fetched(mesh, self.vertices)));
-        self.engine.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
+        let make = |mesh| Ok(Arc::new(as_fetched(mesh, self.vertices)));
+        self.context.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
             self.subdivided.lock().insert(key, mesh);
         })
     }
 
     fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError> {
-        let _one_at_a_time = self.engine.drawing.lock();
+        let _one_at_a_time = self.context.drawing.lock();
         for (pass, commands) in &passes {
             let known = self.passes.iter().find(|known| known.pass == *pass);
             let unknown = || BackendError::BrokenRule { rule: format!("{pass:?} is of this frame") };
@@ -124,13 +66,17 @@ impl<R: Number> Recording for Frame<R> {
     }
 }
 
-impl<R: Number> Frame<R> {
-    fn draw(&self, pass: &FramePass<R>, commands: &SoftwareCommands) -> Result<(), BackendError> {
+impl<R: Precision> TypedFrame<R> {
+    fn draw(&self, pass: &SoftwarePass<R>, commands: &SoftwareCommands) -> Result<(), BackendError> {
         let view = &self.views[pass.pass.view];
-        let drawing =
-            DrawingPass { crew: &self.engine.crew, view, materials: &*self.materials, attachments: &pass.attachments };
+        let context = PassContext {
+            executor: &self.context.executor,
+            view,
+            materials: &*self.materials,
+            attachments: &pass.attachments,
+        };
         let outcome = match &pass.draws {
-            PassDraws::Objects { twin, writes_depth } => {
+            SoftwareDraws::Objects { shader, writes_depth } => {
                 let subdivided = self.subdivided.lock();
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
@@ -139,14 +85,15 @@ impl<R: Number> Frame<R> {
                     };
                     mesh.cloned().ok_or_else(no_such_mesh)
                 };
-                let pieces = pieces(&commands.draws, &commands.objects, &commands.indices, mesh_of)?;
+                let chunks = setup_chunks(commands, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
-                let (twin, writes_depth) = (&**twin, *writes_depth);
-                ObjectPass { drawing, twin, writes_depth, pieces: &pieces, object_of: &object_of }.run()
+                let (shader, writes_depth) = (&**shader, *writes_depth);
+                ObjectPass { context, shader, writes_depth, chunks: &chunks, object_of: &object_of }.draw()
             }
-            PassDraws::FullScreen { twin, blend } => draw_full_screen(&drawing, &**twin, *blend),
-            PassDraws::Lights { twin, lights } => draw_lights(&drawing, &**twin, lights.clone()),
+            SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &**shader, *blend),
+            SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &**shader, lights.clone()),
         };
-        outcome.map_err(|panic| BackendError::TwinPanicked { process: pass.process.clone(), message: panic.message })
+        outcome
+            .map_err(|panic| BackendError::CpuShaderPanicked { process: pass.process.clone(), message: panic.message })
     }
 }

@@ -1,67 +1,69 @@
-//! Where in the picture a light may reach.
+//! Conservative bounds of what a light reaches in the picture.
 
-use crate::process::{LightValues, ViewValues};
+use crate::process::{ShaderLight, ShaderView};
 use crate::raster::{PixelBounds, Real, Vector3};
 use crate::scene::{LightKind, Projection};
 
-/// What of a picture a light may reach.
+/// Conservative bounds of what a light reaches in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Reached {
-    /// Pixels among which are all whose surface it reaches.
-    pub(super) bounds: PixelBounds,
-    /// Depths between which those surfaces lie.
+pub(super) struct LightBounds {
+    /// These contain every pixel whose surface the light reaches.
+    pub(super) pixels: PixelBounds,
+    /// Those surfaces' depths lie between these.
     pub(super) depths: [f64; 2],
 }
 
-/// What a light may reach: it reaches no farther than its range, so that is a ball, whose outline and whose two ends along the
-/// camera's axis are found in f64, whatever the twin computes in.
-///
-/// What the twin rounds is allowed for: around the outline a pixel and a thousandth of the ball, and along the axis a thousandth
-/// of the range and a hundred-thousandth of the distance, a hundred times what f32 rounds. Where the camera is inside of the ball or
-/// beside it, the outline is the whole picture.
-pub(super) fn reached_by<R: Real>(view: &ViewValues<R>, light: &LightValues<R>) -> Reached {
-    let whole = Reached { bounds: PixelBounds::of_picture(view.size), depths: [0.0, f64::INFINITY] };
-    if light.kind == LightKind::Directional {
-        return whole;
+impl LightBounds {
+    /// A light reaches no farther than its range, so it is bounded by a sphere. The sphere's outline and its two ends along the
+    /// camera's axis are computed in f64, whatever precision the shader has.
+    ///
+    /// Margins cover the shader's rounding: a pixel and a thousandth of the sphere around the outline; along the axis a
+    /// thousandth of the range and a hundred-thousandth of the distance, a hundred times the rounding of f32. If the camera is
+    /// inside of the sphere or beside it, the outline is the whole picture.
+    pub(super) fn new<R: Real>(view: &ShaderView<R>, light: &ShaderLight<R>) -> Self {
+        let whole = Self { pixels: PixelBounds::of_picture(view.size), depths: [0.0, f64::INFINITY] };
+        if light.kind == LightKind::Directional {
+            return whole;
+        }
+        let double = |vector: Vector3<R>| vector.0.map(Real::as_f64);
+        let (position, range) = (double(light.position), light.range.as_f64());
+        let along = |axis: Vector3<R>| {
+            let axis = double(axis);
+            let length = dot(axis, axis).sqrt();
+            (dot(axis, position) / length, length)
+        };
+        let ahead = along(view.forward).0;
+        let [columns, rows] =
+            [(view.right, view.size[0], 1.0), (view.up, view.size[1], -1.0)].map(|(axis, pixels, sign)| {
+                let (aside, half) = along(axis);
+                let [low, high] = match view.projection {
+                    Projection::Perspective { .. } => disc_slopes(aside, ahead, range)?,
+                    Projection::Orthographic { .. } => [aside - range, aside + range],
+                    Projection::Paraboloid => return None,
+                };
+                let margin = (high - low) * 1e-3;
+                let pixel_of = |value: f64| (sign * value / half * 0.5 + 0.5) * pixels as f64;
+                let [one, other] = [pixel_of(low - margin), pixel_of(high + margin)];
+                let (first, last) = (one.min(other) - 1.0, one.max(other) + 1.0);
+                // False for NaN, which an infinitely large light leads to: the bounds are the whole picture.
+                (first <= last).then(|| (first.max(0.0) as usize, (last.ceil().max(0.0) as usize).min(pixels)))
+            });
+        let pixels = match (columns, rows) {
+            (Some((left, right)), Some((top, bottom))) => PixelBounds { left, top, right, bottom },
+            _ => whole.pixels,
+        };
+        let margin = range * 1e-3 + ahead.abs() * 1e-5;
+        let ends = [ahead + range + margin, ahead - range - margin];
+        Self { pixels, depths: depths_at(view, ends).unwrap_or(whole.depths) }
     }
-    let double = |vector: Vector3<R>| vector.0.map(Real::as_f64);
-    let (position, range) = (double(light.position), light.range.as_f64());
-    let along = |axis: Vector3<R>| {
-        let axis = double(axis);
-        let length = dot(axis, axis).sqrt();
-        (dot(axis, position) / length, length)
-    };
-    let ahead = along(view.forward).0;
-    let [columns, rows] =
-        [(view.right, view.size[0], 1.0), (view.up, view.size[1], -1.0)].map(|(axis, pixels, sign)| {
-            let (aside, half) = along(axis);
-            let [low, high] = match view.projection {
-                Projection::Perspective { .. } => seen_in_perspective(aside, ahead, range)?,
-                Projection::Orthographic { .. } => [aside - range, aside + range],
-                Projection::Paraboloid => return None,
-            };
-            let slack = (high - low) * 1e-3;
-            let place = |value: f64| (sign * value / half * 0.5 + 0.5) * pixels as f64;
-            let [one, other] = [place(low - slack), place(high + slack)];
-            let (first, last) = (one.min(other) - 1.0, one.max(other) + 1.0);
-            // What is not a number, as of a light that is infinitely large, is everywhere.
-            (first <= last).then(|| (first.max(0.0) as usize, (last.ceil().max(0.0) as usize).min(pixels)))
-        });
-    let bounds = match (columns, rows) {
-        (Some((left, right)), Some((top, bottom))) => PixelBounds { left, top, right, bottom },
-        _ => whole.bounds,
-    };
-    let slack = range * 1e-3 + ahead.abs() * 1e-5;
-    let ends = [ahead + range + slack, ahead - range - slack];
-    Reached { bounds, depths: depths_between(view, ends).unwrap_or(whole.depths) }
 }
 
-/// The depths at the farther and at the nearer of two distances along the camera's axis; `None` where that cannot be said.
-fn depths_between<R: Real>(view: &ViewValues<R>, ends: [f64; 2]) -> Option<[f64; 2]> {
+/// The depths at two distances along the camera's axis, the farther first; `None` if they cannot be computed.
+fn depths_at<R: Real>(view: &ShaderView<R>, ends: [f64; 2]) -> Option<[f64; 2]> {
     let (near, far) = (view.near.as_f64(), view.far.as_f64());
     let depths = match view.projection {
         Projection::Perspective { .. } => {
-            // What lies behind the camera is behind all that is seen.
+            // An end behind the camera is nearer than everything visible.
             ends.map(|distance| if distance > 0.0 { near / distance } else { f64::INFINITY })
         }
         Projection::Orthographic { .. } => ends.map(|distance| (far - distance) / (far - near)),
@@ -70,13 +72,14 @@ fn depths_between<R: Real>(view: &ViewValues<R>, ends: [f64; 2]) -> Option<[f64;
     depths.iter().all(|depth| !depth.is_nan()).then_some(depths)
 }
 
-/// Between which slopes a disc is seen whose centre is so far aside and ahead; `None` where some of it is beside the eye.
+/// The two slopes between which a disc is seen in perspective, by its centre's distances aside and ahead; `None` if some of
+/// the disc is beside the camera.
 ///
-/// The lines through the eye that touch the disc have the slopes (a·z ± r·√(a² + z² − r²)) ÷ (z² − r²).
-fn seen_in_perspective(aside: f64, ahead: f64, radius: f64) -> Option<[f64; 2]> {
+/// The lines through the camera that touch the disc have the slopes (a·z ± r·√(a² + z² − r²)) ÷ (z² − r²).
+fn disc_slopes(aside: f64, ahead: f64, radius: f64) -> Option<[f64; 2]> {
     let squared = ahead * ahead - radius * radius;
     let root = radius * (aside * aside + squared).sqrt();
-    // Close to the eye's own plane the slopes are without bound.
+    // Close to the camera's own plane the slopes are unbounded.
     (ahead > radius * 1.001).then(|| [(aside * ahead - root) / squared, (aside * ahead + root) / squared])
 }
 
@@ -90,13 +93,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::backend::software::values::{exact_view, light_of_record};
+    use crate::backend::software::shader_inputs::{exact_view, light_as_uploaded};
     use crate::scene::{Assets, Camera, Light, SceneRef};
     use crate::view::{GpuLight, RenderView};
 
     const SIZE: [u32; 2] = [160, 90];
 
-    fn view_of(camera: &Camera) -> ViewValues<f64> {
+    fn view_of(camera: &Camera) -> ShaderView<f64> {
         let assets = Assets::default();
         let scene = SceneRef {
             positions: &[],
@@ -114,42 +117,42 @@ mod tests {
         exact_view(&RenderView::new(camera), &scene)
     }
 
-    fn reached(camera: &Camera, position: DVec3, range: f32) -> Reached {
+    fn light_bounds(camera: &Camera, position: DVec3, range: f32) -> LightBounds {
         let light = Light::Point { position, intensity: Vec3::ONE, range };
-        reached_by(&view_of(camera), &light_of_record(&GpuLight::new(&light, camera.position, None)))
+        LightBounds::new(&view_of(camera), &light_as_uploaded(&GpuLight::new(&light, camera.position, None)))
     }
 
     fn bounds_of(camera: &Camera, position: DVec3, range: f32) -> PixelBounds {
-        reached(camera, position, range).bounds
+        light_bounds(camera, position, range).pixels
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4_000))]
 
-        /// Whatever of a light's ball lies in a pixel is within the bounds.
+        /// Every visible point of a light's sphere lies within the bounds.
         #[test]
-        fn they_hold_all_that_a_light_reaches(
+        fn the_bounds_contain_all_that_a_light_reaches(
             position in prop::array::uniform3(-30.0..30.0_f64),
             exponent in -2.0..2.0_f64,
             direction in prop::array::uniform3(-1.0..1.0_f64),
             share in 0.9..1.0_f64,
             degrees in 1.0..170.0_f32,
             turn in 0.0..6.3_f32,
-            is_flat in any::<bool>(),
+            is_orthographic in any::<bool>(),
         ) {
             let mut camera = Camera::looking_at("main", DVec3::new(1e5, 2.0, 3.0), DVec3::ZERO);
             camera.orientation = Quat::from_rotation_y(turn);
             camera.size = SIZE;
             let perspective = Projection::Perspective { field_of_view: degrees.to_radians() };
-            camera.projection = if is_flat { Projection::Orthographic { height: degrees } } else { perspective };
+            camera.projection = if is_orthographic { Projection::Orthographic { height: degrees } } else { perspective };
             camera.far = 1e4;
             let position = camera.position + DVec3::from(position);
             let range = 10_f64.powf(exponent);
-            let Reached { bounds, depths } = reached(&camera, position, range as f32);
+            let LightBounds { pixels: bounds, depths } = light_bounds(&camera, position, range as f32);
             let direction = DVec3::from(direction).normalize_or(DVec3::X);
-            let place = position + direction * (range * share) - camera.position;
+            let point = position + direction * (range * share) - camera.position;
 
-            let clip = RenderView::new(&camera).clip_from_relative().as_dmat4() * place.extend(1.0);
+            let clip = RenderView::new(&camera).clip_from_relative().as_dmat4() * point.extend(1.0);
             let (x, y) = (clip.x / clip.w, clip.y / clip.w);
             let column = ((x * 0.5 + 0.5) * f64::from(SIZE[0])).floor();
             let row = ((0.5 - y * 0.5) * f64::from(SIZE[1])).floor();

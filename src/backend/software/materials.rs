@@ -1,32 +1,32 @@
-//! Materials and their textures, kept from frame to frame.
+//! Materials and their textures, kept over frames.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
 use super::mip_chain::MipChain;
-use crate::process::{MaterialValues, Materials};
+use crate::process::{Materials, ShaderMaterial};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Assets, Blend, Material};
 use crate::view::{RejectionReason, Rejections};
 
-/// Keeps the materials of the last frame, and the mip levels of the textures that they carry.
+/// Keeps the materials of the last frame, and the mip chains of their textures.
 #[derive(Default)]
 pub(super) struct MaterialCache {
-    /// By texture slot: its revision and its levels.
+    /// By texture slot: its revision and its mip chain.
     chains: Vec<Option<(u64, Arc<MipChain>)>>,
-    /// Whose textures the levels are.
+    /// The identity of the collection that the textures are of.
     identity: u64,
-    /// Identities and revisions of what the table holds.
+    /// Identities and revisions of the materials and textures in the table.
     current: Option<[(u64, u64); 2]>,
     table: Arc<MaterialTable>,
-    /// The materials whose texture was removed: counted in every frame.
+    /// The materials whose texture was removed, which every frame reports.
     stale: Vec<usize>,
 }
 
 impl MaterialCache {
-    /// The materials that a frame of these assets draws with. Only textures that changed since the last frame, and that a
-    /// material carries, are scaled again; where nothing changed it is the table of before.
+    /// The materials of these assets. Mip chains are built only for textures that a material uses and that changed since the
+    /// last frame; if nothing changed, the same table is returned.
     pub(super) fn update(&mut self, assets: &Assets, rejections: &Rejections) -> Arc<MaterialTable> {
         let wanted = [
             (assets.materials.identity(), assets.materials.revision()),
@@ -101,13 +101,13 @@ impl TableEntry {
 }
 
 impl<R: Real> Materials<R> for MaterialTable {
-    /// Black, where the slot is free: what refers to that is not drawn.
-    fn get(&self, slot: u32) -> MaterialValues<R> {
+    /// Black if the slot is free: an object that refers to it is not drawn.
+    fn get(&self, slot: u32) -> ShaderMaterial<R> {
         let Some(Some(entry)) = self.slots.get(slot as usize) else {
             let (diffuse, emission) = (Vector3::zero(), Vector3::zero());
-            return MaterialValues { diffuse, opacity: R::zero(), emission, double_sided: false, blend: Blend::None };
+            return ShaderMaterial { diffuse, opacity: R::zero(), emission, double_sided: false, blend: Blend::None };
         };
-        MaterialValues {
+        ShaderMaterial {
             diffuse: Vector3::of_single(entry.diffuse),
             opacity: R::of(f64::from(entry.opacity)),
             emission: Vector3::of_single(entry.emission),
@@ -116,10 +116,10 @@ impl<R: Real> Materials<R> for MaterialTable {
         }
     }
 
-    fn texel(&self, slot: u32, uv: Vector2<R>, across: Vector2<R>, down: Vector2<R>) -> Vector4<R> {
+    fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
         let entry = self.slots.get(slot as usize).and_then(Option::as_ref);
         match entry.and_then(|entry| entry.chain.as_ref()) {
-            Some(chain) => chain.trilinear(uv, across, down),
+            Some(chain) => chain.trilinear(uv, dpdx, dpdy),
             None => Vector::splat(R::one()),
         }
     }
@@ -131,7 +131,7 @@ mod tests {
     use crate::backend::software::mip_chain::tests::noise;
 
     fn texel(table: &MaterialTable, uv: [f32; 2]) -> [f32; 4] {
-        Materials::<f32>::texel(table, 0, Vector(uv), Vector::zero(), Vector::zero()).0
+        Materials::<f32>::sample(table, 0, Vector(uv), Vector::zero(), Vector::zero()).0
     }
 
     #[test]
@@ -156,14 +156,14 @@ mod tests {
         assets.replace(materials[0], plain).unwrap();
         let third = cache.update(&assets, &Rejections::default());
         assert_eq!([chains(&third)[0], chains(&third)[1]], [None, chains(&second)[1]]);
-        let values: MaterialValues<f32> = third.get(0);
+        let values: ShaderMaterial<f32> = third.get(0);
         assert!(values.double_sided && values.diffuse == Vector([1.0, 0.5, 0.25]) && values.opacity == 1.0);
         assert_eq!(texel(&third, [0.1, 0.2]), [1.0; 4]);
         assert!(chains(&first)[0].is_some(), "a frame keeps what it began with");
 
         let other = Assets::default();
         assert!(cache.update(&other, &Rejections::default()).slots.is_empty());
-        let free: MaterialValues<f32> = cache.update(&other, &Rejections::default()).get(7);
+        let free: ShaderMaterial<f32> = cache.update(&other, &Rejections::default()).get(7);
         assert_eq!(free.opacity, 0.0);
     }
 
@@ -182,7 +182,7 @@ mod tests {
                 .iter()
                 .map(|rejection| (rejection.reason, rejection.count, rejection.first))
                 .collect();
-            (counts, Materials::<f32>::texel(&*table, 1, Vector::zero(), Vector::zero(), Vector::zero()))
+            (counts, Materials::<f32>::sample(&*table, 1, Vector::zero(), Vector::zero(), Vector::zero()))
         };
         assert!(rejected(&assets).0.is_empty());
         assets.remove(texture).unwrap();

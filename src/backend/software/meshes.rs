@@ -1,25 +1,25 @@
-//! Meshes, kept from frame to frame.
+//! Meshes, kept over frames.
 
 use std::sync::Arc;
 
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 
-/// What frames draw, by the mesh's slot.
+/// The meshes of a frame, by slot.
 pub(super) type Meshes = Arc<[Option<Arc<Mesh>>]>;
 
-/// Keeps the meshes of a scene: a frame that is drawn later needs them, whatever becomes of the scene.
+/// Keeps the meshes of a scene: a frame that is drawn later needs them after the scene has changed.
 #[derive(Default)]
 pub(super) struct MeshCache {
-    /// Whose meshes they are, as of when, and how their vertices lie.
+    /// The identity and revision of the collection that the meshes are of, and the format of their vertices.
     assets: (u64, u64, VertexFormat),
-    /// With the revision of each.
+    /// By slot, with the revision of each.
     kept: Vec<Option<(u64, Arc<Mesh>)>>,
     meshes: Meshes,
 }
 
 impl MeshCache {
-    /// The meshes of these assets, as a device would fetch their vertices.
+    /// The meshes of these assets, with the vertices that a device would fetch.
     pub(super) fn update(&mut self, assets: &Assets, vertices: VertexFormat) -> Meshes {
         let wanted = (assets.meshes.identity(), assets.meshes.revision(), vertices);
         if self.assets == wanted {
@@ -33,7 +33,7 @@ impl MeshCache {
         for (handle, revision, mesh) in assets.meshes.iter_revised() {
             let slot = handle.index() as usize;
             let same = before.get_mut(slot).and_then(Option::take).filter(|(kept, _)| *kept == revision);
-            self.kept[slot] = Some(same.unwrap_or_else(|| (revision, Arc::new(fetched(mesh.clone(), vertices)))));
+            self.kept[slot] = Some(same.unwrap_or_else(|| (revision, Arc::new(as_fetched(mesh.clone(), vertices)))));
         }
         self.assets = wanted;
         self.meshes = self.kept.iter().map(|kept| kept.as_ref().map(|(_, mesh)| Arc::clone(mesh))).collect();
@@ -41,8 +41,8 @@ impl MeshCache {
     }
 }
 
-/// The mesh as a device would fetch its vertices.
-pub(super) fn fetched(mesh: Mesh, vertices: VertexFormat) -> Mesh {
+/// The mesh with the vertices that a device would fetch.
+pub(super) fn as_fetched(mesh: Mesh, vertices: VertexFormat) -> Mesh {
     match vertices {
         VertexFormat::Full => mesh,
         VertexFormat::Packed => mesh.as_packed(),

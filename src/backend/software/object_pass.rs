@@ -1,56 +1,57 @@
 //! A pass that draws objects.
 
-use super::number::Number;
-use super::pass::{DrawingPass, MOST_COLORS, OpenPass, OpenTile};
-use super::pieces::{Face, Run, SetUp};
-use crate::process::{ObjectPixel, ObjectTwin, ObjectValues, PassValues, VARYINGS};
+use super::attachments::{MAX_COLOR_ATTACHMENTS, OpenAttachments, TileAttachments};
+use super::pass_context::PassContext;
+use super::precision::Precision;
+use super::triangle_setup::{TriangleRange, TriangleSetup, TriangleState};
+use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS};
 use crate::raster::{Triangle, Vector4};
 use crate::scene::Blend;
 use crate::task::JobPanic;
 
 /// A pass that draws objects.
-pub(super) struct ObjectPass<'a, R: Number> {
-    pub(super) drawing: DrawingPass<'a, R>,
-    pub(super) twin: &'a dyn ObjectTwin<R>,
-    /// Whether what is drawn hides what comes behind it.
+pub(super) struct ObjectPass<'a, R: Precision> {
+    pub(super) context: PassContext<'a, R>,
+    pub(super) shader: &'a dyn ObjectCpuShader<R>,
+    /// Whether what is drawn occludes what is behind it.
     pub(super) writes_depth: bool,
-    /// Each drawn by one job before its pixels are.
-    pub(super) pieces: &'a [Vec<Run>],
+    /// One job sets up the triangles of a chunk.
+    pub(super) chunks: &'a [Vec<TriangleRange>],
     /// An object relative to the camera.
-    pub(super) object_of: &'a (dyn Fn(u32) -> Option<ObjectValues<R>> + Sync),
+    pub(super) object_of: &'a (dyn Fn(u32) -> Option<ShaderObject<R>> + Sync),
 }
 
-/// Pieces whose triangles are held at once: a frame of any size takes no more memory than these.
-const AT_ONCE: usize = 256;
+/// Chunks whose triangles are in memory at once, which bounds the memory of a frame of any size.
+const CHUNKS_IN_MEMORY: usize = 256;
 
-impl<R: Number> ObjectPass<'_, R> {
+impl<R: Precision> ObjectPass<'_, R> {
     /// Draws it.
     ///
     /// # Errors
-    /// If the twin panics.
-    pub(super) fn run(&self) -> Result<(), JobPanic> {
-        self.drawing.attachments.open(|open| {
-            // What is not interpolated need not be kept.
-            if self.twin.draws_pixels() { self.draw::<VARYINGS>(open) } else { self.draw::<0>(open) }
+    /// If the CPU shader panics.
+    pub(super) fn draw(&self) -> Result<(), JobPanic> {
+        self.context.attachments.open(|open| {
+            // Without a fragment shader no varyings are kept.
+            if self.shader.draws_pixels() { self.draw_tiles::<VARYINGS>(open) } else { self.draw_tiles::<0>(open) }
         })
     }
 
-    fn draw<const V: usize>(&self, open: &OpenPass<'_, R>) -> Result<(), JobPanic> {
-        let Self { drawing, twin, pieces, object_of, .. } = self;
-        let DrawingPass { crew, view, attachments, .. } = drawing;
+    fn draw_tiles<const V: usize>(&self, open: &OpenAttachments<'_, R>) -> Result<(), JobPanic> {
+        let Self { context, shader, chunks, object_of, .. } = self;
+        let PassContext { executor, view, attachments, .. } = context;
         let sampled = open.sampled();
-        let values = drawing.values(&sampled);
-        crew.each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
-        for pieces in pieces.chunks(AT_ONCE) {
-            let set_up = |piece: usize| -> SetUp<R, V> {
-                SetUp::new(*twin, &view.values, &open.tiling, &pieces[piece], object_of)
+        let inputs = context.inputs(&sampled);
+        executor.for_each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
+        for chunks in chunks.chunks(CHUNKS_IN_MEMORY) {
+            let set_up = |chunk: usize| -> TriangleSetup<R, V> {
+                TriangleSetup::new(*shader, &view.shader_view, &open.tiling, &chunks[chunk], object_of)
             };
-            let set_up = crew.map(pieces.len(), set_up)?;
-            crew.each(open.tiles.len(), |tile| {
-                let mut place = open.tiles[tile].lock();
-                let bounds = place.bounds;
-                for (triangle, face) in set_up.iter().flat_map(|piece| piece.of_tile(tile, bounds)) {
-                    self.draw_triangle(&mut place, &values, triangle, face);
+            let setups = executor.map(chunks.len(), set_up)?;
+            executor.for_each(open.tiles.len(), |index| {
+                let mut tile = open.tiles[index].lock();
+                let bounds = tile.bounds;
+                for (triangle, state) in setups.iter().flat_map(|setup| setup.of_tile(index, bounds)) {
+                    self.draw_triangle(&mut tile, &inputs, triangle, state);
                 }
             })?;
         }
@@ -59,39 +60,49 @@ impl<R: Number> ObjectPass<'_, R> {
 
     fn draw_triangle<const V: usize>(
         &self,
-        tile: &mut OpenTile<'_, R>,
-        values: &PassValues<'_, R>,
+        tile: &mut TileAttachments<'_, R>,
+        inputs: &PassInputs<'_, R>,
         triangle: &Triangle<R, V>,
-        face: Face,
+        state: TriangleState,
     ) {
-        let matches = self.drawing.attachments.depth.as_ref().is_some_and(|depth| depth.matches);
-        // What mixes with what is behind it must not hide what is drawn after it.
-        let writes_depth = self.writes_depth && face.blend == Blend::None;
-        let (draws_pixels, colors) = (self.twin.draws_pixels(), tile.color_count());
-        let mut targets = [Vector4::zero(); MOST_COLORS];
-        triangle.rasterize(tile.bounds, |place, depth| {
-            // Reversed: what is nearer is greater.
-            let is_seen = tile.depth(place).is_none_or(|there| if matches { depth == there } else { depth > there });
-            if !is_seen {
+        let tests_equal = self.context.attachments.depth.as_ref().is_some_and(|depth| depth.tests_equal);
+        // A blended triangle must not occlude what is drawn after it.
+        let writes_depth = self.writes_depth && state.blend == Blend::None;
+        let (draws_pixels, colors) = (self.shader.draws_pixels(), tile.color_count());
+        let mut targets = [Vector4::zero(); MAX_COLOR_ATTACHMENTS];
+        triangle.rasterize(tile.bounds, |pixel, depth| {
+            // Depth is reversed: nearer is greater.
+            let passes = |stored| if tests_equal { depth == stored } else { depth > stored };
+            if !tile.depth(pixel).is_none_or(passes) {
                 return;
             }
             if draws_pixels {
-                targets = [Vector4::zero(); MOST_COLORS];
-                let pixel = pixel_of(triangle, place, face.material);
-                if !self.twin.fragment(values, &pixel, &mut targets[..colors]) {
+                targets = [Vector4::zero(); MAX_COLOR_ATTACHMENTS];
+                let object_pixel = object_pixel(triangle, pixel, state.material);
+                if !self.shader.fragment(inputs, &object_pixel, &mut targets[..colors]) {
                     return;
                 }
-                tile.draw(place, face.blend, &targets[..colors]);
+                tile.draw(pixel, state.blend, &targets[..colors]);
             }
             if writes_depth {
-                tile.set_depth(place, depth);
+                tile.set_depth(pixel, depth);
             }
         });
     }
 }
 
-fn pixel_of<R: Number, const V: usize>(triangle: &Triangle<R, V>, place: [usize; 2], material: u32) -> ObjectPixel<R> {
-    let found = triangle.interpolate(place);
-    let all = |numbers: [R; V]| std::array::from_fn(|index| numbers.get(index).copied().unwrap_or_default());
-    ObjectPixel { place, varyings: all(found.value), across: all(found.dpdx), down: all(found.dpdy), material }
+fn object_pixel<R: Precision, const V: usize>(
+    triangle: &Triangle<R, V>,
+    coordinates: [usize; 2],
+    material: u32,
+) -> ObjectPixel<R> {
+    let found = triangle.interpolate(coordinates);
+    let padded = |numbers: [R; V]| std::array::from_fn(|index| numbers.get(index).copied().unwrap_or_default());
+    ObjectPixel {
+        coordinates,
+        varyings: padded(found.value),
+        dpdx: padded(found.dpdx),
+        dpdy: padded(found.dpdy),
+        material,
+    }
 }

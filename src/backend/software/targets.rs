@@ -1,22 +1,25 @@
-//! The views' targets.
+//! The targets of a frame's views.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::RwLock;
 
-use super::SoftwareBackend;
-use super::formats::append_bytes;
-use super::number::Number;
+use super::pixel_formats::append_bytes;
+use super::precision::Precision;
+use super::submission::ReadTargets;
 use super::tiles::{Tile, Tiling};
 use crate::backend::{BackendError, Picture};
-use crate::process::{FramePlan, PlannedTarget, Sampled};
+use crate::process::{FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// A target's pixels: of one view, or, in layers, of all views of a kind.
-pub(super) struct Texture<R> {
+/// The greatest width and height of a picture, in pixels.
+pub(super) const MAX_PICTURE_SIZE: u32 = 16_384;
+
+/// A target's pixels, in tiles: of one view, or, in layers, of all views of a kind.
+pub(super) struct TiledTexture<R> {
     pub(super) planned: PlannedTarget,
     pub(super) tiling: Tiling,
     layers: usize,
@@ -24,49 +27,48 @@ pub(super) struct Texture<R> {
     pub(super) tiles: RwLock<Vec<Tile<R>>>,
 }
 
-/// A target as one view has it.
-pub(super) struct Target<R> {
-    pub(super) texture: Arc<Texture<R>>,
+/// A target of one view: a layer of a texture.
+pub(super) struct SoftwareTarget<R> {
+    pub(super) texture: Arc<TiledTexture<R>>,
     pub(super) layer: usize,
 }
 
-impl<R> Clone for Target<R> {
+impl<R> Clone for SoftwareTarget<R> {
     fn clone(&self) -> Self {
         Self { texture: Arc::clone(&self.texture), layer: self.layer }
     }
 }
 
 /// The targets of one frame.
-pub(super) struct FrameTargets<R> {
-    /// One for each view: those it has for itself, and its layers of those it shares.
-    views: Vec<Vec<Target<R>>>,
-    /// Those that all views of a kind share.
-    layered: Vec<Arc<Texture<R>>>,
+pub(super) struct SoftwareTargets<R> {
+    /// Of each view: its own targets, and its layers of shared ones.
+    views: Vec<Vec<SoftwareTarget<R>>>,
+    /// The targets that all views of a kind share.
+    layered: Vec<Arc<TiledTexture<R>>>,
 }
 
-impl<R> Default for FrameTargets<R> {
+impl<R> Default for SoftwareTargets<R> {
     fn default() -> Self {
         Self { views: Vec::new(), layered: Vec::new() }
     }
 }
 
-impl<R> FrameTargets<R> {
-    /// The target of one view by its name.
-    pub(super) fn find(&self, view: usize, name: &str) -> Option<&Target<R>> {
+impl<R> SoftwareTargets<R> {
+    /// A view's target by its name.
+    pub(super) fn find(&self, view: usize, name: &str) -> Option<&SoftwareTarget<R>> {
         self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
     }
 
-    /// All layers of what the views of a kind share.
-    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<Target<R>> {
-        let is_wanted = |texture: &&Arc<Texture<R>>| texture.planned.views == kind && texture.planned.name == name;
-        self.layered.iter().find(is_wanted).map(|texture| Target { texture: Arc::clone(texture), layer: 0 })
+    /// A target that all views of a kind share, from its first layer on.
+    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<SoftwareTarget<R>> {
+        let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
+        self.layered.iter().find(is_wanted).map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 }
 
-/// Keeps targets from frame to frame, and makes new ones where a picture's size or the plan changes. What no frame needs any
-/// more is dropped.
+/// Keeps targets over frames, and replaces those whose size or plan changes. Targets that no frame needs any more are dropped.
 pub(super) struct TargetCache<R> {
-    current: Arc<FrameTargets<R>>,
+    current: Arc<SoftwareTargets<R>>,
 }
 
 impl<R> Default for TargetCache<R> {
@@ -75,7 +77,7 @@ impl<R> Default for TargetCache<R> {
     }
 }
 
-impl<R: Number> TargetCache<R> {
+impl<R: Precision> TargetCache<R> {
     /// The targets of a frame of these views.
     ///
     /// # Errors
@@ -84,18 +86,18 @@ impl<R: Number> TargetCache<R> {
         &mut self,
         plan: &FramePlan,
         views: &[RenderView],
-    ) -> Result<Arc<FrameTargets<R>>, BackendError> {
-        let mut next = FrameTargets::default();
+    ) -> Result<Arc<SoftwareTargets<R>>, BackendError> {
+        let mut next = SoftwareTargets::default();
         for planned in plan.targets().iter().filter(|planned| planned.layered) {
             let mut sharing = views.iter().filter(|view| view.kind() == planned.views);
-            // Without a view there still is something to read: a pixel where nothing is.
+            // Without a view there is still a texture to read: one pixel in which nothing was drawn.
             let size = sharing.clone().next().map_or([1, 1], |view| view.camera.size);
             let layers = sharing.by_ref().count().max(1);
-            let fits = |kept: &&Arc<Texture<R>>| (layers..=2 * layers).contains(&kept.layers);
+            let has_layers = |kept: &&Arc<TiledTexture<R>>| (layers..=2 * layers).contains(&kept.layers);
             let mut kept = self.current.layered.iter().filter(|kept| kept.is_for(planned, size));
-            let texture = match kept.find(fits) {
+            let texture = match kept.find(has_layers) {
                 Some(kept) => Arc::clone(kept),
-                None => Arc::new(Texture::new(planned, size, layers)?),
+                None => Arc::new(TiledTexture::new(planned, size, layers)?),
             };
             next.layered.push(texture);
         }
@@ -105,16 +107,17 @@ impl<R: Number> TargetCache<R> {
                 if planned.layered {
                     let shared = next.layered.iter().find(|texture| texture.planned == *planned);
                     targets.extend(
-                        shared.map(|texture| Target { texture: Arc::clone(texture), layer: view.layer as usize }),
+                        shared
+                            .map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: view.layer as usize }),
                     );
                     continue;
                 }
                 let kept = self.current.find(index, &planned.name);
                 let texture = match kept.filter(|kept| kept.texture.is_for(planned, view.camera.size)) {
                     Some(kept) => Arc::clone(&kept.texture),
-                    None => Arc::new(Texture::new(planned, view.camera.size, 1)?),
+                    None => Arc::new(TiledTexture::new(planned, view.camera.size, 1)?),
                 };
-                targets.push(Target { texture, layer: 0 });
+                targets.push(SoftwareTarget { texture, layer: 0 });
             }
             next.views.push(targets);
         }
@@ -123,9 +126,9 @@ impl<R: Number> TargetCache<R> {
     }
 }
 
-impl<R: Number> Texture<R> {
+impl<R: Precision> TiledTexture<R> {
     fn new(planned: &PlannedTarget, size: [u32; 2], layers: usize) -> Result<Self, BackendError> {
-        let (allowed, needed) = (SoftwareBackend::LARGEST_PICTURE, size[0].max(size[1]));
+        let (allowed, needed) = (MAX_PICTURE_SIZE, size[0].max(size[1]));
         if needed > allowed {
             let (allowed, needed) = (u64::from(allowed), u64::from(needed));
             return Err(BackendError::Limit { limit: "largest width and height of a picture", allowed, needed });
@@ -146,14 +149,14 @@ impl<R: Number> Texture<R> {
     }
 }
 
-impl<R: Number> Target<R> {
-    /// Where its tiles are among those of the texture.
+impl<R: Precision> SoftwareTarget<R> {
+    /// The range of its tiles among those of the texture.
     pub(super) fn tiles(&self) -> Range<usize> {
         let count = self.texture.tiling.count();
         self.layer * count..(self.layer + 1) * count
     }
 
-    /// Its pixels, as a device has them in memory.
+    /// Its pixels in its format, as a device has them in memory.
     pub(super) fn picture(&self) -> Picture {
         let (format, size) = (self.texture.planned.format, self.texture.tiling.size());
         let mut bytes = Vec::with_capacity(size[0] * size[1] * format.bytes());
@@ -161,7 +164,7 @@ impl<R: Number> Target<R> {
         Picture { width: size[0] as u32, height: size[1] as u32, format, bytes }
     }
 
-    /// Its pixels as they are kept, rows from top to bottom.
+    /// Its pixels as they are stored, rows from top to bottom.
     pub(super) fn numbers(&self) -> Vec<[f64; 4]> {
         let mut numbers = Vec::new();
         self.visit(|pixel| numbers.push(pixel.0.map(Real::as_f64)));
@@ -169,7 +172,7 @@ impl<R: Number> Target<R> {
     }
 
     fn visit(&self, mut visit: impl FnMut(Vector4<R>)) {
-        // No writer waits for this one while it waits for another.
+        // No deadlock: a writer of these tiles waits for no reader.
         let tiles = self.texture.tiles.read();
         let sampled = self.sampled(&tiles);
         let [width, height] = self.texture.tiling.size();
@@ -178,38 +181,32 @@ impl<R: Number> Target<R> {
         }
     }
 
-    /// What twins read of it.
-    pub(super) fn sampled<'a>(&self, tiles: &'a [Tile<R>]) -> SampledTarget<'a, R> {
-        let Texture { planned, tiling, layers, .. } = &*self.texture;
-        SampledTarget {
-            tiles,
-            tiling: *tiling,
-            channels: planned.format.channels(),
-            first: self.layer,
-            layers: *layers,
-        }
+    /// What CPU shaders read.
+    pub(super) fn sampled<'a>(&self, tiles: &'a [Tile<R>]) -> TargetReader<'a, R> {
+        let TiledTexture { planned, tiling, layers, .. } = &*self.texture;
+        TargetReader { tiles, tiling: *tiling, channels: planned.format.channels(), first: self.layer, layers: *layers }
     }
 }
 
-/// A target that a twin reads.
-pub(super) struct SampledTarget<'a, R> {
+/// A target that a CPU shader samples.
+pub(super) struct TargetReader<'a, R> {
     tiles: &'a [Tile<R>],
     tiling: Tiling,
     channels: usize,
-    /// The layer that is the twin's first.
+    /// The texture's layer that the CPU shader sees as layer 0.
     first: usize,
     layers: usize,
 }
 
-impl<R: Number> Sampled<R> for SampledTarget<'_, R> {
+impl<R: Precision> SampledTexture<R> for TargetReader<'_, R> {
     fn size(&self) -> [usize; 2] {
         self.tiling.size()
     }
 
-    fn load(&self, place: [usize; 2], layer: usize) -> Vector4<R> {
+    fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R> {
         let layer = (self.first + layer).min(self.layers - 1);
-        let (tile, pixel) = self.tiling.find(place);
-        // Channels that a format lacks are those of opaque black.
+        let (tile, pixel) = self.tiling.find(coordinates);
+        // Channels that the format lacks are those of opaque black.
         let (zero, one) = (R::zero(), R::one());
         Vector(match *self.tiles[layer * self.tiling.count() + tile].pixel(pixel, self.channels) {
             [red] => [red, zero, zero, one],
@@ -218,5 +215,15 @@ impl<R: Number> Sampled<R> for SampledTarget<'_, R> {
             [red, green, blue, alpha, ..] => [red, green, blue, alpha],
             [] => [zero, zero, zero, one],
         })
+    }
+}
+
+impl<R: Precision> ReadTargets for SoftwareTargets<R> {
+    fn picture(&self, view: usize, target: &str) -> Option<Picture> {
+        self.find(view, target).map(|target| target.picture())
+    }
+
+    fn numbers(&self, view: usize, target: &str) -> Option<Vec<[f64; 4]>> {
+        self.find(view, target).map(|target| target.numbers())
     }
 }

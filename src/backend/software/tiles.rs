@@ -1,11 +1,11 @@
-//! Squares of a picture: what one job draws.
+//! Tiles of a picture: each is drawn by one job.
 
 use std::ops::Range;
 
-use super::number::Number;
+use super::precision::Precision;
 use crate::raster::PixelBounds;
 
-/// A picture cut into squares.
+/// A picture divided into tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Tiling {
     size: [usize; 2],
@@ -13,12 +13,12 @@ pub(super) struct Tiling {
     down: usize,
 }
 
-/// Pixels along a square's side.
-const SIDE: usize = 64;
+/// The width and height of a tile in pixels.
+const TILE_SIZE: usize = 64;
 
 impl Tiling {
     pub(super) fn new(size: [usize; 2]) -> Self {
-        Self { size, across: size[0].div_ceil(SIDE), down: size[1].div_ceil(SIDE) }
+        Self { size, across: size[0].div_ceil(TILE_SIZE), down: size[1].div_ceil(TILE_SIZE) }
     }
 
     /// The picture's width and height in pixels.
@@ -26,48 +26,48 @@ impl Tiling {
         self.size
     }
 
-    /// How many squares.
+    /// The number of tiles.
     pub(super) fn count(&self) -> usize {
         self.across * self.down
     }
 
-    /// The square that holds a pixel, and the pixel's place in it.
+    /// The tile that holds a pixel, and the pixel's index in the tile.
     #[inline]
     pub(super) fn find(&self, [x, y]: [usize; 2]) -> (usize, usize) {
-        (y / SIDE * self.across + x / SIDE, place_in_tile([x, y]))
+        (y / TILE_SIZE * self.across + x / TILE_SIZE, index_in_tile([x, y]))
     }
 
-    /// The pixels of a square that are in the picture.
+    /// The pixels of a tile that are in the picture.
     pub(super) fn bounds(&self, tile: usize) -> PixelBounds {
-        let (left, top) = (tile % self.across * SIDE, tile / self.across * SIDE);
-        let (right, bottom) = ((left + SIDE).min(self.size[0]), (top + SIDE).min(self.size[1]));
+        let (left, top) = (tile % self.across * TILE_SIZE, tile / self.across * TILE_SIZE);
+        let (right, bottom) = ((left + TILE_SIZE).min(self.size[0]), (top + TILE_SIZE).min(self.size[1]));
         PixelBounds { left, top, right, bottom }
     }
 
-    /// The squares that hold pixels of these.
+    /// The tiles that overlap these pixels.
     pub(super) fn touched(&self, bounds: PixelBounds) -> impl Iterator<Item = usize> {
         let across = self.across;
-        let ends = |start: usize, end: usize| -> Range<usize> { start / SIDE..end.div_ceil(SIDE) };
+        let ends = |start: usize, end: usize| -> Range<usize> { start / TILE_SIZE..end.div_ceil(TILE_SIZE) };
         let (columns, rows) = (ends(bounds.left, bounds.right), ends(bounds.top, bounds.bottom));
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
 }
 
-/// A pixel's place in its square.
+/// A pixel's index in its tile.
 #[inline]
-pub(super) fn place_in_tile([x, y]: [usize; 2]) -> usize {
-    y % SIDE * SIDE + x % SIDE
+pub(super) fn index_in_tile([x, y]: [usize; 2]) -> usize {
+    y % TILE_SIZE * TILE_SIZE + x % TILE_SIZE
 }
 
-/// A square's pixels, whether they are all in the picture or not.
+/// A tile's pixels; those outside of the picture are unused.
 pub(super) struct Tile<R>(Box<[R]>);
 
-impl<R: Number> Tile<R> {
-    /// One whose pixels are so many numbers each, all 0; `None` where there is no memory for it.
+impl<R: Precision> Tile<R> {
+    /// A tile whose pixels have `channels` numbers each, all 0; `None` if out of memory.
     pub(super) fn new(channels: usize) -> Option<Self> {
         let mut numbers = Vec::new();
-        numbers.try_reserve_exact(SIDE * SIDE * channels).ok()?;
-        numbers.resize(SIDE * SIDE * channels, R::zero());
+        numbers.try_reserve_exact(TILE_SIZE * TILE_SIZE * channels).ok()?;
+        numbers.resize(TILE_SIZE * TILE_SIZE * channels, R::zero());
         Some(Self(numbers.into_boxed_slice()))
     }
 
@@ -81,14 +81,14 @@ impl<R: Number> Tile<R> {
         &mut self.0
     }
 
-    /// The numbers of the pixel at a place.
+    /// The numbers of a pixel, by its index in the tile.
     #[inline]
-    pub(super) fn pixel(&self, place: usize, channels: usize) -> &[R] {
-        &self.0[place * channels..][..channels]
+    pub(super) fn pixel(&self, index: usize, channels: usize) -> &[R] {
+        &self.0[index * channels..][..channels]
     }
 }
 
-/// Each pixel of these, row by row.
+/// The coordinates of these pixels, row by row.
 pub(super) fn pixels_of(bounds: PixelBounds) -> impl Iterator<Item = [usize; 2]> {
     (bounds.top..bounds.bottom).flat_map(move |y| (bounds.left..bounds.right).map(move |x| [x, y]))
 }
@@ -101,7 +101,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_pixel_is_in_one_square(size in prop::array::uniform2(1..200_usize), within in prop::array::uniform4(0..200_usize)) {
+        fn every_pixel_is_in_one_tile(size in prop::array::uniform2(1..200_usize), within in prop::array::uniform4(0..200_usize)) {
             let tiling = Tiling::new(size);
             let all = PixelBounds::of_picture(size);
             let bounds = PixelBounds { left: within[0], top: within[1], right: within[2], bottom: within[3] };
@@ -109,7 +109,7 @@ mod tests {
             let mut found = vec![0; size[0] * size[1]];
             for tile in 0..tiling.count() {
                 for [x, y] in pixels_of(tiling.bounds(tile)) {
-                    prop_assert_eq!(tiling.find([x, y]), (tile, place_in_tile([x, y])));
+                    prop_assert_eq!(tiling.find([x, y]), (tile, index_in_tile([x, y])));
                     found[y * size[0] + x] += 1;
                 }
             }

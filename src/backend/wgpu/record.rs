@@ -17,7 +17,7 @@ use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawState;
 use crate::command::{Batch, DrawList};
-use crate::process::{Access, ClearColor, Draws, Pass, RawPass, Resolved};
+use crate::process::{Access, ClearColor, Draws, Pass, RawPass, RawPassResources};
 
 /// An earlier frame's bundle at a place of a pass that has one encoder, if that way is taken and there is one.
 pub(super) fn kept(frame: &WgpuFrame, index: usize, list: &DrawList, place: usize) -> Option<WgpuPart> {
@@ -309,7 +309,7 @@ pub(super) fn raw(
     let textures = |name: &str| frame.targets.find(pass.view, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
     let size = request.views[pass.view].camera.size;
-    let resources = Resolved { device, view: pass.view, size, textures: &textures, layered: &layered };
+    let resources = RawPassResources { device, view: pass.view, size, textures: &textures, layered: &layered };
     let times = timed_place.and_then(|place| frame.buffers.timestamps()?.of_pass(place));
     if let Some((set, [began, _])) = times {
         encoder.write_timestamp(set, began);

@@ -1,10 +1,13 @@
 //! Anti-aliasing of the finished picture.
 
+mod cpu_shader;
+
 use std::sync::Arc;
 
-use super::fxaa_twin::FxaaTwin;
-use super::{Placed, PlacedStep, PostStep};
-use crate::process::{FullScreen, RenderProcess, Twin};
+use self::cpu_shader::FxaaCpuShader;
+use super::PostStep;
+use super::shipped_step::{BoundStep, ShippedStep};
+use crate::process::{CpuShader, FullScreen, RenderProcess};
 
 /// Smooths the steps that edges have where a pixel shows one surface or the other, from the picture alone (Lottes, "FXAA",
 /// NVIDIA 2009, in the form of its last version, 3.11).
@@ -46,25 +49,25 @@ impl Fxaa {
 
 impl PostStep for Fxaa {
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
-        Placed::between(source, target, *self)
+        BoundStep::between(source, target, *self)
     }
 }
 
-impl PlacedStep for Fxaa {
+impl ShippedStep for Fxaa {
     const NAME: &str = "fxaa";
 
     fn full_screen(&self) -> FullScreen<'static> {
         let [contrast_threshold, dark_threshold, sub_pixel] = self.usable_settings();
         let parameters = [contrast_threshold, dark_threshold, sub_pixel, 0.0];
         FullScreen {
-            shader: include_str!("fxaa.wgsl"),
+            shader: include_str!("fxaa/fxaa.wgsl"),
             parameters: bytemuck::cast_slice(&parameters).to_vec().into(),
             ..FullScreen::default()
         }
     }
 
-    fn twin(&self) -> Twin {
+    fn cpu_shader(&self) -> CpuShader {
         let [contrast_threshold, dark_threshold, sub_pixel] = self.usable_settings();
-        Twin::full_screen(FxaaTwin { contrast_threshold, dark_threshold, sub_pixel })
+        CpuShader::full_screen(FxaaCpuShader { contrast_threshold, dark_threshold, sub_pixel })
     }
 }

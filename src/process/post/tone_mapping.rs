@@ -1,11 +1,14 @@
 //! Tone mapping: the step that every picture needs.
 
+mod cpu_shader;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::tone_mapping_twin::ToneMappingTwin;
-use super::{Placed, PlacedStep, PostStep, declare_step};
-use crate::process::{Declare, Draws, FullScreen, RenderProcess, Twin};
+use self::cpu_shader::ToneMappingCpuShader;
+use super::PostStep;
+use super::shipped_step::{BoundStep, ShippedStep, declare_step};
+use crate::process::{CpuShader, Declare, Draws, FullScreen, RenderProcess};
 use crate::quality::{Quality, ToneCurve};
 
 /// Maps radiance, which has no upper end, to a picture, which has: exposure, then a curve, then sRGB. What is below zero, because
@@ -94,14 +97,14 @@ impl RenderProcess for ToneMapping {
         Draws::FullScreen(self.full_screen())
     }
 
-    fn twin(&self) -> Option<Twin> {
-        Some(PlacedStep::twin(self))
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(ShippedStep::cpu_shader(self))
     }
 }
 
 impl PostStep for ToneMapping {
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
-        Placed::between(source, target, self.clone())
+        BoundStep::between(source, target, self.clone())
     }
 
     fn with_quality(&self, quality: &Quality) -> Option<Arc<dyn PostStep>> {
@@ -109,19 +112,19 @@ impl PostStep for ToneMapping {
     }
 }
 
-impl PlacedStep for ToneMapping {
+impl ShippedStep for ToneMapping {
     const NAME: &str = "tone mapping";
 
     fn full_screen(&self) -> FullScreen<'static> {
         let clips = if self.curve == ToneCurve::Clipped { 1.0 } else { 0.0 };
         FullScreen {
-            shader: include_str!("tone_mapping.wgsl"),
+            shader: include_str!("tone_mapping/tone_mapping.wgsl"),
             parameters: bytemuck::cast_slice(&[self.usable_exposure(), clips, 0.0, 0.0]).to_vec().into(),
             ..FullScreen::default()
         }
     }
 
-    fn twin(&self) -> Twin {
-        Twin::full_screen(ToneMappingTwin { exposure: self.usable_exposure(), curve: self.curve })
+    fn cpu_shader(&self) -> CpuShader {
+        CpuShader::full_screen(ToneMappingCpuShader { exposure: self.usable_exposure(), curve: self.curve })
     }
 }

@@ -1,0 +1,140 @@
+//! The backend, for either precision.
+
+use std::convert::Infallible;
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::SoftwareSubmission;
+use super::commands::SoftwareCommands;
+use super::executor::Executor;
+use super::frame_recording::{BeginFrame, FrameRecording};
+use super::rasterizer::{Rasterizer, cpu_shaders_of};
+use super::targets;
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
+use crate::process::Pass;
+use crate::task::{Scheduler, Worker};
+use crate::view::ObjectTable;
+
+/// Draws on the CPU.
+///
+/// Every process of a frame needs a [`CpuShader`](crate::process::CpuShader): see
+/// [`RenderProcess::cpu_shader`](crate::process::RenderProcess::cpu_shader). Those that come with the crate have one.
+///
+/// In f32, targets hold what their formats can: values are rounded when they are stored. The reference keeps f64, and only
+/// clamps to the range of a format. Neither stores NaN: 0 is stored instead.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use drawloom::Renderer;
+/// use drawloom::backend::SoftwareBackend;
+/// use drawloom::glam::DVec3;
+/// use drawloom::process::Deferred;
+/// use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
+/// use drawloom::task::Scheduler;
+///
+/// let scheduler = Arc::new(Scheduler::new(2)?);
+/// let backend = SoftwareBackend::new(Arc::clone(&scheduler));
+/// let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+///
+/// let mut scene = Scene::new();
+/// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+/// let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)];
+/// let mesh = scene.add(Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?)?;
+/// let material = scene.add(Material::default())?;
+/// scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+/// let camera = Camera::looking_at("main", DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO);
+/// scene.cameras.push(Camera { size: [96, 54], ..camera });
+///
+/// let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+/// let picture = submitted.submission.read(0, "picture")?;
+/// assert_eq!(picture.bytes.len(), 96 * 54 * 4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct SoftwareBackend {
+    rasterizer: Arc<dyn BeginFrame>,
+}
+
+/// A frame from `begin` until it was submitted.
+pub struct SoftwareFrame {
+    recording: Box<dyn FrameRecording>,
+}
+
+impl SoftwareBackend {
+    /// The greatest width and height of a picture, in pixels.
+    pub const MAX_PICTURE_SIZE: u32 = targets::MAX_PICTURE_SIZE;
+
+    /// Draws in f32, on the workers of this scheduler; it may be the scheduler that records.
+    pub fn new(scheduler: Arc<Scheduler>) -> Self {
+        Self { rasterizer: Arc::new(Rasterizer::<f32>::new(Executor::Scheduler(scheduler))) }
+    }
+
+    /// Draws in f64, on the thread that submits, and keeps its targets in f64: the reference for what a picture should be.
+    pub fn reference() -> Self {
+        Self { rasterizer: Arc::new(Rasterizer::<f64>::new(Executor::CallingThread)) }
+    }
+}
+
+impl Backend for SoftwareBackend {
+    type Frame = SoftwareFrame;
+    type Part = Infallible;
+    type Commands = SoftwareCommands;
+    type Submission = SoftwareSubmission;
+
+    fn adapter(&self) -> String {
+        self.rasterizer.adapter_name()
+    }
+
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<SoftwareFrame, BackendError> {
+        let shaders = cpu_shaders_of(request)?;
+        Ok(SoftwareFrame { recording: self.rasterizer.begin(request, &shaders)? })
+    }
+
+    fn upload_objects(
+        &self,
+        _worker: &Worker,
+        frame: &SoftwareFrame,
+        objects: &ObjectTable,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        frame.recording.upload(objects, blocks);
+        Ok(())
+    }
+
+    fn prepare(&self, _worker: &Worker, frame: &SoftwareFrame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        frame.recording.prepare(pass)
+    }
+
+    fn parts(&self, _frame: &SoftwareFrame, _pass: &PassRequest<'_>) -> usize {
+        0
+    }
+
+    fn record(
+        &self,
+        _worker: &Worker,
+        _frame: &SoftwareFrame,
+        _pass: &PassRequest<'_>,
+        _parts: Range<usize>,
+        _put: &mut dyn FnMut(Infallible),
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn finish(
+        &self,
+        _worker: &Worker,
+        _frame: &SoftwareFrame,
+        pass: &PassRequest<'_>,
+        _parts: &mut Vec<Infallible>,
+    ) -> Result<SoftwareCommands, BackendError> {
+        Ok(SoftwareCommands::new(pass.list))
+    }
+
+    fn submit(
+        &self,
+        frame: SoftwareFrame,
+        passes: Vec<(Pass, SoftwareCommands)>,
+    ) -> Result<SoftwareSubmission, BackendError> {
+        frame.recording.submit(passes)
+    }
+}

@@ -1,0 +1,17 @@
+//! What the frames of one rasterizer share while they are drawn.
+
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+
+use super::executor::Executor;
+use crate::backend::subdivisions::Subdivisions;
+use crate::scene::Mesh;
+
+/// What the frames of one rasterizer share while they are drawn.
+pub(super) struct DrawContext {
+    pub(super) executor: Executor,
+    /// Held while a frame is drawn: one frame is drawn at a time.
+    pub(super) drawing: Mutex<()>,
+    pub(super) subdivisions: Subdivisions<Arc<Mesh>>,
+}

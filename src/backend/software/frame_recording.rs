@@ -1,0 +1,39 @@
+//! A frame that is being recorded, in either precision.
+
+use std::ops::Range;
+
+use super::SoftwareSubmission;
+use super::commands::SoftwareCommands;
+use crate::backend::{BackendError, FrameRequest, PassRequest};
+use crate::process::{CpuShader, Pass};
+use crate::view::ObjectTable;
+
+/// A rasterizer in either precision.
+pub(super) trait BeginFrame: Send + Sync {
+    fn adapter_name(&self) -> String;
+
+    /// Begins a frame, with the CPU shader of each process.
+    ///
+    /// # Errors
+    /// If a view, a target or a pass cannot be drawn.
+    fn begin(&self, request: &FrameRequest<'_>, shaders: &[CpuShader])
+    -> Result<Box<dyn FrameRecording>, BackendError>;
+}
+
+/// A frame that is being recorded, in either precision.
+pub(super) trait FrameRecording: Send + Sync {
+    /// Copies blocks of objects.
+    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>);
+
+    /// Subdivides the meshes that a pass draws subdivided.
+    ///
+    /// # Errors
+    /// If a batch's mesh does not exist: an error of Drawloom's own.
+    fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
+
+    /// Draws all passes.
+    ///
+    /// # Errors
+    /// If a CPU shader panics.
+    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError>;
+}

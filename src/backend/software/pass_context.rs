@@ -1,0 +1,23 @@
+//! What drawing a pass needs.
+
+use super::attachments::Attachments;
+use super::executor::Executor;
+use super::precision::Precision;
+use super::view_state::ViewState;
+use crate::process::{Materials, PassInputs, SampledTexture};
+
+/// What drawing a pass needs, whatever it draws.
+pub(super) struct PassContext<'a, R: Precision> {
+    pub(super) executor: &'a Executor,
+    pub(super) view: &'a ViewState<R>,
+    pub(super) materials: &'a dyn Materials<R>,
+    pub(super) attachments: &'a Attachments<R>,
+}
+
+impl<R: Precision> PassContext<'_, R> {
+    /// What the pass' CPU shader reads.
+    pub(super) fn inputs<'a>(&'a self, sampled: &'a [&'a dyn SampledTexture<R>]) -> PassInputs<'a, R> {
+        let ViewState { shader_view, lights, .. } = self.view;
+        PassInputs { view: shader_view, lights, materials: self.materials, sampled }
+    }
+}

@@ -1,0 +1,202 @@
+//! Blends colours and converts them to the formats of targets.
+
+use std::array::from_fn;
+use std::sync::LazyLock;
+
+use half::f16;
+
+use super::precision::Precision;
+use crate::backend::texels::linear;
+use crate::process::Format;
+use crate::raster::Vector4;
+use crate::scene::Blend;
+
+/// Blends a colour with the one in the target, and converts the result to the format.
+///
+/// In formats from 0 to 1, colours are clamped before and after blending, as Vulkan and D3D specify. NaN becomes 0.
+pub(super) fn blended<R: Precision>(format: Format, blend: Blend, color: Vector4<R>, destination: [R; 4]) -> [R; 4] {
+    let Vector4 { 0: color } = color.map(|value| clamped(format, value));
+    let mix = |new: fn(R, R, R) -> R, opacity: fn(R, R, R) -> R| -> [R; 4] {
+        let of = |channel: usize| if channel == 3 { opacity } else { new };
+        from_fn(|channel| of(channel)(color[channel], destination[channel], color[3]))
+    };
+    let result = match blend {
+        Blend::None => color,
+        Blend::Alpha => mix(
+            |source, destination, alpha| source * alpha + destination * (R::one() - alpha),
+            |source, destination, alpha| source + destination * (R::one() - alpha),
+        ),
+        Blend::Additive => {
+            mix(|source, destination, _| source + destination, |source, destination, _| source + destination)
+        }
+        Blend::Subtractive => {
+            mix(|source, destination, _| destination - source, |source, destination, _| destination - source)
+        }
+    };
+    stored(format, result)
+}
+
+/// A colour as a target of this format holds it.
+pub(super) fn stored<R: Precision>(format: Format, color: [R; 4]) -> [R; 4] {
+    let clamped = color.map(|value| clamped(format, value));
+    if !R::ROUNDS {
+        return clamped;
+    }
+    from_fn(|channel| R::of(rounded(encoding_of(format, channel), clamped[channel].as_f64())))
+}
+
+/// Appends the bytes of a pixel, as a device has them in memory.
+pub(super) fn append_bytes<R: Precision>(format: Format, color: [R; 4], bytes: &mut Vec<u8>) {
+    let color: [f64; 4] = color.map(|value| clamped(format, value).as_f64());
+    if format == Format::Rgb10a2Unorm {
+        let [red, green, blue, opacity] = color;
+        let word = step_of(red, 1023.0) | step_of(green, 1023.0) << 10 | step_of(blue, 1023.0) << 20;
+        bytes.extend((word | step_of(opacity, 3.0) << 30).to_le_bytes());
+        return;
+    }
+    for (channel, value) in color.into_iter().enumerate().take(format.channels()) {
+        match encoding_of(format, channel) {
+            ChannelEncoding::Steps(steps) => bytes.push(step_of(value, steps) as u8),
+            ChannelEncoding::Srgb => bytes.push(srgb_byte_of(value)),
+            ChannelEncoding::Half => bytes.extend(half_of(value).to_le_bytes()),
+            ChannelEncoding::Float => bytes.extend((value as f32).to_le_bytes()),
+        }
+    }
+}
+
+/// How a channel is stored.
+#[derive(Clone, Copy)]
+enum ChannelEncoding {
+    /// 0 to 1 in this number of steps.
+    Steps(f64),
+    /// 0 to 1 in 255 steps, sRGB encoded.
+    Srgb,
+    Half,
+    Float,
+}
+
+fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
+    match format {
+        Format::Rgba8Srgb if channel < 3 => ChannelEncoding::Srgb,
+        Format::Rgb10a2Unorm if channel < 3 => ChannelEncoding::Steps(1023.0),
+        Format::Rgb10a2Unorm => ChannelEncoding::Steps(3.0),
+        Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm => ChannelEncoding::Steps(255.0),
+        Format::Rgba16Float | Format::Rg16Float => ChannelEncoding::Half,
+        Format::R32Float | Format::Depth32Float => ChannelEncoding::Float,
+    }
+}
+
+/// Clamps a number to the format's range; NaN becomes 0.
+fn clamped<R: Precision>(format: Format, value: R) -> R {
+    if format.is_signed() {
+        return if value.is_nan() { R::zero() } else { value };
+    }
+    // False for NaN.
+    if value > R::zero() { value.min(R::one()) } else { R::zero() }
+}
+
+fn rounded(encoding: ChannelEncoding, value: f64) -> f64 {
+    match encoding {
+        ChannelEncoding::Steps(steps) => f64::from(step_of(value, steps)) / steps,
+        ChannelEncoding::Srgb => f64::from(LINEAR_OF_BYTES[usize::from(srgb_byte_of(value))]),
+        ChannelEncoding::Half => half_of(value).to_f64(),
+        ChannelEncoding::Float => value,
+    }
+}
+
+/// The nearest half float. For a greater number than the greatest half float, a device may store that or infinity. Here it is
+/// that: blending an opaque colour over it multiplies it by 0, which would make NaN of infinity.
+fn half_of(value: f64) -> f16 {
+    let end = f16::MAX.to_f64();
+    f16::from_f32(value.clamp(-end, end) as f32)
+}
+
+/// The nearest of 0 to `steps`.
+fn step_of(value: f64, steps: f64) -> u32 {
+    (value * steps + 0.5) as u32
+}
+
+/// The nearest sRGB byte.
+fn srgb_byte_of(value: f64) -> u8 {
+    BYTE_THRESHOLDS.partition_point(|&threshold| f64::from(threshold) <= value) as u8
+}
+
+/// The linear value of each sRGB byte.
+static LINEAR_OF_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| from_fn(|byte| linear(byte as f64 / 255.0) as f32));
+
+/// The linear value from which on the next sRGB byte is nearest.
+static BYTE_THRESHOLDS: LazyLock<[f32; 255]> =
+    LazyLock::new(|| from_fn(|byte| linear((byte as f64 + 0.5) / 255.0) as f32));
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::raster::Vector;
+
+    fn srgb(light: f64) -> f64 {
+        if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+    }
+
+    #[test]
+    fn every_srgb_byte_is_itself() {
+        for byte in 0..=255 {
+            assert_eq!(srgb_byte_of(f64::from(LINEAR_OF_BYTES[usize::from(byte)])), byte);
+            assert_eq!(step_of(f64::from(byte) / 255.0, 255.0), u32::from(byte));
+        }
+        assert_eq!(stored::<f32>(Format::Rgba8Srgb, [f32::INFINITY, -1.0, f32::NAN, 2.0]), [1.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn an_opaque_colour_hides_colours_beyond_half_floats() {
+        let bright = stored::<f32>(Format::Rgba16Float, [1e30, 65_505.0, -1e30, 1.0]);
+        assert_eq!(bright, [65_504.0, 65_504.0, -65_504.0, 1.0]);
+        let pane = Vector([0.25, 0.5, 0.75, 1.0]);
+        assert_eq!(blended::<f32>(Format::Rgba16Float, Blend::Alpha, pane, bright), [0.25, 0.5, 0.75, 1.0]);
+    }
+
+    proptest! {
+        /// The thresholds are f32: a value within their rounding of one may go either way.
+        #[test]
+        fn bytes_are_the_nearest(light in 0.0..1.0_f64) {
+            let off = (srgb(light) * 255.0 - f64::from(srgb_byte_of(light))).abs();
+            prop_assert!(off <= 0.5 + 1e-4, "{light} {off}");
+            prop_assert!((light * 255.0 - f64::from(step_of(light, 255.0))).abs() <= 0.5);
+        }
+
+        #[test]
+        fn blending_follows_the_blend_equations(
+            color in prop::array::uniform4(-2.0..2.0_f64),
+            there in prop::array::uniform4(-2.0..2.0_f64),
+        ) {
+            let mix = |blend| blended(Format::Rgba16Float, blend, Vector(color), there);
+            let alpha = color[3];
+            for channel in 0..4 {
+                let share = if channel == 3 { 1.0 } else { alpha };
+                prop_assert_eq!(mix(Blend::None)[channel], color[channel]);
+                prop_assert_eq!(mix(Blend::Additive)[channel], color[channel] + there[channel]);
+                prop_assert_eq!(mix(Blend::Subtractive)[channel], there[channel] - color[channel]);
+                let over = color[channel] * share + there[channel] * (1.0 - alpha);
+                prop_assert!((mix(Blend::Alpha)[channel] - over).abs() < 1e-12);
+            }
+            let sum = blended(Format::Rgba8Unorm, Blend::Additive, Vector(color), there.map(f64::abs).map(|one| one.min(1.0)));
+            prop_assert!(sum.iter().all(|value| (0.0..=1.0).contains(value)));
+        }
+    }
+
+    #[test]
+    fn bytes_follow_the_format() {
+        let bytes = |format| {
+            let mut bytes = Vec::new();
+            append_bytes(format, [0.5_f64, 1.0, f64::NAN, 0.25], &mut bytes);
+            bytes
+        };
+        assert_eq!(bytes(Format::Rgba8Srgb), [188, 255, 0, 64]);
+        assert_eq!(bytes(Format::Rgba8Unorm), [128, 255, 0, 64]);
+        assert_eq!(bytes(Format::Rg8Unorm), [128, 255]);
+        assert_eq!(bytes(Format::Rgb10a2Unorm), (512_u32 | 1023 << 10 | 1 << 30).to_le_bytes());
+        assert_eq!(bytes(Format::Rg16Float), [0x00, 0x38, 0x00, 0x3c]);
+        assert_eq!(bytes(Format::R32Float), 0.5_f32.to_le_bytes());
+    }
+}

@@ -1,0 +1,193 @@
+//! Begins frames in one precision, and caches what they share.
+
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+
+use super::attachments::{Attachments, ColorAttachment, DepthAttachment};
+use super::draw_context::DrawContext;
+use super::executor::Executor;
+use super::frame::TypedFrame;
+use super::frame_recording::{BeginFrame, FrameRecording};
+use super::materials::MaterialCache;
+use super::meshes::MeshCache;
+use super::precision::Precision;
+use super::shader_inputs::CameraPosition;
+use super::software_pass::{SoftwareDraws, SoftwarePass};
+use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
+use super::view_state::ViewState;
+use crate::backend::subdivisions::Subdivisions;
+use crate::backend::{BackendError, FrameRequest};
+use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
+use crate::quality::VertexFormat;
+use crate::scene::ViewKind;
+use crate::task::catch;
+use crate::view::{FixedPosition, GpuView};
+
+/// Draws frames in one precision, and keeps meshes, materials and targets over frames.
+pub(super) struct Rasterizer<R: Precision> {
+    context: Arc<DrawContext>,
+    meshes: Mutex<MeshCache>,
+    materials: Mutex<MaterialCache>,
+    targets: Mutex<TargetCache<R>>,
+}
+
+impl<R: Precision> Rasterizer<R> {
+    pub(super) fn new(executor: Executor) -> Self {
+        let (drawing, subdivisions) = (Mutex::default(), Subdivisions::default());
+        Self {
+            context: Arc::new(DrawContext { executor, drawing, subdivisions }),
+            meshes: Mutex::default(),
+            materials: Mutex::default(),
+            targets: Mutex::default(),
+        }
+    }
+}
+
+impl<R: Precision> BeginFrame for Rasterizer<R> {
+    fn adapter_name(&self) -> String {
+        match &self.context.executor {
+            Executor::Scheduler(scheduler) => format!("software (f32, {} workers)", scheduler.workers()),
+            Executor::CallingThread => String::from("software (f64 reference)"),
+        }
+    }
+
+    fn begin(
+        &self,
+        request: &FrameRequest<'_>,
+        shaders: &[CpuShader],
+    ) -> Result<Box<dyn FrameRecording>, BackendError> {
+        let FrameRequest { plan, views, passes, scene, rejections, .. } = *request;
+        let view_states = (0..views.len()).map(|view| view_state(request, view)).collect::<Result<_, _>>()?;
+        let targets = self.targets.lock().update(plan, views)?;
+        let pass = |&pass: &Pass| software_pass(request, pass, &shaders[pass.process], &targets);
+        let passes = passes.iter().map(pass).collect::<Result<_, _>>()?;
+        self.context.subdivisions.begin(scene.assets);
+        // The reference draws the scene's own vertices.
+        let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
+        let meshes = self.meshes.lock().update(scene.assets, vertices);
+        let materials = self.materials.lock().update(scene.assets, rejections);
+        Ok(Box::new(TypedFrame {
+            context: Arc::clone(&self.context),
+            views: view_states,
+            passes,
+            objects: R::objects(scene),
+            vertices,
+            meshes,
+            subdivided: Mutex::default(),
+            materials,
+            targets,
+        }))
+    }
+}
+
+/// The CPU shader of each process.
+///
+/// # Errors
+/// If a process has none, or panics when its `cpu_shader` is called.
+pub(super) fn cpu_shaders_of(request: &FrameRequest<'_>) -> Result<Vec<CpuShader>, BackendError> {
+    let shader_of = |planned: &PlannedProcess| {
+        let process = || planned.process.name().to_owned();
+        let shader = catch(|| planned.process.cpu_shader())
+            .map_err(|panic| BackendError::CpuShaderPanicked { process: process(), message: panic.message })?;
+        shader.ok_or_else(|| BackendError::NoCpuShader { process: process() })
+    };
+    request.plan.processes().iter().map(shader_of).collect()
+}
+
+/// # Errors
+/// If the camera is out of reach.
+fn view_state<R: Precision>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
+    let (view, lights, scene) = (&request.views[index], &request.lights[index], request.scene);
+    let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
+    let gpu_view = GpuView::new(view, scene, lights.gpu_lights().len()).ok_or_else(out_of_reach)?;
+    let camera = CameraPosition {
+        exact: view.camera.position,
+        fixed: FixedPosition::from_halves(gpu_view.position_low, gpu_view.position_high),
+        transforms: request.quality.transforms,
+    };
+    let light = |(gpu_light, (light, map)): (_, (usize, Option<usize>))| {
+        R::light(gpu_light, &scene.lights[light], &camera, map.map(|map| &request.views[map]))
+    };
+    let shader_view = R::view(view, &gpu_view, scene);
+    Ok(ViewState { shader_view, lights: lights.gpu_lights().iter().zip(lights.sources()).map(light).collect(), camera })
+}
+
+/// # Errors
+/// If the process cannot be drawn by this backend.
+fn software_pass<R: Precision>(
+    request: &FrameRequest<'_>,
+    pass: Pass,
+    shader: &CpuShader,
+    targets: &SoftwareTargets<R>,
+) -> Result<SoftwarePass<R>, BackendError> {
+    let planned = &request.plan.processes()[pass.process];
+    let process = planned.process.name().to_owned();
+    let draws = match (&request.draws[pass.process], R::shader(shader)) {
+        (Draws::Commands(draws), TypedCpuShader::Objects(shader)) => {
+            SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth }
+        }
+        (Draws::FullScreen(draws), TypedCpuShader::FullScreen(shader)) => {
+            SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
+        }
+        (Draws::Lights(draws), TypedCpuShader::Lights(shader)) => {
+            let lights = request.lights[pass.view].range(draws.class);
+            SoftwareDraws::Lights { shader: Arc::clone(shader), lights: lights.start as usize..lights.end as usize }
+        }
+        _ => {
+            let message = String::from("its CPU shader is of another kind than its draws");
+            return Err(BackendError::Validation { label: process, message });
+        }
+    };
+    let attachments = attachments(request, pass, targets)?;
+    attachments.check(&process)?;
+    Ok(SoftwarePass { pass, process, draws, attachments })
+}
+
+/// # Errors
+/// If a target is missing: an error of Drawloom's own.
+fn attachments<R: Precision>(
+    request: &FrameRequest<'_>,
+    pass: Pass,
+    targets: &SoftwareTargets<R>,
+) -> Result<Attachments<R>, BackendError> {
+    let declaration = &request.plan.processes()[pass.process].declaration;
+    let missing = |name: &str| BackendError::UnknownTarget { view: pass.view, target: name.to_owned() };
+    let of_view = |name: &str| -> Result<SoftwareTarget<R>, BackendError> {
+        targets.find(pass.view, name).cloned().ok_or_else(|| missing(name))
+    };
+    let layered = |kind: ViewKind, name: &str| targets.find_layered(kind, name).ok_or_else(|| missing(name));
+    let color = |(name, clear): (&str, Option<ClearColor>)| {
+        let clear = clear.map(|clear| clear_color(clear, request));
+        Ok(ColorAttachment { target: of_view(name)?, clear })
+    };
+    let depth = |(name, access): (&str, Access)| {
+        let is_writable = access.writes();
+        let clears = is_writable && access != Access::DrawDepth;
+        let tests_equal = access == Access::MatchDepth;
+        Ok(DepthAttachment { target: of_view(name)?, clears, is_writable, tests_equal })
+    };
+    let sampled = declaration.accesses.iter().filter_map(|(name, access)| match access {
+        Access::Sample => Some(of_view(name)),
+        Access::SampleLayers(kind) => Some(layered(*kind, name)),
+        _ => None,
+    });
+    Ok(Attachments {
+        colors: declaration.colors().map(color).collect::<Result<_, BackendError>>()?,
+        depth: declaration.depth().map(depth).transpose()?,
+        sampled: sampled.collect::<Result<_, _>>()?,
+    })
+}
+
+fn clear_color<R: Precision>(clear: ClearColor, request: &FrameRequest<'_>) -> [R; 4] {
+    let color = match clear {
+        ClearColor::Value(value) => value,
+        // A half float would become infinite.
+        ClearColor::Background => {
+            let [red, green, blue] =
+                request.scene.background.as_dvec3().to_array().map(|radiance| radiance.min(60_000.0));
+            [red, green, blue, 1.0]
+        }
+    };
+    color.map(R::of)
+}

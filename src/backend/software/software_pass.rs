@@ -1,0 +1,25 @@
+//! A pass of a frame.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::attachments::Attachments;
+use super::precision::Precision;
+use crate::process::{FullScreenCpuShader, LightCpuShader, ObjectCpuShader, Pass};
+use crate::scene::Blend;
+
+/// A pass of a frame: one process in one view.
+pub(super) struct SoftwarePass<R: Precision> {
+    pub(super) pass: Pass,
+    /// The process' name.
+    pub(super) process: String,
+    pub(super) draws: SoftwareDraws<R>,
+    pub(super) attachments: Attachments<R>,
+}
+
+/// What a pass draws.
+pub(super) enum SoftwareDraws<R: Precision> {
+    Objects { shader: Arc<dyn ObjectCpuShader<R>>, writes_depth: bool },
+    FullScreen { shader: Arc<dyn FullScreenCpuShader<R>>, blend: Blend },
+    Lights { shader: Arc<dyn LightCpuShader<R>>, lights: Range<usize> },
+}

@@ -1,0 +1,164 @@
+//! What CPU shaders are given: the Rust side of the structures and bindings in `drawloom.wgsl`.
+
+use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
+use crate::scene::{Blend, LightKind, Projection};
+
+/// How many numbers a vertex hands on to the pixels.
+pub const VARYINGS: usize = 9;
+
+/// What a vertex shader returns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexOutput<R> {
+    /// In clip space.
+    pub clip: Vector4<R>,
+    /// Interpolated in perspective and handed on to the pixels.
+    pub varyings: [R; VARYINGS],
+}
+
+/// A pixel of an object.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectPixel<R> {
+    /// Column and row, from the top left.
+    pub coordinates: [usize; 2],
+    /// The interpolated varyings at the pixel's centre.
+    pub varyings: [R; VARYINGS],
+    /// Their derivatives towards the next column.
+    pub dpdx: [R; VARYINGS],
+    /// Their derivatives towards the next row.
+    pub dpdy: [R; VARYINGS],
+    /// The object's material slot.
+    pub material: u32,
+}
+
+/// A pixel of the picture.
+#[derive(Clone, Copy, Debug)]
+pub struct FullScreenPixel<R> {
+    /// Column and row, from the top left.
+    pub coordinates: [usize; 2],
+    /// Its centre, from (-1, -1) at the picture's lower left to (1, 1) at its upper right.
+    pub clip: Vector2<R>,
+}
+
+/// What the shaders of a pass read.
+pub struct PassInputs<'a, R: Real> {
+    /// The view.
+    pub view: &'a ShaderView<R>,
+    /// The lights that reach the view.
+    pub lights: &'a [ShaderLight<R>],
+    /// Materials and their textures.
+    pub materials: &'a dyn Materials<R>,
+    /// The targets that the process samples, in the order declared.
+    pub sampled: &'a [&'a dyn SampledTexture<R>],
+}
+
+/// The materials of a scene and their textures: `@group(1)`.
+pub trait Materials<R: Real>: Sync {
+    /// The material in a slot.
+    fn get(&self, slot: u32) -> ShaderMaterial<R>;
+
+    /// `textureSampleGrad` of a material's texture, linear; white where the material has none.
+    fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R>;
+}
+
+/// A target that a process samples.
+pub trait SampledTexture<R: Real>: Sync {
+    /// Width and height in pixels.
+    fn size(&self) -> [usize; 2];
+
+    /// `textureLoad`: a pixel, of one layer if views share the target as layers. Depth is the first number. The coordinates are
+    /// inside the texture.
+    fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R>;
+}
+
+/// A view: `View` in `drawloom.wgsl`, without the camera's position, which every other position is already relative to.
+#[derive(Clone, Debug)]
+pub struct ShaderView<R> {
+    /// From world axes relative to the camera to clip space, column by column; depth is reversed.
+    pub clip_from_relative: [Vector4<R>; 4],
+    /// To the right, as long as half the picture's width; in perspective at a distance of 1.
+    pub right: Vector3<R>,
+    /// Up, as long as half the picture's height; in perspective at a distance of 1.
+    pub up: Vector3<R>,
+    /// The direction in which the camera looks.
+    pub forward: Vector3<R>,
+    /// In metres.
+    pub near: R,
+    /// In metres; infinite for most cameras.
+    pub far: R,
+    /// In pixels.
+    pub size: [usize; 2],
+    /// How it is projected.
+    pub projection: Projection,
+    /// Whether geometry in front of the near plane is clamped onto it: only for an orthographic shadow map.
+    pub clamps_near: bool,
+    /// The scene's ambient light.
+    pub ambient: Vector3<R>,
+}
+
+/// An object: `Object` in `drawloom.wgsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct ShaderObject<R> {
+    /// Relative to the camera, along the world's axes; in the world if transforms are absolute.
+    pub origin: Vector3<R>,
+    /// Subtracted from transformed positions: the camera's position if transforms are absolute, and otherwise 0.
+    pub camera: Vector3<R>,
+    /// From object space to the world's axes.
+    pub orientation: Quaternion<R>,
+    /// Along the object's own axes.
+    pub scale: Vector3<R>,
+    /// Its material's slot.
+    pub material: u32,
+}
+
+/// A vertex: `VertexInput` in `drawloom.wgsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct VertexInput<R> {
+    /// In object space.
+    pub position: Vector3<R>,
+    /// In object space.
+    pub normal: Vector3<R>,
+    /// Texture coordinates.
+    pub uv: Vector2<R>,
+}
+
+/// A material: `Material` in `drawloom.wgsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct ShaderMaterial<R> {
+    /// The fraction of light that is reflected.
+    pub diffuse: Vector3<R>,
+    /// Used by blended materials only.
+    pub opacity: R,
+    /// Emitted radiance.
+    pub emission: Vector3<R>,
+    /// Whether triangles that face away are drawn too.
+    pub double_sided: bool,
+    /// How it blends with what is behind it.
+    pub blend: Blend,
+}
+
+/// A light: `Light` in `drawloom.wgsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct ShaderLight<R> {
+    /// Relative to the camera, along the world's axes. For a directional light: the position of its shadow map's camera.
+    pub position: Vector3<R>,
+    /// What kind of light it is.
+    pub kind: LightKind,
+    /// The direction in which the light travels.
+    pub direction: Vector3<R>,
+    /// Where the light ends, in metres; for a directional light, where its shadow map ends.
+    pub range: R,
+    /// At 1 m; for a directional light, on a surface that faces it.
+    pub intensity: Vector3<R>,
+    /// The cosine at which a spot light begins to fade.
+    pub cone_begin: R,
+    /// The cosine at which a spot light has faded out.
+    pub cone_end: R,
+    /// The layer of its shadow map, if it has one.
+    pub shadow_layer: Option<usize>,
+    /// Half the width of its shadow map: at 1 m for a spot light, in metres for a directional one.
+    pub shadow_half: R,
+    /// Where the shadow map begins, in metres.
+    pub shadow_near: R,
+    /// From the axes of the shadow map's camera to the world's.
+    pub shadow_orientation: Quaternion<R>,
+}

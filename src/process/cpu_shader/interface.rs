@@ -1,0 +1,82 @@
+//! What a process implements for the software backend.
+
+use std::sync::Arc;
+
+use super::{
+    FullScreenPixel, ObjectPixel, PassInputs, ShaderLight, ShaderObject, ShaderView, VertexInput, VertexOutput,
+};
+use crate::raster::{Real, Vector4};
+
+/// A process's shader on the CPU, which the software backend runs in place of its WGSL, in f32 and in f64: see
+/// [`RenderProcess::cpu_shader`](crate::process::RenderProcess::cpu_shader). It computes the same numbers as the WGSL.
+#[derive(Clone)]
+pub struct CpuShader {
+    pub(crate) single: TypedCpuShader<f32>,
+    pub(crate) double: TypedCpuShader<f64>,
+}
+
+/// A CPU shader in one precision.
+#[derive(Clone)]
+pub(crate) enum TypedCpuShader<R> {
+    Objects(Arc<dyn ObjectCpuShader<R>>),
+    FullScreen(Arc<dyn FullScreenCpuShader<R>>),
+    Lights(Arc<dyn LightCpuShader<R>>),
+}
+
+impl CpuShader {
+    /// For a process that draws objects: [`Draws::Commands`](crate::process::Draws::Commands).
+    pub fn objects<S: ObjectCpuShader<f32> + ObjectCpuShader<f64> + 'static>(shader: S) -> Self {
+        let shader = Arc::new(shader);
+        Self { single: TypedCpuShader::Objects(Arc::clone(&shader) as _), double: TypedCpuShader::Objects(shader) }
+    }
+
+    /// For a process that draws every pixel once: [`Draws::FullScreen`](crate::process::Draws::FullScreen).
+    pub fn full_screen<S: FullScreenCpuShader<f32> + FullScreenCpuShader<f64> + 'static>(shader: S) -> Self {
+        let shader = Arc::new(shader);
+        Self {
+            single: TypedCpuShader::FullScreen(Arc::clone(&shader) as _),
+            double: TypedCpuShader::FullScreen(shader),
+        }
+    }
+
+    /// For a process that draws the pixels that lights reach: [`Draws::Lights`](crate::process::Draws::Lights).
+    pub fn lights<S: LightCpuShader<f32> + LightCpuShader<f64> + 'static>(shader: S) -> Self {
+        let shader = Arc::new(shader);
+        Self { single: TypedCpuShader::Lights(Arc::clone(&shader) as _), double: TypedCpuShader::Lights(shader) }
+    }
+}
+
+/// A vertex and a fragment shader for objects.
+pub trait ObjectCpuShader<R: Real>: Send + Sync {
+    /// The entry point `vertex`: a vertex' clip position and varyings.
+    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R>;
+
+    /// Whether there is a fragment entry point. Without one, only depth is drawn.
+    fn draws_pixels(&self) -> bool {
+        true
+    }
+
+    /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
+    fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool;
+}
+
+/// A fragment shader that runs once for every pixel.
+pub trait FullScreenCpuShader<R: Real>: Send + Sync {
+    /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
+    fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool;
+}
+
+/// A fragment shader that runs for every pixel that a light may reach.
+///
+/// It runs for the pixels within conservative bounds of the light whose surface is nearer than the light's far side. No light
+/// geometry is drawn, so the shader discards pixels that the light does not reach.
+pub trait LightCpuShader<R: Real>: Send + Sync {
+    /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
+    fn fragment(
+        &self,
+        pass: &PassInputs<'_, R>,
+        pixel: &FullScreenPixel<R>,
+        light: &ShaderLight<R>,
+        targets: &mut [Vector4<R>],
+    ) -> bool;
+}

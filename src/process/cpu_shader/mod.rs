@@ -1,0 +1,20 @@
+//! CPU shaders: the same shaders in Rust, which the software backend runs in place of a process's WGSL.
+//!
+//! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`, and
+//! `built_in` those of WGSL itself.
+
+pub(super) mod built_in;
+mod inputs;
+mod interface;
+mod prelude;
+#[cfg(all(test, not(drawloom_loom)))]
+pub(super) mod test_inputs;
+
+pub use inputs::{
+    FullScreenPixel, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject,
+    ShaderView, VARYINGS, VertexInput, VertexOutput,
+};
+pub use interface::{CpuShader, FullScreenCpuShader, LightCpuShader, ObjectCpuShader};
+pub use prelude::{direction_from_octahedral, octahedral_from_direction};
+
+pub(crate) use interface::TypedCpuShader;

@@ -1,0 +1,134 @@
+//! Views, lights and targets that the tests of several CPU shaders use.
+
+use glam::{DVec3, Quat, Vec3};
+use proptest::prelude::*;
+
+use super::{Materials, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderView};
+use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
+use crate::scene::{Blend, Camera, Light, Projection, ViewKind};
+use crate::view::{GpuLight, RenderView};
+
+/// How far f32 rounds, as a share of the value: 2⁻²⁴.
+pub(in crate::process) const UNIT: f64 = 1.0 / 16_777_216.0;
+
+/// Any direction, the octahedron's corners and edges among them.
+pub(in crate::process) fn direction() -> impl Strategy<Value = DVec3> {
+    let number = || prop_oneof![4 => -1.0..1.0_f64, 1 => Just(0.0), 1 => -1e-6..1e-6_f64];
+    let vector = [number(), number(), number()].prop_map(DVec3::from);
+    vector.prop_filter("a direction", |vector| vector.length() > 1e-6).prop_map(DVec3::normalize)
+}
+
+/// One in perspective, looking along its own axis, and one without.
+pub(in crate::process) fn views() -> [RenderView; 2] {
+    let camera = Camera { size: [16, 9], ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
+    let plan = Camera {
+        projection: Projection::Orthographic { height: 8.0 },
+        near: 2.0,
+        far: 50.0,
+        ..Camera::looking_at("plan", DVec3::ZERO, DVec3::new(-1.0, 2.0, 0.5))
+    };
+    [RenderView::new(&camera), RenderView::new(&plan)]
+}
+
+pub(in crate::process) fn paraboloid() -> Camera {
+    Camera {
+        projection: Projection::Paraboloid,
+        near: 0.1,
+        far: 10.0,
+        size: [64; 2],
+        kind: ViewKind::Shadow,
+        ..Camera::looking_at("map", DVec3::ZERO, DVec3::new(1.0, -2.0, 0.5))
+    }
+}
+
+pub(in crate::process) fn view_values<R: Real>(view: &RenderView) -> ShaderView<R> {
+    let [right, up, forward] = view.picture_axes().map(Vector3::of_single);
+    let is_orthographic = matches!(view.camera.projection, Projection::Orthographic { .. });
+    let number = |value: f32| R::of(f64::from(value));
+    ShaderView {
+        clip_from_relative: view.clip_from_relative().to_cols_array_2d().map(|column| Vector(column.map(number))),
+        right,
+        up,
+        forward,
+        near: number(view.camera.near),
+        far: number(view.camera.far),
+        size: view.camera.size.map(|pixels| pixels as usize),
+        projection: view.camera.projection,
+        clamps_near: is_orthographic && view.kind() == ViewKind::Shadow,
+        ambient: Vector3::of_single(Vec3::new(0.1, 0.2, 0.3)),
+    }
+}
+
+/// A light as a camera at the world's origin has it.
+pub(in crate::process) fn light_values<R: Real>(light: &Light, map: Option<&RenderView>) -> ShaderLight<R> {
+    let record = GpuLight::new(light, DVec3::ZERO, map);
+    let number = |value: f32| R::of(f64::from(value));
+    let orientation: Quat = record.shadow_orientation;
+    ShaderLight {
+        position: Vector3::of_single(record.position),
+        kind: light.kind(),
+        direction: Vector3::of_single(record.direction),
+        range: number(record.range),
+        intensity: Vector3::of_single(record.intensity),
+        cone_begin: number(record.cone_begin),
+        cone_end: number(record.cone_end),
+        shadow_layer: map.map(|map| map.layer as usize),
+        shadow_half: number(record.shadow_half),
+        shadow_near: number(record.shadow_near),
+        shadow_orientation: Quaternion(orientation.to_array().map(number)),
+    }
+}
+
+/// A target that is a function of the place.
+pub(in crate::process) struct Painted<F> {
+    pub(in crate::process) size: [usize; 2],
+    pub(in crate::process) color: F,
+}
+
+impl<R: Real, F: Fn([usize; 2], usize) -> Vector4<R> + Sync> SampledTexture<R> for Painted<F> {
+    fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    fn load(&self, place: [usize; 2], layer: usize) -> Vector4<R> {
+        assert!(place[0] < self.size[0] && place[1] < self.size[1], "{place:?} is outside");
+        (self.color)(place, layer)
+    }
+}
+
+/// A target of one colour.
+pub(in crate::process) fn plain<R: Real>(color: [f64; 4]) -> Painted<impl Fn([usize; 2], usize) -> Vector4<R> + Sync> {
+    Painted { size: [64; 2], color: move |_, _| Vector(color.map(R::of)) }
+}
+
+/// One material, whose texture says how `uv` changes.
+pub(in crate::process) struct OneMaterial<R>(pub(in crate::process) ShaderMaterial<R>);
+
+impl<R: Real> Materials<R> for OneMaterial<R> {
+    fn get(&self, _slot: u32) -> ShaderMaterial<R> {
+        self.0
+    }
+
+    fn sample(&self, _slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
+        Vector([uv[0], uv[1], dpdx[0] + dpdy[1], R::one()])
+    }
+}
+
+pub(in crate::process) fn material<R: Real>(blend: Blend) -> OneMaterial<R> {
+    OneMaterial(ShaderMaterial {
+        diffuse: Vector([0.5, 0.25, 1.0].map(R::of)),
+        opacity: R::of(0.5),
+        emission: Vector([0.0, 0.5, 0.125].map(R::of)),
+        double_sided: false,
+        blend,
+    })
+}
+
+/// What a pass without lights reads.
+pub(in crate::process) fn pass<'a, R: Real>(
+    view: &'a ShaderView<R>,
+    materials: &'a dyn Materials<R>,
+    sampled: &'a [&'a dyn SampledTexture<R>],
+) -> PassInputs<'a, R> {
+    PassInputs { view, lights: &[], materials, sampled }
+}

@@ -1,0 +1,32 @@
+//! The depth pre-pass (L 4.1 advises it).
+
+mod cpu_shader;
+
+use self::cpu_shader::DepthPrePassCpuShader;
+use crate::process::{CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
+
+/// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once instead
+/// of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more than vertices.
+///
+/// Of two surfaces at exactly the same depth, the one drawn last is visible, and not the one drawn first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DepthPrePass;
+
+impl RenderProcess for DepthPrePass {
+    fn name(&self) -> &str {
+        "depth pre-pass"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth("depth", Format::Depth32Float);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = include_str!("depth_pre_pass/depth_pre_pass.wgsl");
+        Draws::Commands(CommandDraws { shader, fragment: None, ..CommandDraws::default() })
+    }
+
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::objects(DepthPrePassCpuShader))
+    }
+}

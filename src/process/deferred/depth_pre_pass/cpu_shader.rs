@@ -1,0 +1,71 @@
+//! The CPU shader of `depth_pre_pass.wgsl`.
+
+use crate::process::{
+    ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+};
+use crate::raster::{Real, Vector4};
+
+/// Draws depth alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DepthPrePassCpuShader;
+
+impl<R: Real> ObjectCpuShader<R> for DepthPrePassCpuShader {
+    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        VertexOutput {
+            clip: view.clip_position(object.relative_position(vertex.position)),
+            varyings: [R::zero(); VARYINGS],
+        }
+    }
+
+    fn draws_pixels(&self) -> bool {
+        false
+    }
+
+    fn fragment(&self, _pass: &PassInputs<'_, R>, _pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
+        true
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::{DQuat, DVec3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::process::cpu_shader::test_inputs::{view_values, views};
+    use crate::process::{GeometryBuffer, GeometryFormats, RenderProcess, TypedCpuShader};
+    use crate::raster::{Quaternion, Vector, Vector3};
+
+    proptest! {
+        /// What the geometry buffer draws after the pre-pass must have exactly the same depth.
+        #[test]
+        fn positions_equal_those_of_the_geometry_buffer_to_the_bit(
+            position in prop::array::uniform3(-9.0..9.0_f64),
+            origin in prop::array::uniform3(-99.0..99.0_f64),
+            turn in prop::array::uniform3(-3.0..3.0_f64),
+        ) {
+            let buffer = GeometryBuffer::new(GeometryFormats::default()).cpu_shader().unwrap();
+            let TypedCpuShader::Objects(buffer) = buffer.single else { panic!("it draws objects") };
+            let object = ShaderObject {
+                camera: Vector3::zero(),
+                origin: Vector3::<f32>::of(origin.into()),
+                orientation: Quaternion::of(DQuat::from_scaled_axis(turn.into())),
+                scale: Vector3::of(DVec3::new(0.3, -7.0, 1.0)),
+                material: 0,
+            };
+            let vertex =
+                VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero() };
+            for view in views() {
+                let view = view_values(&view);
+                let pre_pass: VertexOutput<f32> = DepthPrePassCpuShader.vertex(&view, &object, &vertex);
+                let buffer = buffer.vertex(&view, &object, &vertex);
+                prop_assert_eq!(pre_pass.clip.0.map(f32::to_bits), buffer.clip.0.map(f32::to_bits));
+            }
+        }
+    }
+
+    #[test]
+    fn it_draws_no_pixels() {
+        assert!(!ObjectCpuShader::<f32>::draws_pixels(&DepthPrePassCpuShader));
+    }
+}

@@ -1,0 +1,100 @@
+//! The geometry buffer (L 4.1).
+
+mod cpu_shader;
+
+use std::borrow::Cow;
+
+use self::cpu_shader::GeometryBufferCpuShader;
+use super::GeometryFormats;
+use crate::command::{Blending, MaterialShare, Selection};
+use crate::process::{ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
+
+/// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for radiance:
+///
+/// | target | content | default format |
+/// | --- | --- | --- |
+/// | `depth` | reversed depth, 0 where nothing was drawn | [`Format::Depth32Float`] |
+/// | `normal` | world-space normal, octahedral (Cigolle et al. 2014): see [`GeometryFormats::normal_encoding_wgsl`] | [`Format::Rg16Float`] |
+/// | `diffuse` | the fraction of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
+/// | `radiance` | emitted light and reflected ambient light; elsewhere the scene's background | [`Format::Rgba16Float`] |
+///
+/// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the depth; draw
+/// each object; finish. The viewport is the picture's, and the states are the pipelines'.
+#[derive(Clone, Debug)]
+pub struct GeometryBuffer {
+    name: String,
+    shader: String,
+    formats: GeometryFormats,
+    share: MaterialShare,
+    has_depth: bool,
+}
+
+impl GeometryBuffer {
+    /// Draws every opaque object.
+    pub fn new(formats: GeometryFormats) -> Self {
+        Self::of_share(formats, MaterialShare::ALL)
+    }
+
+    /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over it: all of
+    /// them are recorded at the same time.
+    pub fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
+        let name = if share.of <= 1 {
+            String::from("geometry buffer")
+        } else {
+            format!("geometry buffer {} of {}", share.index + 1, share.of)
+        };
+        let shader = [
+            include_str!("shading/surface.wgsl"),
+            &formats.normal_encoding_wgsl(),
+            include_str!("geometry_buffer/geometry_buffer.wgsl"),
+        ];
+        Self { name, shader: shader.concat(), formats, share, has_depth: false }
+    }
+
+    /// The same after a [`DepthPrePass`](super::DepthPrePass): it draws only pixels whose depth equals the stored depth.
+    pub fn after_depth_pre_pass(self) -> Self {
+        Self { has_depth: true, ..self }
+    }
+}
+
+impl RenderProcess for GeometryBuffer {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        let GeometryFormats { normal, diffuse, radiance } = self.formats;
+        let zero = ClearColor::Value([0.0; 4]);
+        let targets =
+            [("normal", normal, zero), ("diffuse", diffuse, zero), ("radiance", radiance, ClearColor::Background)];
+        let first = self.share.index == 0;
+        for (target, format, clear) in targets {
+            if first {
+                declare.clears_color(target, format, clear);
+            } else {
+                declare.draws_over(target);
+            }
+        }
+        if self.has_depth {
+            declare.matches_depth("depth");
+        } else if first {
+            declare.clears_depth("depth", Format::Depth32Float);
+        } else {
+            declare.draws_depth("depth");
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: &self.shader,
+            fragment: Some("fragment"),
+            selection: Selection { blending: Blending::Opaque, materials: self.share },
+            writes_depth: !self.has_depth,
+            parameters: Cow::Borrowed(&[]),
+        })
+    }
+
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::objects(GeometryBufferCpuShader { formats: self.formats }))
+    }
+}

@@ -1,0 +1,76 @@
+//! The CPU shader of `geometry_buffer.wgsl`.
+
+use crate::process::cpu_shader::built_in::{rgb, with_alpha};
+use crate::process::deferred::shading::illumination::MAX_STORED_RADIANCE;
+use crate::process::deferred::shading::surface::{shading_normal, surface_diffuse, surface_vertex};
+use crate::process::{
+    GeometryFormats, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VertexInput, VertexOutput,
+};
+use crate::raster::{Real, Vector3, Vector4};
+
+/// Fills in normal, diffuse and radiance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GeometryBufferCpuShader {
+    /// Of its targets.
+    pub(super) formats: GeometryFormats,
+}
+
+impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
+    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        surface_vertex(view, object, vertex)
+    }
+
+    fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
+        let material = pass.materials.get(pixel.material);
+        let normal = shading_normal(pass.view, pixel, &material);
+        let diffuse = rgb(surface_diffuse(pass, pixel, &material));
+        let radiance = material.emission + diffuse * pass.view.ambient;
+        let storable = |color: Vector3<R>| color.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
+        let outputs = [
+            self.formats.encode_normal(normal),
+            with_alpha(storable(diffuse), R::one()),
+            with_alpha(storable(radiance), R::one()),
+        ];
+        for (target, output) in targets.iter_mut().zip(outputs) {
+            *target = output;
+        }
+        true
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::process::cpu_shader::TypedCpuShader;
+    use crate::process::cpu_shader::test_inputs::{material, pass, view_values, views};
+    use crate::process::{Format, GeometryBuffer, RenderProcess, VARYINGS};
+    use crate::raster::Vector;
+    use crate::scene::Blend;
+
+    #[test]
+    fn it_stores_what_lighting_needs_in_the_order_declared() {
+        let view = view_values::<f64>(&views()[0]);
+        let mut material = material::<f64>(Blend::None);
+        material.0.emission = Vector([0.0, 0.5, 1e9]);
+        let normal = Vector([0.48, 0.6, 0.64]);
+        let pixel = ObjectPixel {
+            coordinates: [0, 0],
+            varyings: [0.0, 0.0, -4.0, normal[0], normal[1], normal[2], 0.5, 1.0, 0.0],
+            dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0],
+            dpdy: [0.0; VARYINGS],
+            material: 0,
+        };
+        for (format, bound) in [(Format::Rg16Float, 1e-15), (Format::Rgba8Unorm, 1e-4), (Format::Rg8Unorm, 0.02)] {
+            let formats = GeometryFormats { normal: format, ..GeometryFormats::default() };
+            let cpu_shader = GeometryBuffer::new(formats).cpu_shader().unwrap();
+            let TypedCpuShader::Objects(cpu_shader) = cpu_shader.double else { panic!("it draws objects") };
+            let mut targets = [Vector::zero(); 3];
+            assert!(
+                cpu_shader.draws_pixels() && cpu_shader.fragment(&pass(&view, &material, &[]), &pixel, &mut targets)
+            );
+            assert!((formats.decode_normal(targets[0]) - normal).length() < bound);
+            assert_eq!(targets[1], Vector([0.25, 0.25, 0.25, 1.0]));
+            assert_eq!(targets[2], Vector([0.25 * view.ambient[0], 0.5 + 0.25 * view.ambient[1], 60_000.0, 1.0]));
+        }
+    }
+}

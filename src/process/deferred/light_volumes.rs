@@ -1,0 +1,89 @@
+//! Lighting (L 4.2).
+
+mod cpu_shader;
+
+use std::borrow::Cow;
+
+use self::cpu_shader::LightVolumesCpuShader;
+use super::shading::shadow::{ShadowFilter, shadow_shader};
+use super::{GeometryFormats, ShadowCasters};
+use crate::process::{CpuShader, Declare, Draws, LightDraws, RenderProcess};
+use crate::scene::{LightKind, ViewKind};
+use crate::view::{LightClass, ShadowMaps};
+
+/// Adds to the target `radiance` what the surfaces of the geometry buffer reflect of the lights of one class. Surfaces are
+/// Lambertian.
+///
+/// Lights are drawn as geometry (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or hemispherical light,
+/// the whole picture for a directional one. Their far side is drawn, and where it is behind the surface of a pixel the pixel
+/// is shaded: so a light costs the pixels that it may reach, and it is right when the camera stands inside of it. All lights
+/// of a class are one instanced draw, whose cost is N + L and not N × L (L 2).
+///
+/// The steps of L 4.2.1 are: set the viewport; the radiance as target; test depth but do not write it; the rasterizer state;
+/// the geometry buffer as the shader's input; draw each light; finish. Those of L 4.2.2 that concern a light with a shadow map
+/// are the same with the map as one more input.
+#[derive(Clone, Debug)]
+pub struct LightVolumes {
+    name: String,
+    shader: String,
+    class: LightClass,
+    cpu_shader: LightVolumesCpuShader,
+}
+
+impl LightVolumes {
+    /// The lights of a kind that have no shadow map.
+    pub fn new(kind: LightKind, formats: GeometryFormats) -> Self {
+        Self::of_class(kind, formats, None)
+    }
+
+    /// The lights of a kind that have one, drawn by [`ShadowCasters`].
+    pub fn shadowed(kind: LightKind, formats: GeometryFormats, maps: &ShadowMaps) -> Self {
+        Self::of_class(kind, formats, Some(maps))
+    }
+
+    fn of_class(kind: LightKind, formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
+        let class = LightClass { kind, shadowed: maps.is_some() };
+        let shader = [
+            &formats.normal_encoding_wgsl(),
+            include_str!("shading/illumination.wgsl"),
+            &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
+            include_str!("light_volumes/light_volumes.wgsl"),
+        ];
+        let shadows = maps.map(ShadowFilter::new);
+        let cpu_shader = LightVolumesCpuShader { formats, shadows };
+        Self { name: Self::name_of(class), shader: shader.concat(), class, cpu_shader }
+    }
+
+    /// What the process of a class is called, such as "point lights" or "shadowed spot lights".
+    pub fn name_of(class: LightClass) -> String {
+        format!("{}{} lights", if class.shadowed { "shadowed " } else { "" }, class.kind.name())
+    }
+}
+
+/// Behind depth, normal and diffuse.
+const SHADOW_MAPS_BINDING: u32 = 4;
+
+impl RenderProcess for LightVolumes {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples("depth");
+        declare.samples("normal");
+        declare.samples("diffuse");
+        if self.class.shadowed {
+            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        }
+        declare.tests_depth("depth");
+        declare.draws_over("radiance");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Lights(LightDraws { shader: &self.shader, class: self.class, parameters: Cow::Borrowed(&[]) })
+    }
+
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::lights(self.cpu_shader))
+    }
+}

@@ -1,0 +1,190 @@
+//! The CPU shader of `light_volumes.wgsl`.
+
+use std::f64::consts::PI;
+
+use crate::process::cpu_shader::built_in::{rgb, with_alpha};
+use crate::process::deferred::shading::illumination::{MAX_STORED_RADIANCE, illuminance_from};
+use crate::process::deferred::shading::shadow::ShadowFilter;
+use crate::process::{FullScreenPixel, GeometryFormats, LightCpuShader, PassInputs, ShaderLight};
+use crate::raster::{Real, Vector3, Vector4};
+
+/// Adds what a surface of the geometry buffer reflects of a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightVolumesCpuShader {
+    /// Of the geometry buffer.
+    pub(super) formats: GeometryFormats,
+    /// Without shadow maps everything is lit.
+    pub(super) shadows: Option<ShadowFilter>,
+}
+
+impl<R: Real> LightCpuShader<R> for LightVolumesCpuShader {
+    fn fragment(
+        &self,
+        pass: &PassInputs<'_, R>,
+        pixel: &FullScreenPixel<R>,
+        light: &ShaderLight<R>,
+        targets: &mut [Vector4<R>],
+    ) -> bool {
+        let stored = |target: usize| pass.sampled[target].load(pixel.coordinates, 0);
+        let place = pass.view.position_from_depth(pixel.clip, stored(DEPTH)[0]);
+        let normal = self.formats.decode_normal(stored(NORMAL));
+
+        let mut illuminance = illuminance_from(light, place, normal);
+        if illuminance == Vector3::zero() {
+            return false;
+        }
+        if let Some(shadows) = self.shadows {
+            illuminance = illuminance * shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, place, normal);
+        }
+        let reflected = rgb(stored(DIFFUSE)).map(|value| value / R::of(PI)) * illuminance;
+        // Half floats end at 65,504; past that they would be infinite, and infinities turn to NaN further on.
+        targets[0] = with_alpha(reflected.map(|value| value.min(R::of(MAX_STORED_RADIANCE))), R::zero());
+        true
+    }
+}
+
+// The targets sampled, in the order declared.
+const DEPTH: usize = 0;
+const NORMAL: usize = 1;
+const DIFFUSE: usize = 2;
+const SHADOW_MAPS: usize = 3;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::process::cpu_shader::TypedCpuShader;
+    use crate::process::cpu_shader::test_inputs::{
+        Painted, direction, light_values, material, pass, plain, view_values, views,
+    };
+    use crate::process::{
+        Format, LightVolumes, ObjectCpuShader, ObjectPixel, RenderProcess, SampledTexture, Transparency, VARYINGS,
+        octahedral_from_direction,
+    };
+    use crate::raster::Vector;
+    use crate::scene::{Blend, Light, LightKind};
+    use crate::view::{RenderView, ShadowMaps};
+
+    fn cpu_shader<R: Real>(shadows: Option<ShadowFilter>) -> impl LightCpuShader<R> {
+        LightVolumesCpuShader { formats: GeometryFormats::default(), shadows }
+    }
+
+    fn light(position: DVec3) -> Light {
+        Light::Point { position, intensity: Vec3::new(3.0, 5.0, 7.0), range: 40.0 }
+    }
+
+    proptest! {
+        /// A surface is lit alike whether it went through the geometry buffer or is drawn over it, in both kinds of number.
+        #[test]
+        fn it_lights_as_transparency_does(normal in direction(), position in prop::array::uniform3(-5.0..5.0_f64), depth in 0.01..0.5_f64) {
+            let view = view_values::<f64>(&views()[0]);
+            let clip = Vector([0.25, -0.5]);
+            let place = view.position_from_depth(clip, depth);
+            let light = light_values(&light(DVec3::from(position)), None);
+            let point = octahedral_from_direction(Vector3::of(normal));
+            let sampled = [plain([depth, 0.0, 0.0, 0.0]), plain([point[0], point[1], 0.0, 1.0]), plain([0.5, 0.25, 0.75, 1.0])];
+            let [one, two, three] = &sampled;
+            let sampled: [&dyn SampledTexture<f64>; 3] = [one, two, three];
+            let mut material = material(Blend::Alpha);
+            material.0.diffuse = Vector([1.0, 0.25, 1.5]);
+            material.0.emission = Vector::zero();
+            let mut pass = pass(&view, &material, &sampled);
+            let mut lit = [Vector::splat(9.0)];
+            let pixel = FullScreenPixel { coordinates: [3, 5], clip };
+            let is_lit = cpu_shader(None).fragment(&pass, &pixel, &light, &mut lit);
+            if !is_lit {
+                lit = [Vector::zero()];
+            }
+
+            let lights = [light];
+            pass.lights = &lights;
+            let [x, y, z] = place.0;
+            let [dpdx, dpdy] = [[0.0; VARYINGS], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]];
+            let varyings = [x, y, z, normal.x, normal.y, normal.z, 0.5, 1.0, 0.0];
+            let pixel = ObjectPixel { coordinates: [3, 5], varyings, dpdx, dpdy, material: 0 };
+            let TypedCpuShader::Objects(transparency) = Transparency::new(None).cpu_shader().unwrap().double else { panic!("objects") };
+            let mut drawn = [Vector::zero()];
+            prop_assert!(ObjectCpuShader::fragment(&*transparency, &pass, &pixel, &mut drawn));
+            for channel in 0..3 {
+                let ambient = [0.5, 0.25, 0.75][channel] * view.ambient[channel];
+                let difference = lit[0][channel] + ambient - drawn[0][channel];
+                prop_assert!(difference.abs() < 1e-9 * drawn[0][channel], "{lit:?} {drawn:?} {ambient}");
+            }
+            prop_assert_eq!(lit[0][3], 0.0);
+        }
+    }
+
+    #[test]
+    fn a_lambertian_surface_reflects_its_share_over_pi() {
+        let view = view_values::<f64>(&views()[0]);
+        let depth = view.near / 4.0;
+        let material = material(Blend::None);
+        for format in [GeometryFormats::default(), of_bytes()] {
+            // It faces the camera.
+            let Vector([x, y, z, w]) = format.encode_normal(Vector([0.0, 0.0, 1.0]));
+            let shader = LightVolumes::new(LightKind::Point, format).cpu_shader().unwrap().double;
+            let TypedCpuShader::Lights(cpu_shader) = shader else { panic!("it draws lights") };
+            let [depth, normal, diffuse] =
+                [plain([depth, 0.0, 0.0, 0.0]), plain([x, y, z, w]), plain([0.5, 0.25, 1.0, 1.0])];
+            let sampled: [&dyn SampledTexture<f64>; 3] = [&depth, &normal, &diffuse];
+            let pass = pass(&view, &material, &sampled);
+            let pixel = FullScreenPixel { coordinates: [0, 0], clip: Vector([0.0, 0.0]) };
+            // The surface is 4 m before the camera and faces it; the light is 2 m before the surface.
+            let before = light_values(&light(DVec3::NEG_Z * 2.0), None);
+            let mut targets = [Vector::zero()];
+            assert!(cpu_shader.fragment(&pass, &pixel, &before, &mut targets));
+            let window = (1.0 - 0.05_f64.powi(4)).powi(2);
+            for (channel, expected) in [0.5 * 3.0, 0.25 * 5.0, 7.0].into_iter().enumerate() {
+                let expected = expected / PI / 4.0 * window;
+                assert!((targets[0][channel] / expected - 1.0).abs() < 1e-6, "{targets:?}");
+            }
+            let behind = light_values(&light(DVec3::NEG_Z * 6.0), None);
+            let mut untouched = [Vector::splat(7.0)];
+            assert!(!cpu_shader.fragment(&pass, &pixel, &behind, &mut untouched), "what gives nothing is discarded");
+            assert_eq!(untouched, [Vector::splat(7.0)]);
+            let mut blinding = before;
+            blinding.intensity = Vector::splat(1e30);
+            assert!(cpu_shader.fragment(&pass, &pixel, &blinding, &mut targets));
+            assert_eq!(targets[0], Vector([60_000.0, 60_000.0, 60_000.0, 0.0]));
+        }
+    }
+
+    #[test]
+    fn shadows_come_from_the_fourth_target() {
+        let view = view_values::<f64>(&views()[0]);
+        let material = material(Blend::None);
+        let maps = ShadowMaps::default();
+        let shader =
+            LightVolumes::shadowed(LightKind::Spot, GeometryFormats::default(), &maps).cpu_shader().unwrap().double;
+        let TypedCpuShader::Lights(cpu_shader) = shader else { panic!("it draws lights") };
+        let spot = Light::Spot {
+            position: DVec3::ZERO,
+            direction: Vec3::NEG_Z,
+            intensity: Vec3::ONE,
+            range: 9.0,
+            inner_angle: 0.4,
+            outer_angle: 0.5,
+            casts_shadow: true,
+        };
+        let map = RenderView { layer: 1, ..RenderView::new(&maps.camera("map".into(), &spot, &[]).unwrap()) };
+        let light = light_values(&spot, Some(&map));
+        let targets = [plain([view.near / 4.0, 0.0, 0.0, 0.0]), plain([0.0; 4]), plain([1.0; 4])];
+        let [depth, normal, diffuse] = &targets;
+        // The layer of another light shows a wall before it.
+        let walled =
+            Painted { size: [64; 2], color: |_, layer: usize| Vector::splat(if layer == 1 { 0.0 } else { 1.0 }) };
+        for (maps, is_lit) in [(&walled as &dyn SampledTexture<f64>, true), (&plain([1.0; 4]), false)] {
+            let sampled = [depth as &dyn SampledTexture<f64>, normal, diffuse, maps];
+            let mut targets = [Vector::zero()];
+            let pixel = FullScreenPixel { coordinates: [0, 0], clip: Vector([0.0, 0.0]) };
+            assert!(cpu_shader.fragment(&pass(&view, &material, &sampled), &pixel, &light, &mut targets));
+            assert_eq!(targets[0][0] > 0.0, is_lit);
+        }
+    }
+
+    fn of_bytes() -> GeometryFormats {
+        GeometryFormats { normal: Format::Rgba8Unorm, ..GeometryFormats::default() }
+    }
+}

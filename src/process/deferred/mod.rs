@@ -1,0 +1,23 @@
+//! The deferred pipeline (L 4) and the processes that it is made of.
+//!
+//! `pipeline` puts the processes together that a scene requires. Each process has a file, and a folder with its WGSL and its CPU
+//! shader. `shading` is what several of their shaders share.
+
+mod depth_pre_pass;
+mod geometry_buffer;
+mod geometry_formats;
+mod light_volumes;
+mod pipeline;
+mod requirements;
+mod shading;
+mod shadow_casters;
+mod transparency;
+
+pub use depth_pre_pass::DepthPrePass;
+pub use geometry_buffer::GeometryBuffer;
+pub use geometry_formats::GeometryFormats;
+pub use light_volumes::LightVolumes;
+pub use pipeline::Deferred;
+pub use requirements::Requirements;
+pub use shadow_casters::ShadowCasters;
+pub use transparency::Transparency;

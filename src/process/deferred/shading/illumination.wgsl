@@ -1,0 +1,28 @@
+const PI: f32 = 3.14159265;
+
+// Past the range of f32 light would be infinite, and not a number where nothing of it is left.
+const MAX_ILLUMINANCE: vec3<f32> = vec3<f32>(1e30);
+
+// What a light brings to a surface, were nothing in between.
+fn illuminance_from(light: Light, place: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    if light.kind == DIRECTIONAL {
+        return min(light.intensity * max(dot(normal, -light.direction), 0.0), MAX_ILLUMINANCE);
+    }
+    let to_light = light.position - place;
+    let distance_squared = dot(to_light, to_light);
+    if distance_squared == 0.0 || distance_squared >= light.range * light.range {
+        return vec3<f32>(0.0);
+    }
+    let towards = to_light * inverseSqrt(distance_squared);
+    let along_axis = dot(-towards, light.direction);
+    var shape = 1.0;
+    if light.kind == SPOT {
+        shape = smoothstep(light.cone_end, light.cone_begin, along_axis);
+    } else if light.kind == HEMISPHERICAL {
+        shape = max(along_axis, 0.0);
+    }
+    let share = distance_squared / (light.range * light.range);
+    let window = 1.0 - share * share;
+    let factor = shape * max(dot(normal, towards), 0.0) * window * window / distance_squared;
+    return min(light.intensity * min(factor, 1e30), MAX_ILLUMINANCE);
+}

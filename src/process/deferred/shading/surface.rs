@@ -1,0 +1,159 @@
+//! The CPU shader of `surface.wgsl`: what CPU shaders that draw objects have in common.
+
+use crate::process::cpu_shader::built_in::{inverse_square_root, sign};
+use crate::process::{
+    ObjectPixel, PassInputs, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+};
+use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
+
+/// The entry point `vertex`.
+pub(in crate::process::deferred) fn surface_vertex<R: Real>(
+    view: &ShaderView<R>,
+    object: &ShaderObject<R>,
+    vertex: &VertexInput<R>,
+) -> VertexOutput<R> {
+    let relative = object.relative_position(vertex.position);
+    let normal = object.world_normal(vertex.normal);
+    let mut varyings = [R::zero(); VARYINGS];
+    varyings[RELATIVE..RELATIVE + 3].copy_from_slice(&relative.0);
+    varyings[NORMAL..NORMAL + 3].copy_from_slice(&normal.0);
+    let farthest = R::of(MAX_UV);
+    varyings[UV..UV + 2].copy_from_slice(&vertex.uv.map(|value| value.max(-farthest).min(farthest)).0);
+    VertexOutput { clip: view.clip_position(relative), varyings }
+}
+
+/// From here on all f32 are whole numbers, and the texture is at its beginning.
+const MAX_UV: f64 = 8_388_608.0;
+
+/// A pixel's place relative to the camera, along the world's axes.
+pub(in crate::process::deferred) fn relative_of<R: Real>(pixel: &ObjectPixel<R>) -> Vector3<R> {
+    three(&pixel.varyings, RELATIVE)
+}
+
+/// The normal of the side that is seen.
+pub(in crate::process::deferred) fn shading_normal<R: Real>(
+    view: &ShaderView<R>,
+    pixel: &ObjectPixel<R>,
+    material: &ShaderMaterial<R>,
+) -> Vector3<R> {
+    // The triangle's own, of either sign.
+    let across = three(&pixel.dpdx, RELATIVE).cross(three(&pixel.dpdy, RELATIVE));
+    // Whichever way the triangle is wound, its visible side is the one that faces the camera.
+    let to_eye = view.direction_to_eye(relative_of(pixel));
+    let facing = unit_or(across * sign(across.dot(to_eye)), to_eye);
+    let normal = unit_or(three(&pixel.varyings, NORMAL), facing);
+    if material.double_sided && normal.dot(facing) < R::zero() { -normal } else { normal }
+}
+
+/// The diffuse colour and opacity of what is seen.
+pub(in crate::process::deferred) fn surface_diffuse<R: Real>(
+    pass: &PassInputs<'_, R>,
+    pixel: &ObjectPixel<R>,
+    material: &ShaderMaterial<R>,
+) -> Vector4<R> {
+    let [uv, across, down] = [&pixel.varyings, &pixel.dpdx, &pixel.dpdy].map(uv_of);
+    pass.diffuse_at(pixel.material, material, uv, across, down)
+}
+
+// Where a corner's varyings begin.
+const RELATIVE: usize = 0;
+const NORMAL: usize = 3;
+const UV: usize = 6;
+
+fn three<R: Real>(varyings: &[R; VARYINGS], first: usize) -> Vector3<R> {
+    Vector([varyings[first], varyings[first + 1], varyings[first + 2]])
+}
+
+fn uv_of<R: Real>(varyings: &[R; VARYINGS]) -> Vector2<R> {
+    Vector([varyings[UV], varyings[UV + 1]])
+}
+
+/// A vector brought to unit length, or another where it has no direction.
+fn unit_or<R: Real>(vector: Vector3<R>, other: Vector3<R>) -> Vector3<R> {
+    let length_squared = vector.dot(vector);
+    let has_direction = length_squared > R::zero() && length_squared < R::of(1e38);
+    if has_direction { vector * inverse_square_root(length_squared) } else { other }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::process::cpu_shader::test_inputs::{material, pass, view_values, views};
+    use crate::raster::Quaternion;
+    use crate::scene::Blend;
+
+    /// A pixel of a wall before the camera, whose texture goes once along it in each metre.
+    fn pixel(normal: [f64; 3]) -> ObjectPixel<f64> {
+        let [x, y, z] = normal;
+        ObjectPixel {
+            coordinates: [0, 0],
+            varyings: [0.5, 0.25, -4.0, x, y, z, 0.5, 0.25, 0.0],
+            dpdx: [0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0],
+            dpdy: [0.0, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, -0.03, 0.0],
+            material: 0,
+        }
+    }
+
+    #[test]
+    fn a_corner_hands_on_what_its_pixels_read() {
+        let view = view_values::<f32>(&views()[0]);
+        let object = ShaderObject {
+            camera: Vector3::zero(),
+            origin: Vector([0.0, 1.0, -5.0]),
+            orientation: Quaternion([0.0, 0.0, 0.0, 1.0]),
+            scale: Vector([2.0, 1.0, 1.0]),
+            material: 3,
+        };
+        let vertex =
+            VertexInput { position: Vector([1.0, 1.0, 1.0]), normal: Vector([0.0, 0.0, 1.0]), uv: Vector([0.75, 0.5]) };
+        let corner = surface_vertex(&view, &object, &vertex);
+        assert_eq!(corner.clip, view.clip_position(Vector([2.0, 2.0, -4.0])));
+        let pixel = ObjectPixel {
+            coordinates: [0, 0],
+            varyings: corner.varyings,
+            dpdx: [0.0; VARYINGS],
+            dpdy: [0.0; VARYINGS],
+            material: 3,
+        };
+        assert_eq!(relative_of(&pixel), Vector([2.0, 2.0, -4.0]));
+        let material = material(Blend::None);
+        assert_eq!(shading_normal(&view, &pixel, &material.0), vertex.normal);
+        let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel, &material.0);
+        assert_eq!(diffuse, Vector([0.5 * 0.75, 0.25 * 0.5, 0.0, 0.5]));
+    }
+
+    #[test]
+    fn normals_face_whom_sees_them_where_both_sides_are_drawn() {
+        let view = view_values::<f64>(&views()[0]);
+        let mut material = material::<f64>(Blend::None).0;
+        let slanted = [0.6, 0.0, -0.8];
+        assert!((shading_normal(&view, &pixel(slanted), &material) - Vector(slanted)).length() < 1e-15);
+        material.double_sided = true;
+        assert!((shading_normal(&view, &pixel(slanted), &material) + Vector(slanted)).length() < 1e-15);
+        let facing = [0.6, 0.0, 0.8];
+        assert!((shading_normal(&view, &pixel(facing), &material) - Vector(facing)).length() < 1e-15);
+    }
+
+    #[test]
+    fn who_has_no_normal_gets_the_triangles_own_or_the_way_to_the_eye() {
+        let view = view_values::<f64>(&views()[0]);
+        let material = material(Blend::None).0;
+        let mut bare = pixel([0.0; 3]);
+        assert_eq!(shading_normal(&view, &bare, &material), Vector([0.0, 0.0, 1.0]));
+        (bare.dpdx, bare.dpdy) = (bare.dpdy, bare.dpdx);
+        assert_eq!(shading_normal(&view, &bare, &material), Vector([0.0, 0.0, 1.0]), "wound the other way");
+        bare.dpdx = [0.0; VARYINGS];
+        let to_eye = view.direction_to_eye(relative_of(&bare));
+        assert_eq!(shading_normal(&view, &bare, &material), to_eye);
+        bare.varyings[NORMAL] = f64::NAN;
+        assert_eq!(shading_normal(&view, &bare, &material), to_eye);
+    }
+
+    #[test]
+    fn gradients_reach_the_texture() {
+        let view = view_values::<f64>(&views()[0]);
+        let material = material(Blend::None);
+        let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel([0.0, 0.0, 1.0]), &material.0);
+        assert_eq!(diffuse, Vector([0.5 * 0.5, 0.25 * 0.25, 0.01 - 0.03, 0.5]));
+    }
+}

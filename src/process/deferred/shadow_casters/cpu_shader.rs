@@ -1,0 +1,84 @@
+//! The CPU shader of `shadow_casters.wgsl`.
+
+use crate::process::{
+    ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+};
+use crate::raster::{Real, Vector4};
+use crate::scene::Projection;
+
+/// Draws the depth of what casts shadows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShadowCastersCpuShader {
+    /// Whether there are hemispherical lights, whose maps must not show what is behind the light.
+    pub(super) hemispheres: bool,
+}
+
+/// Who filters a map at the disc's rim looks a few pixels past it.
+const RIM_MARGIN: f64 = 0.05;
+
+impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
+    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        let relative = object.relative_position(vertex.position);
+        let mut varyings = [R::zero(); VARYINGS];
+        varyings[0] = match view.projection {
+            Projection::Paraboloid => view.forward.dot(relative) / relative.length().max(R::of(1e-30)),
+            _ => R::one(),
+        };
+        VertexOutput { clip: view.clip_position(relative), varyings }
+    }
+
+    fn draws_pixels(&self) -> bool {
+        self.hemispheres
+    }
+
+    /// A triangle behind a paraboloid whose corners lie all around its axis is drawn right across the picture, where it must
+    /// not be.
+    fn fragment(&self, _pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
+        let is_behind = pixel.varyings[0] < R::of(-RIM_MARGIN);
+        !is_behind
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::process::cpu_shader::test_inputs::{material, paraboloid, pass, view_values, views};
+    use crate::raster::{Quaternion, Vector, Vector3};
+    use crate::scene::Blend;
+    use crate::view::RenderView;
+
+    fn is_drawn(view: &RenderView, place: impl Fn(&ShaderView<f64>) -> Vector3<f64>) -> bool {
+        let view = view_values::<f64>(view);
+        let object = ShaderObject {
+            camera: Vector3::zero(),
+            origin: place(&view),
+            orientation: Quaternion([0.0, 0.0, 0.0, 1.0]),
+            scale: Vector::splat(1.0),
+            material: 0,
+        };
+        let vertex = VertexInput { position: Vector::zero(), normal: Vector::zero(), uv: Vector::zero() };
+        let cpu_shader = ShadowCastersCpuShader { hemispheres: true };
+        let VertexOutput { varyings, .. } = cpu_shader.vertex(&view, &object, &vertex);
+        let pixel =
+            ObjectPixel { coordinates: [0, 0], varyings, dpdx: [0.0; VARYINGS], dpdy: [0.0; VARYINGS], material: 0 };
+        cpu_shader.fragment(&pass(&view, &material(Blend::None), &[]), &pixel, &mut [])
+    }
+
+    #[test]
+    fn what_is_behind_a_paraboloid_is_not_drawn() {
+        let map = RenderView::new(&paraboloid());
+        assert!(is_drawn(&map, |view| view.forward * 2.0));
+        assert!(is_drawn(&map, |view| view.right * 2.0 - view.forward * 0.09), "just past the rim");
+        assert!(!is_drawn(&map, |view| view.right * 2.0 - view.forward * 0.11));
+        assert!(!is_drawn(&map, |view| view.forward * -2.0));
+        assert!(is_drawn(&map, |_| Vector::zero()));
+        assert!(is_drawn(&views()[1], |view| view.forward * -2.0), "other maps have nothing to leave out here");
+    }
+
+    #[test]
+    fn only_hemispheres_cost_a_look_at_each_pixel() {
+        for hemispheres in [false, true] {
+            assert_eq!(ObjectCpuShader::<f32>::draws_pixels(&ShadowCastersCpuShader { hemispheres }), hemispheres);
+        }
+    }
+}

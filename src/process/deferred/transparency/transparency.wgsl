@@ -1,0 +1,17 @@
+@fragment
+fn fragment(in: Surface) -> @location(0) vec4<f32> {
+    let material = materials[in.material];
+    let normal = shading_normal(in, material);
+    let diffuse = surface_diffuse(in, material);
+    var illuminance = view.ambient * PI;
+    for (var index = 0u; index < view.light_count; index++) {
+        let light = lights[index];
+        let unobstructed = illuminance_from(light, in.relative, normal);
+        if any(unobstructed > vec3<f32>(0.0)) {
+            illuminance += unobstructed * light_visibility(light, in.relative, normal);
+        }
+    }
+    let radiance = min(material.emission + diffuse.rgb / PI * illuminance, vec3<f32>(60000.0));
+    // Alpha blending multiplies by the opacity itself.
+    return vec4<f32>(select(radiance * diffuse.a, radiance, material.blend == ALPHA), diffuse.a);
+}

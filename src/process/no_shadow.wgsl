@@ -1,3 +1,0 @@
-fn lit_share(light: Light, place: vec3<f32>, normal: vec3<f32>) -> f32 {
-    return 1.0;
-}

@@ -1,0 +1,98 @@
+//! Errors in a frame's processes and how they fit together.
+
+use crate::graph::GraphProblem;
+use crate::process::Format;
+
+/// Why no frame can be made of these processes.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// What the processes read and write cannot be ordered.
+    #[error(transparent)]
+    Graph(#[from] GraphProblem),
+    /// A process is declared to come after or before one that the graph does not have.
+    #[error("process {process:?} is to come after or before {other:?}, which is not in the graph")]
+    UnknownProcess {
+        /// The process.
+        process: String,
+        /// The missing process.
+        other: String,
+    },
+    /// Two processes create a target in different formats.
+    #[error("target {target:?} is both {first:?} and {second:?}")]
+    ConflictingFormats {
+        /// The target.
+        target: String,
+        /// One format.
+        first: Format,
+        /// The other.
+        second: Format,
+    },
+    /// A target is used as depth with a format that holds colour, or the other way round.
+    #[error("process {process:?} uses target {target:?} in a way that its format {format:?} does not allow")]
+    WrongFormat {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+        /// Its format.
+        format: Format,
+    },
+    /// A target is drawn as a layer of a texture array by one process, and used as a texture of its own by another.
+    #[error("process {process:?} does not agree with others on whether the views share target {target:?} as layers")]
+    LayeringMismatch {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+    },
+    /// A process has more than one depth target.
+    #[error("process {process:?} has more than one depth target")]
+    MultipleDepthTargets {
+        /// The process.
+        process: String,
+    },
+    /// The settings of the shadow maps are invalid.
+    #[error("shadow maps cannot have {problem}")]
+    ShadowMaps {
+        /// What is wrong with them.
+        problem: &'static str,
+    },
+    /// A process is to be replaced or left out that the pipeline never has.
+    #[error("there is no process {name:?} to replace or leave out, only: {known}")]
+    NoSuchProcess {
+        /// The name.
+        name: String,
+        /// Those that there may be.
+        known: String,
+    },
+    /// A process could not say what it reads and writes.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// No process is left, because none leads to an output.
+    #[error("no process leads to an output")]
+    Empty,
+}
+
+/// An error in a process' declaration or draws.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProcessError {
+    /// It panicked when it was asked.
+    #[error("process {process:?} panicked when it was asked what it does: {message}")]
+    Panicked {
+        /// The process.
+        process: String,
+        /// What the panic said.
+        message: String,
+    },
+    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads one
+    /// by commands of its own.
+    #[error("process {process:?} does not use target {target:?} in the way that it declares")]
+    Misdeclared {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+    },
+}

@@ -1,0 +1,292 @@
+//! From a list of processes to what a frame does, in order.
+
+use std::sync::Arc;
+#[cfg(feature = "wgpu")]
+use std::sync::Weak;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::order::{AddedProcess, order_constraints};
+use super::planned_target::targets_of;
+use super::{ChainSlot, PlanError, PlannedProcess, PlannedTarget, ProcessError};
+use crate::graph::FrameGraph;
+use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters};
+use crate::scene::ViewKind;
+
+/// What every frame does: its processes in the order they are submitted, and the targets that they use.
+pub struct FramePlan {
+    identity: u64,
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend caches something for a plan"))]
+    alive: Arc<()>,
+    processes: Vec<PlannedProcess>,
+    targets: Vec<PlannedTarget>,
+    dropped: Vec<String>,
+    dot: String,
+}
+
+impl FramePlan {
+    /// Orders processes by what they read and write, and drops those on which no output depends. Where reads and writes
+    /// leave the order open, the earlier [`ViewKind`] goes first, then the process that was added first (M 10.4).
+    ///
+    /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot may be
+    /// empty because the frame needs no such process; other processes may still be ordered before or after it. The chain does
+    /// not order its processes against writers of the same target that are outside of it.
+    ///
+    /// # Errors
+    /// See [`PlanError`].
+    pub fn new(
+        chain: Vec<ChainSlot>,
+        processes: Vec<Arc<dyn RenderProcess>>,
+        outputs: &[String],
+    ) -> Result<Self, PlanError> {
+        let (slot_names, in_chain): (Vec<_>, Vec<_>) = chain.into_iter().map(|slot| (slot.name, slot.process)).unzip();
+        let chained = in_chain.into_iter().enumerate().filter_map(|(slot, process)| Some((Some(slot), process?)));
+        let others = processes.into_iter().map(|process| (None, process));
+        let mut planned: Vec<_> = chained
+            .chain(others)
+            .map(|(slot, process)| Ok((slot, PlannedProcess::new(process)?)))
+            .collect::<Result<_, PlanError>>()?;
+        planned.sort_by_key(|(_, planned)| planned.declaration.views);
+        let mut graph = FrameGraph::new();
+        let mut added: Vec<AddedProcess> = Vec::new();
+        for (chain_slot, PlannedProcess { process, declaration }) in planned {
+            let name = process.name().to_owned();
+            let id = graph.add(name.clone(), PlannedProcess { process, declaration: declaration.clone() });
+            for (target, access) in &declaration.accesses {
+                let resource = graph.resource(resource_name(access.views(declaration.views), target));
+                if access.reads() {
+                    graph.read(id, resource);
+                }
+                if access.writes() {
+                    graph.write(id, resource);
+                }
+            }
+            if declaration.keep {
+                graph.keep(id);
+            }
+            added.push(AddedProcess { chain_slot, name, id, declaration });
+        }
+        let placeholder = placeholder_shadow_map(&slot_names, &added);
+        if let Some(target) = &placeholder {
+            let resource = graph.resource(resource_name(target.views, &target.name));
+            graph.import(resource);
+        }
+        for (before, after) in order_constraints(&slot_names, &added)? {
+            graph.order(before, after);
+        }
+        for output in outputs {
+            let writers = added.iter().filter(|added| added.declaration.written().any(|target| target == output));
+            let mut kinds: Vec<_> = writers.map(|added| added.declaration.views).collect();
+            if kinds.is_empty() {
+                kinds.push(ViewKind::Main);
+            }
+            for kind in kinds {
+                let resource = graph.resource(resource_name(kind, output));
+                graph.output(resource);
+            }
+        }
+
+        let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
+        let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
+        let dot =
+            schedule.to_labelled_dot(|before, after| passed_on_targets(declarations[before], declarations[after]));
+        let dropped = schedule.dropped().to_vec();
+        let processes: Vec<_> = schedule.into_nodes().map(|(_, process)| process).collect();
+        if processes.is_empty() {
+            return Err(PlanError::Empty);
+        }
+        let mut targets = targets_of(&processes)?;
+        targets.extend(placeholder);
+        // Relaxed: identities are compared for equality only.
+        let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { identity, alive: Arc::default(), processes, targets, dropped, dot })
+    }
+
+    /// A number that no other plan of this program has.
+    pub fn identity(&self) -> u64 {
+        self.identity
+    }
+
+    /// A token that expires with the plan: a cache that holds it can drop what it made for the plan.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn alive(&self) -> Weak<()> {
+        Arc::downgrade(&self.alive)
+    }
+
+    /// The processes in the order they are submitted.
+    pub fn processes(&self) -> &[PlannedProcess] {
+        &self.processes
+    }
+
+    /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
+    ///
+    /// # Errors
+    /// If a process panics, or its draws do not fit its declaration.
+    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
+        self.processes.iter().map(PlannedProcess::draws).collect()
+    }
+
+    /// Whether any process draws in views of this kind.
+    pub fn draws_views(&self, kind: ViewKind) -> bool {
+        self.processes.iter().any(|planned| planned.declaration.views == kind)
+    }
+
+    /// The targets that views of each kind have.
+    pub fn targets(&self) -> &[PlannedTarget] {
+        &self.targets
+    }
+
+    /// The names of the processes that were dropped because no output depends on them.
+    pub fn dropped(&self) -> &[String] {
+        &self.dropped
+    }
+
+    /// The processes as a graph in the DOT language; edges are labelled with the targets that one process leaves to the next.
+    pub fn to_dot(&self) -> &str {
+        &self.dot
+    }
+}
+
+static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
+
+/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a texture
+/// to bind.
+fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Option<PlannedTarget> {
+    let is_map = |(target, access): &(String, Access)| {
+        target == ShadowCasters::TARGET && *access == Access::SampleLayers(ViewKind::Shadow)
+    };
+    let is_read = added.iter().any(|other| other.declaration.accesses.iter().any(is_map));
+    let is_drawn = added.iter().any(|other| {
+        other.declaration.views == ViewKind::Shadow
+            && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
+    });
+    let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
+    (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
+        name: ShadowCasters::TARGET.to_owned(),
+        views: ViewKind::Shadow,
+        format: Format::Depth32Float,
+        stored: false,
+        layered: true,
+    })
+}
+
+/// The names of the targets that one process writes and another then uses, for an edge's label.
+fn passed_on_targets(before: &Declaration, after: &Declaration) -> String {
+    let mut names: Vec<_> = after
+        .accesses
+        .iter()
+        .filter_map(|(target, access)| {
+            let same_views = access.views(after.views) == before.views;
+            (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
+        })
+        .collect();
+    // A process may test and sample the same target.
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+/// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.
+fn resource_name(kind: ViewKind, target: &str) -> String {
+    match kind {
+        ViewKind::Main => target.to_owned(),
+        other => format!("{}: {target}", other.name()),
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::process::{
+        ClearColor, CommandDraws, Declare, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, ToneMapping,
+    };
+    use crate::scene::LightKind;
+
+    struct TestProcess<F>(&'static str, F);
+
+    impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for TestProcess<F> {
+        fn name(&self) -> &str {
+            self.0
+        }
+
+        fn declare(&self, declare: &mut Declare) {
+            (self.1)(declare);
+        }
+
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws::default())
+        }
+    }
+
+    fn plan(processes: Vec<Arc<dyn RenderProcess>>) -> Result<FramePlan, PlanError> {
+        FramePlan::new(Vec::new(), processes, &["picture".to_owned()])
+    }
+
+    fn shipped() -> Vec<Arc<dyn RenderProcess>> {
+        let formats = GeometryFormats::default();
+        let lights = LightVolumes::new(LightKind::Point, formats);
+        vec![Arc::new(ToneMapping::default()), Arc::new(lights), Arc::new(GeometryBuffer::new(formats))]
+    }
+
+    #[test]
+    fn reads_and_writes_determine_the_order() {
+        let plan = plan(shipped()).unwrap();
+        let names: Vec<_> = plan.processes().iter().map(|planned| planned.process.name()).collect();
+        assert_eq!(names, ["geometry buffer", "point lights", "tone mapping"]);
+        let targets: Vec<_> = plan.targets().iter().map(|target| (target.name.as_str(), target.format)).collect();
+        assert_eq!(
+            targets,
+            [
+                ("normal", Format::Rg16Float),
+                ("diffuse", Format::Rgba8Srgb),
+                ("radiance", Format::Rgba16Float),
+                ("depth", Format::Depth32Float),
+                ("picture", Format::Rgba8Srgb),
+            ]
+        );
+    }
+
+    #[test]
+    fn a_process_that_no_output_depends_on_is_dropped_with_its_targets() {
+        let mut processes = shipped();
+        processes.push(Arc::new(TestProcess("overlay", |declare: &mut Declare| {
+            declare.clears_color("overlay", Format::Rgba8Unorm, ClearColor::Background);
+        })));
+        let plan = plan(processes).unwrap();
+        assert_eq!(plan.dropped(), ["overlay"]);
+        assert!(plan.targets().iter().all(|target| target.name != "overlay"));
+    }
+
+    #[test]
+    fn errors_name_the_process_or_target() {
+        let mut processes = shipped();
+        processes.pop();
+        let error = plan(processes).err().unwrap().to_string();
+        assert!(error.contains("nothing writes \"radiance\"") && error.contains("point lights"), "{error}");
+
+        let mut processes = shipped();
+        processes.push(Arc::new(TestProcess("fog", |declare: &mut Declare| declare.after("weather"))));
+        let error = plan(processes).err().unwrap();
+        assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "weather".into() });
+
+        let mut processes = shipped();
+        processes.push(Arc::new(TestProcess("again", |declare: &mut Declare| {
+            declare.clears_color("diffuse", Format::R32Float, ClearColor::Background);
+            declare.after("geometry buffer");
+            declare.keep();
+        })));
+        let error = plan(processes).err().unwrap();
+        assert!(matches!(&error, PlanError::ConflictingFormats { target, .. } if target == "diffuse"), "{error}");
+
+        let mut processes = shipped();
+        processes.push(Arc::new(TestProcess("depth test", |declare: &mut Declare| {
+            declare.tests_depth("diffuse");
+            declare.keep();
+        })));
+        let error = plan(processes).err().unwrap();
+        assert!(matches!(&error, PlanError::WrongFormat { process, .. } if process == "depth test"), "{error}");
+
+        let error = FramePlan::new(Vec::new(), shipped(), &["unknown".to_owned()]).err().unwrap().to_string();
+        assert!(error.contains("unknown"), "{error}");
+        assert!(plan(Vec::new()).is_err());
+    }
+}

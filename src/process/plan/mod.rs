@@ -1,0 +1,16 @@
+//! The plan of a frame: its processes in order, and the targets that they use.
+
+mod chain;
+mod error;
+mod frame_plan;
+mod order;
+mod pass;
+mod planned_process;
+mod planned_target;
+
+pub use chain::ChainSlot;
+pub use error::{PlanError, ProcessError};
+pub use frame_plan::FramePlan;
+pub use pass::Pass;
+pub use planned_process::PlannedProcess;
+pub use planned_target::PlannedTarget;

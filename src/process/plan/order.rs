@@ -1,0 +1,90 @@
+//! The order constraints between processes that reads and writes do not imply.
+
+use super::PlanError;
+use crate::graph::NodeId;
+use crate::process::Declaration;
+
+/// A process that was added to the graph.
+pub(super) struct AddedProcess {
+    /// Its slot in the chain, if it is in the chain.
+    pub(super) chain_slot: Option<usize>,
+    pub(super) name: String,
+    pub(super) id: NodeId,
+    pub(super) declaration: Declaration,
+}
+
+/// The pairs (before, after) that follow from the chain and from what processes declare with `after` and `before`.
+///
+/// # Errors
+/// If a process names one that there is not.
+pub(super) fn order_constraints(
+    slot_names: &[String],
+    added: &[AddedProcess],
+) -> Result<Vec<(NodeId, NodeId)>, PlanError> {
+    let mut orders = Vec::new();
+    for earlier in added {
+        let follows = |later: &&AddedProcess| {
+            later.chain_slot.is_some() && earlier.chain_slot.is_some() && later.chain_slot > earlier.chain_slot
+        };
+        for later in added.iter().filter(follows) {
+            let is_written_by_both = |target: &str| later.declaration.written().any(|other| other == target);
+            if earlier.declaration.views == later.declaration.views
+                && earlier.declaration.written().any(is_written_by_both)
+            {
+                orders.push((earlier.id, later.id));
+            }
+        }
+    }
+    for own in added {
+        for before in &own.declaration.after {
+            let known = find(slot_names, added, before, |wanted, slot| slot <= wanted);
+            orders.extend(known.map_err(|error| error.in_process(own, before))?.map(|before| (before, own.id)));
+        }
+        for after in &own.declaration.before {
+            let known = find(slot_names, added, after, |wanted, slot| slot >= wanted);
+            orders.extend(known.map_err(|error| error.in_process(own, after))?.map(|after| (own.id, after)));
+        }
+    }
+    // Order is transitive through an empty slot too: what goes before it goes before what comes after it.
+    let empty_slot = |name: &String| {
+        let slot = slot_names.iter().position(|slot_name| slot_name == name)?;
+        added.iter().all(|other| other.chain_slot != Some(slot) && other.name != *name).then_some(slot)
+    };
+    for earlier in added {
+        let Some(before) = earlier.declaration.before.iter().filter_map(empty_slot).min() else { continue };
+        let comes_after =
+            |later: &&AddedProcess| later.declaration.after.iter().filter_map(empty_slot).any(|after| before <= after);
+        let later = added.iter().filter(|later| later.id != earlier.id).filter(comes_after);
+        orders.extend(later.map(|later| (earlier.id, later.id)));
+    }
+    Ok(orders)
+}
+
+/// The process of this name; if it is an empty slot of the chain, the process in the nearest slot for which `is_on_side` holds,
+/// which is given the empty slot and the other.
+///
+/// # Errors
+/// If neither a process nor a slot has this name.
+fn find(
+    slot_names: &[String],
+    added: &[AddedProcess],
+    name: &str,
+    is_on_side: impl Fn(usize, usize) -> bool,
+) -> Result<Option<NodeId>, UnknownName> {
+    if let Some(found) = added.iter().find(|other| other.name == name) {
+        return Ok(Some(found.id));
+    }
+    let wanted = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
+    let in_chain = added.iter().filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
+    let nearest = in_chain.filter(|(slot, _)| is_on_side(wanted, *slot)).min_by_key(|(slot, _)| slot.abs_diff(wanted));
+    Ok(nearest.map(|(_, id)| id))
+}
+
+/// Neither a process nor a slot has a name.
+struct UnknownName;
+
+impl UnknownName {
+    fn in_process(self, process: &AddedProcess, other: &str) -> PlanError {
+        PlanError::UnknownProcess { process: process.name.clone(), other: other.to_owned() }
+    }
+}

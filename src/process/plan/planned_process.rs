@@ -1,0 +1,52 @@
+//! A process and its declaration.
+
+use std::sync::Arc;
+
+use super::{PlanError, ProcessError};
+use crate::process::{Access, Declaration, Declare, Draws, RenderProcess};
+use crate::task::{JobPanic, catch};
+
+/// A process and what it declared.
+pub struct PlannedProcess {
+    /// The process.
+    pub process: Arc<dyn RenderProcess>,
+    /// What it declared.
+    pub declaration: Declaration,
+}
+
+impl PlannedProcess {
+    /// Calls a process' `declare`, once.
+    ///
+    /// # Errors
+    /// If `declare` panics, or declares more than one depth target.
+    pub(super) fn new(process: Arc<dyn RenderProcess>) -> Result<Self, PlanError> {
+        let mut declare = Declare::default();
+        catch(|| process.declare(&mut declare))
+            .map_err(|panic| ProcessError::Panicked { process: process.name().to_owned(), message: panic.message })?;
+        let declaration = declare.finish();
+        if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
+            return Err(PlanError::MultipleDepthTargets { process: process.name().to_owned() });
+        }
+        Ok(Self { process, declaration })
+    }
+
+    /// What the process draws in this frame.
+    ///
+    /// # Errors
+    /// If the process panics, or its draws do not fit its declaration: only raw passes use targets by their own commands.
+    pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
+        let process = || self.process.name().to_owned();
+        let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
+        let draws = catch(|| self.process.draws()).map_err(panicked)?;
+        let is_raw = match draws {
+            Draws::Commands(_) | Draws::FullScreen(_) | Draws::Lights(_) => false,
+            #[cfg(feature = "wgpu")]
+            Draws::Raw(_) => true,
+        };
+        let fits = |access: &Access| access.is_raw() == is_raw;
+        match self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
+            Some((target, _)) => Err(ProcessError::Misdeclared { process: process(), target: target.clone() }),
+            None => Ok(draws),
+        }
+    }
+}

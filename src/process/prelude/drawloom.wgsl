@@ -1,0 +1,254 @@
+// What every shader begins with. A process's own WGSL comes after this and may use all of it.
+//
+//   @group(0)  what the frame and the view are: below
+//   @group(1)  materials and their textures: below
+//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets it samples, in that order
+//
+// Before it stands `const ABSOLUTE_TRANSFORMS: bool`, as the frame's quality has it.
+
+struct View {
+    // From world axes relative to the camera to clip space; depth is reversed.
+    clip_from_relative: mat4x4<f32>,
+    // The camera's position, as an object's.
+    position_low: vec3<u32>,
+    light_count: u32,
+    position_high: vec3<i32>,
+    near: f32,
+    // Right and up are as long as half the picture is at a distance of 1.
+    right: vec3<f32>,
+    width: f32,
+    up: vec3<f32>,
+    height: f32,
+    forward: vec3<f32>,
+    projection: u32,
+    // Linear.
+    ambient: vec3<f32>,
+    far: f32,
+}
+
+const PERSPECTIVE: u32 = 0u;
+const ORTHOGRAPHIC: u32 = 1u;
+// What lies before the near plane is drawn onto it.
+const ORTHOGRAPHIC_SHADOW: u32 = 2u;
+const PARABOLOID: u32 = 3u;
+
+// A position is 64-bit fixed point in steps of 2^-30 m, as two halves.
+struct Object {
+    position_low: vec3<u32>,
+    material: u32,
+    position_high: vec3<i32>,
+    padding: u32,
+    orientation: vec4<f32>,
+    scale: vec3<f32>,
+    index: u32,
+}
+
+const DIRECTIONAL: u32 = 0u;
+const POINT: u32 = 1u;
+const SPOT: u32 = 2u;
+const HEMISPHERICAL: u32 = 3u;
+
+const NO_SHADOW_MAP: u32 = 0xffffffffu;
+
+struct Light {
+    // Relative to the camera, along the world's axes. Of a directional light: where its shadow map is seen from.
+    position: vec3<f32>,
+    kind: u32,
+    // The way it travels.
+    direction: vec3<f32>,
+    // Of a directional light: where its shadow map ends.
+    range: f32,
+    // At 1 m, or on a surface that faces a directional light.
+    intensity: vec3<f32>,
+    // Spot: from here to `cone_end` the cosine fades.
+    cone_begin: f32,
+    cone_end: f32,
+    shadow_layer: u32,
+    // Half as wide as its shadow map: at 1 m for a spot light, in metres for a directional one.
+    shadow_half: f32,
+    shadow_near: f32,
+    // From the axes of the shadow map's camera to the world's.
+    shadow_orientation: vec4<f32>,
+}
+
+struct Material {
+    diffuse: vec3<f32>,
+    opacity: f32,
+    emission: vec3<f32>,
+    // Which array its texture is in, from 0; 4 for none.
+    texture_array: u32,
+    texture_layer: u32,
+    // 1 where both sides are drawn.
+    double_sided: u32,
+    // 0 for none, 1 alpha, 2 additive, 3 subtractive.
+    blend: u32,
+    padding: u32,
+}
+
+const ALPHA: u32 = 1u;
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> objects: array<Object>;
+// In batch order: which object each instance is.
+@group(0) @binding(2) var<storage, read> drawn: array<u32>;
+@group(0) @binding(3) var<storage, read> lights: array<Light>;
+
+@group(1) @binding(0) var<storage, read> materials: array<Material>;
+@group(1) @binding(1) var textures_256: texture_2d_array<f32>;
+@group(1) @binding(2) var textures_512: texture_2d_array<f32>;
+@group(1) @binding(3) var textures_1024: texture_2d_array<f32>;
+@group(1) @binding(4) var textures_2048: texture_2d_array<f32>;
+@group(1) @binding(5) var texture_sampler: sampler;
+
+struct VertexInput {
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) uv: vec2<f32>,
+    @builtin(instance_index) instance: u32,
+}
+
+struct FullScreenPixel {
+    @builtin(position) position: vec4<f32>,
+    // From (-1, -1) at the picture's lower left to (1, 1) at its upper right.
+    @location(0) clip: vec2<f32>,
+}
+
+// A pixel of what a light lights.
+struct LightPixel {
+    @builtin(position) position: vec4<f32>,
+    @location(0) @interpolate(flat) light: u32,
+}
+
+// One triangle that covers the picture.
+@vertex
+fn full_screen(@builtin(vertex_index) index: u32) -> FullScreenPixel {
+    let clip = vec2<f32>(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0);
+    return FullScreenPixel(vec4<f32>(clip, 0.0, 1.0), clip);
+}
+
+fn drawn_object(instance: u32) -> Object {
+    return objects[drawn[instance]];
+}
+
+fn rotate(orientation: vec4<f32>, direction: vec3<f32>) -> vec3<f32> {
+    let twice = 2.0 * cross(orientation.xyz, direction);
+    return direction + orientation.w * twice + cross(orientation.xyz, twice);
+}
+
+// From object space to world axes relative to the camera.
+fn relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
+    let turned = rotate(object.orientation, object.scale * position);
+    if ABSOLUTE_TRANSFORMS {
+        // Far from the world's origin both lose what they have in common too late.
+        let in_world = metres_from_origin(object.position_low, object.position_high) + turned;
+        return in_world - metres_from_origin(view.position_low, view.position_high);
+    }
+    return fixed_difference(object.position_low, object.position_high, view.position_low, view.position_high) + turned;
+}
+
+// A shader that is to draw at just the depth of another calls this, and marks its position `@invariant`.
+fn clip_position(relative: vec3<f32>) -> vec4<f32> {
+    var clip = view.clip_from_relative * vec4<f32>(relative, 1.0);
+    if view.projection == PARABOLOID {
+        return paraboloid_position(clip.xyz);
+    }
+    if view.projection == ORTHOGRAPHIC_SHADOW {
+        clip.z = min(clip.z, 1.0);
+    }
+    return clip;
+}
+
+// From the camera's axes to clip space, as a mirror shaped like a paraboloid shows it (Brabec et al. 2002). The half space
+// before the camera becomes a disc as wide as the picture, and depth is the distance.
+fn paraboloid_position(place: vec3<f32>) -> vec4<f32> {
+    let distance = length(place);
+    let forward = -place.z / max(distance, 1e-30);
+    let depth = (view.far - distance) / (view.far - view.near);
+    // Straight behind the camera is everywhere at once. What lies there is outside the picture anyway, so it is left out.
+    return vec4<f32>(place.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
+}
+
+// From object space to the world's axes, of unit length; 0 where there is none to be had. The cofactors of a scale need no
+// division, so a scale of 0 along one axis leaves a normal too.
+fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
+    // Products of the scale as it is could leave the range of f32.
+    let sizes = abs(object.scale);
+    let largest = max(max(sizes.x, sizes.y), sizes.z);
+    let scale = select(vec3<f32>(1.0), object.scale / largest, largest > 0.0);
+    let cofactors = scale.yzx * scale.zxy;
+    let mirrored = select(1.0, -1.0, scale.x * scale.y * scale.z < 0.0);
+    let turned = rotate(object.orientation, mirrored * cofactors * normal);
+    let length_squared = dot(turned, turned);
+    return select(vec3<f32>(0.0), turned * inverseSqrt(length_squared), length_squared > 0.0);
+}
+
+// A pixel's place relative to the camera, along the world's axes.
+fn position_from_depth(clip: vec2<f32>, depth: f32) -> vec3<f32> {
+    let across = clip.x * view.right + clip.y * view.up;
+    if view.projection == PERSPECTIVE {
+        return (across + view.forward) * (view.near / depth);
+    }
+    return across + view.forward * mix(view.far, view.near, depth);
+}
+
+// A pixel's place in the picture, from (-1, -1) at its lower left to (1, 1) at its upper right.
+fn clip_of_pixel(position: vec4<f32>) -> vec2<f32> {
+    return position.xy / vec2<f32>(view.width, view.height) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
+}
+
+// The way from a place to the eye, of unit length.
+fn direction_to_eye(relative: vec3<f32>) -> vec3<f32> {
+    if view.projection == PERSPECTIVE {
+        return -normalize(relative);
+    }
+    return -view.forward;
+}
+
+// The exact difference of two fixed-point positions, rounded once, in metres.
+fn fixed_difference(low: vec3<u32>, high: vec3<i32>, from_low: vec3<u32>, from_high: vec3<i32>) -> vec3<f32> {
+    let borrow = select(vec3<i32>(0), vec3<i32>(1), low < from_low);
+    let difference_low = low - from_low;
+    let difference_high = high - from_high - borrow;
+    // The magnitude first: the two halves of a small negative number are both large.
+    let negative = difference_high < vec3<i32>(0);
+    let carry = select(vec3<u32>(0u), vec3<u32>(1u), difference_low == vec3<u32>(0u));
+    let magnitude_low = select(difference_low, ~difference_low + 1u, negative);
+    let magnitude_high = select(bitcast<vec3<u32>>(difference_high), ~bitcast<vec3<u32>>(difference_high) + carry, negative);
+    let magnitude = vec3<f32>(magnitude_high) * 4.0 + vec3<f32>(magnitude_low) * 0x1p-30;
+    return select(magnitude, -magnitude, negative);
+}
+
+// A fixed-point position in the world, rounded to f32: in steps of 6 cm at 1,000 km.
+fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
+    return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
+}
+
+// A material's diffuse colour and opacity at a place of its texture. The two gradients are how `uv` changes from pixel to
+// pixel: taken by the caller, because they must be taken where all pixels go the same way.
+fn diffuse_at(material: Material, uv: vec2<f32>, gradient_x: vec2<f32>, gradient_y: vec2<f32>) -> vec4<f32> {
+    var texel = vec4<f32>(1.0);
+    switch material.texture_array {
+        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
+        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
+        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
+        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
+        default: {}
+    }
+    return vec4<f32>(material.diffuse, material.opacity) * texel;
+}
+
+// A direction as a point of the unfolded octahedron, each coordinate from -1 to 1 (Cigolle et al. 2014).
+fn octahedral_from_direction(direction: vec3<f32>) -> vec2<f32> {
+    let point = direction.xy / (abs(direction.x) + abs(direction.y) + abs(direction.z));
+    return select(fold(point), point, direction.z >= 0.0);
+}
+
+fn direction_from_octahedral(point: vec2<f32>) -> vec3<f32> {
+    let z = 1.0 - abs(point.x) - abs(point.y);
+    return normalize(vec3<f32>(select(fold(point), point, z >= 0.0), z));
+}
+
+fn fold(point: vec2<f32>) -> vec2<f32> {
+    let sign = select(vec2<f32>(-1.0), vec2<f32>(1.0), point >= vec2<f32>(0.0));
+    return (1.0 - abs(point.yx)) * sign;
+}
