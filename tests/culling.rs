@@ -1,4 +1,4 @@
-//! Nothing that a camera sees is left out, whatever stands for it: the cases of `benches/benches/culling/main.rs`, and frames.
+//! No visible object is culled, with any culling volume: the cases of `benches/benches/culling/main.rs`, and frames.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -15,29 +15,30 @@ use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
 use drawloom_testing::culling::tally::Tallies;
 use drawloom_testing::culling::{boxes, spheres};
 
-/// Of what is outside and anywhere, the share that may be kept.
-const MOST_FALSE_VISIBLES: f64 = 1e-3;
+/// The maximum share of invisible volumes at random positions that tests may find visible.
+const MAX_FALSE_VISIBLE_SHARE: f64 = 1e-3;
 
-/// Neither is a test passed by seeing everything, nor by cases that are all far from where it is decided.
+/// Checks that nothing visible is culled, that few invisible volumes are kept, and that the cases include enough
+/// invisible ones.
 fn check(what: &str, tallies: &Tallies) {
     assert_eq!(tallies.false_culls(), 0, "{what}: of {} cases", tallies.cases());
     let share = tallies.anywhere.false_share();
-    assert!(share <= MOST_FALSE_VISIBLES, "{what}: {share} of {:?}", tallies.anywhere);
+    assert!(share <= MAX_FALSE_VISIBLE_SHARE, "{what}: {share} of {:?}", tallies.anywhere);
     for tally in [tallies.tangent, tallies.anywhere] {
         assert!(tally.outside > tally.cases / 10, "{what}: {tally:?}");
     }
 }
 
 #[test]
-fn no_sphere_that_is_seen_is_culled() {
+fn no_visible_sphere_is_culled() {
     let tallies = spheres::try_batches(0..2_000);
     check("sphere", &tallies.ours);
-    // The cases are hard: how it is commonly done fails one in ten.
+    // The cases are hard: the common method fails one in ten.
     assert!(tallies.naive.tangent.false_culls > tallies.naive.tangent.cases / 20, "{:?}", tallies.naive);
 }
 
 #[test]
-fn no_object_that_is_seen_is_culled_by_what_stands_for_it() -> Result<(), Box<dyn Error>> {
+fn no_visible_object_is_culled_by_its_volume() -> Result<(), Box<dyn Error>> {
     let BoxTallies { volumes, rejected } = boxes::try_batches(&Shapes::new()?, 0..400);
     assert_eq!(rejected, 0);
     for (volume, tallies) in VOLUMES.iter().zip(&volumes) {
@@ -46,21 +47,21 @@ fn no_object_that_is_seen_is_culled_by_what_stands_for_it() -> Result<(), Box<dy
     Ok(())
 }
 
-/// Poles 3 m beside the picture, whose balls reach into it. One stands upright, and so does its box; one lies along the picture's
-/// edge, where the box along the world's axes reaches into it and the pole does not.
+/// Poles 3 m outside the frustum, whose bounding spheres intersect it. One is vertical, as is its box. One is parallel
+/// to the frustum's side, so its axis-aligned box intersects the frustum, and its oriented box does not.
 #[test]
-fn frames_draw_what_the_volume_holds() -> Result<(), Box<dyn Error>> {
+fn frames_draw_objects_whose_volume_is_visible() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     let half = Vec3::new(0.1, 0.1, 10.0);
     let vertices = [-1.0, 1.0, 1.0].map(|sign| Vertex { position: (half * sign).to_array(), ..Vertex::default() });
     let pole = scene.add(Mesh::new("pole", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
     let paint = scene.add(Material::default())?;
-    // The camera looks along −z, and 10 m along the picture ends 10.3 m to the right, at 45.7°.
-    let beside = RenderObject::new(pole, paint, DVec3::new(14.5, 0.0, -10.0));
+    // The camera looks along −z, and at a depth of 10 m the picture ends 10.3 m to the right, at 45.7°.
+    let outside = RenderObject::new(pole, paint, DVec3::new(14.5, 0.0, -10.0));
     for orientation in [Quat::from_rotation_x(90_f32.to_radians()), Quat::from_rotation_y(-45.7_f32.to_radians())] {
-        scene.add_object(RenderObject { orientation, ..beside })?;
+        scene.add_object(RenderObject { orientation, ..outside })?;
     }
-    // Seen, and far behind.
+    // One visible, and one far behind the camera.
     scene.add_object(RenderObject::new(pole, paint, DVec3::new(0.0, 0.0, -10.0)))?;
     scene.add_object(RenderObject::new(pole, paint, DVec3::new(0.0, 0.0, 100.0)))?;
     scene.cameras.push(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
@@ -80,24 +81,24 @@ fn frames_draw_what_the_volume_holds() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Nothing is hidden for want of a box: an engine's own bounds are what counts, and what cannot be drawn is not.
+/// An engine's own bounds replace the mesh's for every volume, and an object with invalid bounds is never visible.
 #[test]
-fn bounds_of_an_engine_are_its_word() -> Result<(), Box<dyn Error>> {
+fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     let vertices = [0.0, 0.1, 0.1].map(|size| Vertex { position: [size; 3], ..Vertex::default() });
     let speck = scene.add(Mesh::new("speck", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
     let paint = scene.add(Material::default())?;
-    // Behind the camera: seen only by who believes that it moves its vertices 9 m.
+    // Behind the camera: visible only with bounds that say that a shader moves its vertices by up to 9 m.
     for _ in 0..3 {
         scene.add_object(RenderObject::new(speck, paint, DVec3::new(0.0, 0.0, 5.0)))?;
     }
-    let lent = scene.as_scene_ref();
-    let mut bounds = lent.bounds.to_vec();
+    let scene_ref = scene.as_scene_ref();
+    let mut bounds = scene_ref.bounds.to_vec();
     bounds[1].radius = 9.0;
     bounds[2].radius = f32::NAN;
-    let lent = drawloom::scene::SceneRef { bounds: &bounds, ..lent };
+    let scene_ref = drawloom::scene::SceneRef { bounds: &bounds, ..scene_ref };
     let frustum = Frustum::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
-    for (volume, seen) in [
+    for (volume, visible) in [
         (CullingVolume::None, 0b011),
         (CullingVolume::Sphere, 0b010),
         (CullingVolume::Box, 0b010),
@@ -106,8 +107,8 @@ fn bounds_of_an_engine_are_its_word() -> Result<(), Box<dyn Error>> {
         let mut table = ObjectTable::default();
         table.configure(volume);
         table.reset(3);
-        table.fill(&lent, 0..3);
-        assert_eq!(table.block(0).visible(&frustum, volume, 0..3), seen, "{volume:?}");
+        table.fill(&scene_ref, 0..3);
+        assert_eq!(table.block(0).visible(&frustum, volume, 0..3), visible, "{volume:?}");
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }
     Ok(())

@@ -77,11 +77,6 @@ impl CoarseDepth {
         self.size[1].div_ceil(Self::BLOCK)
     }
 
-    /// The numbers of columns and rows of tiles.
-    pub fn size(&self) -> [usize; 2] {
-        self.size
-    }
-
     /// Clears and draws a strip. One strip must not be drawn twice at the same time.
     pub fn draw(&self, strip: usize, silhouettes: &Silhouettes) {
         let [columns, rows] = self.size;
@@ -97,15 +92,15 @@ impl CoarseDepth {
         }
         for (column, block) in (0..columns).step_by(Self::BLOCK).zip(self.blocks_in(strip)) {
             let tiles = rows.clone().flat_map(|row| self.row(row, column..columns.min(column + Self::BLOCK)));
-            let least = tiles.map(|tile| tile.load(Ordering::Relaxed)).min();
-            block.store(least.unwrap_or(0), Ordering::Relaxed);
+            let min_nearness = tiles.map(|tile| tile.load(Ordering::Relaxed)).min();
+            block.store(min_nearness.unwrap_or(0), Ordering::Relaxed);
         }
     }
 
     fn draw_row(&self, row: usize, silhouette: &Silhouette<'_>) {
         let [left, right] = silhouette.width.map(|x| (x / self.tile_size).clamp(0.0, self.size[0] as f64));
-        let most = (silhouette.max_nearness as f32).max(0.0).next_up().to_bits();
-        let is_nearer = |tile: &AtomicU32| tile.load(Ordering::Relaxed) >= most;
+        let max_nearness = (silhouette.max_nearness as f32).max(0.0).next_up().to_bits();
+        let is_nearer = |tile: &AtomicU32| tile.load(Ordering::Relaxed) >= max_nearness;
         if self.row(row, left as usize..right.ceil() as usize).iter().all(is_nearer) {
             return;
         }
@@ -343,7 +338,7 @@ mod tests {
         silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, [], [1.0; 2]);
         silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, [[0.0, f64::NAN, 0.0]], [1.0; 2]);
         silhouettes.add(rectangle([0.0; 2], [9.0; 2]), f64::NAN, plane, [1.0; 2]);
-        assert!(silhouettes.is_empty());
+        assert_eq!(silhouettes.len(), 0);
         silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, plane, [1.0; 2]);
         assert_eq!(silhouettes.len(), 1);
     }
@@ -388,7 +383,7 @@ mod tests {
                 }
                 nearest
             };
-            let [columns, rows] = depth.size();
+            let [columns, rows] = depth.size;
             let width = f64::from(side);
             for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
                 let [left, top] = [column, row].map(|tile| tile as f64 * width);

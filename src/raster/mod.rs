@@ -1,6 +1,7 @@
 //! A rasteriser for the CPU: the software backend and occlusion culling use it.
 //!
-//! It is generic over [`Real`] numbers: f32 for speed, f64 as the reference that other results are measured against.
+//! It is generic over [`Real`] numbers: f32 for speed, f64 as the reference that other results are measured against. Engines use
+//! its vectors in CPU shaders; the rasteriser itself is private.
 
 mod coarse_depth;
 mod convex;
@@ -14,12 +15,13 @@ mod edge;
 mod triangle;
 mod triangle_culling;
 
-pub use coarse_depth::CoarseDepth;
-pub use convex::{ConvexPart, Plane};
-pub use grid::{MAX_PICTURE_SIZE, Winding};
-pub use pixel_bounds::PixelBounds;
+pub(crate) use coarse_depth::CoarseDepth;
+pub(crate) use convex::{ConvexPart, Plane};
+pub(crate) use grid::Winding;
+pub(crate) use pixel_bounds::PixelBounds;
 pub use real::Real;
-pub use silhouettes::Silhouettes;
-pub use triangle::{Interpolated, Triangle};
-pub use triangle_culling::{CullVertex, CulledTriangles, cull_triangles};
+pub(crate) use silhouettes::Silhouettes;
+pub(crate) use triangle::Triangle;
+pub use triangle_culling::CulledTriangles;
+pub(crate) use triangle_culling::{CullVertex, cull_triangles};
 pub use vector::{Quaternion, Vector, Vector2, Vector3, Vector4};

@@ -58,11 +58,6 @@ impl Silhouettes {
         self.shapes.len()
     }
 
-    /// Whether there are no silhouettes.
-    pub fn is_empty(&self) -> bool {
-        self.shapes.is_empty()
-    }
-
     /// Adds the convex hull of `corners`, shrunk by `margin` pixels. At each point its nearness is the least of those
     /// of `planes`. A plane is its change per pixel to the right, its change per pixel down, and its value at the
     /// picture's origin. Where all planes are nearer than `opening_nearness`, nothing is covered. Nothing is nearer

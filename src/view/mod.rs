@@ -1,7 +1,6 @@
 //! Views: "everything is a camera" (M 10.4). Tables that all views of a frame share, and culling for each view.
 //!
-//! An embedder uses [`ShadowMaps`], [`RenderView`] and [`RejectionReason`]; everything else is public for this
-//! repository's tests and benchmarks.
+//! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts.
 
 mod bounding_boxes;
 mod bounding_spheres;
@@ -21,7 +20,9 @@ mod subdivision_level;
 mod triangle_culling;
 mod visible_set;
 
-pub use bounding_boxes::{BoundingBoxes, OrientedBox};
+#[doc(hidden)]
+pub use bounding_boxes::BoundingBoxes;
+pub(crate) use bounding_boxes::OrientedBox;
 pub use bounding_spheres::{BoundingSphere, BoundingSpheres};
 pub(crate) use fill::Fill;
 pub use fixed_position::FixedPosition;
@@ -31,9 +32,11 @@ pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
 pub use light_table::{LightClass, LightTable};
 pub use object_table::{ObjectBlock, ObjectDraw, ObjectTable};
+#[doc(hidden)] // For this repository's tests and benchmarks.
 pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
 pub use shadow_maps::ShadowMaps;
+#[doc(hidden)] // For this repository's tests and benchmarks.
 pub use visible_set::VisibleSet;
 pub(crate) use visible_set::set_bits;

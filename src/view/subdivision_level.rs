@@ -37,8 +37,8 @@ pub(super) fn subdivision_level(
     if by_box < TRIANGLE_TEST_THRESHOLD {
         return Some(by_box);
     }
-    let places = |corner: u32| (Vec3::from(mesh.vertices()[corner as usize].position) * scale).as_dvec3() - eye;
-    let shortest = mesh.triangles().map(|corners| corners.map(places)).filter_map(|[a, b, c]| {
+    let relative = |corner: u32| (Vec3::from(mesh.vertices()[corner as usize].position) * scale).as_dvec3() - eye;
+    let shortest = mesh.triangles().map(|corners| corners.map(relative)).filter_map(|[a, b, c]| {
         let widest = widest_angle * distance_to_triangle(a, b, c).max(min_distance);
         let is_before = [a, b, c].iter().any(|corner| forward.dot(*corner) > 0.0);
         (is_before && a.distance(b).max(b.distance(c)).max(c.distance(a)) > widest).then_some(widest)
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_a_light_keeps_it_from_nothing() {
+    fn an_object_behind_a_light_casts_no_shadow() {
         assert_eq!(floor_from(0.0, Vec3::ONE), None);
         assert_eq!(floor_from(-3.0, Vec3::ONE), None);
     }
@@ -131,15 +131,15 @@ mod tests {
     /// A room of 4 m whose walls are cut into squares of 10 cm, seen from its middle and from a hand's breadth off its
     /// floor.
     #[test]
-    fn a_room_around_a_lamp_is_cut_no_finer_than_its_walls_want() {
+    fn a_room_around_a_lamp_is_subdivided_no_more_than_its_walls_need() {
         let mut vertices = Vec::new();
         for face in 0..6 {
             for (u, v) in (0..40).flat_map(|u| (0..40).map(move |v| (u, v))) {
                 for (du, dv) in [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)] {
-                    let mut place = [(u + du) as f32 * 0.1 - 2.0, (v + dv) as f32 * 0.1 - 2.0, 2.0];
-                    place[2] *= if face < 3 { 1.0 } else { -1.0 };
-                    place.rotate_right(face % 3);
-                    vertices.push(Vertex { position: place, ..Vertex::default() });
+                    let mut position = [(u + du) as f32 * 0.1 - 2.0, (v + dv) as f32 * 0.1 - 2.0, 2.0];
+                    position[2] *= if face < 3 { 1.0 } else { -1.0 };
+                    position.rotate_right(face % 3);
+                    vertices.push(Vertex { position, ..Vertex::default() });
                 }
             }
         }
@@ -170,8 +170,8 @@ mod tests {
             let [a, b, c] = corners.map(DVec3::from);
             let found = distance_to_triangle(a, b, c);
             let steps = 60;
-            let places = (0..=steps).flat_map(|one| (0..=steps - one).map(move |other| (one, other)));
-            let distances = places.map(|(one, other)| {
+            let points = (0..=steps).flat_map(|one| (0..=steps - one).map(move |other| (one, other)));
+            let distances = points.map(|(one, other)| {
                 let (one, other) = (f64::from(one) / f64::from(steps), f64::from(other) / f64::from(steps));
                 (a + (b - a) * one + (c - a) * other).length()
             });

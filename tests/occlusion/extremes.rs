@@ -1,4 +1,4 @@
-//! Numbers at their ends: no panic, and nothing that shows is left out.
+//! Extreme numbers: no panic, and no visible object is culled.
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::Quality;
@@ -8,19 +8,19 @@ use drawloom_testing::scenes::{cube, sized};
 
 use crate::occlusion;
 
-/// A large cube before small ones, all of it scaled by `size` and moved by `shift`.
+/// A large cube in front of small ones, all scaled by `size` and moved by `shift`.
 fn scene(size: f64, shift: DVec3, change: impl Fn(&mut Camera)) -> Scene {
     let mut scene = Scene::new();
     let (mesh, material) = (scene.add(cube()).unwrap(), scene.add(Material::default()).unwrap());
-    for place in 0..60 {
-        let (x, y) = (f64::from(place % 8) - 3.5, f64::from(place / 8) - 3.5);
-        let (position, scale) = if place == 0 {
+    for index in 0..60 {
+        let (x, y) = (f64::from(index % 8) - 3.5, f64::from(index / 8) - 3.5);
+        let (position, scale) = if index == 0 {
             (DVec3::new(0.0, 0.0, -10.0), 3.0)
         } else {
-            (DVec3::new(x * 1.7, y * 1.7, -16.0 - f64::from(place % 5)), 0.3)
+            (DVec3::new(x * 1.7, y * 1.7, -16.0 - f64::from(index % 5)), 0.3)
         };
         let object = RenderObject::new(mesh, material, shift + position * size);
-        let orientation = Quat::from_rotation_y(place as f32);
+        let orientation = Quat::from_rotation_y(index as f32);
         scene.add_object(RenderObject { scale: Vec3::splat((scale * size) as f32), orientation, ..object }).unwrap();
     }
     let mut camera = sized(Camera::looking_at("main", shift, shift + DVec3::NEG_Z), [96, 64]);
@@ -30,15 +30,15 @@ fn scene(size: f64, shift: DVec3, change: impl Fn(&mut Camera)) -> Scene {
     scene
 }
 
-/// How many are hidden at all coarsenesses, none of which show.
+/// Checks that no hidden object is visible, and returns the number of hidden objects, summed over all tile sizes.
 fn check(scene: &Scene, case: &str) -> usize {
     let scene = scene.as_scene_ref();
     let samples = Samples::new(&scene, &scene.cameras[0], 0.25, |_| true);
     let mut count = 0;
-    for side in Quality::OCCLUSION_TILE_SIZES {
-        let (_, hidden) = occlusion(&scene, side);
+    for tile_size in Quality::OCCLUSION_TILE_SIZES {
+        let (_, hidden) = occlusion(&scene, tile_size);
         for (object, (hidden, shown)) in hidden.into_iter().zip(&samples.shown).enumerate() {
-            assert!(!(hidden && *shown), "{case}: {object} at {side}");
+            assert!(!(hidden && *shown), "{case}: {object} at {tile_size}");
             count += usize::from(hidden);
         }
     }
@@ -46,7 +46,7 @@ fn check(scene: &Scene, case: &str) -> usize {
 }
 
 #[test]
-fn far_origins_large_and_small_worlds() {
+fn far_origins_and_large_and_small_worlds() {
     let usual = check(&scene(1.0, DVec3::ZERO, |_| {}), "usual");
     assert!(usual > 50, "{usual}");
     for distance in [1e3, -1e6, 1e9] {
@@ -57,7 +57,7 @@ fn far_origins_large_and_small_worlds() {
         let count = check(&scene(size, DVec3::ZERO, |_| {}), "size");
         assert!(count.abs_diff(usual) <= 2, "{count} at {size}, and {usual} as it is");
     }
-    // Below what positions can tell apart, and towards the end of them.
+    // Below the resolution of positions, and near their limit.
     for size in [1e-20, 1e-9, 1e8] {
         check(&scene(size, DVec3::ZERO, |_| {}), "size");
     }
@@ -85,7 +85,7 @@ fn cameras_of_every_kind() {
 }
 
 #[test]
-fn transforms_that_leave_nothing_and_those_that_leave_too_much() {
+fn transforms_with_very_small_and_very_large_scales() {
     for scale in [
         Vec3::ZERO,
         Vec3::new(0.0, 3.0, 3.0),
@@ -107,7 +107,7 @@ fn transforms_that_leave_nothing_and_those_that_leave_too_much() {
 }
 
 #[test]
-fn a_scene_of_nothing() {
+fn an_empty_scene() {
     let mut scene = Scene::new();
     scene.cameras = vec![Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z)];
     assert_eq!(check(&scene, "empty"), 0);

@@ -290,7 +290,7 @@ mod tests {
         #[test]
         fn a_device_draws_within_the_slack(
             camera in any_camera(),
-            aside in prop::array::uniform2(-1.2..1.2_f32),
+            slope in prop::array::uniform2(-1.2..1.2_f32),
             distance in -1.0..4.0_f64,
             arm in prop::array::uniform3(-1.0..1.0_f32),
             length in -3.0..3.0_f32,
@@ -300,7 +300,7 @@ mod tests {
             let occlusion_camera = OcclusionCamera::new(&camera);
             let view = RenderView::new(&camera);
             let [right, up, forward] = view.picture_axes().map(|axis| axis.as_dvec3());
-            let ray = right * f64::from(aside[0]) + up * f64::from(aside[1]);
+            let ray = right * f64::from(slope[0]) + up * f64::from(slope[1]);
             let along = 10_f64.powf(distance);
             let target = camera.position + if occlusion_camera.is_perspective() { (ray + forward) * along } else { ray + forward * along };
             let orientation = Quat::from_array(turn);
@@ -325,9 +325,9 @@ mod tests {
             let error = (drawn - occlusion_camera.project(exact)).abs().max_element();
             prop_assert!(error <= pixel_error, "{error} pixels, and the bound is {pixel_error}");
             let nearness = f64::from(clip.z / clip.w);
-            let least = occlusion_camera.min_nearness(exact.z + placement.slack);
-            let most = occlusion_camera.max_nearness(depth);
-            prop_assert!((least..=most).contains(&nearness), "{least} {nearness} {most}");
+            let min = occlusion_camera.min_nearness(exact.z + placement.slack);
+            let max = occlusion_camera.max_nearness(depth);
+            prop_assert!((min..=max).contains(&nearness), "{min} {nearness} {max}");
         }
 
         #[test]
@@ -336,7 +336,7 @@ mod tests {
             corners in prop::array::uniform4(prop::array::uniform3(-9.0..9.0_f64)),
             scale in prop::array::uniform3(-3.0..3.0_f32),
             turn in prop::array::uniform4(-1.0..1.0_f32),
-            aside in prop::array::uniform3(-50.0..50.0_f64),
+            offset in prop::array::uniform3(-50.0..50.0_f64),
         ) {
             let [a, b, c, inside] = corners.map(DVec3::from);
             let normal = (b - a).cross(c - a);
@@ -348,7 +348,7 @@ mod tests {
             prop_assume!(face.signed_distance(inside) < -0.1);
 
             let occlusion_camera = OcclusionCamera::new(&camera);
-            let position = camera.position + DVec3::from(aside);
+            let position = camera.position + DVec3::from(offset);
             let placement = occlusion_camera.camera_from_object(position, orientation.normalize(), scale.into(), 50.0);
             let placed = placement.transform_face(&face);
             let points = [a, b, c].map(|point| placement.transform_point(point));
@@ -359,8 +359,8 @@ mod tests {
                 for point in points.into_iter().filter(|point| point.z > 1.0 && placed.offset < -1.0) {
                     let pixel = occlusion_camera.project(point);
                     let found = right * pixel.x + down * pixel.y + offset;
-                    let least = occlusion_camera.min_nearness(point.z);
-                    prop_assert!((found - least).abs() <= 1e-4 * occlusion_camera.max_nearness(point.z).abs(), "{found} {least}");
+                    let expected = occlusion_camera.min_nearness(point.z);
+                    prop_assert!((found - expected).abs() <= 1e-4 * occlusion_camera.max_nearness(point.z).abs(), "{found} {expected}");
                 }
             }
         }
