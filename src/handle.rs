@@ -1,5 +1,5 @@
-//! Generational handles: how everything refers to a mesh, a material or an object without owning it (M 10.3,
-//! "Device-Independent Resource Handles").
+//! Generational handles: references to meshes, materials and objects without ownership (M 10.3, "Device-Independent
+//! Resource Handles").
 
 use std::any::type_name;
 use std::fmt;
@@ -7,18 +7,18 @@ use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Refers to a `T` kept in [`Slots`]. Once that `T` is removed the handle is stale: using it is an error, never
+/// A reference to a `T` in [`Slots`]. When that `T` is removed, the handle is stale: using it is an error, and never returns
 /// another `T`.
 pub struct Handle<T> {
     index: u32,
     generation: u32,
-    /// Whose entry it is: the lower half of [`Slots::identity`].
+    /// The collection of the entry: the lower half of [`Slots::identity`].
     collection: u32,
     kind: PhantomData<fn() -> T>,
 }
 
 impl<T> Handle<T> {
-    /// The slot. Slots are reused, so the index alone names a `T` only while the handle is not stale.
+    /// The index of the slot. Slots are reused, so an index alone identifies a `T` only until its handle is stale.
     pub fn index(self) -> u32 {
         self.index
     }
@@ -29,20 +29,20 @@ impl<T> Handle<T> {
     }
 }
 
-/// A handle whose referent was removed, or that belongs to another collection.
+/// The error for a handle whose entry has been removed, or that belongs to another collection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stale {kind} handle: slot {index}, generation {generation}")]
 pub struct StaleHandle {
-    /// What the handle referred to: `Mesh`, `Material` ...
+    /// The type of the entry: `Mesh`, `Material` ...
     pub kind: &'static str,
-    /// Its slot.
+    /// The index of the slot.
     pub index: u32,
-    /// Its generation.
+    /// The generation of the handle.
     pub generation: u32,
 }
 
-/// A collection whose entries are reached by [`Handle`]. Entries keep their slot for life; a removed entry's slot is
-/// reused with the next generation.
+/// A slot map: a collection whose entries are accessed by [`Handle`]. An entry keeps its slot until it is removed; the slot is
+/// then reused with the next generation.
 #[derive(Debug)]
 pub struct Slots<T> {
     identity: u64,
@@ -57,7 +57,7 @@ impl<T> Slots<T> {
     pub fn new() -> Self {
         static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(1);
         Self {
-            // Only uniqueness matters, and nothing else is published through this counter.
+            // Relaxed: only uniqueness matters; the counter publishes no other data.
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
             revision: 0,
             entries: Vec::new(),
@@ -69,7 +69,7 @@ impl<T> Slots<T> {
     /// Adds an entry.
     ///
     /// # Panics
-    /// Beyond `u32::MAX` entries.
+    /// If there are more than `u32::MAX` slots.
     pub fn insert(&mut self, value: T) -> Handle<T> {
         self.revision += 1;
         self.length += 1;
@@ -86,7 +86,7 @@ impl<T> Slots<T> {
         self.handle(index, generation)
     }
 
-    /// Takes an entry out; its handle is stale from here on.
+    /// Removes an entry. Its handle is then stale.
     ///
     /// # Errors
     /// If the handle is stale already.
@@ -97,7 +97,7 @@ impl<T> Slots<T> {
         self.revision += 1;
         self.length -= 1;
         entry.revision = self.revision;
-        // A slot that ran out of generations is retired, so that no stale handle ever becomes valid again.
+        // A slot without generations left is retired: reusing it would make a stale handle valid again.
         if let Some(next) = entry.generation.checked_add(1) {
             entry.generation = next;
             self.free.push(handle.index);
@@ -105,7 +105,7 @@ impl<T> Slots<T> {
         Ok(value)
     }
 
-    /// The entry.
+    /// Returns an entry.
     ///
     /// # Errors
     /// If the handle is stale.
@@ -117,7 +117,7 @@ impl<T> Slots<T> {
             .ok_or_else(|| handle.stale())
     }
 
-    /// The entry, to change; this counts as a change for [`Slots::revision`].
+    /// Returns an entry for modification, which counts as a change for [`Slots::revision`].
     ///
     /// # Errors
     /// If the handle is stale.
@@ -139,36 +139,36 @@ impl<T> Slots<T> {
         self.len() == 0
     }
 
-    /// One more than the highest slot in use so far: the length of an array indexed by [`Handle::index`].
+    /// The number of slots ever used: the length of an array indexed by [`Handle::index`].
     pub fn slot_count(&self) -> usize {
         self.entries.len()
     }
 
     /// The entries in slot order.
     pub fn iter(&self) -> impl Iterator<Item = (Handle<T>, &T)> {
-        self.iter_revised().map(|(handle, _, value)| (handle, value))
+        self.iter_with_revision().map(|(handle, _, value)| (handle, value))
     }
 
-    /// The entries in slot order, each with the revision at which it last changed.
-    pub fn iter_revised(&self) -> impl Iterator<Item = (Handle<T>, u64, &T)> {
+    /// The entries in slot order, each with the revision of its last change.
+    pub fn iter_with_revision(&self) -> impl Iterator<Item = (Handle<T>, u64, &T)> {
         self.entries.iter().enumerate().filter_map(|(index, entry)| {
             let handle = self.handle(index as u32, entry.generation);
             entry.value.as_ref().map(|value| (handle, entry.revision, value))
         })
     }
 
-    /// The entry in a slot, with the revision at which it last changed.
-    pub fn revised_at(&self, slot: u32) -> Option<(u64, &T)> {
+    /// The entry in a slot, with the revision of its last change.
+    pub fn get_with_revision(&self, slot: u32) -> Option<(u64, &T)> {
         let entry = self.entries.get(slot as usize)?;
         entry.value.as_ref().map(|value| (entry.revision, value))
     }
 
-    /// A number that no other collection of this process has, so that a cache knows whose entries it holds.
+    /// A number that is unique among the collections of the OS process. A cache identifies a collection by it.
     pub fn identity(&self) -> u64 {
         self.identity
     }
 
-    /// Grows whenever an entry is added, changed or removed.
+    /// A counter that grows whenever an entry is added, changed or removed.
     pub fn revision(&self) -> u64 {
         self.revision
     }
@@ -195,7 +195,7 @@ struct Entry<T> {
     value: Option<T>,
 }
 
-// Written by hand because derives would ask the same of `T`, which a handle does not hold.
+// Implemented by hand: derives would require the traits of `T`, which a handle does not contain.
 impl<T> Clone for Handle<T> {
     fn clone(&self) -> Self {
         *self
@@ -256,27 +256,27 @@ mod tests {
     }
 
     #[test]
-    fn only_what_changed_has_a_new_revision() {
+    fn only_a_changed_entry_has_a_new_revision() {
         let mut numbers = Slots::new();
         let (first, second) = (numbers.insert(1), numbers.insert(2));
         let before = numbers.revision();
         *numbers.get_mut(first).unwrap() = 10;
-        let revisions: Vec<_> = numbers.iter_revised().map(|(handle, revision, _)| (handle, revision)).collect();
+        let revisions: Vec<_> = numbers.iter_with_revision().map(|(handle, revision, _)| (handle, revision)).collect();
         assert!(revisions.iter().any(|&(handle, revision)| handle == first && revision > before));
         assert!(revisions.iter().any(|&(handle, revision)| handle == second && revision <= before));
     }
 
     #[test]
-    fn a_handle_of_another_collection_is_no_panic() {
-        let mut many = Slots::new();
-        let handles: Vec<_> = (0..3).map(|number| many.insert(number)).collect();
+    fn a_handle_of_another_collection_is_stale() {
+        let mut numbers = Slots::new();
+        let handles: Vec<_> = (0..3).map(|number| numbers.insert(number)).collect();
         assert!(Slots::<i32>::new().get(handles[2]).is_err());
-        let mut as_many = Slots::new();
+        let mut other = Slots::new();
         for number in 0..3 {
-            as_many.insert(number);
+            other.insert(number);
         }
-        assert!(as_many.get(handles[1]).is_err() && as_many.get_mut(handles[1]).is_err());
-        assert!(as_many.remove(handles[1]).is_err());
-        assert_eq!(as_many.len(), 3);
+        assert!(other.get(handles[1]).is_err() && other.get_mut(handles[1]).is_err());
+        assert!(other.remove(handles[1]).is_err());
+        assert_eq!(other.len(), 3);
     }
 }

@@ -1,6 +1,6 @@
-//! Delta commands of whole frames: they come back as they were, and take few bytes.
+//! Delta coding of the commands of whole frames is lossless and compact.
 //!
-//! The case that needs a shared scene is ignored, and never passes, where that is missing.
+//! The case that needs a shared scene is ignored if that is missing.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ fn main() -> ExitCode {
     let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza/sponza_part.obj");
     let is_missing = !sponza.is_file();
     let trials = vec![
-        Trial::test("the_projects_own_scene", || check(&demo::colonnade()?)),
+        Trial::test("colonnade", || check(&demo::colonnade()?)),
         Trial::test("shared::sponza_twenty_times", move || {
             let mut scene = obj::load(sponza)?.scene;
             demo::add_camera_and_lights(&mut scene);
@@ -28,26 +28,26 @@ fn main() -> ExitCode {
     run(&arguments, trials).exit_code()
 }
 
-/// What a command may take on average, in bytes: half of its fixed form.
-const MOST: f64 = 12.0;
+/// The largest allowed average size of a command, in bytes: half of its uncompressed size.
+const MAX_AVERAGE_BYTES: f64 = 12.0;
 
-/// Codes what each process draws in each view of a frame, by itself.
+/// Encodes and decodes each draw list of a frame by itself.
 fn check(scene: &Scene) -> Result<(), Failed> {
     let lists = draw_lists(scene)?;
     let (mut count, mut bytes) = (0, 0);
-    let mut coded = DeltaCommands::new();
+    let mut encoded = DeltaCommands::new();
     for commands in &lists {
-        coded.clear();
-        coded.extend_from_slice(commands);
-        let received = DeltaCommands::from_bytes(coded.bytes().to_vec())?;
-        if !received.iter().eq(commands.iter().copied()) {
-            return Err("not the commands that were coded".into());
+        encoded.clear();
+        encoded.extend_from_slice(commands);
+        let decoded = DeltaCommands::from_bytes(encoded.bytes().to_vec())?;
+        if !decoded.iter().eq(commands.iter().copied()) {
+            return Err("the decoded commands differ".into());
         }
         count += commands.len();
-        bytes += coded.bytes().len();
+        bytes += encoded.bytes().len();
     }
     let average = bytes as f64 / count as f64;
     println!("{count} commands in {} lists, {average:.2} bytes each", lists.len());
-    // Not a single command would be NaN.
-    if average <= MOST { Ok(()) } else { Err(format!("{average:.1} bytes a command").into()) }
+    // Without commands the average is NaN, which fails.
+    if average <= MAX_AVERAGE_BYTES { Ok(()) } else { Err(format!("{average:.1} bytes a command").into()) }
 }

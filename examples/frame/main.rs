@@ -142,7 +142,7 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
     if arguments.cull_triangles {
         let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
         for (handle, mesh) in meshes {
-            scene.replace(handle, mesh.with_triangles_culled(true))?;
+            scene.replace(handle, mesh.with_triangle_culling(true))?;
         }
     }
     Ok(scene)

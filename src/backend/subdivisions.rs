@@ -100,7 +100,7 @@ impl<T> Subdivisions<T> {
         vertices: VertexFormat,
         make: impl FnOnce(Mesh) -> Result<T, BackendError>,
     ) -> Result<Arc<Subdivided<T>>, BackendError> {
-        let (revision, mesh) = assets.meshes.revised_at(slot).ok_or_else(no_such_mesh)?;
+        let (revision, mesh) = assets.meshes.get_with_revision(slot).ok_or_else(no_such_mesh)?;
         let key = (slot, revision, level, vertices);
         let kept = self.kept.lock().get(&key).cloned();
         let found = match kept {

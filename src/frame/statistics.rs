@@ -44,7 +44,7 @@ pub struct ViewStatistics {
     /// Bundles that those fill, whether they are recorded as bundles or not.
     pub bundles: usize,
     /// Triangles that were looked at before they were drawn, and how many of them were left out, over all its processes: see
-    /// [`Mesh::with_triangles_culled`](crate::scene::Mesh::with_triangles_culled).
+    /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
     pub culled_triangles: CulledTriangles,
 }
 

@@ -27,7 +27,7 @@ impl AskingMeshes {
         }
         self.seen = Some(seen);
         self.asks.clear();
-        for (handle, ..) in assets.meshes.iter_revised().filter(|(.., mesh)| mesh.culls_triangles()) {
+        for (handle, ..) in assets.meshes.iter_with_revision().filter(|(.., mesh)| mesh.culls_triangles()) {
             self.asks.resize(handle.index() as usize, false);
             self.asks.push(true);
         }
@@ -74,7 +74,7 @@ impl PassTriangles {
         let mut room = MOST_TRIANGLES;
         let asking = (0..).zip(&list.batches).filter(|(_, batch)| asking.contains(batch.mesh));
         for (batch, drawn) in asking {
-            let count = assets.meshes.revised_at(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
+            let count = assets.meshes.get_with_revision(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
             let Some(left) = room.checked_sub(count) else { continue };
             room = left;
             let starts = (0..count).step_by(LARGEST_ITEM);

@@ -20,7 +20,7 @@ impl ValidLights {
             if let Err(error) = light.check(index) {
                 tracing::debug!(target: "drawloom", %error, "light left out");
                 rejections.count(RejectionReason::InvalidLight, index);
-            } else if light.reach().is_some_and(|(position, _)| FixedPosition::new(position).is_none()) {
+            } else if light.bounding_sphere().is_some_and(|(position, _)| FixedPosition::new(position).is_none()) {
                 rejections.count(RejectionReason::LightOutOfReach, index);
             } else if light.is_dark() {
                 rejections.count(RejectionReason::DarkLight, index);
@@ -52,7 +52,7 @@ pub(super) fn views_of(
             let reaches = |(center, radius)| {
                 cameras.iter().any(|view: &RenderView| view.frustum.intersects_sphere(center, radius))
             };
-            if !definition.casts_shadow() || !definition.reach().is_none_or(reaches) {
+            if !definition.casts_shadow() || !definition.bounding_sphere().is_none_or(reaches) {
                 continue;
             }
             let name = format!("shadow of light {index}");

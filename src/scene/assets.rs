@@ -1,10 +1,10 @@
-//! Meshes, materials and textures: what objects refer to.
+//! The collection of meshes, materials and textures.
 
 use super::{Material, Mesh, SceneError, Texture};
 use crate::handle::{Handle, Slots, StaleHandle};
 
-/// Owns meshes, materials and textures. An engine that keeps its own objects still keeps these here, so that a frame
-/// uploads each once and again only when it changes.
+/// Owns meshes, materials and textures. An engine with its own storage for objects keeps its assets here too, so that a
+/// frame uploads an asset only when it is new or has changed.
 ///
 /// ```
 /// use drawloom::glam::Vec3;
@@ -25,26 +25,26 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// Adds one.
+    /// Adds an asset.
     ///
     /// # Errors
-    /// If it is invalid, or refers to what is not here.
+    /// If the asset is invalid, or refers to an asset that is not in this collection.
     pub fn add<T: Asset>(&mut self, asset: T) -> Result<Handle<T>, SceneError> {
         asset.check(self)?;
         Ok(T::slots_mut(self).insert(asset))
     }
 
-    /// Puts another in its place; every object that refers to it changes with it.
+    /// Replaces an asset, for every object that refers to it.
     ///
     /// # Errors
-    /// If the handle is stale or the new one is invalid; nothing changes then.
+    /// If the handle is stale or the new asset is invalid. Nothing changes then.
     pub fn replace<T: Asset>(&mut self, handle: Handle<T>, asset: T) -> Result<(), SceneError> {
         asset.check(self)?;
         *T::slots_mut(self).get_mut(handle)? = asset;
         Ok(())
     }
 
-    /// Takes one out. Objects that still refer to it are rejected, and reported, by the next frame.
+    /// Removes an asset. The next frame rejects and reports objects that still refer to it.
     ///
     /// # Errors
     /// If the handle is stale.
@@ -52,7 +52,7 @@ impl Assets {
         T::slots_mut(self).remove(handle)
     }
 
-    /// Reads one.
+    /// Returns an asset.
     ///
     /// # Errors
     /// If the handle is stale.
@@ -60,13 +60,13 @@ impl Assets {
         T::slots(self).get(handle)
     }
 
-    /// All of one type, in slot order.
+    /// All assets of one type, in slot order.
     pub fn iter<T: Asset>(&self) -> impl Iterator<Item = (Handle<T>, &T)> {
         T::slots(self).iter()
     }
 }
 
-/// What [`Assets`] keeps: [`Mesh`], [`Material`] and [`Texture`].
+/// A type that [`Assets`] stores: [`Mesh`], [`Material`] and [`Texture`].
 pub trait Asset: Sized + sealed::Sealed + 'static {
     #[doc(hidden)]
     fn slots(assets: &Assets) -> &Slots<Self>;

@@ -5,64 +5,61 @@ use glam::{DVec3, Quat, Vec3};
 use super::SceneError;
 use super::transform::is_unit;
 
-/// A camera: it looks along its own −Z, +Y is up, +X to the right.
+/// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// What it is called in reports, and what its view is called.
+    /// The name of the camera and of its view, in reports.
     pub name: String,
     /// In the world, in metres.
     pub position: DVec3,
     /// From camera space to the world; of unit length.
     pub orientation: Quat,
-    /// How places become places of the picture.
+    /// How positions are projected onto the picture.
     pub projection: Projection,
-    /// The distance from which on it sees, in metres, 1e-27 or more.
+    /// The distance of the near plane, in metres, 1e-27 or more.
     pub near: f32,
-    /// The distance up to which it sees, in metres. In perspective it may be infinite; there it leaves out objects that are
-    /// farther away as a whole, and depth does not depend on it.
+    /// The distance of the far plane, in metres. In perspective it may be infinite, depth does not depend on it, and only
+    /// objects that are entirely beyond it are culled.
     pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
-    /// What the picture is for; decides which processes draw it.
+    /// The purpose of the picture, which determines the render processes that draw it.
     pub kind: ViewKind,
 }
 
-/// How places become places of the picture.
+/// How positions are projected onto the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Projection {
-    /// Through one point: what is farther is smaller.
+    /// Central projection.
     Perspective {
-        /// The angle between the picture's lower and upper edge, in radians, from a ten-thousandth of a degree to just below
-        /// π.
+        /// The vertical field of view, in radians, from 0.0001° to just below π.
         field_of_view: f32,
     },
-    /// Along parallel rays: everything is as large as it is.
+    /// Parallel projection.
     ///
-    /// In a [`ViewKind::Shadow`] picture, what is nearer than `near` is drawn as if it were just there: it casts its shadow
-    /// from however far in front of the picture it is.
+    /// In a [`ViewKind::Shadow`] view, depth is clamped to the near plane: an object in front of it still casts a shadow.
     Orthographic {
-        /// The distance between the picture's lower and upper edge, in metres, 1e-6 or more.
+        /// The height of the view volume, in metres, 1e-6 or more.
         height: f32,
     },
-    /// Everything that lies before the camera, as a mirror shaped like a paraboloid shows it: the half space becomes a disc
-    /// as wide as the picture (Brabec et al. 2002; the shadow map of L 4.2.2). Straight edges are drawn straight although
-    /// they should be curved, so meshes are subdivided as far as their angle wants it. For [`ViewKind::Shadow`] alone.
+    /// Paraboloid projection: the half space before the camera becomes a disc as wide as the picture (Brabec et al. 2002;
+    /// the shadow map of L 4.2.2). Rasterised edges are straight although the projection curves them, so meshes are
+    /// subdivided as far as the angle of their edges requires. Only for [`ViewKind::Shadow`].
     Paraboloid,
 }
 
-/// What a view's picture is for (M listing 10.4). Where the graph leaves the order of two views open, the earlier kind
-/// goes first.
+/// The purpose of a view (M listing 10.4). If two views do not depend on each other, the earlier kind comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ViewKind {
-    /// What a light sees.
+    /// The shadow map of a light.
     Shadow,
-    /// What a mirror, a portal or a screen in the scene shows.
+    /// The picture of a mirror, a portal or a screen in the scene.
     Reflection,
-    /// What a person looks at.
+    /// The picture on the screen.
     #[default]
     Main,
-    /// A picture made of pictures.
+    /// A picture composed of other pictures.
     Post,
 }
 
@@ -70,7 +67,7 @@ impl ViewKind {
     /// How many kinds there are.
     pub const COUNT: usize = 4;
 
-    /// In small letters, as reports print it.
+    /// The lower-case name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Shadow => "shadow",
@@ -86,7 +83,7 @@ impl Camera {
     /// 5 cm and a picture of 960 × 540 pixels.
     pub fn looking_at(name: impl Into<String>, position: DVec3, target: DVec3) -> Self {
         let forward = (target - position).normalize_or(DVec3::NEG_Z).as_vec3();
-        // Straight up or down leaves no upright; any perpendicular will do then.
+        // Looking straight up or down, any perpendicular serves as the right vector.
         let right = forward.cross(Vec3::Y).try_normalize().unwrap_or(Vec3::X);
         let axes = glam::Mat3::from_cols(right, right.cross(forward), -forward);
         Self {
@@ -106,9 +103,10 @@ impl Camera {
         self.size[0] as f32 / self.size[1] as f32
     }
 
+    /// Checks all fields but `size`: a minimised window reports a size of 0 × 0, which the frame handles.
+    ///
     /// # Errors
-    /// If a number is not finite or out of its range. A picture of 0 × 0 pixels is for the frame to refuse, since it is
-    /// what a window reports while it is minimised.
+    /// If a number is not finite or out of its range.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         let reason = if !self.position.is_finite() {
             "its position is not finite"
@@ -116,7 +114,7 @@ impl Camera {
             "its orientation is not of unit length"
         } else if !(self.near > 0.0 && self.near.is_finite()) {
             "its near plane is not a positive distance"
-        } else if self.near < NEAREST {
+        } else if self.near < MIN_NEAR {
             "its near plane is nearer than 1e-27 m"
         } else if self.far.is_nan() || self.far <= self.near {
             "its far plane is not beyond its near plane"
@@ -129,29 +127,29 @@ impl Camera {
     }
 
     fn projection_problem(&self) -> Option<&'static str> {
-        let in_range = |value: f32, least: f32| value >= least && value.is_finite();
+        let in_range = |value: f32, min: f32| value >= min && value.is_finite();
         match self.projection {
-            Projection::Perspective { field_of_view } => (!in_range(field_of_view, NARROWEST)
+            Projection::Perspective { field_of_view } => (!in_range(field_of_view, MIN_FIELD_OF_VIEW)
                 || field_of_view >= std::f32::consts::PI)
                 .then_some("its field of view is not between 0.0001 and 180 degrees"),
             _ if self.far.is_infinite() => Some("without perspective its far plane must be finite"),
             Projection::Orthographic { height } => {
-                (!in_range(height, LOWEST)).then_some("its height is not a distance of 1e-6 m or more")
+                (!in_range(height, MIN_HEIGHT)).then_some("its height is not a distance of 1e-6 m or more")
             }
             Projection::Paraboloid => {
-                (self.kind != ViewKind::Shadow).then_some("only what a light sees can be drawn as a paraboloid")
+                (self.kind != ViewKind::Shadow).then_some("only a shadow view can use a paraboloid projection")
             }
         }
     }
 }
 
-/// The nearest near plane in metres. Depth is its distance over that of what is seen, and what is seen may be 1.5e10 m away, from
-/// one end of the world's reach to the other: nearer than 2e-28 m, that leaves the range of f32, and nothing would be seen.
-const NEAREST: f32 = 1e-27;
+/// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to 1.5e10 m
+/// across: with a near plane below 2e-28 m, depth would underflow in f32.
+const MIN_NEAR: f32 = 1e-27;
 
-/// The lowest picture without perspective in metres: below, the steps of the places of objects, 2⁻³⁰ m, would be seen as steps of
-/// whole pixels.
-const LOWEST: f32 = 1e-6;
+/// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would be
+/// larger than a pixel.
+const MIN_HEIGHT: f32 = 1e-6;
 
-/// The narrowest field of view in radians: some 2 m at a million metres. Far below it the projection leaves the range of f32.
-const NARROWEST: f32 = 1.7e-6;
+/// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of f32.
+const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;

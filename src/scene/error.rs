@@ -1,8 +1,8 @@
-//! What can be wrong with a scene.
+//! Errors of scenes.
 
 use crate::handle::StaleHandle;
 
-/// Why something was refused by a scene.
+/// Why a scene, or a part of it, is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -12,12 +12,12 @@ pub enum SceneError {
         /// Its name.
         mesh: String,
     },
-    /// A triangle list whose last triangle is not whole.
-    #[error("mesh `{mesh}`: {indices} indices are no whole number of triangles")]
+    /// A triangle list whose number of indices is not a multiple of 3.
+    #[error("mesh `{mesh}`: {indices} indices are not a multiple of 3")]
     PartialTriangle {
         /// Its name.
         mesh: String,
-        /// How many indices it has.
+        /// The number of indices.
         indices: usize,
     },
     /// An index that points past the vertices.
@@ -27,7 +27,7 @@ pub enum SceneError {
         mesh: String,
         /// The index.
         index: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
     /// A NaN or an infinity in a vertex.
@@ -35,10 +35,10 @@ pub enum SceneError {
     NonFiniteVertex {
         /// Its name.
         mesh: String,
-        /// Which vertex.
+        /// The index of the vertex.
         vertex: usize,
     },
-    /// A mesh that no sphere of a finite radius holds.
+    /// A mesh whose bounding sphere has no finite radius.
     #[error("mesh `{mesh}` is too large for a bounding sphere")]
     MeshTooLarge {
         /// Its name.
@@ -50,25 +50,25 @@ pub enum SceneError {
         /// Its name.
         material: String,
     },
-    /// A texture of a size that cannot be, or that its bytes do not have.
+    /// A texture with an invalid size, or with a number of bytes that does not match its size.
     #[error("texture `{texture}`: {width}x{height} pixels in {bytes} bytes")]
     InvalidTexture {
         /// Its name.
         texture: String,
-        /// In pixels.
+        /// Its width in pixels.
         width: u32,
-        /// In pixels.
+        /// Its height in pixels.
         height: u32,
-        /// Bytes given.
+        /// The number of bytes.
         bytes: usize,
     },
-    /// An object whose position, orientation or scale is not finite, or whose orientation is no rotation.
+    /// An object whose position, orientation or scale is not finite, or whose orientation is not of unit length.
     #[error("object {object}: its transform is not finite, or its orientation is not of unit length")]
     InvalidTransform {
         /// Its index.
         object: usize,
     },
-    /// A light that cannot be.
+    /// An invalid light.
     #[error("light {light}: {reason}")]
     InvalidLight {
         /// Its index.
@@ -76,7 +76,7 @@ pub enum SceneError {
         /// What is wrong with it.
         reason: &'static str,
     },
-    /// A camera that cannot be.
+    /// An invalid camera.
     #[error("camera `{camera}`: {reason}")]
     InvalidCamera {
         /// Its name.
@@ -87,20 +87,20 @@ pub enum SceneError {
     /// An ambient light or a background that is negative or not finite.
     #[error("the scene's {name} is negative or not finite")]
     InvalidColor {
-        /// Which of the two.
+        /// `ambient` or `background`.
         name: &'static str,
     },
     /// Slices of a [`SceneRef`](super::SceneRef) whose lengths differ.
     #[error("the scene has {positions} positions but {count} {slice}")]
     UnequalSlices {
-        /// Which slice differs.
+        /// The name of the slice.
         slice: &'static str,
         /// Its length.
         count: usize,
         /// The length of `positions`.
         positions: usize,
     },
-    /// A handle to what was removed.
+    /// A stale handle.
     #[error(transparent)]
     StaleHandle(#[from] StaleHandle),
 }

@@ -7,29 +7,29 @@ use glam::{DVec3, Vec3};
 use super::SceneError;
 use super::transform::is_unit;
 
-/// A light. Colours are linear; directions are of unit length, in the world, the way the light travels.
+/// A light source. Colours are linear. Directions have unit length, are in world space, and point away from the light.
 ///
-/// Lights with a position fall off with the square of the distance, and are brought smoothly to 0 at their `range` by
-/// the factor (1 − (d/range)⁴)².
+/// Lights with a position fall off with the square of the distance, and the factor (1 − (d/range)⁴)² brings them smoothly
+/// to 0 at their `range`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Light {
-    /// So far away that its rays are parallel.
+    /// A light at infinity: its rays are parallel.
     Directional {
-        /// The way it travels.
+        /// The direction of the rays.
         direction: Vec3,
-        /// On a surface that faces it, per channel.
+        /// The illuminance of a surface that faces the light, per channel.
         illuminance: Vec3,
-        /// Whether objects keep it from what is behind them.
+        /// Whether objects cast shadows in this light.
         casts_shadow: bool,
     },
-    /// The same in every direction.
+    /// Equal intensity in all directions.
     Point {
         /// In the world, in metres.
         position: DVec3,
-        /// At 1 m, per channel.
+        /// Illuminance at 1 m, per channel.
         intensity: Vec3,
-        /// Where it ends, in metres.
+        /// The distance at which the light ends, in metres.
         range: f32,
     },
     /// A cone.
@@ -38,30 +38,30 @@ pub enum Light {
         position: DVec3,
         /// The cone's axis.
         direction: Vec3,
-        /// On the axis at 1 m, per channel.
+        /// Illuminance on the axis at 1 m, per channel.
         intensity: Vec3,
-        /// Where it ends, in metres.
+        /// The distance at which the light ends, in metres.
         range: f32,
-        /// Between the axis and where it begins to fade, in radians.
+        /// The angle from the axis at which the light begins to fade, in radians.
         inner_angle: f32,
-        /// Between the axis and where it is gone, in radians, up to π/2.
+        /// The angle from the axis at which the light ends, in radians, up to π/2.
         outer_angle: f32,
-        /// Whether objects keep it from what is behind them. A shadow map sees up to 85° from the axis; what the light reaches
-        /// beyond that is lit.
+        /// Whether objects cast shadows in this light. A shadow map covers up to 85° from the axis; beyond that
+        /// there are no shadows.
         casts_shadow: bool,
     },
-    /// A small lit surface that faces `direction`: it falls off with the cosine from its axis, and nothing goes backwards
-    /// (the light of L 4.2.2).
+    /// A small emissive surface that faces `direction`: intensity falls off with the cosine of the angle from the axis, and
+    /// is 0 behind the surface (the light of L 4.2.2).
     Hemispherical {
         /// In the world, in metres.
         position: DVec3,
         /// The axis.
         direction: Vec3,
-        /// On the axis at 1 m, per channel.
+        /// Illuminance on the axis at 1 m, per channel.
         intensity: Vec3,
-        /// Where it ends, in metres.
+        /// The distance at which the light ends, in metres.
         range: f32,
-        /// Whether objects keep it from what is behind them.
+        /// Whether objects cast shadows in this light.
         casts_shadow: bool,
     },
 }
@@ -72,7 +72,7 @@ impl Light {
         16.0 * intensity.max_element().max(0.0).sqrt()
     }
 
-    /// What kind of light it is.
+    /// The kind of light.
     pub fn kind(&self) -> LightKind {
         match self {
             Self::Directional { .. } => LightKind::Directional,
@@ -82,7 +82,7 @@ impl Light {
         }
     }
 
-    /// Whether objects keep it from what is behind them. Point lights cast no shadows.
+    /// Whether objects cast shadows in this light. Point lights cast no shadows.
     pub fn casts_shadow(&self) -> bool {
         match *self {
             Self::Directional { casts_shadow, .. }
@@ -92,9 +92,9 @@ impl Light {
         }
     }
 
-    /// A sphere that holds all that it reaches: its centre in the world and its radius, in metres. `None` for a directional
-    /// light, which reaches everything.
-    pub fn reach(&self) -> Option<(DVec3, f32)> {
+    /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional light,
+    /// which reaches everything.
+    pub fn bounding_sphere(&self) -> Option<(DVec3, f32)> {
         match *self {
             Self::Directional { .. } => None,
             Self::Point { position, range, .. }
@@ -103,23 +103,23 @@ impl Light {
         }
     }
 
-    /// The same, but ending where the brightest channel of its intensity has fallen to `cut_off`, if that is nearer than its
-    /// range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0 leaves it as it is, and so
-    /// does any a directional light, which does not fall off.
+    /// The same light, but ending where the illuminance of its brightest channel has fallen to `cut_off`, if that is nearer
+    /// than its range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0 changes
+    /// nothing, and none changes a directional light, which does not fall off.
     pub(crate) fn cut_off_at(mut self, cut_off: f32) -> Self {
         if let Self::Point { intensity, range, .. }
         | Self::Spot { intensity, range, .. }
         | Self::Hemispherical { intensity, range, .. } = &mut self
             && cut_off > 0.0
         {
-            // In f64 no quotient of two floats leaves the range; and a light's range is never 0.
+            // No quotient of two f32 leaves the range of f64. The range of a light must not be 0.
             let end = (f64::from(intensity.max_element()) / f64::from(cut_off)).sqrt() as f32;
             *range = range.min(end.max(f32::MIN_POSITIVE));
         }
         self
     }
 
-    /// Whether it gives no light at all.
+    /// Whether the light is black.
     pub(crate) fn is_dark(&self) -> bool {
         let (Self::Directional { illuminance: color, .. }
         | Self::Point { intensity: color, .. }
@@ -128,22 +128,23 @@ impl Light {
         color == Vec3::ZERO
     }
 
-    /// Says what is wrong with it, if anything.
+    /// # Errors
+    /// If a number is not finite or out of its range. `index` is the light's index in the scene, for the message.
     pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
         let problem = match *self {
             Self::Directional { direction, illuminance, .. } => {
                 direction_problem(direction).or_else(|| color_problem(illuminance))
             }
             Self::Point { position, intensity, range } => {
-                place_problem(position, range).or_else(|| color_problem(intensity))
+                position_problem(position, range).or_else(|| color_problem(intensity))
             }
             Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
-                place_problem(position, range)
+                position_problem(position, range)
                     .or_else(|| color_problem(intensity))
                     .or_else(|| direction_problem(direction))
                     .or_else(|| cone_problem(inner_angle, outer_angle))
             }
-            Self::Hemispherical { position, direction, intensity, range, .. } => place_problem(position, range)
+            Self::Hemispherical { position, direction, intensity, range, .. } => position_problem(position, range)
                 .or_else(|| color_problem(intensity))
                 .or_else(|| direction_problem(direction)),
         };
@@ -151,7 +152,7 @@ impl Light {
     }
 }
 
-/// What kind a [`Light`] is.
+/// The kind of a [`Light`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum LightKind {
@@ -166,10 +167,10 @@ pub enum LightKind {
 }
 
 impl LightKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 4] = [Self::Directional, Self::Point, Self::Spot, Self::Hemispherical];
 
-    /// In small letters, as reports print it.
+    /// The lower-case name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Directional => "directional",
@@ -188,7 +189,7 @@ fn color_problem(color: Vec3) -> Option<&'static str> {
     (!color.is_finite() || color.min_element() < 0.0).then_some("its intensity is negative or not finite")
 }
 
-fn place_problem(position: DVec3, range: f32) -> Option<&'static str> {
+fn position_problem(position: DVec3, range: f32) -> Option<&'static str> {
     if !position.is_finite() {
         Some("its position is not finite")
     } else if !(range > 0.0 && range.is_finite()) {
@@ -200,7 +201,7 @@ fn place_problem(position: DVec3, range: f32) -> Option<&'static str> {
 
 fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
     let ordered = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
-    // Shaders fade between the cosines, which must differ.
+    // Shaders fade between the cosines, so these must differ.
     let distinct = inner.cos() > outer.cos();
     (!ordered || !distinct)
         .then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees, or too close to fade")
@@ -212,7 +213,7 @@ mod tests {
 
     use super::*;
 
-    /// What a light brings to a surface that faces it on its axis: `illuminance_from` in `illumination.wgsl`, in f64.
+    /// The illuminance of a surface that faces the light on its axis: `illuminance_from` in `illumination.wgsl`, in f64.
     fn illuminance(intensity: f64, range: f64, distance: f64) -> f64 {
         if distance >= range {
             return 0.0;
@@ -234,9 +235,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(5_000))]
 
-        /// The bound that `Quality::light_cut_off` states, against the light as it is and against one that never ends.
+        /// Compares with the original light and with one without a range.
         #[test]
-        fn what_is_cut_off_is_less_than_stated(
+        fn the_error_of_a_cut_off_is_within_the_bound_of_quality(
             exponents in prop::array::uniform3(-6.0..6.0_f32),
             range in -3.0..6.0_f32,
             cut_off in -8.0..3.0_f32,
@@ -246,16 +247,16 @@ mod tests {
             let (range, cut_off) = (10_f32.powf(range), 10_f32.powf(cut_off));
             let bound = 1.089 * f64::from(cut_off);
             for light in lights(intensity, range) {
-                let (_, end) = light.cut_off_at(cut_off).reach().unwrap();
+                let (_, end) = light.cut_off_at(cut_off).bounding_sphere().unwrap();
                 prop_assert!(end <= range);
                 let distance = share * f64::from(end);
                 for channel in intensity.to_array().map(f64::from) {
-                    let drawn = illuminance(channel, f64::from(end), distance);
-                    let own = illuminance(channel, f64::from(range), distance);
-                    prop_assert!(drawn <= own * (1.0 + 1e-12) && own - drawn <= bound, "{own} {drawn}");
+                    let cut = illuminance(channel, f64::from(end), distance);
+                    let original = illuminance(channel, f64::from(range), distance);
+                    prop_assert!(cut <= original * (1.0 + 1e-12) && original - cut <= bound, "{original} {cut}");
                     if end < range {
                         let untruncated = channel / (distance * distance);
-                        prop_assert!(untruncated - drawn <= bound, "{untruncated} {drawn}");
+                        prop_assert!(untruncated - cut <= bound, "{untruncated} {cut}");
                     }
                 }
             }
@@ -263,9 +264,9 @@ mod tests {
     }
 
     #[test]
-    fn lights_end_where_they_have_fallen_to_the_cut_off() {
+    fn a_light_ends_where_its_illuminance_has_fallen_to_the_cut_off() {
         for light in lights(Vec3::new(1.0, 9.0, 4.0), 100.0) {
-            let reach = |cut_off| light.cut_off_at(cut_off).reach().map(|(_, range)| range);
+            let reach = |cut_off| light.cut_off_at(cut_off).bounding_sphere().map(|(_, range)| range);
             assert_eq!(light.cut_off_at(0.0), light);
             assert_eq!([reach(1.0), reach(0.01), reach(1e-9)], [Some(3.0), Some(30.0), Some(100.0)]);
         }
@@ -274,10 +275,10 @@ mod tests {
     }
 
     #[test]
-    fn no_cut_off_leaves_a_light_that_cannot_be() {
-        let least = f32::from_bits(1);
-        for intensity in [0.0, least, f32::MIN_POSITIVE, 1.0, f32::MAX] {
-            for cut_off in [least, 1.0, f32::MAX] {
+    fn a_light_stays_valid_after_any_cut_off() {
+        let smallest = f32::from_bits(1);
+        for intensity in [0.0, smallest, f32::MIN_POSITIVE, 1.0, f32::MAX] {
+            for cut_off in [smallest, 1.0, f32::MAX] {
                 for light in lights(Vec3::splat(intensity), 5.0) {
                     assert_eq!(light.cut_off_at(cut_off).check(0), Ok(()), "{intensity} {cut_off}");
                 }

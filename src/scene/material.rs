@@ -5,22 +5,22 @@ use glam::Vec3;
 use super::SceneError;
 use crate::handle::Handle;
 
-/// What a surface is made of.
+/// The optical properties of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// What it is called in reports.
+    /// The name in reports.
     pub name: String,
-    /// The share of light reflected diffusely, linear; above 1 a surface reflects more light than it gets.
+    /// Diffuse reflectance, linear. Above 1, a surface reflects more light than it receives.
     pub diffuse: Vec3,
-    /// Multiplies `diffuse` where there is one.
+    /// Multiplied by `diffuse`, if there is one.
     pub texture: Option<Handle<Texture>>,
-    /// Radiance given off, linear; 0 for most.
+    /// Emitted radiance, linear.
     pub emission: Vec3,
-    /// 0 lets everything through, 1 nothing. Only blended materials use it.
+    /// 0 is transparent, 1 is opaque. Only blended materials use it.
     pub opacity: f32,
-    /// How it mixes with what is behind it.
+    /// How the surface is blended with what is behind it.
     pub blend: Blend,
-    /// Whether triangles that face away are drawn too.
+    /// Whether back faces are drawn too.
     pub double_sided: bool,
 }
 
@@ -47,22 +47,22 @@ impl Material {
     }
 }
 
-/// How a surface mixes with what is behind it (M listing 10.1).
+/// How a surface is blended with what is behind it (M listing 10.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Blend {
-    /// It hides what is behind it.
+    /// It covers what is behind it.
     #[default]
     None = 0,
-    /// Over what is behind it, by its opacity.
+    /// It is blended over what is behind it by its opacity.
     Alpha = 1,
-    /// Added to what is behind it.
+    /// It is added to what is behind it.
     Additive = 2,
-    /// Taken from what is behind it.
+    /// It is subtracted from what is behind it.
     Subtractive = 3,
 }
 
-/// A picture that a material can carry.
+/// An RGBA image for a material.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     name: String,
@@ -72,16 +72,16 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// The largest width and height: what every wgpu adapter can hold.
-    pub const LARGEST: u32 = 8192;
+    /// The largest width and height, which every wgpu adapter supports.
+    pub const MAX_SIZE: u32 = 8192;
 
     /// A texture of RGBA bytes, sRGB encoded, rows from top to bottom without padding.
     ///
     /// # Errors
-    /// If width or height is 0 or above [`Texture::LARGEST`], or the number of bytes is not `width * height * 4`.
+    /// If width or height is 0 or above [`Texture::MAX_SIZE`], or the number of bytes is not `width * height * 4`.
     pub fn new(name: impl Into<String>, width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, SceneError> {
         let name = name.into();
-        let sides = 1..=Self::LARGEST;
+        let sides = 1..=Self::MAX_SIZE;
         let fits = |bytes: usize| bytes == width as usize * height as usize * 4;
         if !sides.contains(&width) || !sides.contains(&height) || !fits(pixels.len()) {
             return Err(SceneError::InvalidTexture { texture: name, width, height, bytes: pixels.len() });
@@ -89,7 +89,7 @@ impl Texture {
         Ok(Self { name, width, height, pixels })
     }
 
-    /// What it is called in reports.
+    /// The name in reports.
     pub fn name(&self) -> &str {
         &self.name
     }

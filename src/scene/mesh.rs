@@ -6,8 +6,7 @@ use glam::Vec3;
 
 use super::SceneError;
 
-/// A mesh: vertices, indices into them, and how indices make triangles. Right-handed, counter-clockwise triangles face
-/// the viewer, lengths in metres in the object's own space.
+/// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     name: String,
@@ -21,11 +20,11 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// A mesh, with its bounds and the length of its longest edge.
+    /// Checks the parts, and computes bounds and the length of the longest edge.
     ///
     /// # Errors
-    /// If it has no triangle, if an index points past the vertices, if a triangle list is not made of whole triangles,
-    /// if a vertex is not finite, or if no sphere of a finite radius holds them all.
+    /// If the mesh has no triangle, an index is out of range, the number of indices of a triangle list is not a multiple of
+    /// 3, a vertex is not finite, or the bounding sphere has no finite radius.
     pub fn new(
         name: impl Into<String>,
         topology: Topology,
@@ -45,59 +44,59 @@ impl Mesh {
         if let Some(vertex) = vertices.iter().position(|vertex| !vertex.is_finite()) {
             return Err(SceneError::NonFiniteVertex { mesh: name, vertex });
         }
-        let mesh = Self::measured(name, topology, vertices, indices);
+        let mesh = Self::from_valid_parts(name, topology, vertices, indices);
         if !mesh.bounds.is_valid() {
             return Err(SceneError::MeshTooLarge { mesh: mesh.name });
         }
         Ok(mesh)
     }
 
-    /// A mesh of parts that are known to fit each other.
-    pub(super) fn measured(name: String, topology: Topology, vertices: Vec<Vertex>, indices: Vec<u32>) -> Self {
+    /// Computes bounds and the length of the longest edge of a mesh whose parts are known to be valid.
+    pub(super) fn from_valid_parts(name: String, topology: Topology, vertices: Vec<Vertex>, indices: Vec<u32>) -> Self {
         let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
         let start = Vec3::from(vertices.first().map_or([0.0; 3], |vertex| vertex.position));
         let corners = vertices.iter().fold([start; 2], |[low, high], vertex| {
-            let place = Vec3::from(vertex.position);
-            [low.min(place), high.max(place)]
+            let position = Vec3::from(vertex.position);
+            [low.min(position), high.max(position)]
         });
         let mut mesh =
             Self { name, topology, vertices, indices, bounds, corners, longest_edge: 0.0, culls_triangles: false };
         let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
-        let edges = triangles.filter(has_three_places).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let edges = triangles.filter(has_distinct_corners).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
         mesh.longest_edge = root_rounded_up(longest_squared);
         mesh
     }
 
-    /// The same mesh with its triangles culled, or not. If they are, they are looked at for every view in each frame before they are
-    /// drawn, and those that nobody sees are left out, as
-    /// [`RenderView::cull_triangles`](crate::view::RenderView::cull_triangles) tells them. A strip becomes a list for it.
+    /// Enables or disables triangle culling. If enabled, each frame tests every triangle in every view, and leaves out those
+    /// that [`RenderView::cull_triangles`](crate::view::RenderView::cull_triangles) finds invisible. Enabling it turns a strip
+    /// into a list.
     ///
-    /// It pays for large meshes where the device is what is waited for, and has more to do for a vertex than a processor for a
-    /// triangle. Each object of such a mesh is a draw of its own. It is for meshes that are drawn where they stand: a shader that moves
-    /// vertices would be without triangles that it brings into view.
+    /// It is worth it for large meshes in frames that are limited by the device, if the device takes longer for a vertex than
+    /// a CPU core for a triangle. Each object of such a mesh is a draw of its own. Shaders must not move the vertices of such
+    /// a mesh: triangles that a shader would move into view may be missing.
     ///
-    /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass looks at 11 million of them
-    /// at most; objects beyond are drawn whole.
-    pub fn with_triangles_culled(mut self, culled: bool) -> Self {
-        if culled && self.topology == Topology::TriangleStrip {
+    /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
+    /// triangles at most; further objects are drawn whole.
+    pub fn with_triangle_culling(mut self, enabled: bool) -> Self {
+        if enabled && self.topology == Topology::TriangleStrip {
             (self.topology, self.indices) = (Topology::TriangleList, self.triangles().flatten().collect());
         }
-        self.culls_triangles = culled;
+        self.culls_triangles = enabled;
         self
     }
 
-    /// Whether triangles of it that nobody sees are left out of each view: see [`Mesh::with_triangles_culled`].
+    /// Whether triangle culling is enabled: see [`Mesh::with_triangle_culling`].
     pub fn culls_triangles(&self) -> bool {
         self.culls_triangles
     }
 
-    /// What it is called in reports.
+    /// The name in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// How indices make triangles.
+    /// How indices form triangles.
     pub fn topology(&self) -> Topology {
         self.topology
     }
@@ -112,18 +111,18 @@ impl Mesh {
         &self.indices
     }
 
-    /// The sphere that holds every vertex.
+    /// The bounding sphere of all vertices.
     pub fn bounds(&self) -> Bounds {
         self.bounds
     }
 
-    /// The lowest and the highest corner of the box around its vertices, along the axes of object space, in metres.
+    /// The lowest and highest corner of the axis-aligned bounding box in object space.
     pub fn corners(&self) -> [Vec3; 2] {
         self.corners
     }
 
-    /// The length of the longest edge of its triangles, in metres in object space: rounded up from f64, and infinite past
-    /// the end of f32. A triangle with two corners at one place draws nothing, and does not count.
+    /// The length of the longest edge, in metres in object space: rounded up from f64, and infinite beyond the range of f32.
+    /// Triangles with two corners at the same position draw nothing and do not count.
     pub fn longest_edge(&self) -> f32 {
         self.longest_edge
     }
@@ -136,29 +135,28 @@ impl Mesh {
         }
     }
 
-    /// The indices of each triangle's corners, counter-clockwise seen from its visible side.
+    /// The indices of each triangle's corners, counter-clockwise seen from its front.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.triangles_in(0..self.triangle_count())
     }
 
-    /// Those of some of the triangles, by their number.
+    /// The same for a range of triangles.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If the range exceeds the number of triangles.
     pub(crate) fn triangles_in(&self, numbers: Range<usize>) -> impl Iterator<Item = [u32; 3]> + '_ {
-        let (step, turned) = match self.topology {
+        let (step, alternates) = match self.topology {
             Topology::TriangleList => (3, false),
             Topology::TriangleStrip => (1, true),
         };
         let indices = &self.indices[numbers.start * step..];
         let triangles = numbers.zip(indices.array_windows().step_by(step));
-        triangles.map(move |(number, &[a, b, c])| if turned && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
+        triangles.map(move |(number, &[a, b, c])| if alternates && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
     }
 }
 
-/// Whether a triangle's corners are at three different places. One that has no three of them has no area either, and stays
-/// without one however it is projected.
-pub(super) fn has_three_places(triangle: &[Vertex; 3]) -> bool {
+/// Whether a triangle's corners are at three different positions. Otherwise it has no area in any projection.
+pub(super) fn has_distinct_corners(triangle: &[Vertex; 3]) -> bool {
     let [a, b, c] = triangle.map(|vertex| vertex.position);
     a != b && b != c && c != a
 }
@@ -170,20 +168,20 @@ fn root_rounded_up(square: f64) -> f32 {
     if f64::from(root) * f64::from(root) < square { root.next_up() } else { root }
 }
 
-/// A vertex, as it lies in memory and in the vertex buffer.
+/// A vertex, with the layout of the vertex buffer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
     /// In object space, in metres.
     pub position: [f32; 3],
-    /// In object space. Only its direction counts; a normal of 0 stands for the triangle's own.
+    /// In object space, of any length. A normal of 0 means the geometric normal of the triangle.
     pub normal: [f32; 3],
-    /// Texture coordinates: (0, 0) is the picture's top left, (1, 1) its bottom right, and they repeat.
+    /// Texture coordinates: (0, 0) is the top left and (1, 1) the bottom right of the texture, which repeats.
     pub uv: [f32; 2],
 }
 
 impl Vertex {
-    /// The square of the distance in metres, the same to the bit from either of the two.
+    /// The squared distance in metres. Both orders of the vertices give the same bits.
     pub(super) fn distance_squared(&self, other: &Self) -> f64 {
         Vec3::from(self.position).as_dvec3().distance_squared(Vec3::from(other.position).as_dvec3())
     }
@@ -193,14 +191,14 @@ impl Vertex {
     }
 }
 
-/// How indices make triangles (M listing 10.1).
+/// How indices form triangles (M listing 10.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Topology {
-    /// Every three indices are a triangle.
+    /// Every three indices form a triangle.
     #[default]
     TriangleList = 0,
-    /// Every index from the third on makes a triangle with the two before it; every second one is wound the other way.
+    /// Every index from the third on forms a triangle with the two before it, with alternating winding.
     TriangleStrip = 1,
 }
 
@@ -214,7 +212,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// A sphere that holds all points: centred on their box, and grown by what rounding may have lost.
+    /// A sphere around all points: it is centred on their bounding box, and its radius is rounded up.
     pub fn around(points: impl Iterator<Item = Vec3> + Clone) -> Self {
         let Some((low, high)) = points.clone().fold(None, |range: Option<(Vec3, Vec3)>, point| {
             let (low, high) = range.unwrap_or((point, point));
@@ -242,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_meshes_are_refused_by_name() {
+    fn an_invalid_mesh_is_an_error_with_its_name() {
         let corners = vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0)];
         let make = |vertices, indices| Mesh::new("leaf", Topology::TriangleList, vertices, indices);
         assert!(matches!(make(corners.clone(), vec![]), Err(SceneError::EmptyMesh { mesh }) if mesh == "leaf"));
@@ -257,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_every_point_at_every_magnitude() {
+    fn bounds_contain_every_point_at_every_magnitude() {
         for scale in [1e-20_f32, 1e-3, 1.0, 1e6, 1e30] {
             let points = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(-4.0, 0.1, 7.3), Vec3::new(0.3, -9.0, 2.0)];
             let scaled = points.map(|point| point * scale);
@@ -268,18 +266,17 @@ mod tests {
         }
     }
 
-    /// Both are held against the edges of the list that the strip is.
     #[test]
-    fn the_longest_edge_is_rounded_up_and_no_further() {
+    fn the_longest_edge_is_rounded_up_to_the_next_f32() {
         for scale in [1e-40_f32, 1e-20, 0.1, 1.0, 3e7, 1e30] {
-            let places = [[0.1, 0.2, 0.3], [1.7, 0.0, -0.4], [0.3, 2.9, 0.7], [-0.9, 2.2, 5.3], [0.3, 0.2, 0.1]];
-            let corners: Vec<_> = places.iter().map(|[x, y, z]| corner(x * scale, y * scale, z * scale)).collect();
+            let positions = [[0.1, 0.2, 0.3], [1.7, 0.0, -0.4], [0.3, 2.9, 0.7], [-0.9, 2.2, 5.3], [0.3, 0.2, 0.1]];
+            let corners: Vec<_> = positions.iter().map(|[x, y, z]| corner(x * scale, y * scale, z * scale)).collect();
             let strip = Mesh::new("strip", Topology::TriangleStrip, corners.clone(), vec![0, 1, 2, 3, 4]).unwrap();
             let list = vec![0, 1, 2, 1, 3, 2, 2, 3, 4];
             assert!(strip.triangles().flatten().eq(list.iter().copied()));
             let edges = [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]];
-            let place = |index: usize| Vec3::from(corners[index].position).as_dvec3();
-            let longest = edges.iter().map(|&[a, b]| place(a).distance(place(b))).fold(0.0, f64::max);
+            let position = |index: usize| Vec3::from(corners[index].position).as_dvec3();
+            let longest = edges.iter().map(|&[a, b]| position(a).distance(position(b))).fold(0.0, f64::max);
             for mesh in [&strip, &Mesh::new("list", Topology::TriangleList, corners.clone(), list).unwrap()] {
                 let edge = mesh.longest_edge();
                 assert!(
@@ -291,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_that_f32_can_hold_is_not_rounded() {
+    fn an_edge_length_that_f32_represents_is_not_rounded() {
         let longest_of = |corners: [Vertex; 3]| {
             Mesh::new("leaf", Topology::TriangleList, corners.to_vec(), vec![0, 1, 2]).unwrap().longest_edge()
         };

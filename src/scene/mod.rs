@@ -1,6 +1,7 @@
-//! What is drawn: objects, meshes, materials, lights and cameras.
+//! Scenes: objects, meshes, materials, lights and cameras.
 //!
-//! [`SceneRef`] is what a frame reads; [`Scene`] owns one, and an engine with storage of its own lends its slices instead.
+//! A frame reads a [`SceneRef`], which borrows slices. [`Scene`] owns such slices; an engine with storage of its own lends
+//! its own instead.
 
 mod assets;
 mod camera;

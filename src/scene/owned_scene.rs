@@ -1,4 +1,4 @@
-//! The shipped scene.
+//! A scene that owns its objects and assets.
 
 use glam::{DVec3, Quat, Vec3};
 
@@ -6,7 +6,7 @@ use super::transform::transform_is_valid;
 use super::{Asset, Assets, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use crate::handle::{Handle, Slots, StaleHandle};
 
-/// A scene that owns its objects as one array a property, and their assets. Everything can be added, changed and removed
+/// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
 /// between frames.
 ///
 /// ```
@@ -23,19 +23,19 @@ use crate::handle::{Handle, Slots, StaleHandle};
 /// ```
 #[derive(Debug, Default)]
 pub struct Scene {
-    /// A view for each.
+    /// The cameras; each has a view.
     pub cameras: Vec<Camera>,
     /// The lights.
     pub lights: Vec<Light>,
-    /// Radiance that reaches every surface from everywhere, linear: a surface of diffuse 1 then looks just as bright.
+    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this radiance.
     pub ambient: Vec3,
-    /// Radiance where nothing is, linear.
+    /// The radiance of the background, linear.
     pub background: Vec3,
     assets: Assets,
-    /// Where in the arrays below each object is.
-    places: Slots<usize>,
-    /// The way back from the arrays.
-    owners: Vec<Handle<usize>>,
+    /// The index of each object in the arrays below.
+    indices: Slots<usize>,
+    /// The handle of each object, by index.
+    handles: Vec<Handle<usize>>,
     positions: Vec<DVec3>,
     orientations: Vec<Quat>,
     scales: Vec<Vec3>,
@@ -48,23 +48,23 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ObjectHandle(Handle<usize>);
 
-/// One thing to draw (M 10.3's `RenderObject`): it says where it is, what its triangles are and what it is made of.
+/// An object to draw (M 10.3's `RenderObject`): a transform, a mesh and a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderObject {
-    /// Its origin in the world, in metres.
+    /// The object's origin in the world, in metres.
     pub position: DVec3,
-    /// From object space to the world's axes; of unit length.
+    /// The rotation from object space to the world; of unit length.
     pub orientation: Quat,
-    /// Along its own axes, applied first.
+    /// The scale along the object's own axes, applied before the rotation.
     pub scale: Vec3,
-    /// Its triangles.
+    /// The mesh.
     pub mesh: Handle<Mesh>,
-    /// What it is made of.
+    /// The material.
     pub material: Handle<Material>,
 }
 
 impl RenderObject {
-    /// An object at `position`, neither turned nor scaled.
+    /// An object at `position`, without rotation and scale.
     pub fn new(mesh: Handle<Mesh>, material: Handle<Material>, position: DVec3) -> Self {
         Self { position, orientation: Quat::IDENTITY, scale: Vec3::ONE, mesh, material }
     }
@@ -76,7 +76,7 @@ impl Scene {
         Self::default()
     }
 
-    /// What a frame reads.
+    /// The scene as a frame reads it.
     pub fn as_scene_ref(&self) -> SceneRef<'_> {
         SceneRef {
             positions: &self.positions,
@@ -96,80 +96,80 @@ impl Scene {
     /// Adds an object.
     ///
     /// # Errors
-    /// If its transform is not finite, its orientation is no rotation, or a handle is stale.
+    /// If its transform is not finite, its orientation is not of unit length, or a handle is stale.
     pub fn add_object(&mut self, object: RenderObject) -> Result<ObjectHandle, SceneError> {
-        let place = self.positions.len();
-        let bounds = self.check(&object, place)?;
-        let owner = self.places.insert(place);
-        self.owners.push(owner);
+        let index = self.positions.len();
+        let bounds = self.check(&object, index)?;
+        let handle = self.indices.insert(index);
+        self.handles.push(handle);
         self.positions.push(object.position);
         self.orientations.push(object.orientation);
         self.scales.push(object.scale);
         self.bounds.push(bounds);
         self.meshes.push(object.mesh);
         self.materials.push(object.material);
-        Ok(ObjectHandle(owner))
+        Ok(ObjectHandle(handle))
     }
 
-    /// Changes an object.
+    /// Replaces an object.
     ///
     /// # Errors
-    /// As [`Scene::add_object`], and if the object was removed. Nothing changes then.
+    /// As [`Scene::add_object`], and if the object has been removed. Nothing changes then.
     pub fn replace_object(&mut self, handle: ObjectHandle, object: RenderObject) -> Result<(), SceneError> {
-        let place = self.place(handle)?;
-        let bounds = self.check(&object, place)?;
-        self.positions[place] = object.position;
-        self.orientations[place] = object.orientation;
-        self.scales[place] = object.scale;
-        self.bounds[place] = bounds;
-        self.meshes[place] = object.mesh;
-        self.materials[place] = object.material;
+        let index = self.index_of(handle)?;
+        let bounds = self.check(&object, index)?;
+        self.positions[index] = object.position;
+        self.orientations[index] = object.orientation;
+        self.scales[index] = object.scale;
+        self.bounds[index] = bounds;
+        self.meshes[index] = object.mesh;
+        self.materials[index] = object.material;
         Ok(())
     }
 
-    /// Takes an object out. The last one takes its index.
+    /// Removes an object. The last object moves to its index.
     ///
     /// # Errors
-    /// If it was removed already.
+    /// If the object has been removed already.
     pub fn remove_object(&mut self, handle: ObjectHandle) -> Result<RenderObject, StaleHandle> {
         let object = self.object(handle)?;
-        let place = self.places.remove(handle.0).map_err(as_object)?;
-        self.owners.swap_remove(place);
-        self.positions.swap_remove(place);
-        self.orientations.swap_remove(place);
-        self.scales.swap_remove(place);
-        self.bounds.swap_remove(place);
-        self.meshes.swap_remove(place);
-        self.materials.swap_remove(place);
-        if let Some(&moved) = self.owners.get(place) {
-            *self.places.get_mut(moved).map_err(as_object)? = place;
+        let index = self.indices.remove(handle.0).map_err(as_object)?;
+        self.handles.swap_remove(index);
+        self.positions.swap_remove(index);
+        self.orientations.swap_remove(index);
+        self.scales.swap_remove(index);
+        self.bounds.swap_remove(index);
+        self.meshes.swap_remove(index);
+        self.materials.swap_remove(index);
+        if let Some(&moved) = self.handles.get(index) {
+            *self.indices.get_mut(moved).map_err(as_object)? = index;
         }
         Ok(object)
     }
 
-    /// An object as it is.
+    /// Returns an object.
     ///
     /// # Errors
-    /// If it was removed.
+    /// If the object has been removed.
     pub fn object(&self, handle: ObjectHandle) -> Result<RenderObject, StaleHandle> {
-        let place = self.place(handle)?;
+        let index = self.index_of(handle)?;
         Ok(RenderObject {
-            position: self.positions[place],
-            orientation: self.orientations[place],
-            scale: self.scales[place],
-            mesh: self.meshes[place],
-            material: self.materials[place],
+            position: self.positions[index],
+            orientation: self.orientations[index],
+            scale: self.scales[index],
+            mesh: self.meshes[index],
+            material: self.materials[index],
         })
     }
 
-    /// Each object `copies` times over, at the same place, as in L 6: more draws, the same picture. 1 changes nothing, and
-    /// 0 counts as 1.
+    /// Adds copies, so that each object is there `copies` times at the same position, as in L 6: more draws, the same
+    /// picture. 0 and 1 change nothing.
     pub fn duplicate_objects(&mut self, copies: usize) {
         let originals = self.positions.len();
         for _ in 1..copies {
-            for place in 0..originals {
-                self.owners.push(self.places.insert(self.positions.len()));
-                self.positions.push(self.positions[place]);
+            for index in 0..originals {
+                self.handles.push(self.indices.insert(self.positions.len()));
+                self.positions.push(self.positions[index]);
             }
             self.orientations.extend_from_within(..originals);
             self.scales.extend_from_within(..originals);
@@ -184,9 +184,9 @@ impl Scene {
         self.positions.len()
     }
 
-    /// The objects' handles, in the order of their indices.
+    /// The handles of all objects, by index.
     pub fn objects(&self) -> impl Iterator<Item = ObjectHandle> {
-        self.owners.iter().copied().map(ObjectHandle)
+        self.handles.iter().copied().map(ObjectHandle)
     }
 
     /// Meshes, materials and textures.
@@ -197,7 +197,7 @@ impl Scene {
     /// See [`Assets::add`].
     ///
     /// # Errors
-    /// If it is invalid, or refers to what is not here.
+    /// If the asset is invalid, or refers to an asset that is not in this scene.
     pub fn add<T: Asset>(&mut self, asset: T) -> Result<Handle<T>, SceneError> {
         self.assets.add(asset)
     }
@@ -205,12 +205,12 @@ impl Scene {
     /// See [`Assets::replace`].
     ///
     /// # Errors
-    /// If the handle is stale or the new one is invalid; nothing changes then.
+    /// If the handle is stale or the new asset is invalid. Nothing changes then.
     pub fn replace<T: Asset>(&mut self, handle: Handle<T>, asset: T) -> Result<(), SceneError> {
         let meshes_before = self.assets.meshes.revision();
         self.assets.replace(handle, asset)?;
         if self.assets.meshes.revision() != meshes_before {
-            // It was a mesh: what objects copied of it is renewed.
+            // The asset is a mesh, and the bounds of its objects are copies.
             for (bounds, &mesh) in
                 self.bounds.iter_mut().zip(&self.meshes).filter(|(_, mesh)| mesh.index() == handle.index())
             {
@@ -230,13 +230,13 @@ impl Scene {
         self.assets.remove(handle)
     }
 
-    fn place(&self, handle: ObjectHandle) -> Result<usize, StaleHandle> {
-        self.places.get(handle.0).copied().map_err(as_object)
+    fn index_of(&self, handle: ObjectHandle) -> Result<usize, StaleHandle> {
+        self.indices.get(handle.0).copied().map_err(as_object)
     }
 
-    fn check(&self, object: &RenderObject, place: usize) -> Result<Bounds, SceneError> {
+    fn check(&self, object: &RenderObject, index: usize) -> Result<Bounds, SceneError> {
         if !transform_is_valid(object.position, object.orientation, object.scale) {
-            return Err(SceneError::InvalidTransform { object: place });
+            return Err(SceneError::InvalidTransform { object: index });
         }
         self.assets.get(object.material)?;
         Ok(self.assets.get(object.mesh)?.bounds())
@@ -262,8 +262,8 @@ mod tests {
         let mut scene = Scene::new();
         let mesh = scene.add(triangle(1.0)).unwrap();
         let material = scene.add(Material::default()).unwrap();
-        let place = |number| RenderObject::new(mesh, material, DVec3::X * number as f64);
-        let handles = (0..count).map(|number| scene.add_object(place(number)).unwrap()).collect();
+        let object = |number| RenderObject::new(mesh, material, DVec3::X * number as f64);
+        let handles = (0..count).map(|number| scene.add_object(object(number)).unwrap()).collect();
         (scene, handles)
     }
 
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_that_is_not_finite_is_refused_where_it_enters() {
+    fn an_invalid_transform_is_an_error() {
         let (mut scene, handles) = scene_of(1);
         let good = scene.object(handles[0]).unwrap();
         for bad in [
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn replacing_a_mesh_renews_the_bounds_of_its_objects() {
+    fn replacing_a_mesh_updates_the_bounds_of_its_objects() {
         let (mut scene, handles) = scene_of(2);
         let mesh = scene.object(handles[0]).unwrap().mesh;
         let before = scene.as_scene_ref().bounds[1].radius;
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn copies_coincide_with_their_originals() {
+    fn duplicates_have_the_transforms_of_their_originals() {
         let (mut scene, _) = scene_of(3);
         scene.duplicate_objects(4);
         let reference = scene.as_scene_ref();

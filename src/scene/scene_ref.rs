@@ -1,4 +1,4 @@
-//! What a frame reads.
+//! A scene as borrowed slices.
 
 use glam::{DVec3, Quat, Vec3};
 
@@ -6,36 +6,36 @@ use super::transform::transform_is_valid;
 use super::{Assets, Bounds, Camera, Light, Material, Mesh, SceneError};
 use crate::handle::Handle;
 
-/// A scene as a frame reads it: borrowed slices, one entry an object, so that an engine hands over its own storage
-/// without copying. [`Scene`](super::Scene) is one source of it.
+/// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
+/// copying. [`Scene::as_scene_ref`](super::Scene::as_scene_ref) returns one, too.
 ///
-/// It is read only while a frame is recorded; the borrow ends, and the engine has its world back, when
-/// [`Renderer::record`](crate::Renderer::record) returns (L 3).
+/// Only [`Renderer::record`](crate::Renderer::record) reads it. When that returns, the borrow ends and the engine may change
+/// its world (L 3).
 #[derive(Clone, Copy, Debug)]
 pub struct SceneRef<'a> {
-    /// Where each object's origin is in the world, in metres. Anywhere up to 2³² m, 4.3 million kilometres, from the
-    /// world's origin.
+    /// The origin of each object in the world, in metres: up to 2³² m, 4.3 million kilometres, from the world's origin.
     pub positions: &'a [DVec3],
-    /// From object space to the world's axes; of unit length.
+    /// The rotation from object space to the world; of unit length.
     pub orientations: &'a [Quat],
-    /// Along the object's own axes, applied first; negative mirrors. A vertex is drawn within some millionth of its distance of
-    /// where it belongs, so what is as many times as large as it is far does not lie where it should.
+    /// The scale along the object's own axes, applied before the rotation; negative factors mirror. The position of a vertex
+    /// is accurate to about a millionth of its distance. The error grows with the object's size divided by its distance: it
+    /// is visible if that is a million.
     pub scales: &'a [Vec3],
-    /// In object space, before scaling. A sphere that holds all that is drawn of the object.
+    /// A bounding sphere of each object, in object space before scaling.
     pub bounds: &'a [Bounds],
-    /// What each object's triangles are.
+    /// The mesh of each object.
     pub meshes: &'a [Handle<Mesh>],
-    /// What each object is made of.
+    /// The material of each object.
     pub materials: &'a [Handle<Material>],
-    /// What the handles refer to.
+    /// The assets that the handles refer to.
     pub assets: &'a Assets,
     /// The lights.
     pub lights: &'a [Light],
-    /// A view for each (M 10.4).
+    /// The cameras; each has a view (M 10.4).
     pub cameras: &'a [Camera],
-    /// Radiance that reaches every surface from everywhere, linear: a surface of diffuse 1 then looks just as bright.
+    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this radiance.
     pub ambient: Vec3,
-    /// Radiance where nothing is, linear.
+    /// The radiance of the background, linear.
     pub background: Vec3,
 }
 
@@ -46,7 +46,7 @@ impl SceneRef<'_> {
     }
 
     /// # Errors
-    /// If slices differ in length, naming the first that does.
+    /// If a slice has another length than `positions`. The error names the first such slice.
     pub(crate) fn check_lengths(&self) -> Result<(), SceneError> {
         let positions = self.positions.len();
         let slices = [

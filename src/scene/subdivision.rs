@@ -1,30 +1,30 @@
-//! Meshes in smaller triangles.
+//! Subdivision of meshes.
 
 use std::collections::HashMap;
 
-use super::mesh::has_three_places;
+use super::mesh::has_distinct_corners;
 use super::{Mesh, Topology, Vertex};
 
 impl Mesh {
     /// The same surface as a triangle list in which no edge is longer than `longest`, in metres in object space.
     ///
-    /// It is for projections that bend what is straight, such as the paraboloids of a shadow map for all directions (Brabec
+    /// It is for projections that bend straight lines, such as the paraboloids of a shadow map for all directions (Brabec
     /// et al., "Shadow Mapping for Hemispherical and Omnidirectional Light Sources", 2002). Only vertices are projected, and
-    /// edges are drawn straight between them, so an edge that is seen under the angle φ is off by up to 1 − cos(φ/2) of the
+    /// rasterised edges between them are straight. The error of an edge that subtends the angle φ is up to 1 − cos(φ/2) of the
     /// map's radius: in a map 1024 texels wide 39 texels at 45°, 1.9 at 10°, and 0.5 at 5°.
     ///
-    /// Longer edges are split in the middle until none is left. Whether and where an edge is split depends on nothing but
-    /// the places of its two ends, so surfaces that meet along an edge still do, even if normals or texture coordinates
-    /// differ there. New vertices have the mean of both ends' normals and texture coordinates, which is what a triangle
-    /// shows at its edge's middle.
+    /// Longer edges are split at their midpoints until none is left. Whether and where an edge is split depends only on the
+    /// positions of its ends, so surfaces that meet along an edge stay connected, even if normals or texture coordinates
+    /// differ there. A new vertex has the mean normal and texture coordinates of both ends, as interpolation gives at the
+    /// midpoint.
     ///
-    /// All long edges are split at a time, and never into more than `triangle_limit` triangles, or more vertices than 32
-    /// bits number: before that it stops, and [`longest_edge`](Self::longest_edge) of the result is still above `longest`.
-    /// It also is where f32 has no place left between two ends. A `longest` that is NaN or not above 0 cannot be reached,
-    /// and stands for as short as the limit allows.
+    /// Each step splits all long edges. Subdivision stops before a step that could exceed `triangle_limit` triangles or 2³²
+    /// vertices, and does not split an edge whose midpoint f32 cannot distinguish from its ends.
+    /// [`longest_edge`](Self::longest_edge) of the result is then still above `longest`. A `longest` that is NaN or not
+    /// positive cannot be reached, and subdivides up to the limit.
     ///
-    /// Triangles with two corners at one place are left out, for they draw nothing. Where that leaves none, the result
-    /// is a single point.
+    /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result is a
+    /// single degenerate triangle.
     ///
     /// ```
     /// use drawloom::scene::{Mesh, Topology, Vertex};
@@ -38,7 +38,7 @@ impl Mesh {
     /// # }
     /// ```
     pub fn subdivided(&self, longest: f32, triangle_limit: usize) -> Self {
-        // The other operand is the maximum where one is NaN.
+        // `max` returns the other operand if one is NaN.
         let longest = f64::from(longest.max(0.0));
         let mut surface = Surface { vertices: self.vertices().to_vec(), triangles: Vec::new() };
         self.triangles().for_each(|corners| surface.add(corners));
@@ -55,66 +55,66 @@ impl Mesh {
             surface.triangles.push([self.indices()[0]; 3]);
         }
         let indices = surface.triangles.into_flattened();
-        Self::measured(self.name().to_owned(), Topology::TriangleList, surface.vertices, indices)
+        Self::from_valid_parts(self.name().to_owned(), Topology::TriangleList, surface.vertices, indices)
     }
 }
 
-/// What a mesh is in between.
+/// A mesh while it is subdivided.
 struct Surface {
     vertices: Vec<Vertex>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Surface {
-    /// How many more triangles [`split`](Self::split) can make at most: one for each of a triangle's long edges. New
-    /// vertices are no more.
+    /// The most triangles that [`split`](Self::split) can add: one for each long edge of each triangle. It adds no more
+    /// vertices than that.
     fn count_splits(&self, longest_squared: f64) -> usize {
         let edges = self.triangles.iter().flat_map(|&triangle| edges_of(triangle));
-        edges.filter(|&edge| self.long_middle(edge, longest_squared).is_some()).count()
+        edges.filter(|&edge| self.long_edge_midpoint(edge, longest_squared).is_some()).count()
     }
 
     /// Splits every long edge once.
     fn split(&mut self, longest_squared: f64) {
-        let mut middles = HashMap::new();
+        let mut midpoints = HashMap::new();
         for triangle in std::mem::take(&mut self.triangles) {
-            let middles = edges_of(triangle).map(|edge| {
-                let middle = self.long_middle(edge, longest_squared)?;
+            let midpoints = edges_of(triangle).map(|edge| {
+                let midpoint = self.long_edge_midpoint(edge, longest_squared)?;
                 let [one, other] = edge;
-                Some(*middles.entry([one.min(other), one.max(other)]).or_insert_with(|| {
-                    self.vertices.push(middle);
+                Some(*midpoints.entry([one.min(other), one.max(other)]).or_insert_with(|| {
+                    self.vertices.push(midpoint);
                     self.vertices.len() as u32 - 1
                 }))
             });
-            self.add_parts(triangle, middles);
+            self.add_parts(triangle, midpoints);
         }
     }
 
-    /// Adds what becomes of a triangle when its edges from a to b, from b to c and from c to a get these middles.
-    fn add_parts(&mut self, [a, b, c]: [u32; 3], middles: [Option<u32>; 3]) {
-        match middles {
+    /// Adds the parts of a triangle whose edges a–b, b–c and c–a are split at these midpoints.
+    fn add_parts(&mut self, [a, b, c]: [u32; 3], midpoints: [Option<u32>; 3]) {
+        match midpoints {
             [None, None, None] => self.add([a, b, c]),
-            [Some(middle), None, None] => self.add_halves([a, b, c], middle),
-            [None, Some(middle), None] => self.add_halves([b, c, a], middle),
-            [None, None, Some(middle)] => self.add_halves([c, a, b], middle),
-            [Some(first), Some(second), None] => self.add_tip_and_rest([a, b, c], first, second),
-            [None, Some(first), Some(second)] => self.add_tip_and_rest([b, c, a], first, second),
-            [Some(second), None, Some(first)] => self.add_tip_and_rest([c, a, b], first, second),
+            [Some(midpoint), None, None] => self.add_halves([a, b, c], midpoint),
+            [None, Some(midpoint), None] => self.add_halves([b, c, a], midpoint),
+            [None, None, Some(midpoint)] => self.add_halves([c, a, b], midpoint),
+            [Some(first), Some(second), None] => self.add_thirds([a, b, c], first, second),
+            [None, Some(first), Some(second)] => self.add_thirds([b, c, a], first, second),
+            [Some(second), None, Some(first)] => self.add_thirds([c, a, b], first, second),
             [Some(ab), Some(bc), Some(ca)] => {
                 [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].into_iter().for_each(|part| self.add(part));
             }
         }
     }
 
-    /// `middle` is between a and b.
-    fn add_halves(&mut self, [a, b, c]: [u32; 3], middle: u32) {
-        self.add([a, middle, c]);
-        self.add([middle, b, c]);
+    /// Splits the edge a–b at `midpoint`.
+    fn add_halves(&mut self, [a, b, c]: [u32; 3], midpoint: u32) {
+        self.add([a, midpoint, c]);
+        self.add([midpoint, b, c]);
     }
 
-    /// `first` is between a and b, `second` between b and c.
-    fn add_tip_and_rest(&mut self, [a, b, c]: [u32; 3], first: u32, second: u32) {
+    /// Splits the edge a–b at `first` and b–c at `second`.
+    fn add_thirds(&mut self, [a, b, c]: [u32; 3], first: u32, second: u32) {
         self.add([first, b, second]);
-        // The shorter diagonal is below √¾ of either edge that was split, so all that is too long keeps shrinking.
+        // The shorter diagonal is below √¾ of either split edge, so long edges keep shrinking.
         if self.length_squared([a, second]) <= self.length_squared([first, c]) {
             self.add([a, first, second]);
             self.add([a, second, c]);
@@ -124,22 +124,22 @@ impl Surface {
         }
     }
 
-    /// Leaving out a triangle with two corners at one place opens no crack: its other two edges lie upon each other.
+    /// Adds a triangle unless two of its corners coincide. Leaving that out opens no crack, as its other two edges coincide.
     fn add(&mut self, triangle: [u32; 3]) {
-        if has_three_places(&triangle.map(|corner| self.vertices[corner as usize])) {
+        if has_distinct_corners(&triangle.map(|corner| self.vertices[corner as usize])) {
             self.triangles.push(triangle);
         }
     }
 
-    /// The middle of an edge that is too long; the same to the bit from either end.
-    fn long_middle(&self, edge: [u32; 2], longest_squared: f64) -> Option<Vertex> {
+    /// The midpoint of an edge that is too long. Both directions of the edge give the same bits.
+    fn long_edge_midpoint(&self, edge: [u32; 2], longest_squared: f64) -> Option<Vertex> {
         if self.length_squared(edge) <= longest_squared {
             return None;
         }
         let [one, other] = edge.map(|end| self.vertices[end as usize]);
-        let middle = middle_of(one, other);
-        // Next to each other in f32, they would stay as they are for ever.
-        (middle.position != one.position && middle.position != other.position).then_some(middle)
+        let midpoint = midpoint_of(one, other);
+        // The midpoint of neighbouring f32 equals an end, and splitting would never finish.
+        (midpoint.position != one.position && midpoint.position != other.position).then_some(midpoint)
     }
 
     fn length_squared(&self, edge: [u32; 2]) -> f64 {
@@ -152,10 +152,10 @@ fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-fn middle_of(one: Vertex, other: Vertex) -> Vertex {
+fn midpoint_of(one: Vertex, other: Vertex) -> Vertex {
     let [one, other]: [[f32; 8]; 2] = [one, other].map(bytemuck::cast);
-    let middle: [f32; 8] = std::array::from_fn(|place| one[place].midpoint(other[place]));
-    bytemuck::cast(middle)
+    let midpoint: [f32; 8] = std::array::from_fn(|component| one[component].midpoint(other[component]));
+    bytemuck::cast(midpoint)
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -169,26 +169,27 @@ mod tests {
 
     const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
 
-    /// A crooked box. Each side has four vertices of its own, so normals and texture coordinates differ along its edges.
-    fn crooked_box(size: Vec3, origin: Vec3, bends: [[f32; 3]; 8]) -> Mesh {
+    /// A distorted box. Each side has four vertices of its own, so normals and texture coordinates differ along its edges.
+    fn distorted_box(size: Vec3, origin: Vec3, bends: [[f32; 3]; 8]) -> Mesh {
         let (mut vertices, mut indices) = (Vec::new(), Vec::new());
         for normal in SIDES {
             let right = normal.any_orthonormal_vector();
             let up = normal.cross(right);
             indices.extend([0, 1, 2, 0, 2, 3].map(|corner| vertices.len() as u32 + corner));
             for [x, y] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
-                let place = normal + right * x + up * y;
-                let bend = usize::from(place.x > 0.0) + 2 * usize::from(place.y > 0.0) + 4 * usize::from(place.z > 0.0);
-                let position = (origin + size * (place + Vec3::from(bends[bend]))).to_array();
+                let corner = normal + right * x + up * y;
+                let bend =
+                    usize::from(corner.x > 0.0) + 2 * usize::from(corner.y > 0.0) + 4 * usize::from(corner.z > 0.0);
+                let position = (origin + size * (corner + Vec3::from(bends[bend]))).to_array();
                 vertices.push(Vertex { position, normal: normal.to_array(), uv: [x, y] });
             }
         }
         Mesh::new("box", Topology::TriangleList, vertices, indices).unwrap()
     }
 
-    fn places(mesh: &Mesh) -> Vec<[DVec3; 3]> {
-        let place = |corner: u32| Vec3::from(mesh.vertices()[corner as usize].position).as_dvec3();
-        mesh.triangles().map(|triangle| triangle.map(place)).collect()
+    fn positions(mesh: &Mesh) -> Vec<[DVec3; 3]> {
+        let position = |corner: u32| Vec3::from(mesh.vertices()[corner as usize].position).as_dvec3();
+        mesh.triangles().map(|triangle| triangle.map(position)).collect()
     }
 
     fn across([a, b, c]: [DVec3; 3]) -> DVec3 {
@@ -196,19 +197,19 @@ mod tests {
     }
 
     fn area(mesh: &Mesh) -> f64 {
-        places(mesh).into_iter().map(|triangle| across(triangle).length() / 2.0).sum()
+        positions(mesh).into_iter().map(|triangle| across(triangle).length() / 2.0).sum()
     }
 
     fn longest_of(mesh: &Mesh) -> f64 {
-        let edges = places(mesh).into_iter().flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]);
+        let edges = positions(mesh).into_iter().flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]);
         edges.fold(0.0, f64::max)
     }
 
-    /// How often each edge is gone along, less how often it is gone back: nothing is left of a surface without a border.
+    /// The number of directed edges without an opposite edge: 0 on a closed surface.
     fn border(mesh: &Mesh) -> usize {
-        let place = |corner: u32| mesh.vertices()[corner as usize].position.map(|value| (value + 0.0).to_bits());
+        let position = |corner: u32| mesh.vertices()[corner as usize].position.map(|value| (value + 0.0).to_bits());
         let mut edges: HashMap<_, i32> = HashMap::new();
-        for [one, other] in mesh.triangles().flat_map(edges_of).map(|edge| edge.map(place)) {
+        for [one, other] in mesh.triangles().flat_map(edges_of).map(|edge| edge.map(position)) {
             *edges.entry([one, other]).or_default() += 1;
             *edges.entry([other, one]).or_default() -= 1;
         }
@@ -228,7 +229,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
         #[test]
-        fn a_closed_surface_stays_closed_and_the_same(
+        fn a_closed_surface_stays_closed_and_keeps_its_shape(
             sizes in prop::array::uniform3(0.05..1.0_f32),
             origin in prop::array::uniform3(-5.0..5.0_f32),
             bends in prop::array::uniform8(prop::array::uniform3(-0.3..0.3_f32)),
@@ -237,7 +238,7 @@ mod tests {
             limit in prop_oneof![Just(usize::MAX), 0..3000_usize],
         ) {
             let scale = 2_f32.powi(exponent);
-            let whole = crooked_box(Vec3::from(sizes) * scale, Vec3::from(origin) * scale, bends);
+            let whole = distorted_box(Vec3::from(sizes) * scale, Vec3::from(origin) * scale, bends);
             prop_assert_eq!(border(&whole), 0);
             let longest = share * scale;
             let fine = whole.subdivided(longest, limit);
@@ -249,20 +250,20 @@ mod tests {
             }
             prop_assert!(longest_of(&fine) <= f64::from(fine.longest_edge()));
             prop_assert!((area(&fine) / area(&whole) - 1.0).abs() < 1e-4, "{} {}", area(&fine), area(&whole));
-            for (triangle, corners) in fine.triangles().zip(places(&fine)) {
+            for (triangle, corners) in fine.triangles().zip(positions(&fine)) {
                 let normals = triangle.map(|corner| Vec3::from(fine.vertices()[corner as usize].normal));
                 prop_assert!(SIDES.contains(&normals[0]) && normals == [normals[0]; 3]);
                 prop_assert!(across(corners).dot((normals[0] / Vec3::from(sizes)).as_dvec3()) > 0.0);
             }
         }
 
-        /// Every second triangle of a strip is wound the other way, and all of this one face +Z.
+        /// All triangles of this strip face +Z.
         #[test]
-        fn a_strip_is_the_list_that_it_stands_for(
+        fn a_strip_is_subdivided_like_the_equivalent_list(
             bends in prop::collection::vec(0.0..0.8_f32, 3..20),
             longest in 0.2..3.0_f32,
         ) {
-            let corner = |(place, &bend): (u8, &f32)| [f32::from(place) + bend, -f32::from(place % 2)];
+            let corner = |(number, &bend): (u8, &f32)| [f32::from(number) + bend, -f32::from(number % 2)];
             let corners: Vec<_> = (0..).zip(&bends).map(corner).collect();
             let count = corners.len() as u32;
             let strip = flat(Topology::TriangleStrip, &corners, (0..count).collect());
@@ -274,7 +275,7 @@ mod tests {
             let fine = strip.subdivided(longest, 100_000);
             prop_assert_eq!(&fine, &list.subdivided(longest, 100_000));
             prop_assert!(fine.longest_edge() <= longest);
-            prop_assert!(places(&fine).into_iter().all(|triangle| across(triangle).z > 0.0));
+            prop_assert!(positions(&fine).into_iter().all(|triangle| across(triangle).z > 0.0));
         }
     }
 
@@ -291,14 +292,14 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_share_new_vertices_and_these_lie_where_their_coordinates_say() {
+    fn neighbours_share_new_vertices_with_interpolated_coordinates() {
         let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0], [5.0, 0.5]];
         let whole = flat(Topology::TriangleList, &corners, vec![0, 1, 2, 0, 2, 3, 1, 4, 2]);
         let fine = whole.subdivided(0.3, usize::MAX);
         let bits = |vertex: &Vertex| vertex.position.map(f32::to_bits);
         let distinct: HashSet<_> = fine.vertices().iter().map(bits).collect();
         assert_eq!(distinct.len(), fine.vertices().len());
-        // A disc has one more vertex and triangle than edges (Euler), and all but those at its rim have two triangles.
+        // Euler's formula for a disc: vertices + triangles = edges + 1. All edges but those at the rim have two triangles.
         let rim = border(&fine) / 2;
         assert_eq!(distinct.len() + fine.triangle_count(), (3 * fine.triangle_count() + rim) / 2 + 1);
         for vertex in fine.vertices() {
@@ -308,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stops_before_the_limit_and_says_so() {
+    fn subdivision_stops_before_the_limit() {
         let whole = leaf([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
         for (limit, triangles, longest) in [(0, 1, 2.0), (3, 1, 2.0), (4, 4, 0.5), (15, 4, 0.5), (16, 16, 0.125)] {
             let fine = whole.subdivided(1e-3, limit);
@@ -318,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_length_stands_for_as_short_as_can_be() {
+    fn an_invalid_length_subdivides_up_to_the_limit() {
         let whole = leaf([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
         let fine = whole.subdivided(0.0, 1024);
         assert_eq!(fine.triangle_count(), 1024);
@@ -329,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn where_numbers_are_next_to_each_other_it_stops() {
+    fn edges_between_neighbouring_numbers_are_not_split() {
         for start in [0.0_f32, 1.0, 1e30] {
             let next = |steps: u32| f32::from_bits(start.to_bits() + steps);
             let whole = leaf([[start, start], [next(5), next(1)], [next(2), next(7)]]);
@@ -351,16 +352,16 @@ mod tests {
     }
 
     #[test]
-    fn triangles_without_an_area_do_no_harm() {
+    fn degenerate_triangles_are_left_out() {
         let line = leaf([[0.0, 0.0], [8.0, 0.0], [3.0, 0.0]]).subdivided(1.0, 100);
         assert!(line.longest_edge() <= 1.0 && area(&line) == 0.0);
 
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [50.0, 0.0], [50.0, 0.0], [51.0, 0.0], [50.0, 1.0]];
         let two_strips = flat(Topology::TriangleStrip, &corners, vec![0, 1, 2, 2, 4, 3, 5, 6]);
         let fine = two_strips.subdivided(1.0, 1000);
-        assert_eq!(fine.triangle_count(), 4, "the joint between two strips is not worth a triangle");
+        assert_eq!(fine.triangle_count(), 4, "the joint between two strips adds no triangle");
 
-        // The middle of the longest edge is the third corner.
+        // In the last one, the midpoint of the longest edge is the third corner.
         for gone in [[[1.0, 1.0]; 3], [[0.0, 0.0], [9.0, 9.0], [9.0, 9.0]], [[0.0, 0.0], [8.0, 0.0], [4.0, 0.0]]] {
             let fine = leaf(gone).subdivided(5.0, 1000);
             assert_eq!((fine.triangle_count(), fine.longest_edge()), (1, 0.0), "{gone:?}");

@@ -66,7 +66,7 @@ impl LightTable {
         }
         let mut counts = [0; LightClass::COUNT];
         for (index, light) in lights.iter().enumerate() {
-            if light.reach().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
+            if light.bounding_sphere().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
                 let class = LightClass::of(light, shadows).index();
                 counts[class] += 1;
                 self.reaching.push((class, index));

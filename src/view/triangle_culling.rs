@@ -10,7 +10,7 @@ use crate::scene::{Projection, SceneRef, Vertex, ViewKind};
 
 impl RenderView {
     /// Culls the triangles of an object, and appends the indices of those that may cover a pixel to `remaining`. Frames
-    /// do so for meshes that [request it](crate::scene::Mesh::with_triangles_culled). Triangles are culled if they are
+    /// do so for meshes that [request it](crate::scene::Mesh::with_triangle_culling). Triangles are culled if they are
     /// back-facing, outside the picture, degenerate, or cover no pixel centre: "up to 70%" of them (S 9.6). It is worth
     /// its time if a device spends more on a vertex than the 20 to 40 ns that this takes per triangle.
     ///

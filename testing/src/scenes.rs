@@ -61,7 +61,7 @@ pub fn as_list(mesh: &Mesh) -> Mesh {
 
 /// The mesh, whose triangles are to be looked at.
 pub fn culled(mesh: &Mesh) -> Mesh {
-    mesh.clone().with_triangles_culled(true)
+    mesh.clone().with_triangle_culling(true)
 }
 
 /// Some hundreds of boxes in every direction, of several meshes and materials, opaque and blended, some mirrored, with

@@ -1,4 +1,4 @@
-//! Lights: at surfaces, in them, behind them, and as bright and as dim as numbers go.
+//! Lights: at, in and behind surfaces, and of extreme brightness.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -8,18 +8,18 @@ use drawloom_testing::scenes::{cube, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::look::Look;
-use crate::signs::told;
-use crate::stage::Studio;
+use crate::capture::Capture;
+use crate::harness::Harness;
+use crate::markers::with_context;
 
 pub const CASES: &[Case] = &[
-    ("lights_at_a_surface_in_it_and_a_hair_before_it", at_a_surface),
-    ("lights_as_bright_as_f32_goes_leave_no_pixel_that_is_not_a_number", blinding),
-    ("an_opaque_pane_hides_what_is_too_bright_for_half_floats", pane),
-    ("lights_of_every_range_light_what_they_reach", ranges),
-    ("cones_from_nothing_to_a_half_space", cones),
-    ("a_lights_brightness_falls_off_as_it_should_from_a_millimetre_to_a_megametre", falloff),
-    ("a_camera_in_a_light_and_at_it", camera_at_light),
+    ("lights_in_a_surface_and_very_close_to_it", at_a_surface),
+    ("lights_as_bright_as_f32_allows_cause_no_nan", blinding),
+    ("an_opaque_pane_hides_radiance_beyond_half_floats", pane),
+    ("lights_of_every_range", ranges),
+    ("cones_from_almost_nothing_to_a_half_space", cones),
+    ("lights_fall_off_correctly_from_a_millimetre_to_a_megametre", falloff),
+    ("a_camera_at_a_light_and_close_to_it", camera_at_light),
 ];
 
 const SIZE: [u32; 2] = [33, 33];
@@ -34,7 +34,7 @@ fn wall(diffuse: f32) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// A light of every kind that has a place, with and without a shadow.
+/// A light of every kind that has a position, with and without a shadow.
 fn lamps(position: DVec3, intensity: Vec3, range: f32, direction: Vec3) -> Vec<Light> {
     let mut lamps = vec![Light::Point { position, intensity, range }];
     for casts_shadow in [false, true] {
@@ -45,33 +45,33 @@ fn lamps(position: DVec3, intensity: Vec3, range: f32, direction: Vec3) -> Vec<L
     lamps
 }
 
-fn drawn(studio: &mut Studio, what: &str, scene: &Scene) -> Result<Option<Look>, Failed> {
-    Ok(studio.draw(scene).map_err(|failed| told(what, failed))?.look)
+fn drawn(harness: &mut Harness, what: &str, scene: &Scene) -> Result<Option<Capture>, Failed> {
+    Ok(harness.draw(scene).map_err(|failed| with_context(what, failed))?.capture)
 }
 
-/// Fails where there is light of a channel that no light has: what is not a number becomes any once it is cut off.
-fn only_of(look: &Look, color: Vec3) -> Result<(), Failed> {
-    let greatest = look.greatest();
+/// Fails if a channel is lit in which no light shines: clamping may have turned NaN into any number.
+fn assert_lit_only_in(capture: &Capture, color: Vec3) -> Result<(), Failed> {
+    let greatest = capture.greatest();
     let is_dark = |(greatest, color): (f64, f32)| color > 0.0 || greatest == 0.0;
     let holds = greatest.into_iter().zip(color.to_array()).all(is_dark);
     if holds { Ok(()) } else { Err(format!("{color} becomes {greatest:?}").into()) }
 }
 
-fn at_a_surface(studio: &mut Studio) -> Result<(), Failed> {
+fn at_a_surface(harness: &mut Harness) -> Result<(), Failed> {
     for height in [0.0, -0.0, 1e-30, 1e-20, 1e-9, -1e-9, 1e-6, -1e-6, 1e-3, -1e-3] {
         for direction in [Vec3::NEG_Z, Vec3::X, Vec3::Z] {
-            // The middle pixel sees just the place on the surface that the light is at.
+            // The middle pixel shows exactly the point at which the light is.
             for intensity in [1.0, 1e10, 1e38] {
                 for lamp in lamps(DVec3::Z * height, Vec3::X * intensity, 10.0, direction) {
                     let what = format!("{lamp:?}");
                     let mut scene = wall(0.5)?;
                     scene.lights = vec![lamp];
-                    let Some(look) = drawn(studio, &what, &scene)? else { continue };
-                    only_of(&look, Vec3::X).map_err(|failed| told(&what, failed))?;
+                    let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+                    assert_lit_only_in(&capture, Vec3::X).map_err(|failed| with_context(&what, failed))?;
                     let behind = height < 0.0 || (direction.z > 0.0 && !matches!(lamp, Light::Point { .. }));
-                    // What is behind a surface, or shines away from it, does not light it.
-                    if behind && look.covered() > 0.0 {
-                        return Err(format!("{what}: lights {:.1}% from behind", look.covered() * 100.0).into());
+                    // A light behind a surface, or facing away from it, does not light it.
+                    if behind && capture.covered() > 0.0 {
+                        return Err(format!("{what}: lights {:.1}% from behind", capture.covered() * 100.0).into());
                     }
                 }
             }
@@ -80,7 +80,7 @@ fn at_a_surface(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-fn blinding(studio: &mut Studio) -> Result<(), Failed> {
+fn blinding(harness: &mut Harness) -> Result<(), Failed> {
     for intensity in [1e5, 1e20, 1e38, f32::MAX] {
         for color in [Vec3::ONE, Vec3::X, Vec3::new(0.0, 1.0, 1e-30)] {
             for diffuse in [1.0, 1e-30, f32::MAX] {
@@ -98,9 +98,9 @@ fn blinding(studio: &mut Studio) -> Result<(), Failed> {
                     scene.lights = lamps(DVec3::Z, color * intensity, f32::MAX, Vec3::NEG_Z);
                     scene.lights.extend([sun(false), sun(true)]);
                     let what = format!("{color} * {intensity:e} on {diffuse:e}, {blend:?}");
-                    let Some(look) = drawn(studio, &what, &scene)? else { continue };
-                    only_of(&look, color).map_err(|failed| told(&what, failed))?;
-                    if look.radiance(2, 2)[1..] == [0.0; 2] && color.y == 1.0 && diffuse == 1.0 {
+                    let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+                    assert_lit_only_in(&capture, color).map_err(|failed| with_context(&what, failed))?;
+                    if capture.radiance(2, 2)[1..] == [0.0; 2] && color.y == 1.0 && diffuse == 1.0 {
                         return Err(format!("{what}: the wall is dark").into());
                     }
                 }
@@ -110,7 +110,7 @@ fn blinding(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-fn pane(studio: &mut Studio) -> Result<(), Failed> {
+fn pane(harness: &mut Harness) -> Result<(), Failed> {
     let mut scene = wall(1.0)?;
     let mesh = scene.as_scene_ref().meshes[0];
     let dark =
@@ -118,18 +118,18 @@ fn pane(studio: &mut Studio) -> Result<(), Failed> {
     let dark = scene.add(dark)?;
     scene.add_object(RenderObject::new(mesh, dark, DVec3::Z * 0.5))?;
     scene.lights = lamps(DVec3::Z, Vec3::splat(1e30), 100.0, Vec3::NEG_Z);
-    let Some(look) = drawn(studio, "a pane", &scene)? else { return Ok(()) };
-    if look.middle() == [0.25; 3] { Ok(()) } else { Err(format!("it shows {:?}", look.middle()).into()) }
+    let Some(capture) = drawn(harness, "a pane", &scene)? else { return Ok(()) };
+    if capture.middle() == [0.25; 3] { Ok(()) } else { Err(format!("it shows {:?}", capture.middle()).into()) }
 }
 
-fn ranges(studio: &mut Studio) -> Result<(), Failed> {
+fn ranges(harness: &mut Harness) -> Result<(), Failed> {
     for range in [f32::from_bits(1), f32::MIN_POSITIVE, 1e-20, 1e-6, 0.5, 2.0, 1e3, 1e9, 1e20, 1e38, f32::MAX] {
         for lamp in lamps(DVec3::Z, Vec3::splat(10.0), range, Vec3::NEG_Z) {
             let mut scene = wall(0.5)?;
             scene.lights = vec![lamp];
             let what = format!("{lamp:?}");
-            let Some(look) = drawn(studio, &what, &scene)? else { continue };
-            let middle = look.middle()[0];
+            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let middle = capture.middle()[0];
             // 1 m away: 10 lux on a surface of diffuse 0.5, windowed by the range.
             let window = (1.0 - f64::from(range).powi(-4)).max(0.0);
             let expected = 10.0 * 0.5 / std::f64::consts::PI * window * window;
@@ -142,7 +142,7 @@ fn ranges(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-fn cones(studio: &mut Studio) -> Result<(), Failed> {
+fn cones(harness: &mut Harness) -> Result<(), Failed> {
     let angles = [[0.0, 1e-3], [0.0, 0.05], [1.0, 1.001], [0.0, FRAC_PI_2], [1.5, FRAC_PI_2], [1.569, FRAC_PI_2]];
     for [inner_angle, outer_angle] in angles {
         for casts_shadow in [false, true] {
@@ -158,14 +158,14 @@ fn cones(studio: &mut Studio) -> Result<(), Failed> {
                 casts_shadow,
             }];
             let what = format!("{inner_angle}..{outer_angle}, shadow {casts_shadow}");
-            let Some(look) = drawn(studio, &what, &scene)? else { continue };
-            let middle = look.middle()[0];
+            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let middle = capture.middle()[0];
             let expected = 10.0 * 0.5 / std::f64::consts::PI;
             // The middle pixel is 0.17 m wide.
             if outer_angle > 0.3 && (middle - expected).abs() > 0.02 * expected {
                 return Err(format!("{what}: the middle is {middle}, not {expected}").into());
             }
-            let corner = look.radiance(0, 0)[0];
+            let corner = capture.radiance(0, 0)[0];
             if outer_angle < 1.2 && corner != 0.0 {
                 return Err(format!("{what}: the corner is {corner}").into());
             }
@@ -174,7 +174,7 @@ fn cones(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-fn falloff(studio: &mut Studio) -> Result<(), Failed> {
+fn falloff(harness: &mut Harness) -> Result<(), Failed> {
     for distance in [1e-3, 1.0, 1e3, 1e6] {
         for lamp in lamps(
             DVec3::Z * distance,
@@ -191,8 +191,8 @@ fn falloff(studio: &mut Studio) -> Result<(), Failed> {
             scene.replace_object(handle, object)?;
             scene.lights = vec![lamp];
             let what = format!("{lamp:?}");
-            let Some(look) = drawn(studio, &what, &scene)? else { continue };
-            let (middle, expected) = (look.middle()[0], 3.0 * 0.5 / std::f64::consts::PI);
+            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let (middle, expected) = (capture.middle()[0], 3.0 * 0.5 / std::f64::consts::PI);
             if (middle - expected).abs() > 0.02 * expected {
                 return Err(format!("{what}: the middle is {middle}, not {expected}").into());
             }
@@ -201,7 +201,7 @@ fn falloff(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-fn camera_at_light(studio: &mut Studio) -> Result<(), Failed> {
+fn camera_at_light(harness: &mut Harness) -> Result<(), Failed> {
     for offset in [DVec3::ZERO, DVec3::splat(1e-9), DVec3::X * 0.05, DVec3::Z * 0.5] {
         for range in [6.0, 1e3, 1e9] {
             let position = DVec3::Z * 5.0 + offset;
@@ -214,11 +214,11 @@ fn camera_at_light(studio: &mut Studio) -> Result<(), Failed> {
                 scene.add_object(RenderObject { orientation: Quat::from_rotation_z(0.5), ..around })?;
                 scene.lights = vec![lamp];
                 let what = format!("{lamp:?}");
-                let Some(look) = drawn(studio, &what, &scene)? else { continue };
+                let Some(capture) = drawn(harness, &what, &scene)? else { continue };
                 let away = 5.0 + offset.z;
                 let window = 1.0 - (away / f64::from(range)).powi(4);
                 let expected = 100.0 * 0.5 / std::f64::consts::PI * window * window / (away * away);
-                let middle = look.middle()[0];
+                let middle = capture.middle()[0];
                 if (middle - expected).abs() > 0.03 * expected {
                     return Err(format!("{what}: the middle is {middle}, not {expected}").into());
                 }

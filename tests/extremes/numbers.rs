@@ -1,4 +1,4 @@
-//! NaN, infinities, subnormals, zeros of both signs and the ends of f32, in every number that a scene has.
+//! NaN, infinities, subnormals, zeros of both signs and the limits of f32, in every number of a scene.
 
 use drawloom::FrameError;
 use drawloom::backend::BackendError;
@@ -11,38 +11,39 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::signs::told;
-use crate::special::{SPECIAL, SPECIAL_PLACES};
-use crate::stage::{Drawn, Outcome, Studio};
+use crate::harness::{Drawn, Harness, Outcome};
+use crate::markers::with_context;
+use crate::special::{SPECIAL, SPECIAL_POSITIONS};
 
 pub const CASES: &[Case] = &[
-    ("an_objects_numbers", objects),
-    ("a_cameras_numbers", cameras),
-    ("a_lights_numbers", lights),
-    ("ambient_and_background", surroundings),
-    ("a_materials_numbers", materials),
-    ("a_vertexs_numbers", vertices),
+    ("special_numbers_in_an_object", objects),
+    ("special_numbers_in_a_camera", cameras),
+    ("special_numbers_in_a_light", lights),
+    ("special_numbers_in_ambient_and_background", surroundings),
+    ("special_numbers_in_a_material", materials),
+    ("special_numbers_in_a_vertex", vertices),
 ];
 
-/// What is to become of a scene with a number in it that is none, or hardly.
+/// The expected outcome for a scene with a special number.
 enum Expected {
-    /// It is drawn, and nothing is left out.
+    /// It is drawn completely.
     Drawn,
-    /// It is drawn without what has that number.
+    /// It is drawn without the item that has the number.
     Without(RejectionReason),
     /// It is refused because of its camera.
     InvalidCamera,
-    /// It is refused because of its camera's place.
+    /// It is refused because of its camera's position.
     OutOfReach,
     /// It is refused because of a colour.
     InvalidColor,
 }
 
-/// What is to become of a scene with a special number somewhere.
-type Rule<T> = (&'static str, fn(&mut Stand, T), fn(T) -> Expected);
+/// A name, a function that sets a number in a scene, and one that returns the expected outcome.
+type Rule<T> = (&'static str, fn(&mut TestScene, T), fn(T) -> Expected);
 
-/// A witness on the left that must be seen whatever the subject on the right is like, and every kind of light on the subject.
-struct Stand {
+/// A control object on the left, which must be visible whatever the subject on the right is like, and every kind of light on
+/// the subject.
+struct TestScene {
     scene: Scene,
     positions: Vec<DVec3>,
     orientations: Vec<Quat>,
@@ -50,18 +51,18 @@ struct Stand {
     bounds: Vec<Bounds>,
 }
 
-const WITNESS: [f64; 3] = [0.0, 0.75, 0.125];
+const CONTROL: [f64; 3] = [0.0, 0.75, 0.125];
 
-/// Where the witness and the subject are seen.
-const WITNESS_PIXEL: [usize; 2] = [14, 16];
+/// The pixels of the control and the subject.
+const CONTROL_PIXEL: [usize; 2] = [14, 16];
 const SUBJECT_PIXEL: [usize; 2] = [33, 16];
 
-impl Stand {
+impl TestScene {
     fn new() -> Result<Self, Failed> {
         Self::with(square(Topology::TriangleList), Material { diffuse: Vec3::splat(0.5), ..Material::default() }, None)
     }
 
-    /// With another subject.
+    /// The same scene with another subject.
     fn with(mesh: Mesh, material: Material, texture: Option<Texture>) -> Result<Self, Failed> {
         let mut scene = Scene::new();
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z), [48, 32])];
@@ -103,50 +104,51 @@ impl Stand {
         &mut self.scene.cameras[0]
     }
 
-    /// Draws it as an engine would that keeps its own objects.
-    fn outcome(&self, studio: &mut Studio) -> Result<Outcome, Failed> {
+    /// Draws it as an engine with its own storage for objects.
+    fn outcome(&self, harness: &mut Harness) -> Result<Outcome, Failed> {
         let Self { scene, positions, orientations, scales, bounds } = self;
-        studio.outcome(&drawloom::scene::SceneRef { positions, orientations, scales, bounds, ..scene.as_scene_ref() })
+        harness.outcome(&drawloom::scene::SceneRef { positions, orientations, scales, bounds, ..scene.as_scene_ref() })
     }
 
-    /// Whether the witness is where it belongs.
-    fn check_witness(&self, drawn: &Drawn) -> Result<(), Failed> {
-        let Some(look) = &drawn.look else { return Ok(()) };
-        let [x, y] = WITNESS_PIXEL;
-        let found = look.radiance(x, y);
-        let is_right = found.into_iter().zip(WITNESS).all(|(found, expected)| (found - expected).abs() < 1e-3);
-        if is_right { Ok(()) } else { Err(format!("the witness is {found:?}").into()) }
+    /// Fails unless the control is visible.
+    fn check_control(&self, drawn: &Drawn) -> Result<(), Failed> {
+        let Some(capture) = &drawn.capture else { return Ok(()) };
+        let [x, y] = CONTROL_PIXEL;
+        let found = capture.radiance(x, y);
+        let is_right = found.into_iter().zip(CONTROL).all(|(found, expected)| (found - expected).abs() < 1e-3);
+        if is_right { Ok(()) } else { Err(format!("the control is {found:?}").into()) }
     }
 }
 
-/// Draws with each number, by each rule, and the same scene as it should be after each.
-fn check<T: Copy + std::fmt::Debug>(studio: &mut Studio, numbers: &[T], rules: &[Rule<T>]) -> Result<(), Failed> {
+/// Draws the scene with each number by each rule, and the unchanged scene after each rule.
+fn check<T: Copy + std::fmt::Debug>(harness: &mut Harness, numbers: &[T], rules: &[Rule<T>]) -> Result<(), Failed> {
     for (name, put, expected) in rules {
         for &number in numbers {
-            let mut stand = Stand::new()?;
-            put(&mut stand, number);
-            // A camera that sees other things is no witness.
-            let has_witness = !name.starts_with("camera");
-            check_one(studio, &stand, expected(number), has_witness)
-                .map_err(|failed| told(&format!("{name} = {number:?}"), failed))?;
+            let mut test = TestScene::new()?;
+            put(&mut test, number);
+            // A changed camera may not see the control.
+            let has_control = !name.starts_with("camera");
+            check_one(harness, &test, expected(number), has_control)
+                .map_err(|failed| with_context(&format!("{name} = {number:?}"), failed))?;
         }
-        let whole = Stand::new()?;
-        check_one(studio, &whole, Expected::Drawn, true).map_err(|failed| told(&format!("after {name}"), failed))?;
+        let whole = TestScene::new()?;
+        check_one(harness, &whole, Expected::Drawn, true)
+            .map_err(|failed| with_context(&format!("after {name}"), failed))?;
     }
     Ok(())
 }
 
-fn check_one(studio: &mut Studio, stand: &Stand, expected: Expected, has_witness: bool) -> Result<(), Failed> {
-    match (stand.outcome(studio)?, expected) {
+fn check_one(harness: &mut Harness, test: &TestScene, expected: Expected, has_control: bool) -> Result<(), Failed> {
+    match (test.outcome(harness)?, expected) {
         (Outcome::Drawn(drawn), expected @ (Expected::Drawn | Expected::Without(_))) => {
-            // It says that something is drawn less well than asked, not that it is left out.
-            let left_out = drawn.rejections.iter().filter(|told| told.reason != RejectionReason::CoarseEdges);
-            let told: Vec<_> = left_out.map(|told| told.reason).collect();
-            let wanted = if let Expected::Without(reason) = expected { vec![reason] } else { Vec::new() };
-            if told != wanted {
-                return Err(format!("left out: {told:?}").into());
+            // `CoarseEdges` means lower quality, and not that something is left out.
+            let left_out = drawn.rejections.iter().filter(|rejection| rejection.reason != RejectionReason::CoarseEdges);
+            let reasons: Vec<_> = left_out.map(|rejection| rejection.reason).collect();
+            let expected_reasons = if let Expected::Without(reason) = expected { vec![reason] } else { Vec::new() };
+            if reasons != expected_reasons {
+                return Err(format!("left out: {reasons:?}").into());
             }
-            if has_witness { stand.check_witness(&drawn) } else { Ok(()) }
+            if has_control { test.check_control(&drawn) } else { Ok(()) }
         }
         (Outcome::Refused(FrameError::Scene(SceneError::InvalidCamera { camera, .. })), Expected::InvalidCamera)
             if camera == "main" =>
@@ -161,23 +163,23 @@ fn check_one(studio: &mut Studio, stand: &Stand, expected: Expected, has_witness
     }
 }
 
-/// How far places may be from the origin.
+/// Whether a coordinate is within the reach of positions.
 fn is_within_reach(number: f64) -> bool {
     number.abs() < drawloom::view::FixedPosition::MAX_COORDINATE
 }
 
-fn objects(studio: &mut Studio) -> Result<(), Failed> {
-    let place = |number: f64| match number {
+fn objects(harness: &mut Harness) -> Result<(), Failed> {
+    let position = |number: f64| match number {
         _ if !number.is_finite() => Expected::Without(RejectionReason::InvalidTransform),
         _ if is_within_reach(number) => Expected::Drawn,
         _ => Expected::Without(RejectionReason::OutOfReach),
     };
     check(
-        studio,
-        &SPECIAL_PLACES,
+        harness,
+        &SPECIAL_POSITIONS,
         &[
-            ("position.x", |stand, number| stand.subject().0.x = number, place),
-            ("position.z", |stand, number| stand.subject().0.z = number, place),
+            ("position.x", |test, number| test.subject().0.x = number, position),
+            ("position.z", |test, number| test.subject().0.z = number, position),
         ],
     )?;
     let orientation = |number: f32| {
@@ -196,24 +198,24 @@ fn objects(studio: &mut Studio) -> Result<(), Failed> {
         if number.abs() < 1.0 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
     };
     check(
-        studio,
+        harness,
         &SPECIAL,
         &[
-            ("orientation.x", |stand, number| stand.subject().1.x = number, orientation),
-            ("orientation.w", |stand, number| *stand.subject().1 = Quat::from_xyzw(0.0, 1.0, 0.0, number), orientation),
-            ("scale.x", |stand, number| stand.subject().2.x = number, scale),
-            ("scale", |stand, number| *stand.subject().2 = Vec3::splat(number), scale),
-            ("bounds.radius", |stand, number| stand.subject().3.radius = number, radius),
-            ("bounds.center.y", |stand, number| stand.subject().3.center.y = number, center),
+            ("orientation.x", |test, number| test.subject().1.x = number, orientation),
+            ("orientation.w", |test, number| *test.subject().1 = Quat::from_xyzw(0.0, 1.0, 0.0, number), orientation),
+            ("scale.x", |test, number| test.subject().2.x = number, scale),
+            ("scale", |test, number| *test.subject().2 = Vec3::splat(number), scale),
+            ("bounds.radius", |test, number| test.subject().3.radius = number, radius),
+            ("bounds.center.y", |test, number| test.subject().3.center.y = number, center),
         ],
     )
 }
 
-fn cameras(studio: &mut Studio) -> Result<(), Failed> {
+fn cameras(harness: &mut Harness) -> Result<(), Failed> {
     check(
-        studio,
-        &SPECIAL_PLACES,
-        &[("camera's position.y", |stand, number| stand.camera().position.y = number, {
+        harness,
+        &SPECIAL_POSITIONS,
+        &[("camera's position.y", |test, number| test.camera().position.y = number, {
             |number: f64| match number {
                 _ if !number.is_finite() => Expected::InvalidCamera,
                 _ if is_within_reach(number) => Expected::Drawn,
@@ -223,35 +225,35 @@ fn cameras(studio: &mut Studio) -> Result<(), Failed> {
     )?;
     let small = |number: f32| if number.abs() < 0.01 { Expected::Drawn } else { Expected::InvalidCamera };
     check(
-        studio,
+        harness,
         &SPECIAL,
         &[
-            ("camera's orientation.x", |stand, number| stand.camera().orientation.x = number, small),
+            ("camera's orientation.x", |test, number| test.camera().orientation.x = number, small),
             (
                 "camera's near",
-                |stand, number| stand.camera().near = number,
+                |test, number| test.camera().near = number,
                 |number| {
-                    // Behind it there is nothing; but it is a distance.
+                    // A valid distance, although nothing is beyond it.
                     if number == f32::MAX || number == 1e-20 { Expected::Drawn } else { Expected::InvalidCamera }
                 },
             ),
             (
                 "camera's far",
-                |stand, number| stand.camera().far = number,
+                |test, number| test.camera().far = number,
                 |number| {
                     if number > 0.05 { Expected::Drawn } else { Expected::InvalidCamera }
                 },
             ),
             (
                 "camera's field of view",
-                |stand, number| stand.camera().projection = Projection::Perspective { field_of_view: number },
+                |test, number| test.camera().projection = Projection::Perspective { field_of_view: number },
                 |_| Expected::InvalidCamera,
             ),
             (
                 "camera's height",
-                |stand, number| {
-                    stand.camera().far = 100.0;
-                    stand.camera().projection = Projection::Orthographic { height: number };
+                |test, number| {
+                    test.camera().far = 100.0;
+                    test.camera().projection = Projection::Orthographic { height: number };
                 },
                 |number| if number == f32::MAX { Expected::Drawn } else { Expected::InvalidCamera },
             ),
@@ -259,32 +261,44 @@ fn cameras(studio: &mut Studio) -> Result<(), Failed> {
     )
 }
 
-/// Changes the lights that have a place; the sun has none.
-fn change(stand: &mut Stand, one: usize, by: impl Fn(&mut DVec3, &mut Vec3, &mut f32)) {
+/// Changes a light that has a position.
+fn change(test: &mut TestScene, one: usize, by: impl Fn(&mut DVec3, &mut Vec3, &mut f32)) {
     if let Light::Point { position, intensity, range }
     | Light::Spot { position, intensity, range, .. }
-    | Light::Hemispherical { position, intensity, range, .. } = &mut stand.scene.lights[one]
+    | Light::Hemispherical { position, intensity, range, .. } = &mut test.scene.lights[one]
     {
         by(position, intensity, range);
     }
 }
 
-fn lights(studio: &mut Studio) -> Result<(), Failed> {
+fn lights(harness: &mut Harness) -> Result<(), Failed> {
     const POINT: usize = 0;
     const SPOT: usize = 1;
     const HEMISPHERE: usize = 2;
-    let place = |number: f64| match number {
+    let position = |number: f64| match number {
         _ if !number.is_finite() => Expected::Without(RejectionReason::InvalidLight),
         _ if is_within_reach(number) => Expected::Drawn,
         _ => Expected::Without(RejectionReason::LightOutOfReach),
     };
     check(
-        studio,
-        &SPECIAL_PLACES,
+        harness,
+        &SPECIAL_POSITIONS,
         &[
-            ("point light's position", |stand, number| change(stand, POINT, |place, _, _| place.x = number), place),
-            ("spot light's position", |stand, number| change(stand, SPOT, |place, _, _| place.y = number), place),
-            ("hemisphere's position", |stand, number| change(stand, HEMISPHERE, |place, _, _| place.z = number), place),
+            (
+                "point light's position",
+                |test, number| change(test, POINT, |position, _, _| position.x = number),
+                position,
+            ),
+            (
+                "spot light's position",
+                |test, number| change(test, SPOT, |position, _, _| position.y = number),
+                position,
+            ),
+            (
+                "hemisphere's position",
+                |test, number| change(test, HEMISPHERE, |position, _, _| position.z = number),
+                position,
+            ),
         ],
     )?;
     let color = |number: f32| {
@@ -304,35 +318,35 @@ fn lights(studio: &mut Studio) -> Result<(), Failed> {
         if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
     };
     check(
-        studio,
+        harness,
         &SPECIAL,
         &[
-            ("point light's red", |stand, number| change(stand, POINT, |_, color, _| color.x = number), color),
-            ("spot light's red", |stand, number| change(stand, SPOT, |_, color, _| color.x = number), color),
-            ("hemisphere's red", |stand, number| change(stand, HEMISPHERE, |_, color, _| color.x = number), color),
+            ("point light's red", |test, number| change(test, POINT, |_, color, _| color.x = number), color),
+            ("spot light's red", |test, number| change(test, SPOT, |_, color, _| color.x = number), color),
+            ("hemisphere's red", |test, number| change(test, HEMISPHERE, |_, color, _| color.x = number), color),
             (
                 "point light's all",
-                |stand, number| change(stand, POINT, |_, color, _| *color = Vec3::splat(number)),
+                |test, number| change(test, POINT, |_, color, _| *color = Vec3::splat(number)),
                 whole_color,
             ),
             (
                 "sun's illuminance",
-                |stand, number| {
-                    if let Light::Directional { illuminance, .. } = &mut stand.scene.lights[3] {
+                |test, number| {
+                    if let Light::Directional { illuminance, .. } = &mut test.scene.lights[3] {
                         *illuminance = Vec3::splat(number);
                     }
                 },
                 whole_color,
             ),
-            ("point light's range", |stand, number| change(stand, POINT, |_, _, range| *range = number), range),
-            ("spot light's range", |stand, number| change(stand, SPOT, |_, _, range| *range = number), range),
-            ("hemisphere's range", |stand, number| change(stand, HEMISPHERE, |_, _, range| *range = number), range),
+            ("point light's range", |test, number| change(test, POINT, |_, _, range| *range = number), range),
+            ("spot light's range", |test, number| change(test, SPOT, |_, _, range| *range = number), range),
+            ("hemisphere's range", |test, number| change(test, HEMISPHERE, |_, _, range| *range = number), range),
             (
                 "directions",
-                |stand, number| {
-                    stand.scene.lights.truncate(3);
-                    stand.scene.lights.swap_remove(0);
-                    if let Light::Spot { direction, .. } = &mut stand.scene.lights[1] {
+                |test, number| {
+                    test.scene.lights.truncate(3);
+                    test.scene.lights.swap_remove(0);
+                    if let Light::Spot { direction, .. } = &mut test.scene.lights[1] {
                         direction.x = number;
                     }
                 },
@@ -340,8 +354,8 @@ fn lights(studio: &mut Studio) -> Result<(), Failed> {
             ),
             (
                 "sun's direction",
-                |stand, number| {
-                    if let Light::Directional { direction, .. } = &mut stand.scene.lights[3] {
+                |test, number| {
+                    if let Light::Directional { direction, .. } = &mut test.scene.lights[3] {
                         direction.y = number;
                     }
                 },
@@ -349,8 +363,8 @@ fn lights(studio: &mut Studio) -> Result<(), Failed> {
             ),
             (
                 "inner angle",
-                |stand, number| {
-                    if let Light::Spot { inner_angle, .. } = &mut stand.scene.lights[SPOT] {
+                |test, number| {
+                    if let Light::Spot { inner_angle, .. } = &mut test.scene.lights[SPOT] {
                         *inner_angle = number;
                     }
                 },
@@ -364,8 +378,8 @@ fn lights(studio: &mut Studio) -> Result<(), Failed> {
             ),
             (
                 "outer angle",
-                |stand, number| {
-                    if let Light::Spot { outer_angle, .. } = &mut stand.scene.lights[SPOT] {
+                |test, number| {
+                    if let Light::Spot { outer_angle, .. } = &mut test.scene.lights[SPOT] {
                         *outer_angle = number;
                     }
                 },
@@ -375,20 +389,20 @@ fn lights(studio: &mut Studio) -> Result<(), Failed> {
     )
 }
 
-fn surroundings(studio: &mut Studio) -> Result<(), Failed> {
+fn surroundings(harness: &mut Harness) -> Result<(), Failed> {
     let color = |number: f32| {
         if number >= 0.0 && number.is_finite() { Expected::Drawn } else { Expected::InvalidColor }
     };
     check(
-        studio,
+        harness,
         &SPECIAL,
         &[
-            ("ambient", |stand, number| stand.scene.ambient.y = number, color),
-            ("background", |stand, number| stand.scene.background.z = number, color),
+            ("ambient", |test, number| test.scene.ambient.y = number, color),
+            ("background", |test, number| test.scene.background.z = number, color),
             (
                 "both",
-                |stand, number| {
-                    (stand.scene.ambient, stand.scene.background) = (Vec3::splat(number), Vec3::splat(number));
+                |test, number| {
+                    (test.scene.ambient, test.scene.background) = (Vec3::splat(number), Vec3::splat(number));
                 },
                 color,
             ),
@@ -396,10 +410,10 @@ fn surroundings(studio: &mut Studio) -> Result<(), Failed> {
     )
 }
 
-/// Puts a number into a material.
+/// Sets a number in a material.
 type Put = fn(&mut Material, f32);
 
-fn materials(studio: &mut Studio) -> Result<(), Failed> {
+fn materials(harness: &mut Harness) -> Result<(), Failed> {
     let puts: [(&str, Put); 5] = [
         ("diffuse.x", |material, number| material.diffuse.x = number),
         ("diffuse", |material, number| material.diffuse = Vec3::splat(number)),
@@ -420,10 +434,11 @@ fn materials(studio: &mut Studio) -> Result<(), Failed> {
                 put(&mut material, number);
                 let most = if name == "opacity" { 1.0 } else { f32::MAX };
                 let is_fine = (0.0..=most).contains(&number);
-                let stand = Stand::with(square(Topology::TriangleList), material.clone(), None);
-                match (stand, is_fine) {
-                    (Ok(stand), true) => {
-                        check_one(studio, &stand, Expected::Drawn, true).map_err(|failed| told(&what, failed))?;
+                let test = TestScene::with(square(Topology::TriangleList), material.clone(), None);
+                match (test, is_fine) {
+                    (Ok(test), true) => {
+                        check_one(harness, &test, Expected::Drawn, true)
+                            .map_err(|failed| with_context(&what, failed))?;
                     }
                     (Err(_), false) => {
                         let error = Scene::new().add(material).err();
@@ -432,7 +447,7 @@ fn materials(studio: &mut Studio) -> Result<(), Failed> {
                         }
                     }
                     (Ok(_), false) => return Err(format!("{what}: it was taken").into()),
-                    (Err(failed), true) => return Err(told(&what, failed)),
+                    (Err(failed), true) => return Err(with_context(&what, failed)),
                 }
             }
         }
@@ -440,10 +455,10 @@ fn materials(studio: &mut Studio) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Puts a number into a vertex.
+/// Sets a number in a vertex.
 type PutVertex = fn(&mut Vertex, f32);
 
-fn vertices(studio: &mut Studio) -> Result<(), Failed> {
+fn vertices(harness: &mut Harness) -> Result<(), Failed> {
     let red = || Texture::new("red", 4, 4, [255, 0, 0, 255].repeat(16));
     let puts: [(&str, PutVertex); 7] = [
         ("uv.u", |vertex, number| vertex.uv[0] = number),
@@ -470,15 +485,15 @@ fn vertices(studio: &mut Studio) -> Result<(), Failed> {
             };
             let is_far = name.starts_with("position") && number.abs() == f32::MAX;
             let expected = if is_far { Expected::Without(RejectionReason::InvalidBounds) } else { Expected::Drawn };
-            let stand = Stand::with(mesh, Material { double_sided: true, ..Material::default() }, Some(red()?))?;
-            check_one(studio, &stand, expected, true).map_err(|failed| told(&what, failed))?;
+            let test = TestScene::with(mesh, Material { double_sided: true, ..Material::default() }, Some(red()?))?;
+            check_one(harness, &test, expected, true).map_err(|failed| with_context(&what, failed))?;
             if is_far {
                 continue;
             }
-            let Outcome::Drawn(Drawn { look: Some(look), .. }) = stand.outcome(studio)? else { continue };
+            let Outcome::Drawn(Drawn { capture: Some(capture), .. }) = test.outcome(harness)? else { continue };
             let [x, y] = SUBJECT_PIXEL;
-            let [r, g, b] = look.radiance(x, y);
-            // It is lit by the ambient light at least, and wherever the texture is read it is red.
+            let [r, g, b] = capture.radiance(x, y);
+            // Ambient light reaches it, and the texture is red everywhere.
             if !(r >= 0.19 && g < 1e-3 && b < 1e-3) {
                 return Err(format!("{what}: the subject is {:?}", [r, g, b]).into());
             }

@@ -1,4 +1,4 @@
-//! Every knob of the quality at its ends, and beyond.
+//! Every setting of the quality at and beyond its limits.
 
 use drawloom::BuildError;
 use drawloom::glam::{DVec3, Vec3};
@@ -11,16 +11,16 @@ use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::signs::{RED, Sign, Signs, camera, told};
-use crate::stage::{OpenError, Studio};
+use crate::harness::{Harness, OpenError};
+use crate::markers::{Marker, MarkerScene, RED, camera, with_context};
 
 pub const CASES: &[Case] = &[
     ("presets_draw_every_scene", presets),
-    ("every_knob_at_its_ends_draws_every_scene", ends),
-    ("a_quality_that_cannot_be_is_refused_by_the_knobs_name", invalid),
+    ("every_setting_at_its_limits_draws_every_scene", ends),
+    ("an_invalid_quality_is_refused_by_the_name_of_the_setting", invalid),
 ];
 
-/// As bright as numbers go, with everything that can be in a scene.
+/// A scene with every feature, and with the largest finite brightness.
 fn blinding() -> Result<Scene, Failed> {
     let mut scene = everything();
     let bright = Vec3::splat(f32::MAX);
@@ -41,40 +41,40 @@ fn blinding() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Scenes of which some are known to every pixel.
-fn expect_all(studio: &mut Studio, what: &str) -> Result<(), Failed> {
+/// Draws scenes; some of them have an oracle for every pixel.
+fn expect_all(harness: &mut Harness, what: &str) -> Result<(), Failed> {
     for position in [DVec3::ZERO, DVec3::new(1e3, -2e3, 5e2)] {
         let camera = Camera { position, ..camera([48, 32]) };
-        let signs = [
-            Sign::before(&camera, 5.0, 1.5).moved(&camera, 1.5, 1.0),
-            Sign::before(&camera, 9.0, 3.0).moved(&camera, -1.0, 0.0).colored(RED),
+        let markers = [
+            Marker::before(&camera, 5.0, 1.5).moved(&camera, 1.5, 1.0),
+            Marker::before(&camera, 9.0, 3.0).moved(&camera, -1.0, 0.0).colored(RED),
         ];
-        Signs::new(camera, signs)?.expect(studio, what, 2)?;
+        MarkerScene::new(camera, markers)?.expect(harness, what, 2)?;
     }
-    Signs::new(camera([48, 32]), [])?.expect(studio, what, 0)?;
+    MarkerScene::new(camera([48, 32]), [])?.expect(harness, what, 0)?;
     for (name, scene) in [("everything", everything()), ("blinding", blinding()?)] {
-        let drawn = studio.draw_whole(&scene).map_err(|failed| told(&format!("{what}: {name}"), failed))?;
-        if drawn.look.is_some_and(|look| look.covered() < 0.9) {
+        let drawn = harness.draw_whole(&scene).map_err(|failed| with_context(&format!("{what}: {name}"), failed))?;
+        if drawn.capture.is_some_and(|capture| capture.covered() < 0.9) {
             return Err(format!("{what}: {name} is dark").into());
         }
     }
     Ok(())
 }
 
-fn presets(studio: &mut Studio) -> Result<(), Failed> {
+fn presets(harness: &mut Harness) -> Result<(), Failed> {
     for (name, quality) in [("fast", Quality::fast()), ("balanced", Quality::balanced()), ("exact", Quality::exact())] {
-        let quality = studio.name().affordable(quality);
-        let mut studio = studio.with_quality(quality).map_err(|error| error.to_string())?;
-        // More than once: what is kept from frame to frame is to be right as well.
+        let quality = harness.name().affordable(quality);
+        let mut harness = harness.with_quality(quality).map_err(|error| error.to_string())?;
+        // Twice, since caches persist from frame to frame.
         for _ in 0..2 {
-            expect_all(&mut studio, name)?;
+            expect_all(&mut harness, name)?;
         }
     }
     Ok(())
 }
 
-fn ends(studio: &mut Studio) -> Result<(), Failed> {
-    let usual = studio.name().affordable(Quality::balanced());
+fn ends(harness: &mut Harness) -> Result<(), Failed> {
+    let usual = harness.name().affordable(Quality::balanced());
     let shadows = usual.shadows;
     let key = |bits, curve| DepthKey { bits, curve };
     let linear = |far| DepthCurve::Linear { far };
@@ -108,13 +108,13 @@ fn ends(studio: &mut Studio) -> Result<(), Failed> {
         Quality { transforms: TransformPrecision::Absolute, ..usual },
     ] {
         let changed = format!("{quality:?}");
-        let mut studio = studio.with_quality(quality).map_err(|error| error.to_string())?;
-        expect_all(&mut studio, &changed)?;
+        let mut harness = harness.with_quality(quality).map_err(|error| error.to_string())?;
+        expect_all(&mut harness, &changed)?;
     }
     Ok(())
 }
 
-fn invalid(studio: &mut Studio) -> Result<(), Failed> {
+fn invalid(harness: &mut Harness) -> Result<(), Failed> {
     let usual = Quality::exact();
     let shadows = usual.shadows;
     let key = |bits, curve| DepthKey { bits, curve };
@@ -132,7 +132,7 @@ fn invalid(studio: &mut Studio) -> Result<(), Failed> {
         (Quality { shadows: ShadowQuality { interval: 0, ..shadows }, ..usual }, "shadows.interval"),
         (Quality { shadows: ShadowQuality { widest_edge: f32::NAN, ..shadows }, ..usual }, "shadows.widest_edge"),
     ] {
-        match studio.with_quality(wrong).err() {
+        match harness.with_quality(wrong).err() {
             Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { knob: named, .. })))
                 if named == knob => {}
             Some(error) => return Err(format!("{knob}: {error}").into()),
@@ -140,7 +140,7 @@ fn invalid(studio: &mut Studio) -> Result<(), Failed> {
         }
     }
     let blind = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };
-    match studio.with_quality(blind).err() {
+    match harness.with_quality(blind).err() {
         Some(OpenError::Build(BuildError::Quality(QualityError::OcclusionWithoutVolume))) => Ok(()),
         Some(error) => Err(error.to_string().into()),
         None => Err("occlusion without a volume was taken".into()),

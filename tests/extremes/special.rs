@@ -1,6 +1,6 @@
-//! Numbers that are none, or hardly.
+//! Special floating-point numbers.
 
-/// Numbers at the ends of f32, and those that lie between nothing and something.
+/// NaN, infinities, the limits of f32, subnormals and zeros.
 pub const SPECIAL: [f32; 12] = [
     f32::NAN,
     f32::INFINITY,
@@ -9,7 +9,7 @@ pub const SPECIAL: [f32; 12] = [
     f32::MIN,
     f32::MIN_POSITIVE,
     -f32::MIN_POSITIVE,
-    // The least subnormal.
+    // The smallest subnormal.
     f32::from_bits(1),
     -f32::from_bits(1),
     0.0,
@@ -17,8 +17,8 @@ pub const SPECIAL: [f32; 12] = [
     1e-20,
 ];
 
-/// The same for places in the world.
-pub const SPECIAL_PLACES: [f64; 14] = [
+/// The same for positions in the world.
+pub const SPECIAL_POSITIONS: [f64; 14] = [
     f64::NAN,
     f64::INFINITY,
     f64::NEG_INFINITY,

@@ -1,4 +1,4 @@
-//! Files that a case writes, and what it looks at.
+//! Temporary files, and access to what was loaded from them.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,13 +8,13 @@ use drawloom::scene::Mesh;
 use drawloom::scene::obj::{self, Imported, ObjError};
 use image::RgbaImage;
 
-/// A folder of its own, gone when the case ends.
+/// A temporary folder, which is removed on drop.
 pub struct Folder(pub PathBuf);
 
 impl Folder {
     pub fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
-        // Only uniqueness matters.
+        // Relaxed: only uniqueness matters.
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let path = std::env::temp_dir().join(format!("drawloom-obj-{}-{number}", std::process::id()));
         fs::create_dir_all(path.join("textures")).unwrap();
@@ -26,8 +26,8 @@ impl Folder {
         self
     }
 
-    pub fn with_picture(self, name: &str, picture: &RgbaImage) -> Self {
-        picture.save(self.0.join(name)).unwrap();
+    pub fn with_image(self, name: &str, image: &RgbaImage) -> Self {
+        image.save(self.0.join(name)).unwrap();
         self
     }
 
@@ -38,7 +38,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // A folder left behind is no reason to fail.
+        // A folder that cannot be removed is no failure.
         let _ = fs::remove_dir_all(&self.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Vertices and faces, and what is no OBJ file, of files written for one purpose each.
+//! Vertices and faces, and files that are not OBJ.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::obj::{self, Imported, ObjError, ObjWarning};
@@ -9,23 +9,26 @@ use crate::trial;
 
 pub fn trials() -> Vec<Trial> {
     vec![
-        trial("geometry::a_polygon_is_cut_along_its_outline", a_polygon_is_cut_along_its_outline),
+        trial("geometry::a_concave_polygon_is_triangulated", a_concave_polygon_is_triangulated),
         trial("geometry::a_relative_index_counts_back", a_relative_index_counts_back),
         trial("geometry::lines_and_points_are_left_out", lines_and_points_are_left_out),
         trial("geometry::triangles_without_area_are_left_out", triangles_without_area_are_left_out),
-        trial("geometry::a_model_without_area_is_named", a_model_without_area_is_named),
+        trial("geometry::a_model_without_area_is_reported", a_model_without_area_is_reported),
         trial("geometry::bad_normals_and_coordinates_are_replaced", bad_normals_and_coordinates_are_replaced),
         trial("geometry::faces_with_and_without_normals_mix", faces_with_and_without_normals_mix),
-        trial("geometry::a_flat_face_has_its_own_normal", a_flat_face_has_its_own_normal),
-        trial("geometry::objects_stand_at_their_centre", objects_stand_at_their_centre),
-        trial("geometry::bad_lines_are_named", bad_lines_are_named),
-        trial("geometry::what_is_no_text_is_an_error", what_is_no_text_is_an_error),
-        trial("geometry::what_cannot_be_read_is_an_error", what_cannot_be_read_is_an_error),
+        trial("geometry::a_face_without_normals_has_a_face_normal", a_face_without_normals_has_a_face_normal),
+        trial("geometry::the_origin_of_an_object_is_its_centre", the_origin_of_an_object_is_its_centre),
+        trial(
+            "geometry::malformed_lines_are_reported_with_their_number",
+            malformed_lines_are_reported_with_their_number,
+        ),
+        trial("geometry::a_file_that_is_not_text_is_an_error", a_file_that_is_not_text_is_an_error),
+        trial("geometry::an_unreadable_file_is_an_error", an_unreadable_file_is_an_error),
     ]
 }
 
-fn a_polygon_is_cut_along_its_outline() {
-    // An L, whose first corner does not see all others.
+fn a_concave_polygon_is_triangulated() {
+    // An L. A fan around its first corner would cross its outline.
     let text = "v 0 2 0\nv 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nf 4 5 6 1 2 3\n";
     for text in [text.to_owned(), text.replace("f 4 5 6 1 2 3", "f 6 1 2 \\\n3 4 5 # the same")] {
         let imported = load(&text);
@@ -63,7 +66,7 @@ fn triangles_without_area_are_left_out() {
         let imported = load(&format!("{vertices}f 1 2 3\n{bad}\n"));
         assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1), "{bad}");
     }
-    // In a line but for rounding.
+    // Collinear, but for rounding.
     let imported = load(&format!("{TRIANGLE}v 0.1 0.3 0.7\nv 0.2 0.6 1.4\nv 0.3 0.9 2.1\nf 4 5 6\n"));
     assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1));
     // Small is not degenerate.
@@ -71,7 +74,7 @@ fn triangles_without_area_are_left_out() {
     assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 0));
 }
 
-fn a_model_without_area_is_named() {
+fn a_model_without_area_is_reported() {
     let imported = load(&format!("{TRIANGLE}o thin\nf 1 2 1\n"));
     let expected = ObjWarning::EmptyModel { model: String::from("thin"), degenerate_triangles: 1 };
     assert_eq!((imported.warnings, imported.scene.object_count()), (vec![expected], 1));
@@ -109,8 +112,8 @@ fn faces_with_and_without_normals_mix() {
     assert_eq!(dangling.warnings, [ObjWarning::DanglingCorners { corners: 2 }]);
 }
 
-fn a_flat_face_has_its_own_normal() {
-    // Two faces share an edge, and no normal.
+fn a_face_without_normals_has_a_face_normal() {
+    // Two faces share an edge.
     let imported = load(&format!("{TRIANGLE}v 0 0 -1\nf 1 4 2\n"));
     let mesh = mesh(&imported, 0);
     let normals: Vec<_> = mesh.indices().iter().map(|&index| mesh.vertices()[index as usize].normal).collect();
@@ -118,7 +121,7 @@ fn a_flat_face_has_its_own_normal() {
     assert_eq!(normals[3..], [[0.0, -1.0, 0.0]; 3]);
 }
 
-fn objects_stand_at_their_centre() {
+fn the_origin_of_an_object_is_its_centre() {
     let imported = load("v 1000000 5 0\nv 1000000.25 5 0\nv 1000000 5.5 0\nf 1 2 3\n");
     assert_eq!(imported.scene.as_scene_ref().positions, [DVec3::new(1_000_000.125, 5.25, 0.0)]);
     assert_eq!(mesh(&imported, 0).vertices()[0].position, [-0.125, -0.25, 0.0]);
@@ -126,21 +129,21 @@ fn objects_stand_at_their_centre() {
     assert!(bounds.center.length() < 1e-6 && bounds.radius < 0.3);
 }
 
-fn bad_lines_are_named() {
+fn malformed_lines_are_reported_with_their_number() {
     for (text, part) in [
         ("v 1 2\n", "line 1: a vertex needs 3 coordinates and has 2"),
-        ("v 1 2 x\n", "line 1: `x` is no number"),
+        ("v 1 2 x\n", "line 1: `x` is not a number"),
         ("v 1 2 3 0\n", "line 1: a vertex has the weight 0"),
         ("\n\nvn 1 2\n", "line 3: a normal needs 3 numbers and has 2"),
-        ("vt\n", "line 1: texture coordinates without a number"),
+        ("vt\n", "line 1: texture coordinates need a number and have none"),
         ("f\n", "line 1: a face without a corner"),
-        ("v 0 0 0\nf 1 2 3\n", "line 2: a face refers to vertex 2, and there are 1 so far"),
+        ("v 0 0 0\nf 1 2 3\n", "line 2: a face refers to vertex 2, but there are 1 so far"),
         ("v 0 0 0\nf 0 1 1\n", "line 2: a face refers to vertex 0"),
         ("v 0 0 0\nf -2 1 1\n", "line 2: a face refers to vertex -2"),
-        ("v 0 0 0\nf 1/1/1/1 1 1\n", "line 2: `1/1/1/1` is no corner of a face"),
-        ("v 0 0 0\nf 1/a 1 1\n", "line 2: `1/a` is no corner of a face"),
-        ("v 0 0 0\nf //1 1 1\n", "line 2: `//1` is no corner of a face"),
-        ("v 0 0 0\nf 99999999999999999999 1 1\n", "is no corner of a face"),
+        ("v 0 0 0\nf 1/1/1/1 1 1\n", "line 2: `1/1/1/1` is not a corner of a face"),
+        ("v 0 0 0\nf 1/a 1 1\n", "line 2: `1/a` is not a corner of a face"),
+        ("v 0 0 0\nf //1 1 1\n", "line 2: `//1` is not a corner of a face"),
+        ("v 0 0 0\nf 99999999999999999999 1 1\n", "is not a corner of a face"),
     ] {
         let error = Folder::new().with("a.obj", text).load().unwrap_err();
         assert!(matches!(error, ObjError::Malformed { .. }), "{text}");
@@ -151,15 +154,15 @@ fn bad_lines_are_named() {
     assert_eq!(mesh(&weighted, 0).vertices()[1].position, [0.5, -0.5, 0.0]);
 }
 
-fn what_is_no_text_is_an_error() {
+fn a_file_that_is_not_text_is_an_error() {
     let error = Folder::new().with("a.obj", b"v 0 0 \xff\n").load().unwrap_err();
     assert!(matches!(error, ObjError::NotText { offset: 6, .. }), "{error}");
     assert!(error.to_string().contains("a.obj"));
-    // A mark at the start, as some editors write, is text.
+    // A byte order mark is allowed.
     assert_eq!(load(&format!("\u{feff}{TRIANGLE}")).triangles, 1);
 }
 
-fn what_cannot_be_read_is_an_error() {
+fn an_unreadable_file_is_an_error() {
     let folder = Folder::new();
     for path in [folder.0.join("missing.obj"), folder.0.clone()] {
         let error = obj::load(&path).unwrap_err();

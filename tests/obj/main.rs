@@ -1,9 +1,9 @@
-//! OBJ files: the shared scenes, files written for one purpose each, and files broken at random.
+//! The OBJ loader: the shared scenes, minimal files for one feature each, and fuzzing.
 //!
-//! Cases that need the shared scenes are ignored, and never pass, where those are missing.
+//! Cases that need the shared scenes are ignored if those are missing.
 
-mod broken;
 mod folder;
+mod fuzz;
 mod geometry;
 mod materials;
 mod shared;
@@ -14,11 +14,11 @@ use libtest_mimic::{Arguments, Failed, Trial, run};
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
-    let trials = [shared::trials(), geometry::trials(), materials::trials(), broken::trials()];
+    let trials = [shared::trials(), geometry::trials(), materials::trials(), fuzz::trials()];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
 
-/// A trial that fails by panicking, as a usual test does.
+/// A trial that fails if `test` panics.
 fn trial(name: impl Into<String>, test: impl FnOnce() + Send + 'static) -> Trial {
     Trial::test(name, move || {
         test();

@@ -1,4 +1,4 @@
-//! Materials, textures and lights, of files written for one purpose each.
+//! Materials, textures and lights.
 
 use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
@@ -12,18 +12,21 @@ use crate::trial;
 
 pub fn trials() -> Vec<Trial> {
     vec![
-        trial("materials::a_texture_loads_with_its_top_up", a_texture_loads_with_its_top_up),
-        trial("materials::a_missing_texture_is_named", a_missing_texture_is_named),
+        trial("materials::a_texture_is_not_flipped", a_texture_is_not_flipped),
+        trial("materials::a_missing_texture_is_reported", a_missing_texture_is_reported),
         trial("materials::a_large_texture_is_scaled_down", a_large_texture_is_scaled_down),
         trial("materials::a_texture_is_shared", a_texture_is_shared),
-        trial("materials::a_missing_library_is_named", a_missing_library_is_named),
-        trial("materials::an_undefined_material_is_named", an_undefined_material_is_named),
+        trial("materials::a_missing_library_is_reported", a_missing_library_is_reported),
+        trial("materials::an_undefined_material_is_reported", an_undefined_material_is_reported),
         trial("materials::a_colour_of_one_number_is_gray", a_colour_of_one_number_is_gray),
-        trial("materials::opacity_0_everywhere_is_a_mistake", opacity_0_everywhere_is_a_mistake),
-        trial("materials::opacity_0_on_one_is_meant", opacity_0_on_one_is_meant),
-        trial("materials::a_glowing_panel_shines_from_its_front", a_glowing_panel_shines_from_its_front),
-        trial("materials::a_glowing_body_shines_everywhere", a_glowing_body_shines_everywhere),
-        trial("materials::a_dark_scene_gets_lights", a_dark_scene_gets_lights),
+        trial("materials::opacity_0_everywhere_is_treated_as_opaque", opacity_0_everywhere_is_treated_as_opaque),
+        trial("materials::opacity_0_of_one_material_is_kept", opacity_0_of_one_material_is_kept),
+        trial("materials::an_emissive_plane_is_a_hemispherical_light", an_emissive_plane_is_a_hemispherical_light),
+        trial("materials::an_emissive_body_is_a_point_light", an_emissive_body_is_a_point_light),
+        trial(
+            "materials::demo_lights_are_added_to_a_scene_without_lights",
+            demo_lights_are_added_to_a_scene_without_lights,
+        ),
     ]
 }
 
@@ -39,19 +42,18 @@ fn named(imported: &Imported, name: &str) -> Material {
     materials.find(|material| material.name == name).unwrap().clone()
 }
 
-/// Red above, blue below.
-fn picture() -> RgbaImage {
+fn red_above_blue() -> RgbaImage {
     RgbaImage::from_fn(2, 2, |_, y| if y == 0 { Rgba([255, 0, 0, 255]) } else { Rgba([0, 0, 255, 255]) })
 }
 
-fn a_texture_loads_with_its_top_up() {
+fn a_texture_is_not_flipped() {
     let text =
         format!("mtllib a.mtl\nusemtl one\nvt 0 1\nvt 0 0\nvt 1 0\n{}", TRIANGLE.replace("f 1 2 3", "f 1/1 2/2 3/3"));
     let library = "newmtl one\nKd 0 0 0\nmap_Kd -clamp on textures\\a picture.png\n";
     let folder = Folder::new().with("a.obj", text).with("a.mtl", library);
-    let imported = folder.with_picture("textures/a picture.png", &picture()).load().unwrap();
+    let imported = folder.with_image("textures/a picture.png", &red_above_blue()).load().unwrap();
     let material = named(&imported, "one");
-    // Black with a texture means the texture.
+    // A black diffuse colour with a texture becomes white.
     assert_eq!(material.diffuse, Vec3::ONE);
     let texture: &Texture = imported.scene.assets().get(material.texture.unwrap()).unwrap();
     assert_eq!((texture.width(), texture.height()), (2, 2));
@@ -62,14 +64,14 @@ fn a_texture_loads_with_its_top_up() {
     assert!(imported.warnings[0].to_string().contains("-clamp"));
 }
 
-fn a_missing_texture_is_named() {
+fn a_missing_texture_is_reported() {
     let (material, imported) = load_material("newmtl one\nKd 0.5 0.25 0\nmap_Kd textures/no.png\n");
     assert_eq!((material.diffuse, material.texture), (Vec3::new(0.5, 0.25, 0.0), None));
     let [ObjWarning::UnusableTexture { texture, material, .. }] = &imported.warnings[..] else {
         panic!("{:?}", imported.warnings);
     };
     assert_eq!((texture.as_str(), material.as_str()), ("textures/no.png", "one"));
-    // One that is no picture, by a name that none of the formats has.
+    // A file that is not an image, with the extension of no image format.
     let (material, imported) = load_material("newmtl one\nKd 0 0 0\nmap_Kd a.mtl\n");
     assert_eq!((material.diffuse, material.texture), (Vec3::ZERO, None));
     assert_eq!(imported.warnings.len(), 1);
@@ -77,27 +79,27 @@ fn a_missing_texture_is_named() {
 
 fn a_large_texture_is_scaled_down() {
     let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
-    let wide = RgbaImage::new(Texture::LARGEST + 1, 2);
+    let wide = RgbaImage::new(Texture::MAX_SIZE + 1, 2);
     let folder = Folder::new().with("a.obj", text).with("a.mtl", "newmtl one\nmap_Kd wide.png\n");
-    let imported = folder.with_picture("wide.png", &wide).load().unwrap();
+    let imported = folder.with_image("wide.png", &wide).load().unwrap();
     let texture = imported.scene.assets().get(named(&imported, "one").texture.unwrap()).unwrap();
-    assert_eq!((texture.width(), texture.height()), (Texture::LARGEST, 2));
+    assert_eq!((texture.width(), texture.height()), (Texture::MAX_SIZE, 2));
     let expected =
-        ObjWarning::ScaledTexture { texture: String::from("wide.png"), width: Texture::LARGEST + 1, height: 2 };
+        ObjWarning::ScaledTexture { texture: String::from("wide.png"), width: Texture::MAX_SIZE + 1, height: 2 };
     assert_eq!(imported.warnings, [expected]);
 }
 
 fn a_texture_is_shared() {
     let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}usemtl two\nf 3 2 1\n");
     let library = "newmtl one\nmap_Kd a.png\nnewmtl two\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
-    let folder = Folder::new().with("a.obj", text).with("a.mtl", library).with_picture("a.png", &picture());
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", library).with_image("a.png", &red_above_blue());
     let imported = folder.load().unwrap();
     assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
     assert_eq!(named(&imported, "one").texture, named(&imported, "two").texture);
     assert_eq!(named(&imported, "two").diffuse, Vec3::splat(0.5));
 }
 
-fn a_missing_library_is_named() {
+fn a_missing_library_is_reported() {
     let imported = load(&format!("mtllib no.mtl\n{TRIANGLE}"));
     let [ObjWarning::MissingLibrary { library, .. }] = &imported.warnings[..] else {
         panic!("{:?}", imported.warnings);
@@ -109,7 +111,7 @@ fn a_missing_library_is_named() {
     assert_eq!(*material, Material { double_sided: true, ..Material::default() });
 }
 
-fn an_undefined_material_is_named() {
+fn an_undefined_material_is_reported() {
     let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}usemtl no such one\nf 3 2 1\n");
     let imported = Folder::new().with("a.obj", text).with("a.mtl", "newmtl one\nKd 1 0 0\n").load().unwrap();
     assert_eq!(imported.warnings, [ObjWarning::UndefinedMaterial { material: String::from("no such one") }]);
@@ -126,13 +128,13 @@ fn a_colour_of_one_number_is_gray() {
     assert_eq!(imported.warnings, []);
 }
 
-fn opacity_0_everywhere_is_a_mistake() {
+fn opacity_0_everywhere_is_treated_as_opaque() {
     let (material, imported) = load_material("newmtl one\nd 0\nnewmtl two\nTr 1\nnewmtl three\n");
     assert_eq!((material.opacity, material.blend), (1.0, Blend::None));
     assert_eq!(imported.warnings, [ObjWarning::InvertedOpacity { invisible: 2, materials: 2 }]);
 }
 
-fn opacity_0_on_one_is_meant() {
+fn opacity_0_of_one_material_is_kept() {
     let (material, imported) = load_material("newmtl one\nd 0\nnewmtl two\nd 1\n");
     assert_eq!((material.opacity, material.blend), (0.0, Blend::Alpha));
     assert_eq!(imported.warnings, []);
@@ -140,14 +142,14 @@ fn opacity_0_on_one_is_meant() {
     assert_eq!((material.opacity, material.blend), (0.75, Blend::Alpha));
 }
 
-const GLOW: &str = "newmtl glow\nKe 2 1 0.5\n";
+const EMISSIVE: &str = "newmtl glow\nKe 2 1 0.5\n";
 
-fn a_glowing_panel_shines_from_its_front() {
+fn an_emissive_plane_is_a_hemispherical_light() {
     let text = "mtllib a.mtl\nusemtl glow\nv 0 5 0\nv 3 5 0\nv 3 5 2\nv 0 5 2\n";
     // Its winding says up. A normal that says down is right.
     for (face, normal) in [("f 4 3 2 1", Vec3::Y), ("f 4//1 3//1 2//1 1//1\n", Vec3::NEG_Y)] {
         let text = format!("{text}vn 0 -1 0\n{face}\n");
-        let imported = Folder::new().with("a.obj", text).with("a.mtl", GLOW).load().unwrap();
+        let imported = Folder::new().with("a.obj", text).with("a.mtl", EMISSIVE).load().unwrap();
         let [Light::Hemispherical { position, direction, intensity, range, casts_shadow: true }] =
             imported.scene.lights[..]
         else {
@@ -161,23 +163,23 @@ fn a_glowing_panel_shines_from_its_front() {
     }
 }
 
-fn a_glowing_body_shines_everywhere() {
+fn an_emissive_body_is_a_point_light() {
     let mut text = String::from("mtllib a.mtl\nusemtl glow\n");
     for corner in 0..8 {
         let side = |bit: u32| 10 + 2 * ((corner >> bit) & 1);
         text += &format!("v {} {} {}\n", side(0), side(1), side(2));
     }
     text += "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
-    let imported = Folder::new().with("a.obj", text).with("a.mtl", GLOW).load().unwrap();
+    let imported = Folder::new().with("a.obj", text).with("a.mtl", EMISSIVE).load().unwrap();
     let [Light::Point { position, intensity, .. }] = imported.scene.lights[..] else {
         panic!("{:?}", imported.scene.lights);
     };
     assert!(position.distance(DVec3::splat(11.0)) < 1e-6, "{position}");
-    // A quarter of six sides of 4 square metres.
+    // A quarter of six sides of 4 m².
     assert!(intensity.abs_diff_eq(Vec3::new(12.0, 6.0, 3.0), 1e-4), "{intensity}");
 }
 
-fn a_dark_scene_gets_lights() {
+fn demo_lights_are_added_to_a_scene_without_lights() {
     let mut imported = load(TRIANGLE);
     assert_eq!((imported.scene.lights.len(), imported.scene.cameras.len()), (0, 0));
     demo::add_camera_and_lights(&mut imported.scene);

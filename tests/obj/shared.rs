@@ -1,4 +1,4 @@
-//! The scenes that are not part of this package.
+//! The shared scenes, which are not part of this package.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ const fn warns(objects: usize, triangles: usize, warnings: usize) -> Outcome {
 const MALFORMED: [(&str, Outcome); 31] = [
     ("tobj/cornell_box.obj", warns(8, 36, 2)),
     ("tobj/empty_name_triangle.obj", gives(1, 1)),
-    ("tobj/invalid_index.obj", Error("line 12: a face refers to vertex 7, and there are 6 so far")),
+    ("tobj/invalid_index.obj", Error("line 12: a face refers to vertex 7, but there are 6 so far")),
     ("tobj/lines.obj", Error("no triangle to draw (0 degenerate triangles, 0 points, 3 lines)")),
     ("tobj/quad.obj", gives(3, 5)),
     ("tobj/quad_colored_merge.obj", gives(1, 2)),
@@ -93,7 +93,7 @@ fn check(name: &str, outcome: &Outcome) {
             assert!(message.contains(part), "{message}");
             assert!(message.contains(name), "the file is not named: {message}");
         }
-        (Ok(imported), Error(part)) => panic!("{} triangles in place of `{part}`", imported.triangles),
+        (Ok(imported), Error(part)) => panic!("{} triangles instead of the error `{part}`", imported.triangles),
         (Err(error), Gives { .. }) => panic!("{error}"),
     }
 }
@@ -125,7 +125,7 @@ fn cornell() {
     // 17, 12 and 4 times 0.47 m by 0.38 m.
     assert!(intensity.abs_diff_eq(Vec3::new(3.0362, 2.1432, 0.7144), 1e-3), "{intensity}");
     assert!(range > 2.0, "{range}");
-    // Its open side is +Z: the camera looks in from there, level and straight.
+    // The box is open towards +Z, where the camera looks in horizontally.
     demo::add_camera_and_lights(&mut scene);
     let camera = &scene.cameras[0];
     assert!((camera.orientation * Vec3::NEG_Z).abs_diff_eq(Vec3::NEG_Z, 1e-4));
@@ -144,7 +144,7 @@ fn sponza() {
     assert!(warnings.contains(&ObjWarning::InvertedOpacity { invisible: 22, materials: 25 }));
     assert!(warnings.contains(&ObjWarning::UndefinedMaterial { material: String::from("VasePlant") }));
     let missing = warnings.iter().filter(|warning| matches!(warning, ObjWarning::UnusableTexture { .. })).count();
-    // Leaves and a lion's head have quads so bent that they cross themselves in every plane.
+    // Leaves and a lion's head have quads so bent that every projection of them intersects itself.
     let crossed = |warning: &&ObjWarning| matches!(warning, ObjWarning::FannedPolygons { .. });
     assert_eq!((missing, warnings.iter().filter(crossed).count(), warnings.len()), (10, 2, 14));
     assert!(warnings.iter().any(|warning| warning.to_string().contains("`textures/sponza_arch_diff.tga`")));

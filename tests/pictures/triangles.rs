@@ -41,7 +41,7 @@ fn asking(scene: Scene, every: usize) -> Scene {
     let number = Cell::new(0_usize);
     with_meshes(scene, |mesh| {
         number.set(number.get() + 1);
-        as_list(mesh).with_triangles_culled(number.get().is_multiple_of(every))
+        as_list(mesh).with_triangle_culling(number.get().is_multiple_of(every))
     })
 }
 

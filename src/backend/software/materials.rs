@@ -49,7 +49,7 @@ impl MaterialCache {
         }
         self.chains.resize(assets.textures.slot_count(), None);
         for (slot, chain) in (0..).zip(&mut self.chains) {
-            let revision = assets.textures.revised_at(slot).map(|(revision, _)| revision);
+            let revision = assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
             chain.take_if(|(kept, _)| Some(*kept) != revision);
         }
         self.stale.clear();
@@ -69,7 +69,7 @@ impl MaterialCache {
     }
 
     fn chain(&mut self, assets: &Assets, slot: u32) -> Option<Arc<MipChain>> {
-        let (revision, texture) = assets.textures.revised_at(slot)?;
+        let (revision, texture) = assets.textures.get_with_revision(slot)?;
         let (_, chain) =
             self.chains.get_mut(slot as usize)?.get_or_insert_with(|| (revision, Arc::new(MipChain::of(texture))));
         Some(Arc::clone(chain))

@@ -30,7 +30,7 @@ impl MeshCache {
             before.clear();
         }
         self.kept.resize(assets.meshes.slot_count(), None);
-        for (handle, revision, mesh) in assets.meshes.iter_revised() {
+        for (handle, revision, mesh) in assets.meshes.iter_with_revision() {
             let slot = handle.index() as usize;
             let same = before.get_mut(slot).and_then(Option::take).filter(|(kept, _)| *kept == revision);
             self.kept[slot] = Some(same.unwrap_or_else(|| (revision, Arc::new(as_fetched(mesh.clone(), vertices)))));

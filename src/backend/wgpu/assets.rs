@@ -113,7 +113,7 @@ impl AssetCache {
         self.meshes.resize(assets.meshes.slot_count(), None);
         let mut live = vec![false; self.meshes.len()];
         let mut changed = Vec::new();
-        for (handle, revision, mesh) in assets.meshes.iter_revised() {
+        for (handle, revision, mesh) in assets.meshes.iter_with_revision() {
             let slot = handle.index() as usize;
             live[slot] = true;
             if self.meshes[slot].is_none_or(|range| range.revision != revision) {
@@ -136,7 +136,7 @@ impl AssetCache {
             self.indices.renew(device, index_bytes)?;
             changed = assets
                 .meshes
-                .iter_revised()
+                .iter_with_revision()
                 .map(|(handle, revision, mesh)| (handle.index() as usize, revision, mesh))
                 .collect();
         }

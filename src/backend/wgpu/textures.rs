@@ -49,7 +49,7 @@ impl TextureArrays {
         for (array, (entry, side)) in self.arrays.iter_mut().zip(SIDES).enumerate() {
             let mut wanted: Vec<(u32, u64, &Texture)> = assets
                 .textures
-                .iter_revised()
+                .iter_with_revision()
                 .filter(|(_, _, texture)| array_for(texture) == array)
                 .map(|(handle, revision, texture)| (handle.index(), revision, texture))
                 .collect();

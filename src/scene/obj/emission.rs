@@ -1,19 +1,19 @@
-//! The light that a glowing mesh gives.
+//! Lights that stand for emissive meshes.
 
 use glam::{DVec3, Vec3};
 
 use super::geometry::ModelGeometry;
 use crate::scene::Light;
 
-/// A mesh whose mean normal is at least this long is planar.
-const PLANAR: f64 = 0.9;
+/// A mesh counts as planar if the length of its mean normal is at least this.
+const MIN_PLANAR_NORMAL: f64 = 0.9;
 
-/// The light that stands for a mesh at `position` that gives off `radiance`, in a scene of diameter `size`. None if there
-/// is nothing to see of it.
+/// The light for a mesh at `position` that emits `radiance`, in a scene of diameter `scene_diameter`. `None` if the mesh has
+/// no area, or emits nothing.
 ///
-/// A planar mesh shines from its front with the intensity radiance × area on its axis. Any other one shines everywhere,
-/// with a quarter of that, which is what a convex body shows of its surface on average.
-pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, size: f64) -> Option<Light> {
+/// A planar mesh becomes a hemispherical light with the intensity radiance × area on its axis. Any other mesh becomes a point
+/// light with a quarter of that: the mean projected area of a convex body is a quarter of its surface.
+pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, scene_diameter: f64) -> Option<Light> {
     let (mut area, mut facing, mut centroid) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for corners in geometry.indices.as_chunks::<3>().0 {
         let corners = corners.map(|index| geometry.vertices[index as usize]);
@@ -22,7 +22,7 @@ pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, s
         let product = (b - a).cross(c - a) / 2.0;
         area += product.length();
         centroid += product.length() * (a + b + c) / 3.0;
-        // Winding is no promise in an OBJ file, normals are.
+        // OBJ guarantees no winding, but normals.
         facing += if product.dot(normal) < 0.0 { -product } else { product };
     }
     if !(area > 0.0 && radiance.max_element() > 0.0) {
@@ -30,15 +30,15 @@ pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, s
     }
     let center = position + centroid / area;
     let direction = facing / area;
-    // Finite even for a surface as large as 32-bit coordinates allow.
+    // Finite for any surface that 32-bit coordinates can represent.
     let intensity = |area: f64| (radiance.as_dvec3() * area).min(DVec3::splat(1e30)).as_vec3();
-    // A light that reaches much farther than the scene is as good as one that never ends.
-    let range = |intensity: Vec3| Light::range_for(intensity).min((4.0 * size) as f32).max(f32::MIN_POSITIVE);
-    Some(if direction.length() >= PLANAR {
+    // A range much larger than the scene makes no difference.
+    let range = |intensity: Vec3| Light::range_for(intensity).min((4.0 * scene_diameter) as f32).max(f32::MIN_POSITIVE);
+    Some(if direction.length() >= MIN_PLANAR_NORMAL {
         let direction = direction.normalize();
         let intensity = intensity(area);
         Light::Hemispherical {
-            // Off the surface, lest it light itself.
+            // In front of the surface, so that the surface casts no shadow on itself.
             position: center + direction * (1e-3 * area.sqrt()),
             direction: direction.as_vec3().normalize(),
             intensity,

@@ -1,106 +1,106 @@
-//! What can go wrong with an OBJ file, and what was made the best of.
+//! Errors and warnings about OBJ files.
 
 use std::io;
 
 use crate::scene::SceneError;
 
-/// Why an OBJ file gave no scene. Every message names the file.
+/// Why an OBJ file could not be loaded. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjError {
-    /// It is missing, a directory, or may not be read.
+    /// The file is missing, is a directory, or may not be read.
     #[error("cannot read `{file}`: {source}")]
     Unreadable {
         /// The file.
         file: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// It is not UTF-8 text.
-    #[error("`{file}` is not UTF-8 text: byte {offset} is wrong")]
+    /// The file is not UTF-8 text.
+    #[error("`{file}` is not UTF-8 text: byte {offset} is invalid")]
     NotText {
         /// The file.
         file: String,
-        /// The first byte that is wrong, counted from 0.
+        /// The first invalid byte, counted from 0.
         offset: usize,
     },
-    /// A line that cannot be understood.
+    /// A malformed line.
     #[error("`{file}`, line {line}: {reason}")]
     Malformed {
         /// The file.
         file: String,
         /// The line, counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Why it is malformed.
         reason: String,
     },
-    /// Every line was understood, but the whole was refused.
+    /// tobj could not parse the file although every line is well-formed.
     #[error("`{file}`: {reason}")]
     Refused {
         /// The file.
         file: String,
-        /// Why.
+        /// The error of tobj.
         reason: String,
     },
-    /// Nothing in it can be drawn.
+    /// The file has nothing to draw.
     #[error(
         "`{file}` has no triangle to draw ({degenerate_triangles} degenerate triangles, {points} points, {lines} lines)"
     )]
     NoTriangles {
         /// The file.
         file: String,
-        /// Triangles without area.
+        /// The number of triangles without area.
         degenerate_triangles: usize,
-        /// Points, which are not drawn.
+        /// The number of points, which are not drawn.
         points: usize,
-        /// Lines, which are not drawn.
+        /// The number of lines, which are not drawn.
         lines: usize,
     },
-    /// The scene refused what the file brought.
+    /// An asset or object of the file is invalid.
     #[error("`{file}`: {source}")]
     Scene {
         /// The file.
         file: String,
-        /// What it refused.
+        /// The error of the scene.
         source: SceneError,
     },
 }
 
-/// Something in an OBJ file that could not be taken as it is; the scene was made without it.
+/// Something in an OBJ file that was left out or replaced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjWarning {
-    /// A `.mtl` file that cannot be read. Its materials are undefined then.
+    /// A `.mtl` file that cannot be read. Its materials are then undefined.
     #[error("material library `{library}` cannot be read: {reason}")]
     MissingLibrary {
-        /// As the OBJ file names it.
+        /// Its name in the OBJ file.
         library: String,
-        /// What the system said.
+        /// The error of the operating system.
         reason: String,
     },
-    /// A line of a `.mtl` file that was left out, or not taken as it is.
+    /// A line of a `.mtl` file that was left out or changed.
     #[error("material library `{library}`, line {line}: {reason}")]
     LibraryLine {
-        /// As the OBJ file names it.
+        /// Its name in the OBJ file.
         library: String,
         /// The line, counted from 1.
         line: usize,
-        /// What is wrong with it, and what was done.
+        /// What is wrong with it, and what was done about it.
         reason: String,
     },
-    /// A material that is used but nowhere defined. Objects that use it get the default one.
-    #[error("material `{material}` is not defined, and the default one takes its place")]
+    /// A material that is used but not defined. Objects that use it get the default material.
+    #[error("material `{material}` is not defined and was replaced by the default material")]
     UndefinedMaterial {
-        /// As `usemtl` names it.
+        /// Its name in `usemtl`.
         material: String,
     },
-    /// Nearly every material would be invisible, which is what an exporter writes that takes opacity for transparency.
-    /// All are taken for opaque.
-    #[error("{invisible} of {materials} materials have opacity 0, so all are taken for opaque")]
+    /// Nearly every material has opacity 0, because the exporter wrote transparency as opacity. All materials are opaque
+    /// instead.
+    #[error("{invisible} of {materials} materials have opacity 0, so all are treated as opaque")]
     InvertedOpacity {
-        /// Materials of opacity 0.
+        /// The number of materials with opacity 0.
         invisible: usize,
-        /// Materials that have an opacity.
+        /// The number of materials with an opacity.
         materials: usize,
     },
     /// A texture that is missing or cannot be decoded. The material keeps its plain colour.
@@ -110,61 +110,62 @@ pub enum ObjWarning {
         texture: String,
         /// The material.
         material: String,
-        /// What the system or the decoder said.
+        /// The error of the operating system or the decoder.
         reason: String,
     },
-    /// A texture larger than [`Texture::LARGEST`](crate::scene::Texture::LARGEST), scaled down to it.
+    /// A texture larger than [`Texture::MAX_SIZE`](crate::scene::Texture::MAX_SIZE), which was scaled down to it.
     #[error("texture `{texture}` of {width}x{height} pixels was scaled down")]
     ScaledTexture {
         /// Its path, relative to the OBJ file.
         texture: String,
-        /// In pixels, as it was.
+        /// Its original width in pixels.
         width: u32,
-        /// In pixels, as it was.
+        /// Its original height in pixels.
         height: u32,
     },
-    /// A model of which no triangle is left.
-    #[error("model `{model}` has no triangle to draw ({degenerate_triangles} degenerate), and was left out")]
+    /// A model without a triangle that can be drawn.
+    #[error("model `{model}` has no triangle to draw ({degenerate_triangles} degenerate) and was left out")]
     EmptyModel {
         /// Its name.
         model: String,
-        /// Triangles without area.
+        /// The number of triangles without area.
         degenerate_triangles: usize,
     },
-    /// Elements that are no polygons, and were left out.
+    /// Elements other than polygons, which were left out.
     #[error("{points} points, {lines} lines and {surfaces} free-form curves or surfaces were left out")]
     NotDrawn {
-        /// Points.
+        /// The number of points.
         points: usize,
-        /// Lines.
+        /// The number of lines.
         lines: usize,
-        /// Curves and surfaces.
+        /// The number of curves and surfaces.
         surfaces: usize,
     },
-    /// Normals that are zero or not finite. The faces' own take their place.
-    #[error("{normals} normals are zero or not finite, and the faces' own take their place")]
+    /// Normals that are zero or not finite. They were replaced by face normals.
+    #[error("{normals} normals are zero or not finite and were replaced by face normals")]
     ReplacedNormals {
-        /// How many.
+        /// Their number.
         normals: usize,
     },
-    /// Texture coordinates that are not finite. Zero takes their place.
-    #[error("{coordinates} texture coordinates are not finite, and 0 takes their place")]
+    /// Texture coordinates that are not finite. They were replaced by 0.
+    #[error("{coordinates} texture coordinates are not finite and were replaced by 0")]
     ReplacedTextureCoordinates {
-        /// How many.
+        /// Their number.
         coordinates: usize,
     },
-    /// Corners of faces that refer to a normal or texture coordinate that the file does not have. They have none then.
-    #[error("{corners} corners of faces refer to a normal or texture coordinate that is not there")]
+    /// Corners of faces that refer to a normal or texture coordinates that the file does not contain. The reference was
+    /// dropped.
+    #[error("{corners} corners of faces refer to a missing normal or missing texture coordinates")]
     DanglingCorners {
-        /// How many.
+        /// Their number.
         corners: usize,
     },
-    /// Polygons that cross themselves, or are not convex and have more than 256 corners. They were cut into a fan.
-    #[error("model `{model}` has {polygons} polygons that cross themselves or are too large, and may look wrong")]
+    /// Polygons that intersect themselves, or are concave with more than 256 corners. They became triangle fans.
+    #[error("model `{model}` has {polygons} polygons that intersect themselves or are too large, and may look wrong")]
     FannedPolygons {
         /// Its name.
         model: String,
-        /// How many.
+        /// Their number.
         polygons: usize,
     },
 }

@@ -1,7 +1,7 @@
 //! Material libraries, the `.mtl` files beside an OBJ file.
 //!
-//! Read here and not by tobj, which gives up a whole library for one line that it cannot read, without saying which, and
-//! panics on a colour of one number, which the format allows.
+//! tobj does not parse them, because it rejects a whole library for one malformed line without naming the line, and panics on
+//! a colour of one number, which the format allows.
 
 use glam::Vec3;
 
@@ -14,13 +14,13 @@ pub(super) struct Definition {
     pub name: String,
     pub diffuse: Option<Vec3>,
     pub emission: Vec3,
-    /// 1 hides what is behind it.
+    /// 1 is opaque.
     pub opacity: Option<f32>,
     /// Relative to the OBJ file.
     pub texture: Option<String>,
 }
 
-/// Every material that `text` defines; a line that cannot be read is left out, with a warning.
+/// Every material that `text` defines. A malformed line is left out, with a warning.
 pub(super) fn definitions(library: &str, text: &str, warnings: &mut Vec<ObjWarning>) -> Vec<Definition> {
     let mut found: Vec<Definition> = Vec::new();
     for (line, statement) in statements(text) {
@@ -36,22 +36,25 @@ pub(super) fn definitions(library: &str, text: &str, warnings: &mut Vec<ObjWarni
             continue;
         }
         let Some(definition) = found.last_mut() else {
-            warn(format!("`{keyword}` comes before the first `newmtl`, and was left out"));
+            warn(format!("`{keyword}` before the first `newmtl` was left out"));
             continue;
         };
         match keyword {
             "Kd" => definition.diffuse = color(rest, 1.0, &mut warn).or(definition.diffuse),
             "Ke" => definition.emission = color(rest, f32::MAX, &mut warn).unwrap_or(definition.emission),
-            "d" => definition.opacity = share(rest, &mut warn).or(definition.opacity),
-            "Tr" => definition.opacity = share(rest, &mut warn).map(|share| 1.0 - share).or(definition.opacity),
+            "d" => definition.opacity = opacity(rest, &mut warn).or(definition.opacity),
+            "Tr" => {
+                definition.opacity =
+                    opacity(rest, &mut warn).map(|transparency| 1.0 - transparency).or(definition.opacity)
+            }
             _ => definition.texture = texture(library, rest, &mut warn).or(definition.texture.take()),
         }
     }
     found
 }
 
-/// One number for all channels, or one each, from 0 to `largest`.
-fn color(values: &str, largest: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> {
+/// A colour: one number for all channels, or one for each, clamped to 0 to `max`.
+fn color(values: &str, max: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> {
     let numbers = values.split_once('#').map_or(values, |(numbers, _)| numbers);
     let numbers: Result<Vec<f32>, _> = numbers.split_whitespace().map(str::parse).collect();
     let color = match numbers.as_deref() {
@@ -60,34 +63,34 @@ fn color(values: &str, largest: f32, warn: &mut impl FnMut(String)) -> Option<Ve
         _ => Vec3::NAN,
     };
     if !color.is_finite() {
-        warn(format!("`{values}` is no colour, and was left out"));
+        warn(format!("`{values}` is not a colour, and was left out"));
         return None;
     }
-    let clamped = color.clamp(Vec3::ZERO, Vec3::splat(largest));
+    let clamped = color.clamp(Vec3::ZERO, Vec3::splat(max));
     if clamped != color {
-        warn(format!("`{values}` was limited to what a colour can be"));
+        warn(format!("the colour `{values}` was clamped"));
     }
     Some(clamped)
 }
 
-fn share(values: &str, warn: &mut impl FnMut(String)) -> Option<f32> {
-    // `-halo` lets the rim of a curved surface hide more than its middle, which a plain opacity comes closest to.
+fn opacity(values: &str, warn: &mut impl FnMut(String)) -> Option<f32> {
+    // `-halo` makes the rim of a curved surface more opaque than its middle; a uniform opacity approximates that.
     let number = values.trim_start_matches("-halo").split_whitespace().next().and_then(|word| word.parse::<f32>().ok());
     match number {
-        Some(share) if (0.0..=1.0).contains(&share) => Some(share),
+        Some(opacity) if (0.0..=1.0).contains(&opacity) => Some(opacity),
         _ => {
-            warn(format!("`{values}` is no share from 0 to 1, and was left out"));
+            warn(format!("`{values}` is not a number from 0 to 1, and was left out"));
             None
         }
     }
 }
 
-/// The file's name, which may hold spaces, behind options that each have a number of values.
+/// The name of a texture file, which may contain spaces, after options with values.
 fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option<String> {
     let mut rest = values;
     while rest.starts_with('-') {
-        let (option, behind) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-        let most = match option {
+        let (option, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+        let max_values = match option {
             "-o" | "-s" | "-t" => 3,
             "-mm" => 2,
             "-blendu" | "-blendv" | "-bm" | "-boost" | "-cc" | "-clamp" | "-imfchan" | "-texres" | "-type" => 1,
@@ -95,14 +98,14 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
             _ => break,
         };
         warn(format!("the texture option `{option}` was left out"));
-        rest = behind.trim_start();
-        for place in 0..most {
-            let (value, behind) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-            // The second and third number may be missing.
-            if place > 0 && value.parse::<f32>().is_err() {
+        rest = after.trim_start();
+        for number in 0..max_values {
+            let (value, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+            // The second and third value are optional.
+            if number > 0 && value.parse::<f32>().is_err() {
                 break;
             }
-            rest = behind.trim_start();
+            rest = after.trim_start();
         }
     }
     if rest.is_empty() {
@@ -117,7 +120,7 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
 mod tests {
     use super::*;
 
-    fn one(text: &str) -> (Definition, usize) {
+    fn parse_one(text: &str) -> (Definition, usize) {
         let mut warnings = Vec::new();
         let found = definitions("folder\\a.mtl", &format!("newmtl\ta name\t\n{text}"), &mut warnings);
         assert_eq!(found.len(), 1);
@@ -126,28 +129,28 @@ mod tests {
     }
 
     #[test]
-    fn what_a_library_may_say() {
-        assert_eq!(one("Kd 0.5").0.diffuse, Some(Vec3::splat(0.5)));
-        assert_eq!(one("Kd 0.1 0.2 0.3 # red").0.diffuse, Some(Vec3::new(0.1, 0.2, 0.3)));
-        assert_eq!(one("Ke 17 12 4").0.emission, Vec3::new(17.0, 12.0, 4.0));
-        assert_eq!(one("Tr 0.25").0.opacity, Some(0.75));
-        assert_eq!(one("d -halo 0.25").0.opacity, Some(0.25));
-        assert_eq!(one("map_Kd in\\a file.png").0.texture.as_deref(), Some("folder/in/a file.png"));
-        assert_eq!(one("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), {
+    fn statements_of_a_library_are_parsed() {
+        assert_eq!(parse_one("Kd 0.5").0.diffuse, Some(Vec3::splat(0.5)));
+        assert_eq!(parse_one("Kd 0.1 0.2 0.3 # red").0.diffuse, Some(Vec3::new(0.1, 0.2, 0.3)));
+        assert_eq!(parse_one("Ke 17 12 4").0.emission, Vec3::new(17.0, 12.0, 4.0));
+        assert_eq!(parse_one("Tr 0.25").0.opacity, Some(0.75));
+        assert_eq!(parse_one("d -halo 0.25").0.opacity, Some(0.25));
+        assert_eq!(parse_one("map_Kd in\\a file.png").0.texture.as_deref(), Some("folder/in/a file.png"));
+        assert_eq!(parse_one("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), {
             let texture = Some(String::from("folder/-x.png"));
             (Definition { name: String::from("a name"), texture, ..Definition::default() }, 3)
         });
     }
 
     #[test]
-    fn a_bad_line_costs_only_itself() {
+    fn only_a_malformed_line_is_left_out() {
         for bad in ["Kd 0.1 0.2", "Kd red", "Kd nan 0 0", "Ke inf 0 0", "d 2", "d", "map_Kd", "map_Kd -s 1", "Kd"] {
-            let (definition, warnings) = one(&format!("Kd 0.5 0.5 0.5\n{bad}\nKe 1 1 1"));
+            let (definition, warnings) = parse_one(&format!("Kd 0.5 0.5 0.5\n{bad}\nKe 1 1 1"));
             assert_eq!((definition.diffuse, definition.emission), (Some(Vec3::splat(0.5)), Vec3::ONE), "{bad}");
             assert_eq!((definition.opacity, definition.texture), (None, None), "{bad}");
             assert!(warnings >= 1, "{bad}");
         }
-        assert_eq!(one("Kd -1 2 0.5"), {
+        assert_eq!(parse_one("Kd -1 2 0.5"), {
             let diffuse = Some(Vec3::new(0.0, 1.0, 0.5));
             (Definition { name: String::from("a name"), diffuse, ..Definition::default() }, 1)
         });

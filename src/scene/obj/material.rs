@@ -1,4 +1,4 @@
-//! From a library's definitions to the scene's materials and textures.
+//! Materials and textures of the scene, from the definitions in libraries.
 
 use std::collections::HashMap;
 use std::io::{self, Cursor};
@@ -12,10 +12,10 @@ use super::preprocessing::Preprocessed;
 use crate::handle::Handle;
 use crate::scene::{Blend, Material, Scene, SceneError, Texture};
 
-/// This share of materials with opacity 0 is an exporter's mistake: 3ds Max writes transparency where opacity belongs.
+/// If at least this share of materials has opacity 0, the exporter wrote transparency as opacity, as 3ds Max does.
 const INVERTED_SHARE: f64 = 0.8;
 
-/// The materials an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default one.
+/// Adds the materials that an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default material.
 pub(super) fn add_materials(
     scene: &mut Scene,
     file: &Preprocessed,
@@ -27,9 +27,9 @@ pub(super) fn add_materials(
         add_library(library, fetch, &mut definitions, warnings);
     }
     correct_opacity(&mut definitions, warnings);
-    // A later definition of the same name takes the earlier one's place.
+    // A later definition of the same name replaces an earlier one.
     let defined: HashMap<_, _> = definitions.iter().map(|definition| (definition.name.as_str(), definition)).collect();
-    let mut textures = Textures { fetch, known: HashMap::new() };
+    let mut textures = TextureCache { fetch, by_path: HashMap::new() };
     let default = || Material { double_sided: true, ..Material::default() };
     let mut handles = Vec::new();
     for name in &file.materials {
@@ -46,7 +46,7 @@ pub(super) fn add_materials(
     Ok(handles)
 }
 
-/// Reads a library. A name with spaces is one name, or, if there is no such file, several.
+/// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
 fn add_library(
     library: &str,
     fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
@@ -54,7 +54,7 @@ fn add_library(
     warnings: &mut Vec<ObjWarning>,
 ) {
     match fetch(&library.replace('\\', "/")) {
-        // Only names can hold what is not UTF-8, and those will be named as undefined.
+        // Only names can contain invalid UTF-8. Materials of such names are reported as undefined.
         Ok(bytes) => definitions.extend(library::definitions(library, &String::from_utf8_lossy(&bytes), warnings)),
         Err(_) if library.contains(char::is_whitespace) => {
             for part in library.split_whitespace() {
@@ -76,13 +76,13 @@ fn correct_opacity(definitions: &mut [Definition], warnings: &mut Vec<ObjWarning
     }
 }
 
-/// Textures by path, so that materials share them.
-struct Textures<'a> {
+/// TextureCache by path, shared between materials.
+struct TextureCache<'a> {
     fetch: &'a dyn Fn(&str) -> io::Result<Vec<u8>>,
-    known: HashMap<String, Result<Handle<Texture>, String>>,
+    by_path: HashMap<String, Result<Handle<Texture>, String>>,
 }
 
-impl Textures<'_> {
+impl TextureCache<'_> {
     fn material(
         &mut self,
         scene: &mut Scene,
@@ -94,7 +94,7 @@ impl Textures<'_> {
             None => None,
         };
         let diffuse = match definition.diffuse {
-            // Exporters write black where a texture takes the colour's place.
+            // Exporters write black if there is a texture.
             Some(Vec3::ZERO) if texture.is_some() => Vec3::ONE,
             Some(diffuse) => diffuse,
             None if texture.is_some() => Vec3::ONE,
@@ -119,14 +119,14 @@ impl Textures<'_> {
         material: &str,
         warnings: &mut Vec<ObjWarning>,
     ) -> Result<Option<Handle<Texture>>, SceneError> {
-        if !self.known.contains_key(path) {
+        if !self.by_path.contains_key(path) {
             let handle = match self.decode(path, warnings) {
                 Ok(texture) => Ok(scene.add(texture)?),
                 Err(reason) => Err(reason),
             };
-            self.known.insert(path.to_owned(), handle);
+            self.by_path.insert(path.to_owned(), handle);
         }
-        match &self.known[path] {
+        match &self.by_path[path] {
             Ok(handle) => Ok(Some(*handle)),
             Err(reason) => {
                 let (texture, material) = (path.to_owned(), material.to_owned());
@@ -139,19 +139,19 @@ impl Textures<'_> {
     fn decode(&self, path: &str, warnings: &mut Vec<ObjWarning>) -> Result<Texture, String> {
         let bytes = (self.fetch)(path).map_err(|error| error.to_string())?;
         let mut reader = ImageReader::new(Cursor::new(bytes));
-        // Contents over name, but a TGA has nothing to know it by.
+        // The guess from the contents comes first, but TGA has no magic number.
         if let Ok(format) = ImageFormat::from_path(path) {
             reader.set_format(format);
         }
         let reader = reader.with_guessed_format().map_err(|error| error.to_string())?;
-        let mut picture = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
-        let (width, height) = picture.dimensions();
-        if width.max(height) > Texture::LARGEST {
-            let [wide, high] = [width, height].map(|side| side.min(Texture::LARGEST));
-            picture = imageops::resize(&picture, wide, high, imageops::FilterType::Triangle);
+        let mut image = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
+        let (width, height) = image.dimensions();
+        if width.max(height) > Texture::MAX_SIZE {
+            let [wide, high] = [width, height].map(|side| side.min(Texture::MAX_SIZE));
+            image = imageops::resize(&image, wide, high, imageops::FilterType::Triangle);
             warnings.push(ObjWarning::ScaledTexture { texture: path.to_owned(), width, height });
         }
-        let (width, height) = picture.dimensions();
-        Texture::new(path, width, height, picture.into_raw()).map_err(|error| error.to_string())
+        let (width, height) = image.dimensions();
+        Texture::new(path, width, height, image.into_raw()).map_err(|error| error.to_string())
     }
 }

@@ -1,51 +1,55 @@
-//! The text of an OBJ file, made ready for tobj.
+//! Preprocessing: checks and cleans the text of an OBJ file before tobj parses it.
 //!
-//! tobj 4.0.5 makes triangles of lines, tells neither which material is missing nor which line is wrong, reads neither
-//! continued lines nor comments behind a face, mixes up vertices of which only some have a colour, a normal or a texture
-//! coordinate, and overflows on some indices. So every line it gets was checked here first.
+//! tobj 4.0.5 has these defects, so it only gets lines that were checked here:
+//!
+//! - It turns lines into triangles.
+//! - It reports neither which material is missing nor which line is malformed.
+//! - It supports neither continued lines nor comments behind a face.
+//! - It confuses vertices if only some have a colour, a normal or texture coordinates.
+//! - It overflows on some indices.
 
 use std::fmt::Write;
 
 use glam::DVec3;
 
-/// What tobj is given, and what it is not told.
+/// The text for tobj, and what preprocessing took out of it.
 #[derive(Debug, Default)]
 pub(super) struct Preprocessed {
-    /// What tobj reads. Materials are called by their index in `materials`. Every corner of a face has all three indices,
-    /// and what it lacked refers to [`NOTHING`].
+    /// The text for tobj. The name of a material is its index in `materials`. Every corner of a face has all three indices;
+    /// missing ones refer to [`PLACEHOLDERS`].
     pub text: String,
-    /// What `mtllib` names, each once, in order.
+    /// The names of `mtllib` statements, each once, in order.
     pub libraries: Vec<String>,
-    /// What `usemtl` names, each once.
+    /// The names of `usemtl` statements, each once, in order.
     pub materials: Vec<String>,
-    /// Positions in `text` are relative to it.
+    /// The origin of the positions in `text`.
     pub origin: DVec3,
-    /// Points that were left out.
+    /// The number of points, which are left out.
     pub points: usize,
-    /// Lines that were left out.
+    /// The number of lines, which are left out.
     pub lines: usize,
-    /// Free-form curves and surfaces that were left out.
+    /// The number of free-form curves and surfaces, which are left out.
     pub surfaces: usize,
-    /// Normals that are zero or not finite; zero in `text`.
+    /// The number of normals that are zero or not finite. They are zero in `text`.
     pub bad_normals: usize,
-    /// Texture coordinates that are not finite; those of [`NOTHING`] in `text`.
+    /// The number of texture coordinates that are not finite. In `text` they are those of [`PLACEHOLDERS`].
     pub bad_texture_coordinates: usize,
-    /// Corners that refer to a normal or texture coordinate that is not there.
+    /// The number of corners that refer to a missing normal or missing texture coordinates.
     pub dangling_corners: usize,
     counts: Counts,
     positions: Vec<DVec3>,
-    /// The position of the first face's first corner.
+    /// The index of the position of the first corner of the first face.
     first_corner: Option<usize>,
 }
 
-/// A line that cannot be understood: its number from 1, and why.
+/// A malformed line: its number, counted from 1, and the reason.
 #[derive(Debug)]
-pub(super) struct BadLine {
+pub(super) struct MalformedLine {
     pub line: usize,
     pub reason: String,
 }
 
-/// How many there are so far: what relative indices count back from.
+/// The numbers of vertex attributes so far, from which relative indices count back.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     positions: usize,
@@ -53,22 +57,23 @@ struct Counts {
     normals: usize,
 }
 
-/// What a corner without normal or texture coordinate gets: a normal that is none, and, since the second axis points up,
-/// the upper left of the texture.
-const NOTHING: &str = "vt 0 1\nvn 0 0 0\n";
+/// The attributes of a corner without texture coordinates or normal: the upper left of the texture, as the v axis of OBJ points
+/// up, and a zero normal.
+const PLACEHOLDERS: &str = "vt 0 1\nvn 0 0 0\n";
 
-/// Scenes nearer to the world's origin than this are read as they are; others relative to a multiple of it, since tobj
-/// reads `f32`, which is 0.5 m coarse in a survey's coordinates.
+/// The origin of the positions in the text is a multiple of this, in metres. tobj reads f32, whose precision is 0.5 m in the
+/// coordinates of a land survey.
 const ORIGIN_STEP: f64 = 4096.0;
 
-/// Farther than a frame draws. A vertex out there is a mistake that the others do not have to follow.
-const FARTHEST_ORIGIN: f64 = 1e10;
+/// The largest coordinate of an origin. Frames draw nothing as far away, so a vertex farther out is a mistake in the file,
+/// and others are not relative to it.
+const MAX_ORIGIN: f64 = 1e10;
 
 impl Preprocessed {
-    pub(super) fn new(source: &str) -> Result<Self, BadLine> {
-        let mut preprocessed = Self { text: String::from(NOTHING), ..Self::default() };
+    pub(super) fn new(source: &str) -> Result<Self, MalformedLine> {
+        let mut preprocessed = Self { text: String::from(PLACEHOLDERS), ..Self::default() };
         for (line, statement) in statements(source) {
-            preprocessed.statement(&statement).map_err(|reason| BadLine { line, reason })?;
+            preprocessed.statement(&statement).map_err(|reason| MalformedLine { line, reason })?;
         }
         preprocessed.write_positions();
         Ok(preprocessed)
@@ -77,7 +82,7 @@ impl Preprocessed {
     fn statement(&mut self, statement: &str) -> Result<(), String> {
         let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();
-        // Names may hold a `#`, numbers may not.
+        // Names may contain `#`; numbers are followed by comments.
         let values = rest.split_once('#').map_or(rest, |(values, _)| values);
         match keyword {
             "v" => self.position(values),
@@ -119,7 +124,7 @@ impl Preprocessed {
         }
     }
 
-    /// Three coordinates; a fourth divides them, and any further ones are a colour.
+    /// Three coordinates. A fourth number is a weight, which divides them; further numbers are a colour.
     fn position(&mut self, values: &str) -> Result<(), String> {
         let numbers = numbers(values)?;
         let [x, y, z, ..] = numbers[..] else {
@@ -135,12 +140,12 @@ impl Preprocessed {
         Ok(())
     }
 
-    /// Writes the positions, before all else, relative to the first corner of a face: vertices that no face refers to may be
-    /// anywhere.
+    /// Writes the positions at the start of the text, relative to an origin near the first corner of a face. Vertices that no
+    /// face refers to may be anywhere, so they do not determine the origin.
     fn write_positions(&mut self) {
-        let within = |position: &&DVec3| position.abs().cmple(DVec3::splat(FARTHEST_ORIGIN)).all();
-        let anchor = self.first_corner.and_then(|corner| self.positions.get(corner)).filter(within);
-        self.origin = anchor.map_or(DVec3::ZERO, |anchor| (*anchor / ORIGIN_STEP).trunc() * ORIGIN_STEP);
+        let within = |position: &&DVec3| position.abs().cmple(DVec3::splat(MAX_ORIGIN)).all();
+        let first = self.first_corner.and_then(|corner| self.positions.get(corner)).filter(within);
+        self.origin = first.map_or(DVec3::ZERO, |first| (*first / ORIGIN_STEP).trunc() * ORIGIN_STEP);
         let mut text = String::new();
         for position in &self.positions {
             let DVec3 { x, y, z } = *position - self.origin;
@@ -153,10 +158,10 @@ impl Preprocessed {
     fn texture_coordinates(&mut self, values: &str) -> Result<(), String> {
         let numbers = numbers(values)?;
         let [u, ..] = numbers[..] else {
-            return Err(String::from("texture coordinates without a number"));
+            return Err(String::from("texture coordinates need a number and have none"));
         };
         let v = numbers.get(1).copied().unwrap_or(0.0);
-        // As 32-bit numbers, which is what they will be.
+        // Checked as f32, the type of the result.
         let is_finite = (u as f32).is_finite() && (v as f32).is_finite();
         self.bad_texture_coordinates += usize::from(!is_finite);
         self.counts.texture_coordinates += 1;
@@ -196,23 +201,23 @@ impl Preprocessed {
 
     /// A corner is `position`, `position/texture`, `position//normal` or `position/texture/normal`.
     fn corner(&mut self, corner: &str) -> Result<String, String> {
-        let no_corner = || format!("`{corner}` is no corner of a face");
+        let malformed = || format!("`{corner}` is not a corner of a face");
         let mut indices = [None; 3];
-        for (place, index) in corner.split('/').enumerate().filter(|(_, index)| !index.is_empty()) {
-            *indices.get_mut(place).ok_or_else(no_corner)? = Some(index.parse::<i64>().map_err(|_| no_corner())?);
+        for (number, index) in corner.split('/').enumerate().filter(|(_, index)| !index.is_empty()) {
+            *indices.get_mut(number).ok_or_else(malformed)? = Some(index.parse::<i64>().map_err(|_| malformed())?);
         }
         let [Some(position), texture, normal] = indices else {
-            return Err(no_corner());
+            return Err(malformed());
         };
         let Counts { positions, texture_coordinates, normals } = self.counts;
-        let position = absolute(position, positions)
-            .ok_or_else(|| format!("a face refers to vertex {position}, and there are {positions} so far"))?;
+        let position = absolute_index(position, positions)
+            .ok_or_else(|| format!("a face refers to vertex {position}, but there are {positions} so far"))?;
         self.first_corner.get_or_insert(position as usize - 1);
-        let found = [(texture, texture_coordinates), (normal, normals)]
-            .map(|(index, count)| index.map(|index| absolute(index, count)));
-        self.dangling_corners += usize::from(found.contains(&Some(None)));
-        // The first of either is that of `NOTHING`.
-        let [texture, normal] = found.map(|index| index.flatten().map_or(1, |index| index + 1));
+        let resolved = [(texture, texture_coordinates), (normal, normals)]
+            .map(|(index, count)| index.map(|index| absolute_index(index, count)));
+        self.dangling_corners += usize::from(resolved.contains(&Some(None)));
+        // Index 1 of either is that of `PLACEHOLDERS`.
+        let [texture, normal] = resolved.map(|index| index.flatten().map_or(1, |index| index + 1));
         Ok(format!(" {position}/{texture}/{normal}"))
     }
 
@@ -222,36 +227,36 @@ impl Preprocessed {
     }
 }
 
-/// The statements of an OBJ or MTL file, each with the number of its last line: a backslash continues a line on the next.
+/// The statements of an OBJ or MTL file, each with the number of its last line. A backslash at the end continues a line.
 pub(super) fn statements(source: &str) -> impl Iterator<Item = (usize, String)> {
-    let mut begun = String::new();
+    let mut statement_so_far = String::new();
     let lines = source.strip_prefix('\u{feff}').unwrap_or(source).lines().chain([""]);
     lines.enumerate().filter_map(move |(index, line)| {
-        // A comment ends with its line, whatever it ends in: many name a folder.
-        if begun.is_empty() && line.trim_start().starts_with('#') {
+        // A comment is not continued: many end with the path of a folder.
+        if statement_so_far.is_empty() && line.trim_start().starts_with('#') {
             return None;
         }
         if let Some(part) = line.strip_suffix('\\') {
-            begun.push_str(part);
-            begun.push(' ');
+            statement_so_far.push_str(part);
+            statement_so_far.push(' ');
             return None;
         }
-        begun.push_str(line);
-        let statement = begun.trim().to_owned();
-        begun.clear();
+        statement_so_far.push_str(line);
+        let statement = statement_so_far.trim().to_owned();
+        statement_so_far.clear();
         (!statement.is_empty() && !statement.starts_with('#')).then_some((index + 1, statement))
     })
 }
 
-/// An index counted from 1, if there is such an entry; a negative one counts back from the last.
-fn absolute(index: i64, count: usize) -> Option<u64> {
+/// The index counted from 1, if there is such an entry. A negative index counts back from the last entry.
+fn absolute_index(index: i64, count: usize) -> Option<u64> {
     let count = count as u64;
     let distance = index.unsigned_abs();
     (1..=count).contains(&distance).then(|| if index > 0 { distance } else { count + 1 - distance })
 }
 
 fn numbers(values: &str) -> Result<Vec<f64>, String> {
-    let number = |word: &str| word.parse().map_err(|_| format!("`{word}` is no number"));
+    let number = |word: &str| word.parse().map_err(|_| format!("`{word}` is not a number"));
     values.split_whitespace().map(number).collect()
 }
 
@@ -260,7 +265,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scene_far_away_keeps_its_millimetres() {
+    fn a_distant_scene_keeps_millimetre_precision() {
         let stray_vertex = "v 999999999 0 0\n";
         let face = "v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\nf 2 3 2\n";
         let preprocessed = Preprocessed::new(&format!("{stray_vertex}{face}")).unwrap();
@@ -271,10 +276,10 @@ mod tests {
     }
 
     #[test]
-    fn a_line_goes_on_after_a_backslash_and_keeps_its_number() {
-        let found: Vec<_> = statements("# head\r\nf 1 2 \\\r\n 3\r\n\nv 1\\").collect();
-        assert_eq!(found, [(3, String::from("f 1 2   3")), (6, String::from("v 1"))]);
-        let found: Vec<_> = statements("# C:\\models\\\nv 1\n  # D:\\\nv 2").collect();
-        assert_eq!(found, [(2, String::from("v 1")), (4, String::from("v 2"))]);
+    fn a_continued_line_has_the_number_of_its_last_line() {
+        let parsed: Vec<_> = statements("# head\r\nf 1 2 \\\r\n 3\r\n\nv 1\\").collect();
+        assert_eq!(parsed, [(3, String::from("f 1 2   3")), (6, String::from("v 1"))]);
+        let parsed: Vec<_> = statements("# C:\\models\\\nv 1\n  # D:\\\nv 2").collect();
+        assert_eq!(parsed, [(2, String::from("v 1")), (4, String::from("v 2"))]);
     }
 }

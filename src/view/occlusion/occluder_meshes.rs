@@ -25,7 +25,7 @@ impl OccluderMeshes {
         self.synced = Some((identity, revision));
         self.parts.resize_with(assets.meshes.slot_count(), || (0, Vec::new()));
         for (slot, parts) in (0..).zip(&mut self.parts) {
-            match assets.meshes.revised_at(slot) {
+            match assets.meshes.get_with_revision(slot) {
                 Some((revision, _)) if parts.0 == revision => {}
                 Some((revision, mesh)) => *parts = (revision, ConvexPart::decompose(mesh)),
                 None => *parts = (0, Vec::new()),

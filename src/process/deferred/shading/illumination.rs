@@ -68,7 +68,9 @@ mod tests {
     /// By angles, as the documentation of [`Light`] has it.
     fn expected(light: &Light, place: DVec3, normal: DVec3) -> f64 {
         let axis = Vec3::new(0.48, -0.6, 0.64).as_dvec3();
-        let Some((position, range)) = light.reach() else { return (-axis).angle_between(normal).cos().max(0.0) };
+        let Some((position, range)) = light.bounding_sphere() else {
+            return (-axis).angle_between(normal).cos().max(0.0);
+        };
         let way = place - position;
         let (distance, off_axis) = (way.length(), way.angle_between(axis));
         let shape = match light {
@@ -105,7 +107,7 @@ mod tests {
                 let at = |normal: Vec3| (Vector3::of_single(place), Vector3::of_single(normal));
                 let (there, facing) = at(normal);
                 let double: Vector3<f64> = illuminance_from(&light_values(&light, None), there, facing);
-                let most = light.reach().map_or(1.0, |(position, _)| place.as_dvec3().distance_squared(position).recip());
+                let most = light.bounding_sphere().map_or(1.0, |(position, _)| place.as_dvec3().distance_squared(position).recip());
                 let factor = expected(&light, place.as_dvec3(), normal.as_dvec3());
                 let single: Vector3<f32> = illuminance_from(
                     &light_values(&light, None),

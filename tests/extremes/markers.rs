@@ -1,4 +1,4 @@
-//! Scenes of squares that glow in one colour each, so that what every pixel is to show is known.
+//! Scenes of markers: emissive squares of one colour each, so that the expected radiance of every pixel is known.
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
@@ -6,22 +6,22 @@ use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology};
 use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
+use crate::harness::{Drawn, Harness};
 use crate::oracle::{Oracle, Seen};
-use crate::stage::{Drawn, Studio};
 
 /// A square of 2 m before scaling that faces its own +Z.
 #[derive(Clone, Copy, Debug)]
-pub struct Sign {
+pub struct Marker {
     pub position: DVec3,
     pub orientation: Quat,
     pub scale: Vec3,
-    /// Radiance that half floats can say exactly.
+    /// Radiance that half floats represent exactly.
     pub color: Vec3,
     pub double_sided: bool,
 }
 
-impl Sign {
-    /// A single-sided one that faces the camera: so far before it, `side` by side metres large around the middle of what it sees.
+impl Marker {
+    /// A single-sided marker that faces the camera, in the middle of the picture, with sides of `side` metres.
     pub fn before(camera: &Camera, distance: f64, side: f64) -> Self {
         let turn = camera.orientation.as_dquat().normalize();
         Self {
@@ -49,71 +49,71 @@ pub const RED: Vec3 = Vec3::new(0.875, 0.0625, 0.0);
 pub const BLUE: Vec3 = Vec3::new(0.03125, 0.25, 1.0);
 const BACKGROUND: Vec3 = Vec3::new(0.25, 0.125, 0.0625);
 
-/// A scene of signs, and its only camera.
-pub struct Signs {
+/// A scene of markers, and its only camera.
+pub struct MarkerScene {
     pub scene: Scene,
-    pub signs: Vec<Sign>,
+    pub markers: Vec<Marker>,
     mesh: Handle<Mesh>,
 }
 
-/// A camera at the origin, turned in no special way.
+/// A camera at the origin, not aligned with any axis.
 pub fn camera(size: [u32; 2]) -> Camera {
     sized(Camera::looking_at("main", DVec3::ZERO, DVec3::new(0.3, -0.4, -0.8)), size)
 }
 
-impl Signs {
-    pub fn new(camera: Camera, signs: impl IntoIterator<Item = Sign>) -> Result<Self, Failed> {
-        Self::of(square(Topology::TriangleList), camera, signs)
+impl MarkerScene {
+    pub fn new(camera: Camera, markers: impl IntoIterator<Item = Marker>) -> Result<Self, Failed> {
+        Self::of(square(Topology::TriangleList), camera, markers)
     }
 
-    /// Of another mesh, a list of triangles.
-    pub fn of(mesh: Mesh, camera: Camera, signs: impl IntoIterator<Item = Sign>) -> Result<Self, Failed> {
+    /// Markers with another mesh, which must be a triangle list.
+    pub fn of(mesh: Mesh, camera: Camera, markers: impl IntoIterator<Item = Marker>) -> Result<Self, Failed> {
         let mut scene = Scene::new();
         scene.cameras = vec![camera];
         scene.background = BACKGROUND;
         let mesh = scene.add(mesh)?;
-        let mut all = Self { scene, signs: Vec::new(), mesh };
-        for sign in signs {
-            all.add(sign)?;
+        let mut all = Self { scene, markers: Vec::new(), mesh };
+        for marker in markers {
+            all.add(marker)?;
         }
         Ok(all)
     }
 
-    pub fn add(&mut self, sign: Sign) -> Result<(), Failed> {
-        let Sign { position, orientation, scale, color, double_sided } = sign;
+    pub fn add(&mut self, marker: Marker) -> Result<(), Failed> {
+        let Marker { position, orientation, scale, color, double_sided } = marker;
         let glow = Material { emission: color, diffuse: Vec3::ZERO, double_sided, ..Material::default() };
         let material = self.scene.add(glow)?;
         let object = RenderObject { orientation, scale, ..RenderObject::new(self.mesh, material, position) };
         self.scene.add_object(object)?;
-        self.signs.push(sign);
+        self.markers.push(marker);
         Ok(())
     }
 
-    /// Draws them and fails unless each pixel that is not at an edge shows what a ray finds there; and unless there are such
-    /// pixels of so many signs at least.
-    pub fn expect(&self, studio: &mut Studio, what: &str, seen_at_least: usize) -> Result<(), Failed> {
-        let drawn = studio.draw_whole(&self.scene).map_err(|failed| told(what, failed))?;
-        self.compare(&drawn, seen_at_least).map_err(|failed| told(what, failed))
+    /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and unless at
+    /// least `seen_at_least` markers have such pixels.
+    pub fn expect(&self, harness: &mut Harness, what: &str, seen_at_least: usize) -> Result<(), Failed> {
+        let drawn = harness.draw_whole(&self.scene).map_err(|failed| with_context(what, failed))?;
+        self.compare(&drawn, seen_at_least).map_err(|failed| with_context(what, failed))
     }
 
-    /// The same of what was drawn already.
+    /// Checks the same of a frame that has been drawn already.
     pub fn compare(&self, drawn: &Drawn, seen_at_least: usize) -> Result<(), Failed> {
         let camera = &self.scene.cameras[0];
         let mesh = self.scene.assets().get(self.mesh)?;
-        let oracle = Oracle::new(camera, mesh, &self.signs);
+        let oracle = Oracle::new(camera, mesh, &self.markers);
         let [width, height] = camera.size.map(|side| side as usize);
-        let mut seen = vec![0; self.signs.len()];
+        let mut seen = vec![0; self.markers.len()];
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let expected = match oracle.seen(x, y) {
                 Seen::Unsure => continue,
                 Seen::Background => self.scene.background,
-                Seen::Sign(sign) => {
-                    seen[sign] += 1;
-                    self.signs[sign].color
+                Seen::Marker(marker) => {
+                    seen[marker] += 1;
+                    self.markers[marker].color
                 }
             };
-            let Some(look) = &drawn.look else { continue };
-            let found = look.radiance(x, y);
+            let Some(capture) = &drawn.capture else { continue };
+            let found = capture.radiance(x, y);
             let far = |(found, expected): (f64, f32)| (found - f64::from(expected)).abs() > 1e-3;
             if found.into_iter().zip(expected.to_array()).any(far) {
                 return Err(format!("({x}, {y}) is {found:?}, not {expected}").into());
@@ -121,16 +121,16 @@ impl Signs {
         }
         let seen = seen.into_iter().filter(|pixels| *pixels > 0).count();
         if seen < seen_at_least {
-            return Err(format!("the case is none: a ray sees {seen} signs of {seen_at_least}").into());
+            return Err(format!("the case is invalid: the oracle sees {seen} of {seen_at_least} markers").into());
         }
         if drawn.visible < seen {
-            return Err(format!("{seen} signs are seen, and {} were drawn", drawn.visible).into());
+            return Err(format!("{seen} markers are seen, and {} were drawn", drawn.visible).into());
         }
         Ok(())
     }
 }
 
-/// A failure, and of what.
-pub fn told(what: &str, failed: Failed) -> Failed {
+/// Prefixes the message of a failure.
+pub fn with_context(what: &str, failed: Failed) -> Failed {
     format!("{what}: {}", failed.message().unwrap_or("failed")).into()
 }

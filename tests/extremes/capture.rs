@@ -1,26 +1,26 @@
-//! A picture as numbers.
+//! Captured pictures.
 
 use drawloom::backend::Picture;
 use drawloom::process::Format;
 use half::f16;
 use libtest_mimic::Failed;
 
-/// A view's `radiance` and its `picture`.
+/// The targets `radiance` and `picture` of a view.
 #[derive(Clone)]
-pub struct Look {
+pub struct Capture {
     pub size: [usize; 2],
     /// Red, green and blue, row by row from the top.
     radiance: Vec<[f64; 3]>,
-    /// What was made of it.
+    /// The tone-mapped picture, RGBA.
     picture: Vec<u8>,
 }
 
-/// What several lights add up to may be past the end of half floats, and then it is infinite: tone mapping takes it for the
-/// brightest there is.
+/// Reads both targets. Radiance may be infinite, where the sum of lights exceeds the range of half floats; tone mapping clamps
+/// it.
 ///
 /// # Errors
-/// If a pixel's radiance is not a number, or infinitely less than nothing.
-pub fn look(radiance: &Picture, picture: Picture) -> Result<Look, Failed> {
+/// If the radiance of a pixel is NaN or negative infinity.
+pub fn capture(radiance: &Picture, picture: Picture) -> Result<Capture, Failed> {
     let pixels = numbers(radiance)?;
     let size = [radiance.width as usize, radiance.height as usize];
     let is_broken = |channel: &f64| channel.is_nan() || *channel == f64::NEG_INFINITY;
@@ -29,15 +29,15 @@ pub fn look(radiance: &Picture, picture: Picture) -> Result<Look, Failed> {
         let count = pixels.iter().flatten().filter(|channel| is_broken(channel)).count();
         return Err(format!("the radiance at ({x}, {y}) is {value:?}, and {count} channels are like that").into());
     }
-    Ok(Look { size, radiance: pixels, picture: picture.bytes })
+    Ok(Capture { size, radiance: pixels, picture: picture.bytes })
 }
 
-impl Look {
+impl Capture {
     pub fn radiance(&self, x: usize, y: usize) -> [f64; 3] {
         self.radiance[y * self.size[0] + x]
     }
 
-    /// That of the middle.
+    /// The radiance of the middle pixel.
     pub fn middle(&self) -> [f64; 3] {
         self.radiance(self.size[0] / 2, self.size[1] / 2)
     }
@@ -46,16 +46,16 @@ impl Look {
     pub fn greatest(&self) -> [f64; 3] {
         self.radiance
             .iter()
-            .fold([0.0; 3], |most, pixel| std::array::from_fn(|channel| pixel[channel].abs().max(most[channel])))
+            .fold([0.0; 3], |max, pixel| std::array::from_fn(|channel| pixel[channel].abs().max(max[channel])))
     }
 
-    /// What share of the pixels is not as dark as nothing.
+    /// The share of pixels that are not black.
     pub fn covered(&self) -> f64 {
         let bright = self.radiance.iter().filter(|pixel| pixel.iter().any(|channel| *channel > 0.0)).count();
         bright as f64 / self.radiance.len() as f64
     }
 
-    /// The root of the mean square by which two pictures differ, 0 to 255, and the share of pixels that are off by more than 8.
+    /// The root mean square difference of two pictures, 0 to 255, and the share of pixels that differ by more than 8.
     pub fn distance(&self, other: &Self) -> [f64; 2] {
         let off = || self.picture.iter().zip(&other.picture).map(|(one, other)| f64::from(one.abs_diff(*other)));
         let mean_square = off().map(|off| off * off).sum::<f64>() / self.picture.len() as f64;
@@ -65,9 +65,9 @@ impl Look {
     }
 }
 
-/// Fails where two pictures of what is to look the same do not. Where an edge runs just through the middle of a pixel, a
-/// rounding decides which side that pixel shows: so two pixels of a hundred may be anything.
-pub fn assert_alike(what: &str, one: Option<&Look>, other: Option<&Look>) -> Result<(), Failed> {
+/// Fails if two pictures of equivalent scenes differ. Where an edge runs through the centre of a pixel, rounding determines the
+/// pixel, so 2% of the pixels may differ by any amount.
+pub fn assert_alike(what: &str, one: Option<&Capture>, other: Option<&Capture>) -> Result<(), Failed> {
     let (Some(one), Some(other)) = (one, other) else { return Ok(()) };
     let [root_mean_square, share] = one.distance(other);
     if root_mean_square <= 2.55 || share <= 0.02 {

@@ -1,4 +1,4 @@
-//! The backends, behind one face.
+//! A common interface to all backends.
 
 use std::sync::{Arc, OnceLock};
 
@@ -15,22 +15,22 @@ use drawloom::{BuildError, FrameError, Renderer, SubmitError, Submitter, wgpu};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
-use crate::look::{Look, look};
+use crate::capture::{Capture, capture};
 
 /// A backend that cases are run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StageName {
-    /// It draws nothing and checks everything.
+pub enum BackendName {
+    /// [`NullBackend`], which draws nothing and checks everything.
     Null,
-    /// It draws on the CPU, in f32.
+    /// [`SoftwareBackend`] in f32.
     Software,
-    /// It draws on the CPU, in f64.
+    /// [`SoftwareBackend`] in f64.
     Reference,
-    /// The machine's adapter.
+    /// [`WgpuBackend`] on the machine's adapter.
     Wgpu,
 }
 
-impl StageName {
+impl BackendName {
     pub const ALL: [Self; 4] = [Self::Null, Self::Software, Self::Reference, Self::Wgpu];
 
     pub fn name(self) -> &'static str {
@@ -42,40 +42,40 @@ impl StageName {
         }
     }
 
-    /// Whether it draws on the CPU, which without optimisations takes seconds for what an adapter draws in milliseconds.
+    /// Whether it draws on the CPU, where a frame takes seconds without optimisations.
     pub fn is_slow(self) -> bool {
         matches!(self, Self::Software | Self::Reference)
     }
 
-    /// The same quality with shadow maps that this backend has the time for.
+    /// The same quality with shadow maps that are small enough for this backend.
     pub fn affordable(self, quality: Quality) -> Quality {
         let side = if self.is_slow() { quality.shadows.side.min(96) } else { quality.shadows.side };
         Quality { shadows: ShadowQuality { side, ..quality.shadows }, ..quality }
     }
 
-    /// A renderer on it.
-    fn open(self, quality: Quality) -> Result<Box<dyn Stage>, OpenError> {
+    /// Creates a renderer on this backend.
+    fn open(self, quality: Quality) -> Result<Box<dyn Runner>, OpenError> {
         let scheduler = Arc::new(Scheduler::new(2).map_err(|error| error.to_string())?);
         match self {
-            Self::Null => Troupe::open(NullBackend, scheduler, quality),
-            Self::Software => Troupe::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, quality),
-            Self::Reference => Troupe::open(SoftwareBackend::reference(), scheduler, quality),
+            Self::Null => RendererOn::open(NullBackend, scheduler, quality),
+            Self::Software => RendererOn::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, quality),
+            Self::Reference => RendererOn::open(SoftwareBackend::reference(), scheduler, quality),
             Self::Wgpu => {
                 let (device, queue) = device().ok_or_else(|| "there is no graphics adapter".to_owned())?;
                 let backend = WgpuBackend::new(device, queue).map_err(|error| error.to_string())?;
-                Troupe::open(backend, scheduler, quality)
+                RendererOn::open(backend, scheduler, quality)
             }
         }
     }
 }
 
-/// The machine's adapter as a device that all cases share; `None` where there is none.
+/// The device of the machine's adapter, which all cases share. `None` without an adapter.
 pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
     static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
     DEVICE.get_or_init(|| adapter::device().ok()).clone()
 }
 
-/// Why there is no renderer.
+/// Why a renderer could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     #[error(transparent)]
@@ -90,61 +90,61 @@ impl From<String> for OpenError {
     }
 }
 
-/// What became of a scene.
+/// The outcome of drawing a scene.
 pub enum Outcome {
     /// It was drawn.
     Drawn(Drawn),
-    /// It was refused while it was recorded.
+    /// Recording failed.
     Refused(FrameError),
-    /// It was refused by the device.
+    /// Submission failed.
     NotSubmitted(SubmitError),
 }
 
 /// A frame that was drawn.
 pub struct Drawn {
-    /// The first view's picture; `None` where the backend draws nothing.
-    pub look: Option<Look>,
-    /// What was left out or could not be drawn as asked.
+    /// The pictures of the first view. `None` if the backend draws nothing.
+    pub capture: Option<Capture>,
+    /// What was left out or drawn at lower quality.
     pub rejections: Vec<Rejection>,
-    /// How many objects the first main view's geometry buffer was asked to draw.
+    /// The number of visible objects of the first view.
     pub visible: usize,
 }
 
-/// A backend that scenes can be handed to.
-pub trait Stage {
+/// Draws scenes on a backend.
+pub trait Runner {
     /// # Errors
-    /// If a picture cannot be brought back, or has a pixel that is not a number.
+    /// If a picture cannot be read back, or contains NaN.
     fn draw(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed>;
 }
 
-/// A backend, and one renderer on it: a frame that fails is to leave no trace in the next.
-pub struct Studio {
-    name: StageName,
-    stage: Box<dyn Stage>,
+/// One renderer on a backend, for all frames of a case: a failed frame must not affect the next one.
+pub struct Harness {
+    name: BackendName,
+    runner: Box<dyn Runner>,
 }
 
-impl Studio {
-    pub fn new(name: StageName) -> Result<Self, Failed> {
-        Ok(Self { name, stage: name.open(name.affordable(Quality::balanced()))? })
+impl Harness {
+    pub fn new(name: BackendName) -> Result<Self, Failed> {
+        Ok(Self { name, runner: name.open(name.affordable(Quality::balanced()))? })
     }
 
     /// Another renderer on the same backend.
     ///
     /// # Errors
-    /// If the quality cannot be.
+    /// If the quality is invalid.
     pub fn with_quality(&self, quality: Quality) -> Result<Self, OpenError> {
-        Ok(Self { name: self.name, stage: self.name.open(quality)? })
+        Ok(Self { name: self.name, runner: self.name.open(quality)? })
     }
 
-    pub fn name(&self) -> StageName {
+    pub fn name(&self) -> BackendName {
         self.name
     }
 
     pub fn outcome(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed> {
-        self.stage.draw(scene)
+        self.runner.draw(scene)
     }
 
-    /// What is drawn of a scene that can be.
+    /// Draws a scene, which must succeed.
     pub fn draw(&mut self, scene: &Scene) -> Result<Drawn, Failed> {
         match self.outcome(&scene.as_scene_ref())? {
             Outcome::Drawn(drawn) => Ok(drawn),
@@ -153,13 +153,13 @@ impl Studio {
         }
     }
 
-    /// The same, where nothing is to be left out.
+    /// The same; nothing may be left out.
     pub fn draw_whole(&mut self, scene: &Scene) -> Result<Drawn, Failed> {
         let drawn = self.draw(scene)?;
         if drawn.rejections.is_empty() { Ok(drawn) } else { Err(format!("left out: {:?}", drawn.rejections).into()) }
     }
 
-    /// Why a scene is refused that is to be.
+    /// Records a scene, which must fail, and returns the error.
     pub fn refusal(&mut self, scene: &SceneRef<'_>) -> Result<FrameError, Failed> {
         match self.outcome(scene)? {
             Outcome::Refused(error) => Ok(error),
@@ -169,9 +169,9 @@ impl Studio {
     }
 }
 
-/// What a submission knows of its pictures.
+/// Reads back the pictures of a submission.
 pub trait Pictures {
-    /// One of a view's targets; `None` where nothing was drawn.
+    /// A target of a view. `None` if the backend draws nothing.
     fn target(&self, view: usize, target: &str) -> Option<Result<Picture, BackendError>>;
 }
 
@@ -194,20 +194,20 @@ impl Pictures for WgpuSubmission {
 }
 
 /// A renderer and its submitter.
-struct Troupe<B: Backend> {
+struct RendererOn<B: Backend> {
     renderer: Renderer<B>,
     submitter: Submitter<B>,
 }
 
-impl<B: Backend<Submission: Pictures>> Troupe<B> {
-    fn open(backend: B, scheduler: Arc<Scheduler>, quality: Quality) -> Result<Box<dyn Stage>, OpenError> {
+impl<B: Backend<Submission: Pictures>> RendererOn<B> {
+    fn open(backend: B, scheduler: Arc<Scheduler>, quality: Quality) -> Result<Box<dyn Runner>, OpenError> {
         let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
         let (renderer, submitter) = builder.build(scheduler)?;
         Ok(Box::new(Self { renderer, submitter }))
     }
 }
 
-impl<B: Backend<Submission: Pictures>> Stage for Troupe<B> {
+impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
     fn draw(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed> {
         let recorded = match self.renderer.record(*scene) {
             Ok(recorded) => recorded,
@@ -220,12 +220,12 @@ impl<B: Backend<Submission: Pictures>> Stage for Troupe<B> {
             Err(error) => return Ok(Outcome::NotSubmitted(error)),
         };
         let target = |name| submitted.submission.target(0, name).transpose();
-        let look = match (target("radiance")?, target("picture")?) {
-            (Some(radiance), Some(picture)) => Some(look(&radiance, picture)?),
+        let capture = match (target("radiance")?, target("picture")?) {
+            (Some(radiance), Some(picture)) => Some(capture(&radiance, picture)?),
             _ => None,
         };
         Ok(Outcome::Drawn(Drawn {
-            look,
+            capture,
             visible: submitted.statistics.views.first().map_or(0, |view| view.visible),
             rejections: submitted.statistics.rejections,
         }))

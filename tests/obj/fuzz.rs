@@ -1,4 +1,4 @@
-//! Files broken at random: whatever they hold, reading ends, with a scene or with an error that names the file.
+//! Fuzzing: reading a randomly changed file returns a scene, or an error that names the file.
 
 use std::io;
 
@@ -13,7 +13,7 @@ use crate::trial;
 const FILE: &str = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 1 0 0\nv 0 1 0.5\nv 2 2 -1e3\nvt 0 0\nvt 1 0.5\n\
     vn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nusemtl glow\nf -5//-1 -4//1 -3//1 \\\n -2 5/1\nl 1 2\np 3\n";
 const LIBRARY: &str = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 a.png\nnewmtl glow\nKe 1 1 1\nTr 0\n";
-const PIECES: [&str; 14] = [
+const SNIPPETS: [&str; 14] = [
     "f 1 2 3\n",
     "f -1 -2 -3\n",
     "f 1/1/1 2//1 3\n",
@@ -32,8 +32,8 @@ const PIECES: [&str; 14] = [
 
 pub fn trials() -> Vec<Trial> {
     vec![
-        trial("broken::changed_files_never_panic", changed_files_never_panic),
-        trial("broken::arbitrary_bytes_never_panic", arbitrary_bytes_never_panic),
+        trial("fuzz::changed_files_never_panic", changed_files_never_panic),
+        trial("fuzz::arbitrary_bytes_never_panic", arbitrary_bytes_never_panic),
     ]
 }
 
@@ -48,26 +48,26 @@ fn changes() -> impl Strategy<Value = Vec<(usize, Change)>> {
     let change = prop_oneof![
         any::<u8>().prop_map(Change::Byte),
         (1..20_usize).prop_map(Change::Remove),
-        (0..PIECES.len()).prop_flat_map(|piece| Just(Change::Insert(PIECES[piece]))),
+        (0..SNIPPETS.len()).prop_flat_map(|snippet| Just(Change::Insert(SNIPPETS[snippet]))),
     ];
     proptest::collection::vec((any::<usize>(), change), 1..8)
 }
 
 fn change(text: &str, changes: &[(usize, Change)]) -> Vec<u8> {
     let mut bytes = text.as_bytes().to_vec();
-    for (place, change) in changes {
-        let place = place % (bytes.len() + 1);
+    for (position, change) in changes {
+        let position = position % (bytes.len() + 1);
         let end = match change {
-            Change::Byte(_) => place + 1,
-            Change::Remove(count) => place + count,
-            Change::Insert(_) => place,
+            Change::Byte(_) => position + 1,
+            Change::Remove(count) => position + count,
+            Change::Insert(_) => position,
         };
         let new: &[u8] = match change {
             Change::Byte(byte) => &[*byte],
             Change::Remove(_) => &[],
-            Change::Insert(piece) => piece.as_bytes(),
+            Change::Insert(snippet) => snippet.as_bytes(),
         };
-        bytes.splice(place..end.min(bytes.len()), new.iter().copied());
+        bytes.splice(position..end.min(bytes.len()), new.iter().copied());
     }
     bytes
 }
@@ -99,11 +99,11 @@ fn changed_files_never_panic() {
 
 fn arbitrary_bytes_never_panic() {
     let mut runner = TestRunner::new(Config { cases: 400, failure_persistence: None, ..Config::default() });
-    let pieces = proptest::collection::vec((0..PIECES.len()).prop_map(|piece| PIECES[piece]), 0..30);
+    let snippets = proptest::collection::vec((0..SNIPPETS.len()).prop_map(|snippet| SNIPPETS[snippet]), 0..30);
     let bytes = proptest::collection::vec(any::<u8>(), 0..200);
-    let result = runner.run(&(pieces, bytes), |(pieces, bytes)| {
-        read(pieces.concat().as_bytes(), &bytes);
-        read(&bytes, pieces.concat().as_bytes());
+    let result = runner.run(&(snippets, bytes), |(snippets, bytes)| {
+        read(snippets.concat().as_bytes(), &bytes);
+        read(&bytes, snippets.concat().as_bytes());
         Ok(())
     });
     result.unwrap();
