@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use drawloom::report::{FrameReport, Prices, write_chrome_trace, write_page};
+use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace, write_page};
 use drawloom::timeline::{Frame, Log};
 
 use crate::arguments::Arguments;
@@ -33,12 +33,12 @@ pub fn tell(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
     if arguments.html.is_none() && !arguments.explain {
         return Ok(());
     }
-    let prices = Prices::measure()?;
+    let costs = SchedulerCosts::measure()?;
     if let Some(path) = &arguments.html {
-        write(path, |file| write_page(log, &prices, file))?;
+        write(path, |file| write_page(log, &costs, file))?;
     }
     if let Some(frame) = middle(log).filter(|_| arguments.explain) {
-        println!("\n{}", FrameReport::new(log, frame, &prices)?);
+        println!("\n{}", FrameReport::new(log, frame, &costs)?);
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use tracing::{
 use crate::{
     sync::{AtomicUsize, Ordering},
     task::Worker,
-    timeline::{ChunkTimer, Graph, OpenRun, Process, RunEnd},
+    timeline::{ChunkTimer, Graph, NodeInfo, OpenRun, RunEnd},
 };
 
 use super::{
@@ -73,7 +73,7 @@ impl<'run> ActiveInstrument<'run> {
     /// The tracing span of a node.
     fn tracing_span(&self, node: u32) -> Span {
         let Some(tracing) = &self.tracing else { return Span::none() };
-        let Process { name, labels, .. } = &tracing.graph.processes[node as usize];
+        let NodeInfo { name, labels, .. } = &tracing.graph.nodes[node as usize];
         let [process, stage, view] = [&labels.process, &labels.stage, &labels.view].map(Option::as_deref);
         tracing::debug_span!(target: TARGET, parent: &tracing.parent, "node", name, process, stage, view)
     }

@@ -5,7 +5,7 @@ use std::{mem, ops::Range, sync::Arc, time::Duration};
 use crate::{
     sync::{AtomicBool, Instant, Mutex, Ordering},
     task::{Chunks, Scheduler, Worker},
-    timeline::{Graph, Process, RunEnd},
+    timeline::{Graph, NodeInfo, RunEnd},
     unwind::{JobPanic, catch, discard},
 };
 
@@ -118,13 +118,13 @@ impl<P> Schedule<P> {
         P: Node<C>,
     {
         if self.description.is_none() && ActiveInstrument::is_wanted(worker) {
-            let node = |index: usize| Process {
+            let node = |index: usize| NodeInfo {
                 name: self.names[index].clone(),
                 labels: self.labels[index].clone(),
                 dependencies: self.dependencies(index).to_vec(),
                 pinned: catch(|| self.nodes[index].pinned()).unwrap_or(false),
             };
-            self.description = Some(Arc::new(Graph { processes: (0..self.len()).map(node).collect() }));
+            self.description = Some(Arc::new(Graph { nodes: (0..self.len()).map(node).collect() }));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Whether a log is one that a timeline can have recorded: whether all that it speaks of is there.
+//! Checks whether a timeline can have recorded a log: whether every node, worker and thread that it refers to exists.
 
 use std::fmt::Display;
 
@@ -6,7 +6,7 @@ use crate::timeline::{Log, Run};
 
 /// # Errors
 ///
-/// What is wrong with one of its runs or spans, in words.
+/// Returns a message if one of the log's runs or spans refers to something that does not exist.
 pub(super) fn check_log(log: &Log) -> Result<(), String> {
     for (index, run) in log.runs.iter().enumerate() {
         check_run(run, format_args!("run {index}"), log.workers.len())?;
@@ -17,25 +17,27 @@ pub(super) fn check_log(log: &Log) -> Result<(), String> {
     }
 }
 
+/// Checks a run on this many workers. Messages call it `name`.
+///
 /// # Errors
 ///
-/// What is wrong with a run of that name on so many workers, in words.
+/// Returns a message if the run refers to something that does not exist.
 pub(super) fn check_run(run: &Run, name: impl Display, workers: usize) -> Result<(), String> {
-    let processes = run.graph.processes.len();
+    let nodes = run.graph.nodes.len();
     for chunk in run.chunks.iter().chain(&run.empty) {
-        if chunk.process >= processes {
-            return Err(format!("{name} has a chunk of process {} of {processes}", chunk.process));
+        if chunk.node >= nodes {
+            return Err(format!("{name} has a chunk of node {} of {nodes}", chunk.node));
         }
         if chunk.worker >= workers {
             return Err(format!("{name} has a chunk of worker {} of {workers}", chunk.worker));
         }
     }
-    for (index, process) in run.graph.processes.iter().enumerate() {
-        match process.dependencies.iter().find(|&&other| other >= index) {
-            Some(other) if *other < processes => {
-                return Err(format!("process {index} of {name} waits for process {other}, which is not before it"));
+    for (index, node) in run.graph.nodes.iter().enumerate() {
+        match node.dependencies.iter().find(|&&other| other >= index) {
+            Some(other) if *other < nodes => {
+                return Err(format!("node {index} of {name} waits for node {other}, which is not before it"));
             }
-            Some(other) => return Err(format!("process {index} of {name} waits for process {other} of {processes}")),
+            Some(other) => return Err(format!("node {index} of {name} waits for node {other} of {nodes}")),
             None => {}
         }
     }

@@ -1,4 +1,4 @@
-//! What keeps a frame from being reported on.
+//! Why a frame cannot be reported on.
 
 use thiserror::Error;
 
@@ -6,29 +6,29 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// There is no run of that frame in the log.
+    /// The log has no run of that frame.
     #[error("the log has no run of frame {frame}")]
     NoRun {
         /// The frame's number.
         frame: u64,
     },
-    /// Not all chunks of one of its runs are there: a worker had no room for them, or the log was taken amid the run.
+    /// Chunks of one of its runs are missing: a worker had no room for them, or the log was taken during the run.
     #[error(
-        "the log does not have all of frame {frame}: the timeline's capacity was too small, or the log was taken amid the frame"
+        "the log does not have all of frame {frame}: the timeline's capacity was too small, or the log was taken during the frame"
     )]
     Incomplete {
         /// The frame's number.
         frame: u64,
     },
-    /// What the log says of one of its runs cannot be: a process waits for a later one, or a chunk is of a process or a worker
-    /// that is not there. No timeline records that.
+    /// One of its runs is inconsistent: a node waits for a later one, or a chunk belongs to a node or a worker that does not
+    /// exist. No timeline records that.
     #[error("what the log says of frame {frame} contradicts itself")]
     Contradictory {
         /// The frame's number.
         frame: u64,
     },
-    /// A process of one of its runs failed, so that the rest was cancelled.
-    #[error("a process of frame {frame} failed, so the frame did not run to its end")]
+    /// A node of one of its runs failed, so that the rest was cancelled.
+    #[error("a node of frame {frame} failed, so the frame did not run to its end")]
     Failed {
         /// The frame's number.
         frame: u64,

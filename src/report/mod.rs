@@ -1,15 +1,14 @@
-//! What a frame was, and what it could be: why it took as long as it did, and its time on a machine of more workers than
-//! this one has.
+//! Why a frame took as long as it did, and how long it would take on a machine with more workers.
 //!
-//! A frame is recorded by the [timeline](crate::timeline): what every chunk took. A [`FrameReport`] tells from that which
-//! processes are to blame for its time. A [`Replay`] runs those chunks again on a clock of its own, on as many workers as are
-//! asked for, by the rules of this crate's own scheduler: who takes what, who is woken when, and what each of that
-//! [costs](Prices). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
+//! The [timeline](crate::timeline) records how long each chunk of a frame took. A [`FrameReport`] computes from that which
+//! nodes are to blame for the frame's time. A [`Replay`] simulates the same chunks on any number of workers, by the rules of
+//! this crate's scheduler: which worker takes what, who is woken when, and what each of these operations
+//! [costs](SchedulerCosts). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
 //!
 //! ```
 //! use drawloom::{
 //!     graph::{Closure, FrameGraph},
-//!     report::{Prices, Replay},
+//!     report::{SchedulerCosts, Replay},
 //!     task::Scheduler,
 //! };
 //! use std::hint::black_box;
@@ -27,7 +26,7 @@
 //! scheduler.timeline().start();
 //! schedule.run(&scheduler, &())?;
 //! let log = scheduler.timeline().take();
-//! let replay = Replay::new(&log.runs[0], Prices::measure()?)?;
+//! let replay = Replay::new(&log.runs[0], SchedulerCosts::measure()?)?;
 //! for workers in [1, 2, 4, 8, 16] {
 //!     println!("on {workers} workers: {:?}", replay.frame_time(workers));
 //! }
@@ -35,23 +34,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What it leaves out
+//! # What a replay leaves out
 //!
-//! That all workers share caches, memory and clock rate, and what a process itself makes them wait for: locks, counters.
-//! The more workers, the more a prediction is what could be at best.
+//! Workers share caches, memory bandwidth and clock rate, and nodes wait for each other's locks and counters. A replay knows
+//! none of that, so the more workers, the more its prediction is a lower bound.
 
 mod chrome_trace;
 mod consistency;
 mod error;
 mod frame_report;
-mod moments;
+mod intervals;
 mod page;
-mod replay;
+mod simulation;
 
 pub use self::{
     chrome_trace::write_chrome_trace,
     error::ReportError,
-    frame_report::{FrameReport, HeldBy, QueueWait, Share, Slack, Step, WhatIf, WorkerReport},
+    frame_report::{FrameReport, HeldBy, PathShare, QueueWait, Slack, Step, WhatIf, WorkerReport},
     page::write_page,
-    replay::{Prices, Replay, Replayed},
+    simulation::{Replay, ReplayedFrame, SchedulerCosts},
 };

@@ -68,26 +68,26 @@ pub struct Run {
     pub always_parallel: bool,
     /// Whether a background job called for it, which no frame waits for. Its frame is the one in which it began.
     pub in_background: bool,
-    /// Whether a process failed, so that the rest was cancelled. What panicked is not among the chunks.
+    /// Whether a node failed, so that the rest was cancelled. What panicked is not among the chunks.
     pub failed: bool,
     /// Whether every chunk that ran is here: there was room for all of them, and none was taken out before the run had ended.
     pub complete: bool,
-    /// All chunks, by process, and those of one process by their items.
+    /// All chunks, by node, and those of one node by their items.
     pub chunks: Vec<Chunk>,
-    /// For every process that turned out to have no items a chunk without any: who found that, and when. By process.
+    /// For every node that turned out to have no items a chunk without any: who found that, and when. By node.
     pub empty: Vec<Chunk>,
 }
 
-/// The processes of a schedule.
+/// The nodes of a schedule.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Graph {
     /// In an order in which each comes after all it waits for.
-    pub processes: Vec<Process>,
+    pub nodes: Vec<NodeInfo>,
 }
 
-/// A process of a schedule: one stage of a render process in one view, say.
+/// A node of a schedule: one stage of a render process in one view, say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Process {
+pub struct NodeInfo {
     /// What the graph calls it.
     pub name: String,
     /// What it is a part of.
@@ -98,7 +98,7 @@ pub struct Process {
     pub pinned: bool,
 }
 
-/// What a process of a schedule is a part of, so that all that belongs together can be told from its names.
+/// What a node of a schedule is a part of, so that all that belongs together can be told from its names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Labels {
     /// The render process: `geometry buffer`.
@@ -109,18 +109,18 @@ pub struct Labels {
     pub view: Option<String>,
 }
 
-/// Some items of a process, done by one worker without a break.
+/// Some items of a node, done by one worker without a break.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Chunk {
-    /// The index of its process in the [`Graph`].
-    pub process: usize,
+    /// The index of its node in the [`Graph`].
+    pub node: usize,
     /// Its items.
     pub items: Range<usize>,
     /// The worker that ran it.
     pub worker: usize,
-    /// When its process was opened: all that it waits for was done, and a worker had taken it up.
+    /// When its node was opened: all that it waits for was done, and a worker had taken it up.
     pub opened: Duration,
-    /// When it began: where a worker ran one chunk of a process after another, when the one before ended.
+    /// When it began: where a worker ran one chunk of a node after another, when the one before ended.
     pub started: Duration,
     /// When it ended.
     pub ended: Duration,
@@ -219,29 +219,29 @@ impl Log {
 
 impl Run {
     /// How long it took.
-    pub fn took(&self) -> Duration {
+    pub fn duration(&self) -> Duration {
         self.ended.saturating_sub(self.began)
     }
 
-    /// The chunks of the process of that index, by their items; none if there is no such process.
-    pub fn chunks_of(&self, process: usize) -> &[Chunk] {
-        let start = self.chunks.partition_point(|chunk| chunk.process < process);
+    /// The chunks of the node of that index, by their items; none if there is no such node.
+    pub fn chunks_of(&self, node: usize) -> &[Chunk] {
+        let start = self.chunks.partition_point(|chunk| chunk.node < node);
         let rest = &self.chunks[start..];
-        &rest[..rest.partition_point(|chunk| chunk.process == process)]
+        &rest[..rest.partition_point(|chunk| chunk.node == node)]
     }
 
-    /// How many items the process of that index had.
-    pub fn width(&self, process: usize) -> usize {
-        self.chunks_of(process).iter().map(|chunk| chunk.items.len()).sum()
+    /// How many items the node of that index had.
+    pub fn width(&self, node: usize) -> usize {
+        self.chunks_of(node).iter().map(|chunk| chunk.items.len()).sum()
     }
 
     /// All workers' time in chunks, together.
     pub fn work(&self) -> Duration {
-        self.chunks.iter().map(Chunk::took).sum()
+        self.chunks.iter().map(Chunk::duration).sum()
     }
 }
 
-impl Process {
+impl NodeInfo {
     /// What it counts as where all stages and views of a render process are taken together: the render process, or the stage
     /// where it is none's, or its own name.
     pub fn group(&self) -> &str {
@@ -251,7 +251,7 @@ impl Process {
 
 impl Chunk {
     /// How long it took.
-    pub fn took(&self) -> Duration {
+    pub fn duration(&self) -> Duration {
         self.ended.saturating_sub(self.started)
     }
 }

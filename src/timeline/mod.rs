@@ -49,7 +49,8 @@ pub(crate) use self::{
 
 pub use self::{
     log::{
-        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog,
+        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span,
+        WorkerLog,
     },
     recorder::{OpenSpan, Timeline},
 };

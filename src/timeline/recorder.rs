@@ -174,8 +174,8 @@ impl Timeline {
         self.store.lock().mark_incomplete(&open_runs);
         log.clock_panic = self.clock.panic_message().map(str::to_owned);
         for run in &mut log.runs {
-            run.chunks.sort_unstable_by_key(|chunk| (chunk.process, chunk.items.start));
-            run.empty.sort_unstable_by_key(|chunk| chunk.process);
+            run.chunks.sort_unstable_by_key(|chunk| (chunk.node, chunk.items.start));
+            run.empty.sort_unstable_by_key(|chunk| chunk.node);
         }
         log.frames = frames_of(frames, &log);
         log

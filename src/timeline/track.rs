@@ -115,7 +115,7 @@ fn decode(event: Event, worker: usize, clock: &Clock) -> Entry {
         return Entry::Idle(Idle { kind, began: started, ended });
     }
     let chunk = Chunk {
-        process: run_and_node as u32 as usize,
+        node: run_and_node as u32 as usize,
         items: start as usize..start as usize + length as usize,
         worker,
         opened: clock.time(tagged >> TAG_BITS),

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drawloom::timeline::{Chunk, DeviceLog, DevicePass, Frame, Graph, Labels, Log, Process, Run, Span, WorkerLog};
+use drawloom::timeline::{Chunk, DeviceLog, DevicePass, Frame, Graph, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 
 /// Names as nobody should choose them.
 pub fn hostile_names() -> Vec<String> {
@@ -21,9 +21,9 @@ pub fn log_of(names: &[String]) -> Log {
         let name = Some(name.clone());
         Labels { process: name.clone(), stage: name.clone(), view: name }
     };
-    let process = |name: &String| Process { name: name.clone(), labels: labels(name), ..Process::default() };
-    let graph = Arc::new(Graph { processes: names.iter().map(process).collect() });
-    let chunk = |process| Chunk { process, items: 0..1, ended: Duration::from_micros(9), ..Chunk::default() };
+    let node = |name: &String| NodeInfo { name: name.clone(), labels: labels(name), ..NodeInfo::default() };
+    let graph = Arc::new(Graph { nodes: names.iter().map(node).collect() });
+    let chunk = |node| Chunk { node, items: 0..1, ended: Duration::from_micros(9), ..Chunk::default() };
     let chunks = (0..names.len()).map(chunk).collect();
     let end = Duration::from_micros(10);
     let spans = names.iter().map(|name| Span { name: name.clone(), ended: end, ..Span::default() });

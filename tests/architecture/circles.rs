@@ -19,7 +19,6 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 const KNOWN_CIRCLES: &[&str] = &[
     "backend",
     "frame",
-    "report",
 ];
 
 /// How many re-exports are followed to the definition of one item.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use drawloom::report::{Prices, Replay, ReportError};
+use drawloom::report::{Replay, ReportError, SchedulerCosts};
 use drawloom::{FrameError, Granularity};
 use drawloom_testing::scenes::field;
 
@@ -46,13 +46,13 @@ fn a_log_accounts_for_whole_frames() {
             assert!(spans[0].ended <= spans[1].began && spans[1].ended == frame.ended);
 
             // Objects are counted by whoever looks at them, whatever the size of a job.
-            let processes = run.graph.processes.iter().enumerate();
+            let processes = run.graph.nodes.iter().enumerate();
             let seen = processes.filter(|(_, process)| process.labels.stage.as_deref() == Some("visibility"));
             let seen: Vec<_> = seen.map(|(index, _)| run.width(index)).collect();
             assert_eq!(seen, vec![2_000; scene.cameras.len()]);
 
-            let replay = Replay::of_frame(&log, frame.number, Prices::FREE).unwrap();
-            let serial = (spans[0].ended - spans[0].began) - run.took() + (spans[1].ended - spans[1].began);
+            let replay = Replay::of_frame(&log, frame.number, SchedulerCosts::ZERO).unwrap();
+            let serial = (spans[0].ended - spans[0].began) - run.duration() + (spans[1].ended - spans[1].began);
             assert_eq!(replay.frame_time(1), run.work() + serial);
             assert!(replay.frame_time(8) < replay.frame_time(1));
         }
@@ -66,7 +66,7 @@ fn every_job_says_which_process_phase_and_view_it_is_of() {
     renderer.scheduler().timeline().start();
     let _recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let log = renderer.scheduler().timeline().take();
-    let labels = || log.runs[0].graph.processes.iter().map(|process| &process.labels);
+    let labels = || log.runs[0].graph.nodes.iter().map(|process| &process.labels);
     let plan = renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
     let processes: BTreeSet<_> = labels().filter_map(|labels| labels.process.clone()).collect();
     assert_eq!(processes, plan.collect::<BTreeSet<_>>());
@@ -100,5 +100,5 @@ fn a_frame_that_was_not_recorded_cannot_be_reported_on() {
     assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::NoView)));
     let log = renderer.scheduler().timeline().take();
     assert_eq!((log.frames.len(), log.runs.len()), (1, 0));
-    assert_eq!(Replay::of_frame(&log, 0, Prices::FREE).unwrap_err(), ReportError::NoRun { frame: 0 });
+    assert_eq!(Replay::of_frame(&log, 0, SchedulerCosts::ZERO).unwrap_err(), ReportError::NoRun { frame: 0 });
 }

@@ -14,7 +14,7 @@ use std::{
 
 use drawloom::{
     graph::{Closure, FrameGraph, Node, NodeError, Schedule},
-    report::{FrameReport, Prices},
+    report::{FrameReport, SchedulerCosts},
     task::{Scheduler, Worker},
     timeline::{Chunk, IdleKind, Log},
 };
@@ -59,18 +59,18 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     let [run] = log.runs.as_slice() else { panic!("{} runs", log.runs.len()) };
     assert!(run.complete && !run.failed);
     assert_eq!((run.workers, log.workers.len(), log.all_dropped()), (workers, workers, 0));
-    assert_eq!(run.graph.processes.len(), schedule.len());
+    assert_eq!(run.graph.nodes.len(), schedule.len());
     assert!(workers > 1 || run.shared_from.is_none());
     assert!(run.shared_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
-    for (index, (process, (name, busy))) in run.graph.processes.iter().zip(schedule.nodes()).enumerate() {
+    for (index, (process, (name, busy))) in run.graph.nodes.iter().zip(schedule.nodes()).enumerate() {
         assert_eq!(process.name, name);
         assert_eq!(process.dependencies, schedule.dependencies(index));
         assert_eq!(process.pinned, busy.pinned);
         let mut next = 0;
-        let empty = run.empty.iter().filter(|empty| empty.process == index);
+        let empty = run.empty.iter().filter(|empty| empty.node == index);
         let parts: Vec<&Chunk> = run.chunks_of(index).iter().chain(empty).collect();
         for part in &parts {
-            assert_eq!((part.process, part.items.clone()), (index, next..(next + chunk).min(busy.width)));
+            assert_eq!((part.node, part.items.clone()), (index, next..(next + chunk).min(busy.width)));
             next = part.items.end;
             assert!(part.opened <= part.started && part.started <= part.ended);
             assert!(run.began <= part.opened && part.ended <= run.ended);
@@ -88,7 +88,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
         assert_eq!((parts.is_empty(), run.width(index)), (false, busy.width));
     }
     assert_eq!(run.chunks.len(), (0..schedule.len()).map(|index| run.chunks_of(index).len()).sum::<usize>());
-    assert_eq!(run.work(), run.chunks.iter().map(Chunk::took).sum());
+    assert_eq!(run.work(), run.chunks.iter().map(Chunk::duration).sum());
     for (worker, record) in log.workers.iter().enumerate() {
         let chunks = run.chunks.iter().chain(&run.empty).filter(|chunk| chunk.worker == worker);
         let idle = record.idle.iter().map(|idle| (idle.began, idle.ended));
@@ -320,14 +320,14 @@ fn what_runs_in_the_background_is_of_no_frame_that_waits_for_it() {
     ended.send(()).unwrap();
     streaming.wait().unwrap();
     let log = scheduler.timeline().take();
-    let told: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.processes[0].name.as_str())).collect();
+    let told: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.nodes[0].name.as_str())).collect();
     assert_eq!(told, [(false, "busy"), (false, "busy"), (true, "stream")]);
     assert_ne!(log.runs[0].frame, log.runs[1].frame, "each is a frame of its own");
     for run in &log.runs[..2] {
         let frame = log.frames.iter().find(|frame| frame.number == run.frame).unwrap();
         assert_eq!((frame.began, frame.ended), (run.began, run.ended));
-        let report = FrameReport::new(&log, run.frame, &Prices::FREE).unwrap();
-        assert_eq!((report.took, report.critical_path[0].name.as_str()), (run.took(), "busy"));
+        let report = FrameReport::new(&log, run.frame, &SchedulerCosts::ZERO).unwrap();
+        assert_eq!((report.duration, report.critical_path[0].name.as_str()), (run.duration(), "busy"));
     }
 }
 

@@ -10,7 +10,7 @@ use std::{
 };
 
 use drawloom::{
-    report::{Prices, write_page},
+    report::{SchedulerCosts, write_page},
     timeline::Log,
 };
 use libtest_mimic::Failed;
@@ -64,7 +64,7 @@ impl Browser {
         fs::create_dir_all(&folder)?;
         let [page, tree, messages] = ["page.html", "tree.html", "messages"].map(|file| folder.join(file));
         let mut html = Vec::new();
-        write_page(log, &Prices::FREE, &mut html)?;
+        write_page(log, &SchedulerCosts::ZERO, &mut html)?;
         let length = html.len() as u64;
         let html = String::from_utf8(html)?.replace("</body>", &format!("<script>{script}</script></body>"));
         fs::write(&page, html)?;

@@ -5,7 +5,7 @@ use std::{hint::black_box, sync::Arc, time::Duration};
 use drawloom::{
     graph::{Closure, FrameGraph},
     task::Scheduler,
-    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog},
+    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
 };
 use libtest_mimic::Failed;
 
@@ -23,21 +23,21 @@ impl Dice {
 pub fn of_a_real_run() -> Result<Log, Failed> {
     let mut dice = Dice(7);
     let mut graph = FrameGraph::new();
-    let mut processes = Vec::new();
+    let mut nodes = Vec::new();
     for index in 0..40 {
         let width = dice.roll(400);
         let body = Closure::new(|_: &(), range, _worker| {
             range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
             Ok(())
         });
-        let process = graph.add(format!("process {index}"), body.with_width(move |_| width).with_chunk(16));
+        let node = graph.add(format!("node {index}"), body.with_width(move |_| width).with_chunk(16));
         let stage = Some(["cull", "fill", "sort"][index % 3].to_owned());
-        graph.label(process, Labels { stage, ..Labels::default() });
-        for _ in 0..dice.roll(3).min(processes.len()) {
-            graph.order(processes[dice.roll(processes.len())], process);
+        graph.label(node, Labels { stage, ..Labels::default() });
+        for _ in 0..dice.roll(3).min(nodes.len()) {
+            graph.order(nodes[dice.roll(nodes.len())], node);
         }
-        graph.keep(process);
-        processes.push(process);
+        graph.keep(node);
+        nodes.push(node);
     }
     let mut schedule = graph.compile().map_err(|error| error.to_string())?;
     schedule.always_parallel(true);
@@ -55,13 +55,13 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
     const WORKERS: usize = 8;
     const CHUNKS: usize = 250;
     let passes = count / frames / CHUNKS;
-    let process = |index: usize| Process {
+    let node = |index: usize| NodeInfo {
         name: format!("pass {index}"),
         labels: Labels { stage: Some(format!("stage {}", index % 9)), ..Labels::default() },
         dependencies: index.checked_sub(1).into_iter().collect(),
-        ..Process::default()
+        ..NodeInfo::default()
     };
-    let graph = Arc::new(Graph { processes: (0..passes).map(process).collect() });
+    let graph = Arc::new(Graph { nodes: (0..passes).map(node).collect() });
     let mut dice = Dice(1);
     let mut log = Log::default();
     log.workers.resize(WORKERS, WorkerLog { name: "worker".to_owned(), ..WorkerLog::default() });
@@ -69,7 +69,7 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
     for number in 0..frames as u64 {
         let began = now;
         let mut chunks = Vec::new();
-        for process in 0..passes {
+        for node in 0..passes {
             let opened = now;
             let mut free = [now; WORKERS];
             for place in 0..CHUNKS {
@@ -77,7 +77,7 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
                 let started = free[worker];
                 let ended = started + Duration::from_nanos(500 + dice.roll(9_000) as u64);
                 let items = place * 16..place * 16 + 16;
-                chunks.push(Chunk { process, items, worker, opened, started, ended, stolen: worker > 0 });
+                chunks.push(Chunk { node, items, worker, opened, started, ended, stolen: worker > 0 });
                 free[worker] = ended;
             }
             now = free.into_iter().max().unwrap_or(now) + Duration::from_micros(2);
@@ -95,23 +95,23 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
     log
 }
 
-/// Three frames, the second twice as long as the others. In each a process, two that wait for it, the second of which ends
+/// Three frames, the second twice as long as the others. In each a node, two that wait for it, the second of which ends
 /// later, and one that waits for both, in two chunks; and a thread at work before that and after.
 pub fn of_diamonds() -> Log {
-    let process = |name: &str, dependencies: &[usize]| Process {
+    let node = |name: &str, dependencies: &[usize]| NodeInfo {
         name: name.to_owned(),
         dependencies: dependencies.to_vec(),
-        ..Process::default()
+        ..NodeInfo::default()
     };
-    let processes = vec![process("root", &[]), process("left", &[0]), process("right", &[0]), process("end", &[1, 2])];
-    let graph = Arc::new(Graph { processes });
+    let nodes = vec![node("root", &[]), node("left", &[0]), node("right", &[0]), node("end", &[1, 2])];
+    let graph = Arc::new(Graph { nodes });
     let workers = ["caller", "other"].map(|name| WorkerLog { name: name.to_owned(), ..WorkerLog::default() });
     let mut log = Log { workers: workers.into(), threads: vec!["main".to_owned()], ..Log::default() };
     let starts = [(0, 100), (100, 200), (300, 100)];
     for (number, (start, length)) in (0_u64..).zip(starts) {
         let at = |share: u64| Duration::from_micros(start + length * share / 100);
-        let chunk = |process, items, worker, opened, started, ended| Chunk {
-            process,
+        let chunk = |node, items, worker, opened, started, ended| Chunk {
+            node,
             items,
             worker,
             opened: at(opened),

@@ -151,7 +151,7 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
 fn check_log(log: &Log, totals: &mut Totals) {
     totals.recorded_runs += log.runs.len() as u64;
     for run in log.runs.iter().filter(|run| run.complete && !run.failed) {
-        for (index, process) in run.graph.processes.iter().enumerate() {
+        for (index, process) in run.graph.nodes.iter().enumerate() {
             let width = process.name.rsplit(' ').next().and_then(|width| width.parse().ok());
             assert_eq!(Some(run.width(index)), width, "{:?} of a complete run", process.name);
             let mut ends = 0;

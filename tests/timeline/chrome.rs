@@ -18,7 +18,7 @@ use serde_json::json;
 
 use crate::trace::{Event, Trace, nanoseconds};
 
-/// A process of so many items, in chunks of the caller's size. The item of that number fails.
+/// A node of so many items, in chunks of the caller's size. The item of that number fails.
 #[derive(Clone, Debug)]
 struct Busy {
     width: usize,
@@ -45,10 +45,10 @@ impl Node<usize> for Busy {
     }
 }
 
-/// A graph as plain data: each process, and which of those before it it waits for.
+/// A graph as plain data: each node, and which of those before it it waits for.
 type Sketch = Vec<(Busy, HashSet<usize>)>;
 
-/// Of ten processes, so many have an item that fails.
+/// Of ten nodes, so many have an item that fails.
 fn any_sketch(fails: u32) -> impl Strategy<Value = Sketch> {
     let width = prop_oneof![1 => Just(0), 2 => 1..4_usize, 2 => 0..60_usize];
     let fails_at = (0..10_u32, 0..30_usize).prop_map(move |(roll, item)| (roll < fails).then_some(item));
@@ -57,23 +57,23 @@ fn any_sketch(fails: u32) -> impl Strategy<Value = Sketch> {
         pinned,
         fails_at,
     });
-    vec((busy, vec(any::<prop::sample::Index>(), 0..4)), 1..20).prop_map(|processes| {
+    vec((busy, vec(any::<prop::sample::Index>(), 0..4)), 1..20).prop_map(|nodes| {
         let waits_for = |index: usize, picks: Vec<prop::sample::Index>| {
             picks.iter().filter(|_| index > 0).map(|pick| pick.index(index)).collect()
         };
-        let processes = processes.into_iter().enumerate();
-        processes.map(|(index, (busy, picks))| (busy, waits_for(index, picks))).collect()
+        let nodes = nodes.into_iter().enumerate();
+        nodes.map(|(index, (busy, picks))| (busy, waits_for(index, picks))).collect()
     })
 }
 
 fn compile(sketch: &[(Busy, HashSet<usize>)]) -> Schedule<Busy> {
     let mut graph = FrameGraph::new();
-    let mut processes = Vec::new();
+    let mut nodes = Vec::new();
     for (index, (busy, before)) in sketch.iter().enumerate() {
-        let process = graph.add(format!("p{index}"), busy.clone());
-        graph.keep(process);
-        before.iter().for_each(|&before| graph.order(processes[before], process));
-        processes.push(process);
+        let node = graph.add(format!("p{index}"), busy.clone());
+        graph.keep(node);
+        before.iter().for_each(|&before| graph.order(nodes[before], node));
+        nodes.push(node);
     }
     graph.compile().expect("it has no cycle")
 }
@@ -145,7 +145,7 @@ fn check_jobs(log: &Log, trace: &Trace) {
         let mut expected: Vec<String> = Vec::new();
         for (index, run) in log.runs.iter().enumerate() {
             for chunk in list(run) {
-                let process = &run.graph.processes[chunk.process];
+                let node = &run.graph.nodes[chunk.node];
                 let mut arguments = json!({
                     "items": format!("{}..{}", chunk.items.start, chunk.items.end),
                     "opened_us": nanos(chunk.opened),
@@ -153,15 +153,15 @@ fn check_jobs(log: &Log, trace: &Trace) {
                     "frame": run.frame,
                     "run": index,
                 });
-                if let Some(ready) = ready(run, chunk.process) {
+                if let Some(ready) = ready(run, chunk.node) {
                     arguments["queued_us"] = nanos(chunk.started - ready).into();
                 }
-                let labels = &process.labels;
+                let labels = &node.labels;
                 for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
                     label.iter().for_each(|label| arguments[key] = label.as_str().into());
                 }
                 let times = (nanos(chunk.started), nanos(chunk.ended), chunk.worker as u64 + 1);
-                expected.push(format!("{:?} {times:?} {arguments}", process.name));
+                expected.push(format!("{:?} {times:?} {arguments}", node.name));
             }
         }
         let mut found: Vec<String> = Vec::new();
@@ -194,17 +194,16 @@ fn check_arrows(log: &Log, trace: &Trace) {
     }
     assert_eq!(arrows.len(), trace.of_kind("s").count());
     for (index, run) in log.runs.iter().enumerate() {
-        let slices = |process: usize| {
+        let slices = |node: usize| {
             let slices = trace.slices("job").chain(trace.slices("empty"));
-            let name = &run.graph.processes[process].name;
+            let name = &run.graph.nodes[node].name;
             slices.filter(move |slice| slice.arguments["run"] == index && slice.name == *name)
         };
-        for (process, node) in run.graph.processes.iter().enumerate() {
+        for (to, node) in run.graph.nodes.iter().enumerate() {
             for &dependency in &node.dependencies {
-                let (Some(last), Some(first)) = (
-                    slices(dependency).max_by_key(|slice| slice.ended),
-                    slices(process).min_by_key(|slice| slice.began),
-                ) else {
+                let (Some(last), Some(first)) =
+                    (slices(dependency).max_by_key(|slice| slice.ended), slices(to).min_by_key(|slice| slice.began))
+                else {
                     left_out += 1;
                     continue;
                 };
@@ -226,13 +225,13 @@ fn check_arrows(log: &Log, trace: &Trace) {
     assert_eq!(trace.other_data["dependencies_left_out"], left_out);
 }
 
-/// At the moment of each reading, and no other, as many processes are ready and not opened as it says, or others than before.
+/// At the moment of each reading, and no other, as many nodes are ready and not opened as it says, or others than before.
 fn check_ready(log: &Log, trace: &Trace) {
     let mut waits = Vec::new();
     for run in &log.runs {
-        for process in 0..run.graph.processes.len() {
-            let opened = parts(run, process).map(|part| part.opened).min();
-            waits.extend(ready(run, process).zip(opened).map(|(ready, opened)| (nanos(ready), nanos(opened))));
+        for node in 0..run.graph.nodes.len() {
+            let opened = parts(run, node).map(|part| part.opened).min();
+            waits.extend(ready(run, node).zip(opened).map(|(ready, opened)| (nanos(ready), nanos(opened))));
         }
     }
     let count = |at: u64| waits.iter().filter(|&&(ready, opened)| ready <= at && at < opened).count() as f64;
@@ -245,19 +244,19 @@ fn check_ready(log: &Log, trace: &Trace) {
             expected.push((at, count(at)));
         }
     }
-    assert_eq!(trace.readings("ready processes"), expected);
+    assert_eq!(trace.readings("ready nodes"), expected);
 }
 
-/// When the last of what a process waits for had ended, unless something of that has left nothing.
-fn ready(run: &Run, process: usize) -> Option<Duration> {
+/// When the last of what a node waits for had ended, unless something of that has left nothing.
+fn ready(run: &Run, node: usize) -> Option<Duration> {
     let ends = |&before: &usize| parts(run, before).map(|part| part.ended).max();
-    let dependencies = &run.graph.processes[process].dependencies;
+    let dependencies = &run.graph.nodes[node].dependencies;
     let ends: Option<Vec<Duration>> = dependencies.iter().map(ends).collect();
     Some(ends?.into_iter().chain([run.began]).max().unwrap_or_default())
 }
 
-fn parts(run: &Run, process: usize) -> impl Iterator<Item = &Chunk> {
-    run.chunks.iter().chain(&run.empty).filter(move |part| part.process == process)
+fn parts(run: &Run, node: usize) -> impl Iterator<Item = &Chunk> {
+    run.chunks.iter().chain(&run.empty).filter(move |part| part.node == node)
 }
 
 fn nanos(time: Duration) -> u64 {
@@ -296,9 +295,9 @@ proptest! {
 #[test]
 fn a_full_ring_makes_a_trace_that_says_what_is_missing() {
     let scheduler = Scheduler::builder().workers(2).timeline_capacity(16).build().unwrap();
-    let process =
+    let node =
         |width, before: &[usize]| (Busy { width, pinned: false, fails_at: None }, before.iter().copied().collect());
-    let mut schedule = compile(&[process(9, &[]), process(0, &[0]), process(30, &[0]), process(4, &[1])]);
+    let mut schedule = compile(&[node(9, &[]), node(0, &[0]), node(30, &[0]), node(4, &[1])]);
     let log = recorded(&mut schedule, &scheduler, &[3, 1, 1]);
     assert!(log.all_dropped() > 0 && log.runs.iter().any(|run| !run.complete));
     check(&log);

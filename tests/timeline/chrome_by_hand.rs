@@ -9,7 +9,8 @@ use std::{
 use drawloom::{
     report::write_chrome_trace,
     timeline::{
-        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog,
+        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span,
+        WorkerLog,
     },
 };
 use proptest::{collection::vec, prelude::*};
@@ -20,18 +21,18 @@ fn at(nanoseconds: u64) -> Duration {
     Duration::from_nanos(nanoseconds)
 }
 
-fn process(name: &str, dependencies: &[usize]) -> Process {
-    Process { name: name.to_owned(), dependencies: dependencies.to_vec(), ..Process::default() }
+fn node(name: &str, dependencies: &[usize]) -> NodeInfo {
+    NodeInfo { name: name.to_owned(), dependencies: dependencies.to_vec(), ..NodeInfo::default() }
 }
 
-fn chunk(process: usize, worker: usize, opened: u64, started: u64, ended: u64) -> Chunk {
+fn chunk(node: usize, worker: usize, opened: u64, started: u64, ended: u64) -> Chunk {
     let (opened, started, ended) = (at(opened), at(started), at(ended));
-    Chunk { process, items: 0..1, worker, opened, started, ended, stolen: false }
+    Chunk { node, items: 0..1, worker, opened, started, ended, stolen: false }
 }
 
 /// A complete run from 0 on.
-fn run(processes: Vec<Process>, ended: u64, chunks: Vec<Chunk>) -> Run {
-    Run { graph: Arc::new(Graph { processes }), workers: 2, ended: at(ended), complete: true, chunks, ..Run::default() }
+fn run(nodes: Vec<NodeInfo>, ended: u64, chunks: Vec<Chunk>) -> Run {
+    Run { graph: Arc::new(Graph { nodes }), workers: 2, ended: at(ended), complete: true, chunks, ..Run::default() }
 }
 
 fn log(runs: Vec<Run>) -> Log {
@@ -59,23 +60,23 @@ fn an_empty_log_makes_a_trace() {
 fn a_chunk_says_what_it_is_a_part_of_how_long_it_was_queued_and_that_it_was_stolen() {
     let labels =
         Labels { process: Some("g-buffer".into()), stage: Some("record".into()), view: Some("main \"1\"".into()) };
-    let record = Process { labels, ..process("record main", &[0]) };
+    let record = NodeInfo { labels, ..node("record main", &[0]) };
     let stolen = Chunk { items: 512..1024, stolen: true, ..chunk(1, 1, 2_500, 70_001, 70_001) };
     let log = log(vec![Run {
         frame: 7,
-        ..run(vec![process("cull", &[]), record], 80_000, vec![chunk(0, 0, 5, 5, 1_234), stolen])
+        ..run(vec![node("cull", &[]), record], 80_000, vec![chunk(0, 0, 5, 5, 1_234), stolen])
     }]);
     check(&log);
     let trace = Trace::of(&log);
     let arguments = r#""args":{"process":"g-buffer","stage":"record","view":"main \"1\"","items":"512..1024","queued_us":68.767,"opened_us":2.500,"stolen":true,"frame":7,"run":0}"#;
     assert!(trace.text.contains(arguments), "{}", trace.text);
-    assert_eq!(trace.readings("ready processes"), [(0, 1.0), (5, 0.0), (1_234, 1.0), (2_500, 0.0)]);
+    assert_eq!(trace.readings("ready nodes"), [(0, 1.0), (5, 0.0), (1_234, 1.0), (2_500, 0.0)]);
 }
 
 #[test]
 fn times_are_exact_even_after_centuries() {
     let late = u64::MAX / 2;
-    let trace = Trace::of(&log(vec![run(vec![process("late", &[])], late, vec![chunk(0, 0, 0, late - 1, late)])]));
+    let trace = Trace::of(&log(vec![run(vec![node("late", &[])], late, vec![chunk(0, 0, 0, late - 1, late)])]));
     assert!(trace.text.contains(r#""ts":9223372036854775.806,"dur":0.001,"#), "{}", trace.text);
 }
 
@@ -83,19 +84,16 @@ fn times_are_exact_even_after_centuries() {
 fn runs_inside_of_another_ones_chunk_lie_inside_of_it_and_their_ready_processes_are_counted_together() {
     let inner = |name: &str, began: u64, opened: u64, ended: u64| {
         let chunks = vec![chunk(0, 0, opened, opened, ended)];
-        Run { began: at(began), ..run(vec![process(name, &[])], ended, chunks) }
+        Run { began: at(began), ..run(vec![node(name, &[])], ended, chunks) }
     };
-    let outer = run(
-        vec![process("outer", &[]), process("other", &[])],
-        90,
-        vec![chunk(0, 0, 10, 10, 80), chunk(1, 0, 85, 85, 90)],
-    );
+    let outer =
+        run(vec![node("outer", &[]), node("other", &[])], 90, vec![chunk(0, 0, 10, 10, 80), chunk(1, 0, 85, 85, 90)]);
     let log = log(vec![inner("early", 10, 10, 30), inner("late", 50, 55, 60), Run { began: at(10), ..outer }]);
     check(&log);
     let trace = Trace::of(&log);
     let names: Vec<_> = trace.slices("job").map(|slice| slice.name.clone()).collect();
     assert_eq!(names, ["outer", "other", "early", "late"], "what lies around others is read first");
-    let ready = trace.readings("ready processes");
+    let ready = trace.readings("ready nodes");
     assert_eq!(ready, [(10, 1.0), (50, 2.0), (55, 1.0), (85, 0.0)]);
 }
 
@@ -109,7 +107,7 @@ fn arrows_lead_from_the_last_chunk_to_the_first_wherever_their_items_are() {
         chunk(1, 1, 30, 35, 35),
         chunk(1, 1, 30, 35, 60),
     ];
-    let log = log(vec![run(vec![process("from", &[]), process("to", &[0])], 60, chunks)]);
+    let log = log(vec![run(vec![node("from", &[]), node("to", &[0])], 60, chunks)]);
     let trace = Trace::of(&log);
     let only = |kind: &str| trace.of_kind(kind).map(|event| (event.thread, event.began)).collect::<Vec<_>>();
     assert_eq!((only("s"), only("f")), (vec![(1, 29)], vec![(2, 36)]));
@@ -127,8 +125,8 @@ fn spans_that_begin_at_once_lie_one_inside_of_the_other() {
 
 #[test]
 fn chunks_that_took_no_time_have_arrows_in_reading_order() {
-    let processes = vec![process("a", &[]), process("b", &[0]), process("c", &[1])];
-    let mut run = run(processes, 50, vec![chunk(0, 0, 10, 10, 10), chunk(2, 0, 10, 10, 10)]);
+    let nodes = vec![node("a", &[]), node("b", &[0]), node("c", &[1])];
+    let mut run = run(nodes, 50, vec![chunk(0, 0, 10, 10, 10), chunk(2, 0, 10, 10, 10)]);
     run.empty = vec![Chunk { items: 0..0, ..chunk(1, 0, 10, 10, 10) }];
     let log = log(vec![run]);
     check(&log);
@@ -178,7 +176,7 @@ fn the_device_is_a_process_of_its_own_and_says_how_far_off_it_may_be() {
 
 #[test]
 fn without_a_device_there_is_no_device() {
-    let log = log(vec![run(vec![process("cull", &[])], 9, vec![chunk(0, 0, 1, 2, 3)])]);
+    let log = log(vec![run(vec![node("cull", &[])], 9, vec![chunk(0, 0, 1, 2, 3)])]);
     let trace = Trace::of(&log);
     assert!(trace.events.iter().all(|event| event.process == 1));
     assert!(trace.other_data.get("device_error_us").is_none());
@@ -188,7 +186,7 @@ fn without_a_device_there_is_no_device() {
 fn hundred_thousand_chunks_are_as_many_slices() {
     let chunks =
         (0..100_000).map(|index| chunk(0, index as usize % 2, 0, index / 2 * 10, index / 2 * 10 + 10)).collect();
-    let log = log(vec![run(vec![process("wide", &[])], 500_000, chunks)]);
+    let log = log(vec![run(vec![node("wide", &[])], 500_000, chunks)]);
     let mut trace = Lines::default();
     write_chrome_trace(&log, &mut trace).unwrap();
     assert_eq!(trace.slices, 100_000);
@@ -230,15 +228,15 @@ fn what_the_writer_returns_is_returned() {
 
 #[test]
 fn a_log_that_names_what_it_does_not_list_is_refused() {
-    let fine = run(vec![process("a", &[]), process("b", &[0])], 9, vec![chunk(1, 1, 0, 0, 9)]);
+    let fine = run(vec![node("a", &[]), node("b", &[0])], 9, vec![chunk(1, 1, 0, 0, 9)]);
     let cases = [
-        (Run { chunks: vec![chunk(2, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of process 2 of 2"),
-        (Run { empty: vec![chunk(5, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of process 5 of 2"),
+        (Run { chunks: vec![chunk(2, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 2 of 2"),
+        (Run { empty: vec![chunk(5, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 5 of 2"),
         (Run { chunks: vec![chunk(0, 2, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of worker 2 of 2"),
-        (run(vec![process("a", &[]), process("b", &[2])], 9, vec![]), "process 1 of run 0 waits for process 2 of 2"),
+        (run(vec![node("a", &[]), node("b", &[2])], 9, vec![]), "node 1 of run 0 waits for node 2 of 2"),
         (
-            run(vec![process("a", &[1]), process("b", &[])], 9, vec![]),
-            "process 0 of run 0 waits for process 1, which is not before it",
+            run(vec![node("a", &[1]), node("b", &[])], 9, vec![]),
+            "node 0 of run 0 waits for node 1, which is not before it",
         ),
     ];
     for (run, problem) in cases {
@@ -277,7 +275,7 @@ proptest! {
             unreachable!("there are twelve")
         };
         let labels = Labels { process: Some(process_label.clone()), stage: Some(stage.clone()), view: Some(view.clone()) };
-        let mut log = log(vec![run(vec![Process { labels, ..process(name, &[]) }], 9, vec![chunk(0, 1, 1, 2, 3)])]);
+        let mut log = log(vec![run(vec![NodeInfo { labels, ..node(name, &[]) }], 9, vec![chunk(0, 1, 1, 2, 3)])]);
         log.workers[0].name.clone_from(idle_worker);
         log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: at(0), ended: at(9) });
         log.workers[1].name.clone_from(worker);

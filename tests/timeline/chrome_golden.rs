@@ -20,7 +20,7 @@ fn a_frame_makes_the_golden_trace() {
     assert!(trace == golden, "golden_trace.json is another one:\n{trace}");
 }
 
-/// Four processes, one of them without items, within a span, on a clock that goes on by a microsecond a look.
+/// Four nodes, one of them without items, within a span, on a clock that goes on by a microsecond a look.
 fn trace_of_a_frame() -> String {
     let looks = AtomicU64::new(0);
     let clock = move || Duration::from_nanos(looks.fetch_add(1_001, Ordering::Relaxed));
@@ -28,9 +28,9 @@ fn trace_of_a_frame() -> String {
     let mut graph = FrameGraph::new();
     let mut add = |name: &str, width: usize| {
         let items = Closure::new(|_: &(), _range, _worker| Ok(())).with_width(move |_| width).with_chunk(8);
-        let process = graph.add(name, items);
-        graph.keep(process);
-        process
+        let node = graph.add(name, items);
+        graph.keep(node);
+        node
     };
     let [cull, shadows, fill, sort] =
         [("cull", 20), ("shadows", 0), ("fill \"all\"", 8), ("sort", 1)].map(|(name, width)| add(name, width));

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use drawloom::{
-    report::{Prices, write_page},
+    report::{SchedulerCosts, write_page},
     timeline::{Chunk, Idle, IdleKind, Log},
 };
 use drawloom_testing::hostile::{hostile_names, log_of};
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 fn page_of(log: &Log) -> String {
     let mut page = Vec::new();
-    write_page(log, &Prices::FREE, &mut page).expect("the log is whole");
+    write_page(log, &SchedulerCosts::ZERO, &mut page).expect("the log is whole");
     String::from_utf8(page).expect("a page is text")
 }
 
@@ -86,16 +86,16 @@ fn a_frame_without_a_report_says_why() {
 fn a_log_that_contradicts_itself_is_an_error() {
     type Break = fn(&mut Log);
     let breaks: [Break; 5] = [
-        |log| log.runs[0].chunks[0].process = 1,
+        |log| log.runs[0].chunks[0].node = 1,
         |log| log.runs[0].chunks[0].worker = 1,
         |log| log.runs[0].empty.push(Chunk { worker: 7, ..Chunk::default() }),
         |log| log.spans[0].thread = 1,
-        |log| Arc::make_mut(&mut log.runs[0].graph).processes[0].dependencies.push(0),
+        |log| Arc::make_mut(&mut log.runs[0].graph).nodes[0].dependencies.push(0),
     ];
     for (index, change) in breaks.into_iter().enumerate() {
         let mut log = log_of(&["a".to_owned()]);
         change(&mut log);
-        let error = write_page(&log, &Prices::FREE, Vec::new()).expect_err("the log contradicts itself");
+        let error = write_page(&log, &SchedulerCosts::ZERO, Vec::new()).expect_err("the log contradicts itself");
         assert_eq!(error.kind(), std::io::ErrorKind::InvalidData, "{index}: {error}");
     }
 }
@@ -103,10 +103,10 @@ fn a_log_that_contradicts_itself_is_an_error() {
 #[test]
 fn a_writer_that_fails_is_an_error() {
     let (mut room, log) = ([0; 1_000], log_of(&["a".to_owned()]));
-    assert!(write_page(&log, &Prices::FREE, &mut room[..]).is_err());
+    assert!(write_page(&log, &SchedulerCosts::ZERO, &mut room[..]).is_err());
 }
 
-/// Process, first item, number of items, worker, whether it was stolen; when it was opened, and how long it waited and took.
+/// NodeInfo, first item, number of items, worker, whether it was stolen; when it was opened, and how long it waited and took.
 type Pick = (usize, usize, usize, usize, bool, u64, u64, u64);
 
 fn any_chunk() -> impl Strategy<Value = Pick> {
@@ -124,8 +124,8 @@ proptest! {
         idle in vec((any::<bool>(), 0..1_u64 << 40, 0..1_u64 << 40), 0..10),
     ) {
         let at = |after: u64| Duration::from_nanos(start) + Duration::from_nanos(after);
-        let chunk = |&(process, first, items, worker, stolen, opened, waited, took): &Pick| Chunk {
-            process,
+        let chunk = |&(node, first, items, worker, stolen, opened, waited, took): &Pick| Chunk {
+            node,
             items: first..first + items,
             worker,
             opened: at(opened),
@@ -139,7 +139,7 @@ proptest! {
         (log.runs[0].began, log.runs[0].ended) = (at(0), at(1 << 42));
         (log.spans, log.device) = (Vec::new(), None);
         log.runs[0].chunks = picks.iter().map(chunk).collect();
-        log.runs[0].chunks.sort_by_key(|chunk| (chunk.process, chunk.items.start));
+        log.runs[0].chunks.sort_by_key(|chunk| (chunk.node, chunk.items.start));
         let idle_time = |&(asleep, began, took): &_| Idle { kind: kind(asleep), began: at(began), ended: at(began + took) };
         log.workers[1].idle = idle.iter().map(idle_time).collect();
         log.runs[0].complete = false;
@@ -148,7 +148,7 @@ proptest! {
         let chunk = |numbers: &[i64]| {
             let moment = |number: i64| at(u64::try_from(number).unwrap());
             Chunk {
-                process: numbers[0] as usize,
+                node: numbers[0] as usize,
                 items: numbers[1] as usize..(numbers[1] + numbers[2]) as usize,
                 worker: numbers[3] as usize,
                 stolen: numbers[4] == 1,

@@ -3,22 +3,22 @@
 use std::{ops::Range, sync::Arc, time::Duration};
 
 use drawloom::{
-    report::{FrameReport, HeldBy, Prices, ReportError},
-    timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, Process, Run, Span, WorkerLog},
+    report::{FrameReport, HeldBy, ReportError, SchedulerCosts},
+    timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
 };
 
 fn micros(count: u64) -> Duration {
     Duration::from_micros(count)
 }
 
-fn chunk(process: usize, item: usize, worker: usize, times: Range<u64>) -> Chunk {
+fn chunk(node: usize, item: usize, worker: usize, times: Range<u64>) -> Chunk {
     let [started, ended] = [times.start, times.end].map(micros);
-    Chunk { process, items: item..item + 1, worker, opened: started, started, ended, stolen: worker == 1 }
+    Chunk { node, items: item..item + 1, worker, opened: started, started, ended, stolen: worker == 1 }
 }
 
-fn process(name: &str, group: &str, dependencies: &[usize]) -> Process {
+fn node(name: &str, group: &str, dependencies: &[usize]) -> NodeInfo {
     let labels = Labels { process: Some(group.to_owned()), ..Labels::default() };
-    Process { name: name.to_owned(), labels, dependencies: dependencies.to_vec(), pinned: false }
+    NodeInfo { name: name.to_owned(), labels, dependencies: dependencies.to_vec(), pinned: false }
 }
 
 fn span(name: &str, times: Range<u64>) -> Span {
@@ -34,16 +34,16 @@ fn span(name: &str, times: Range<u64>) -> Span {
 /// worker 1               |  asleep  | .. shadows 270 | bloom 80 |  searching
 /// ```
 fn log() -> Log {
-    let processes = vec![
-        process("cull", "visibility", &[]),
-        process("lighting, record", "lighting", &[0]),
-        process("shadows, record", "shadows", &[0]),
-        process("bloom", "post", &[2]),
-        process("nothing", "post", &[1, 3]),
+    let nodes = vec![
+        node("cull", "visibility", &[]),
+        node("lighting, record", "lighting", &[0]),
+        node("shadows, record", "shadows", &[0]),
+        node("bloom", "post", &[2]),
+        node("nothing", "post", &[1, 3]),
     ];
     let run = Run {
         frame: 12,
-        graph: Arc::new(Graph { processes }),
+        graph: Arc::new(Graph { nodes }),
         workers: 2,
         began: micros(1_100),
         ended: micros(1_820),
@@ -80,13 +80,13 @@ fn log() -> Log {
 }
 
 fn report_of(log: &Log) -> FrameReport {
-    FrameReport::new(log, 12, &Prices::FREE).unwrap()
+    FrameReport::new(log, 12, &SchedulerCosts::ZERO).unwrap()
 }
 
 #[test]
 fn of_a_frame_made_by_hand_all_is_known() {
     let report = report_of(&log());
-    assert_eq!((report.frame, report.began, report.took), (12, micros(1_000), micros(1_000)));
+    assert_eq!((report.frame, report.began, report.duration), (12, micros(1_000), micros(1_000)));
     let steps = report.critical_path.iter();
     let steps: Vec<_> = steps.map(|step| (step.name.as_str(), step.ready, step.started, step.ended)).collect();
     let step = |name, ready, started, ended| (name, micros(ready), micros(started), micros(ended));
@@ -103,13 +103,13 @@ fn of_a_frame_made_by_hand_all_is_known() {
         step("submit", 2_000, 2_000, 2_100),
     ];
     assert_eq!(steps, expected);
-    let holders = report.critical_path.iter().map(|step| (step.process, step.worker, step.held_by));
-    let stay = |process, held_by| (Some((0, process)), Some(0), held_by);
+    let holders = report.critical_path.iter().map(|step| (step.node, step.worker, step.held_by));
+    let stay = |node, held_by| (Some((0, node)), Some(0), held_by);
     let outside = [(None, None, HeldBy::Start); 3];
     let stays =
         [stay(0, HeldBy::Start), stay(2, HeldBy::Dependency), stay(1, HeldBy::Worker), stay(4, HeldBy::Dependency)];
     assert_eq!(holders.collect::<Vec<_>>(), [outside.as_slice(), &stays, &outside].concat());
-    let shares: Vec<_> = report.shares.iter().map(|share| (share.group.as_str(), share.took())).collect();
+    let shares: Vec<_> = report.shares.iter().map(|share| (share.group.as_str(), share.duration())).collect();
     let expected = [
         ("shadows", 300),
         ("lighting", 200),
@@ -186,7 +186,7 @@ fn a_worker_that_helps_out_amid_a_chunk_is_held_by_what_was_before_that() {
 fn a_run_amid_a_chunk_of_another_counts_once() {
     let mut log = log();
     let inner = Run {
-        graph: Arc::new(Graph { processes: vec![process("inner", "inner", &[])] }),
+        graph: Arc::new(Graph { nodes: vec![node("inner", "inner", &[])] }),
         began: micros(1_400),
         ended: micros(1_500),
         chunks: vec![chunk(0, 0, 0, 1_420..1_480)],
@@ -198,8 +198,8 @@ fn a_run_amid_a_chunk_of_another_counts_once() {
     log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: micros(1_480), ended: micros(1_500) });
     let (report, without) = (report_of(&log), report_of(&self::log()));
     let names = |report: &FrameReport| report.critical_path.iter().map(|step| step.name.clone()).collect::<Vec<_>>();
-    assert_eq!((report.took, names(&report)), (without.took, names(&without)));
-    assert_eq!(report.critical_path[3].process, Some((1, 0)), "its run is the log's second");
+    assert_eq!((report.duration, names(&report)), (without.duration, names(&without)));
+    assert_eq!(report.critical_path[3].node, Some((1, 0)), "its run is the log's second");
     let caller = &report.workers[0];
     assert_eq!([caller.busy, caller.searching, caller.other], [670, 20, 310].map(micros));
     assert_eq!((caller.chunks, report.what_if), (5, without.what_if));
@@ -210,7 +210,7 @@ fn of_two_threads_the_one_that_began_last_counts() {
     let mut log = log();
     log.spans.push(span("stream", 1_880..1_950));
     let path = report_of(&log).critical_path;
-    let last: Vec<_> = path[8..].iter().map(|step| (step.name.as_str(), step.took())).collect();
+    let last: Vec<_> = path[8..].iter().map(|step| (step.name.as_str(), step.duration())).collect();
     assert_eq!(
         last,
         [("record, after its jobs", 60), ("stream", 70), ("submit", 100)].map(|(name, took)| (name, micros(took)))
@@ -229,8 +229,8 @@ fn between_runs_a_span_says_so() {
     log.runs.push(second);
     log.spans = vec![span("record", 1_090..2_600)];
     let report = report_of(&log);
-    let outside = report.critical_path.iter().filter(|step| step.process.is_none());
-    let outside: Vec<_> = outside.map(|step| (step.name.as_str(), step.took())).collect();
+    let outside = report.critical_path.iter().filter(|step| step.node.is_none());
+    let outside: Vec<_> = outside.map(|step| (step.name.as_str(), step.duration())).collect();
     let expected = [
         ("record, before its jobs", 10),
         ("end of the run", 20),
@@ -243,7 +243,7 @@ fn between_runs_a_span_says_so() {
 
 #[test]
 fn what_is_not_whole_is_not_reported_on() {
-    let report = |log: &Log, frame| FrameReport::new(log, frame, &Prices::FREE).map(|_| ());
+    let report = |log: &Log, frame| FrameReport::new(log, frame, &SchedulerCosts::ZERO).map(|_| ());
     assert_eq!(report(&log(), 13), Err(ReportError::NoRun { frame: 13 }));
     let mut incomplete = log();
     incomplete.runs[0].complete = false;
@@ -258,13 +258,13 @@ fn a_log_that_names_what_is_not_there_is_an_error() {
     let refused = |spoil: fn(&mut Run)| {
         let mut log = log();
         spoil(&mut log.runs[0]);
-        FrameReport::new(&log, 12, &Prices::FREE) == Err(ReportError::Contradictory { frame: 12 })
+        FrameReport::new(&log, 12, &SchedulerCosts::ZERO) == Err(ReportError::Contradictory { frame: 12 })
     };
     assert!(refused(|run| run.chunks[0].worker = 99));
-    assert!(refused(|run| run.chunks[0].process = 77));
-    assert!(refused(|run| run.empty[0].process = 77));
-    assert!(refused(|run| Arc::make_mut(&mut run.graph).processes[0].dependencies.push(3)));
-    assert!(refused(|run| Arc::make_mut(&mut run.graph).processes[0].dependencies.push(0)));
+    assert!(refused(|run| run.chunks[0].node = 77));
+    assert!(refused(|run| run.empty[0].node = 77));
+    assert!(refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(3)));
+    assert!(refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(0)));
 }
 
 #[test]
@@ -285,22 +285,22 @@ fn times_that_make_no_sense_are_reported_on_all_the_same() {
     };
     log.runs.push(backwards(range(1_880, 1_860)));
     let report = report_of(&log);
-    assert_eq!(report.critical_path.iter().map(|step| step.took()).sum::<Duration>(), report.took);
+    assert_eq!(report.critical_path.iter().map(|step| step.duration()).sum::<Duration>(), report.duration);
     let times = |worker: &drawloom::report::WorkerReport| worker.busy + worker.searching + worker.asleep + worker.other;
-    assert!(report.workers.iter().all(|worker| times(worker) == report.took));
+    assert!(report.workers.iter().all(|worker| times(worker) == report.duration));
     let report = report_of(&Log { runs: vec![backwards(range(5, 3))], ..Log::default() });
-    assert_eq!((report.took, report.critical_path), (Duration::ZERO, vec![]));
+    assert_eq!((report.duration, report.critical_path), (Duration::ZERO, vec![]));
 }
 
 #[test]
 fn words_are_few_and_keep_to_their_lines_whatever_the_names() {
     let mut log = log();
     let names = (0..200).map(|index| format!("{index}\n\u{1b}[31m{}", "x".repeat(10_000)));
-    let processes = names.enumerate().map(|(index, name)| {
+    let nodes = names.enumerate().map(|(index, name)| {
         let before = index.checked_sub(1 + index % 2);
-        process(&name, &name, before.as_slice())
+        node(&name, &name, before.as_slice())
     });
-    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    log.runs[0].graph = Arc::new(Graph { nodes: nodes.collect() });
     log.runs[0].empty.clear();
     log.runs[0].chunks =
         (0..200).map(|index| chunk(index, 0, index % 2, 1_100 + index as u64 * 3..1_103 + index as u64 * 3)).collect();
@@ -320,8 +320,8 @@ fn words_are_few_and_keep_to_their_lines_whatever_the_names() {
 #[test]
 fn many_steps_of_one_group_are_one_line() {
     let mut log = log();
-    let processes = (0..30).map(|index: usize| process(&format!("p{index}"), "chain", index.checked_sub(1).as_slice()));
-    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    let nodes = (0..30).map(|index: usize| node(&format!("p{index}"), "chain", index.checked_sub(1).as_slice()));
+    log.runs[0].graph = Arc::new(Graph { nodes: nodes.collect() });
     log.runs[0].empty.clear();
     log.runs[0].chunks =
         (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();
@@ -332,10 +332,10 @@ fn many_steps_of_one_group_are_one_line() {
 #[test]
 fn a_line_of_many_steps_says_what_their_names_have_in_common() {
     let mut log = log();
-    let name = |index: usize| format!("shadows, view {} \"sun\", phase {index}", index / 15);
+    let name = |index: usize| format!("shadows, view {} \"sun\", stage {index}", index / 15);
     let group = |index: usize| if index / 15 == 0 { "one" } else { "other" };
-    let processes = (0..30).map(|index: usize| process(&name(index), group(index), index.checked_sub(1).as_slice()));
-    log.runs[0].graph = Arc::new(Graph { processes: processes.collect() });
+    let nodes = (0..30).map(|index: usize| node(&name(index), group(index), index.checked_sub(1).as_slice()));
+    log.runs[0].graph = Arc::new(Graph { nodes: nodes.collect() });
     log.runs[0].empty.clear();
     log.runs[0].chunks =
         (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();

@@ -12,13 +12,13 @@ use std::{
 
 use drawloom::{
     graph::{Closure, FrameGraph, Schedule},
-    report::{FrameReport, HeldBy, Prices, Replay, Slack, Step},
+    report::{FrameReport, HeldBy, Replay, SchedulerCosts, Slack, Step},
     task::Scheduler,
     timeline::{Chunk, Labels, Log, Run},
 };
 use proptest::{collection::vec, prelude::*, sample::Index};
 
-/// A process: what it depends on, how many items it has, what each costs, and what it counts as.
+/// A node: what it depends on, how many items it has, what each costs, and what it counts as.
 #[derive(Clone, Debug)]
 struct Sketch {
     dependencies: Vec<Index>,
@@ -28,9 +28,9 @@ struct Sketch {
 }
 
 fn any_graph() -> impl Strategy<Value = Vec<Sketch>> {
-    let process = (vec(any::<Index>(), 0..4), 0..9_usize, 0..50_u64, 0..4_usize);
-    let process = process.prop_map(|(dependencies, width, cost, group)| Sketch { dependencies, width, cost, group });
-    vec(process, 1..10)
+    let node = (vec(any::<Index>(), 0..4), 0..9_usize, 0..50_u64, 0..4_usize);
+    let node = node.prop_map(|(dependencies, width, cost, group)| Sketch { dependencies, width, cost, group });
+    vec(node, 1..10)
 }
 
 /// What a run is lent: the clock that its chunks move, where it is no real one, and the group that has nothing to do.
@@ -51,7 +51,7 @@ impl Call {
 
 fn schedule_of(sketch: &[Sketch]) -> Schedule<Closure<'static, Call>> {
     let mut graph = FrameGraph::new();
-    let mut processes = Vec::new();
+    let mut nodes = Vec::new();
     for (index, &Sketch { ref dependencies, width, cost, group }) in sketch.iter().enumerate() {
         let group = format!("group {group}");
         let label = Labels { process: Some(group.clone()), ..Labels::default() };
@@ -60,13 +60,13 @@ fn schedule_of(sketch: &[Sketch]) -> Schedule<Closure<'static, Call>> {
             Ok(())
         });
         let width = move |call: &Call| if call.free.as_ref() == Some(&group) { 0 } else { width };
-        let process = graph.add(format!("p{index}"), body.with_width(width));
-        graph.label(process, label);
-        graph.keep(process);
+        let node = graph.add(format!("p{index}"), body.with_width(width));
+        graph.label(node, label);
+        graph.keep(node);
         for dependency in dependencies.iter().filter(|_| index > 0).map(|dependency| dependency.index(index)) {
-            graph.order(processes[dependency], process);
+            graph.order(nodes[dependency], node);
         }
-        processes.push(process);
+        nodes.push(node);
     }
     graph.compile().unwrap()
 }
@@ -94,22 +94,22 @@ fn frame_of(schedule: &mut Schedule<Closure<'_, Call>>, scheduler: &Scheduler, c
     (log, frame)
 }
 
-/// A worker's stay at a process.
+/// A worker's stay at a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stay {
-    process: usize,
+    node: usize,
     worker: usize,
     started: Duration,
     ended: Duration,
 }
 
-/// When each process could have begun, and when it did.
+/// When each node could have begun, and when it did.
 fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
-    let chunks_of = |process| run.chunks.iter().chain(&run.empty).filter(move |chunk| chunk.process == process);
-    let ended = |process| chunks_of(process).map(|chunk| chunk.ended).max().expect("it has chunks, or none to be seen");
-    let processes = run.graph.processes.iter().enumerate();
-    let times = processes.map(|(index, process)| {
-        let ready = process.dependencies.iter().map(|&dependency| ended(dependency)).max().unwrap_or(run.began);
+    let chunks_of = |node| run.chunks.iter().chain(&run.empty).filter(move |chunk| chunk.node == node);
+    let ended = |node| chunks_of(node).map(|chunk| chunk.ended).max().expect("it has chunks, or none to be seen");
+    let nodes = run.graph.nodes.iter().enumerate();
+    let times = nodes.map(|(index, node)| {
+        let ready = node.dependencies.iter().map(|&dependency| ended(dependency)).max().unwrap_or(run.began);
         (ready, chunks_of(index).map(|chunk| chunk.started).min().unwrap())
     });
     times.collect()
@@ -118,20 +118,20 @@ fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
 /// All stays in the order in which they ended, and which of them had to end before which.
 fn stays_and_edges(run: &Run) -> (Vec<Stay>, Vec<[usize; 2]>) {
     let mut chunks: Vec<_> = run.chunks.iter().chain(&run.empty).collect();
-    chunks.sort_by_key(|chunk| (chunk.ended, chunk.started, chunk.process));
+    chunks.sort_by_key(|chunk| (chunk.ended, chunk.started, chunk.node));
     let mut stays: Vec<Stay> = Vec::new();
     for chunk in chunks {
-        let &Chunk { process, worker, started, ended, .. } = chunk;
+        let &Chunk { node, worker, started, ended, .. } = chunk;
         match stays.iter_mut().rfind(|stay| stay.worker == worker) {
-            Some(last) if last.process == process => last.ended = ended,
-            _ => stays.push(Stay { process, worker, started, ended }),
+            Some(last) if last.node == node => last.ended = ended,
+            _ => stays.push(Stay { node, worker, started, ended }),
         }
     }
-    stays.sort_by_key(|stay| (stay.ended, stay.started, stay.process));
+    stays.sort_by_key(|stay| (stay.ended, stay.started, stay.node));
     let mut edges = Vec::new();
     for (to, stay) in stays.iter().enumerate() {
-        let dependencies = &run.graph.processes[stay.process].dependencies;
-        let is_before = |&from: &usize| dependencies.contains(&stays[from].process);
+        let dependencies = &run.graph.nodes[stay.node].dependencies;
+        let is_before = |&from: &usize| dependencies.contains(&stays[from].node);
         edges.extend((0..stays.len()).filter(is_before).map(|from| [from, to]));
         let previous = (0..to).rfind(|&from| stays[from].worker == stay.worker);
         edges.extend(previous.map(|from| [from, to]));
@@ -163,20 +163,20 @@ fn check_run(run: &Run, path: &[&Step], slack: &[Slack]) -> Result<(), TestCaseE
     let end = stays.iter().map(|stay| stay.ended).max().unwrap();
     let longest = ends(run, &weights, &edges, |_| Duration::ZERO).into_iter().max().unwrap();
     prop_assert_eq!(longest, end);
-    prop_assert_eq!(path.iter().map(|step| step.took()).sum::<Duration>(), end - run.began);
+    prop_assert_eq!(path.iter().map(|step| step.duration()).sum::<Duration>(), end - run.began);
     let mut places = Vec::new();
     for step in path {
-        let (_, process) = step.process.unwrap();
-        let stay = Stay { process, worker: step.worker.unwrap(), started: step.started, ended: step.ended };
+        let (_, node) = step.node.unwrap();
+        let stay = Stay { node, worker: step.worker.unwrap(), started: step.started, ended: step.ended };
         places.extend(stays.iter().position(|other| *other == stay));
-        prop_assert!(slack[process].time.is_zero());
+        prop_assert!(slack[node].time.is_zero());
     }
     prop_assert_eq!(places.len(), path.len());
     prop_assert_eq!(path[0].held_by, HeldBy::Start);
     for (pair, steps) in places.windows(2).zip(path.windows(2)) {
         prop_assert!(edges.iter().any(|edge| edge == pair), "{:?}", steps);
         let [from, to] = [stays[pair[0]], stays[pair[1]]];
-        let depends = run.graph.processes[to.process].dependencies.contains(&from.process);
+        let depends = run.graph.nodes[to.node].dependencies.contains(&from.node);
         prop_assert_eq!(steps[1].held_by, if depends { HeldBy::Dependency } else { HeldBy::Worker });
         prop_assert!(depends || from.worker == to.worker);
     }
@@ -185,9 +185,9 @@ fn check_run(run: &Run, path: &[&Step], slack: &[Slack]) -> Result<(), TestCaseE
         places.retain(|&stay| !weights[stay].is_zero());
         prop_assert_eq!(places, all);
     }
-    for (process, slack) in slack.iter().enumerate() {
+    for (node, slack) in slack.iter().enumerate() {
         let end_if_late = |by| {
-            let late = |stay: usize| stays[stay].process == process;
+            let late = |stay: usize| stays[stay].node == node;
             let at_least = |stay| if late(stay) { stays[stay].ended + by } else { Duration::ZERO };
             ends(run, &weights, &edges, at_least).into_iter().max().unwrap()
         };
@@ -199,21 +199,21 @@ fn check_run(run: &Run, path: &[&Step], slack: &[Slack]) -> Result<(), TestCaseE
 
 fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
     let took: Duration = log.spans.iter().map(|span| span.ended - span.began).sum();
-    prop_assert_eq!(report.took, took);
+    prop_assert_eq!(report.duration, took);
     let path = &report.critical_path;
-    prop_assert_eq!(path.iter().map(Step::took).sum::<Duration>(), took);
+    prop_assert_eq!(path.iter().map(Step::duration).sum::<Duration>(), took);
     prop_assert_eq!(path[0].ready, report.began);
     prop_assert!(path.iter().all(|step| step.ready <= step.started && step.started <= step.ended));
     for pair in path.windows(2) {
         let is_pause = pair[0].ended == log.spans[0].ended && pair[1].ready == log.spans[1].began;
         prop_assert!(pair[0].ended == pair[1].ready || is_pause, "{:?}", pair);
     }
-    prop_assert_eq!(report.shares.iter().map(|share| share.took()).sum::<Duration>(), took);
+    prop_assert_eq!(report.shares.iter().map(|share| share.duration()).sum::<Duration>(), took);
     let mut slack = report.slack.as_slice();
     for (place, run) in log.runs.iter().enumerate() {
-        let steps = path.iter().filter(|step| step.process.is_some_and(|(run, _)| run == place));
-        let (of_run, rest) = slack.split_at(run.graph.processes.len());
-        prop_assert!(of_run.iter().enumerate().all(|(index, slack)| slack.process == (place, index)));
+        let steps = path.iter().filter(|step| step.node.is_some_and(|(run, _)| run == place));
+        let (of_run, rest) = slack.split_at(run.graph.nodes.len());
+        prop_assert!(of_run.iter().enumerate().all(|(index, slack)| slack.node == (place, index)));
         check_run(run, &steps.collect::<Vec<_>>(), of_run)?;
         slack = rest;
     }
@@ -221,7 +221,7 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
     let all = || log.runs.iter().flat_map(|run| run.chunks.iter().chain(&run.empty));
     for (index, worker) in report.workers.iter().enumerate() {
         prop_assert_eq!(worker.busy + worker.searching + worker.asleep + worker.other, took);
-        let ran: Duration = all().filter(|chunk| chunk.worker == index).map(Chunk::took).sum();
+        let ran: Duration = all().filter(|chunk| chunk.worker == index).map(Chunk::duration).sum();
         prop_assert_eq!(worker.busy, ran);
     }
     let chunks: usize = log.runs.iter().map(|run| run.chunks.len()).sum();
@@ -248,20 +248,20 @@ proptest! {
     fn a_report_agrees_with_naive_oracles(sketch in any_graph(), always_parallel in any::<bool>(), wake in 0..20_u64) {
         let mut schedule = schedule_of(&sketch);
         schedule.always_parallel(always_parallel);
-        let prices = Prices { wake: Duration::from_micros(wake), ..Prices::FREE };
+        let costs = SchedulerCosts { wake: Duration::from_micros(wake), ..SchedulerCosts::ZERO };
         for scheduler in &*SCHEDULERS {
             let scheduler = scheduler.lock().unwrap();
             let (log, frame) = frame_of(&mut schedule, &scheduler, &Call::default());
-            let report = FrameReport::new(&log, frame, &prices).unwrap();
+            let report = FrameReport::new(&log, frame, &costs).unwrap();
             check(&report, &log)?;
-            let replay = Replay::of_frame(&log, frame, prices).unwrap();
+            let replay = Replay::of_frame(&log, frame, costs).unwrap();
             prop_assert_eq!(report.replayed, replay.frame_time(scheduler.workers()));
             for what_if in &report.what_if {
-                let time = replay.clone().with_free(&what_if.group).frame_time(scheduler.workers());
+                let time = replay.clone().without_work_of(&what_if.group).frame_time(scheduler.workers());
                 prop_assert_eq!(what_if.time, time.min(report.replayed));
                 prop_assert_eq!(what_if.saved, report.replayed - what_if.time);
             }
-            let groups: BTreeSet<_> = sketch.iter().map(|process| process.group).collect();
+            let groups: BTreeSet<_> = sketch.iter().map(|node| node.group).collect();
             prop_assert_eq!(report.what_if.len(), groups.len());
             prop_assert!(report.what_if.is_sorted_by(|one, other| one.saved >= other.saved));
             let on = [1, 2, 4, 8, 16].map(|workers| (workers, replay.frame_time(workers)));
@@ -279,13 +279,13 @@ proptest! {
         let mut report = |free: Option<&str>| {
             let call = Call { clock: Some(Arc::clone(&clock)), free: free.map(str::to_owned) };
             let (log, frame) = frame_of(&mut schedule, &scheduler, &call);
-            let report = FrameReport::new(&log, frame, &Prices::FREE).unwrap();
+            let report = FrameReport::new(&log, frame, &SchedulerCosts::ZERO).unwrap();
             check(&report, &log).map(|()| report)
         };
         let whole = report(None)?;
-        prop_assert_eq!(whole.replayed, whole.took);
+        prop_assert_eq!(whole.replayed, whole.duration);
         for what_if in &whole.what_if {
-            prop_assert_eq!(report(Some(&what_if.group))?.took, what_if.time, "without {}", what_if.group);
+            prop_assert_eq!(report(Some(&what_if.group))?.duration, what_if.time, "without {}", what_if.group);
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
-use drawloom::report::Prices;
+use drawloom::report::SchedulerCosts;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
 use drawloom_benches::backends::BackendName;
@@ -26,7 +26,7 @@ pub struct Block<'a> {
     pub backend: BackendName,
     pub workers: usize,
     /// The scheduler costs of this machine.
-    pub prices: Prices,
+    pub costs: SchedulerCosts,
     pub extent: &'a Extent,
     pub progress: &'a ProgressBar,
 }
@@ -63,7 +63,7 @@ impl Block<'_> {
             let scheduler = if mode.is_serial { &one } else { &all };
             let builder = Renderer::builder(self.backend.open()?).deferred(Deferred::to_picture());
             let (renderer, submitter) = builder.granularity(mode.granularity).build(Arc::clone(scheduler))?;
-            let prediction = Prediction::new(self.prices, self.workers);
+            let prediction = Prediction::new(self.costs, self.workers);
             Ok::<_, Box<dyn Error>>((Runner { renderer, submitter }, prediction))
         };
         let mut modes = Mode::ALL.iter().map(open).collect::<Result<Vec<_>, _>>()?;

@@ -29,7 +29,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom::report::Prices;
+use drawloom::report::SchedulerCosts;
 use drawloom_benches::arguments::BackendArguments;
 use drawloom_benches::harness::progress_bar;
 
@@ -80,13 +80,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let is_requested = |name: &str| arguments.scenes.is_empty() || arguments.scenes.iter().any(|scene| scene == name);
     let cases: Vec<_> = scenes::all(extent.divisor)?.into_iter().filter(|case| is_requested(case.name)).collect();
 
-    let prices = Prices::measure()?;
+    let costs = SchedulerCosts::measure()?;
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
     for backend in arguments.backend.backends() {
         for case in &cases {
             for workers in worker_counts()? {
-                let block = Block { case, backend, workers, prices, extent: &extent, progress: &progress };
+                let block = Block { case, backend, workers, costs, extent: &extent, progress: &progress };
                 report.add(&block, block.measure()?);
             }
         }

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
-use drawloom::report::{Prices, Replay};
+use drawloom::report::{Replay, SchedulerCosts};
 use drawloom::scene::SceneRef;
 use drawloom::{Renderer, Submitter};
 use drawloom_benches::statistics::median;
@@ -17,18 +17,18 @@ pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 /// warm caches: the prediction for the actual number of workers is compared with it.
 #[derive(Clone)]
 pub struct Prediction {
-    prices: Prices,
+    costs: SchedulerCosts,
     times: Vec<(usize, Vec<f64>)>,
     measured: Vec<f64>,
 }
 
 impl Prediction {
     /// Predicts for `workers` workers, for one, and for [`PREDICTED`].
-    pub fn new(prices: Prices, workers: usize) -> Self {
+    pub fn new(costs: SchedulerCosts, workers: usize) -> Self {
         let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
         counts.sort_unstable();
         counts.dedup();
-        Self { prices, times: counts.into_iter().map(|count| (count, Vec::new())).collect(), measured: Vec::new() }
+        Self { costs, times: counts.into_iter().map(|count| (count, Vec::new())).collect(), measured: Vec::new() }
     }
 
     /// Draws two frames, and replays the second.
@@ -50,7 +50,7 @@ impl Prediction {
         timeline.stop();
         submitted.submission.wait()?;
         let log = timeline.take();
-        let replay = Replay::of_frame(&log, log.frames[0].number, self.prices)?;
+        let replay = Replay::of_frame(&log, log.frames[0].number, self.costs)?;
         for (workers, times) in &mut self.times {
             times.push(replay.frame_time(*workers).as_secs_f64());
         }

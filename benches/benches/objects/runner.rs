@@ -76,7 +76,7 @@ impl Runner {
         timeline.stop();
         submitted.submission.wait()?;
         let log = timeline.take();
-        let in_runs: Duration = log.runs.iter().map(Run::took).sum();
+        let in_runs: Duration = log.runs.iter().map(Run::duration).sum();
         let in_spans: Duration = log.spans.iter().map(|span| span.ended - span.began).sum();
         Ok((in_spans - in_runs).as_secs_f64())
     }

@@ -12,7 +12,7 @@ use std::{
 
 use crate::{
     report::consistency::check_log,
-    timeline::{Chunk, DeviceLog, IdleKind, Log, Process, Run},
+    timeline::{Chunk, DeviceLog, IdleKind, Log, NodeInfo, Run},
 };
 
 use self::{
@@ -34,17 +34,17 @@ const DEVICE: usize = 2;
 ///
 /// | what | events | category |
 /// | --- | --- | --- |
-/// | chunks, as many as ran | `X`, by the name of their process | `job` |
-/// | processes without items | `X` | `empty` |
+/// | chunks, as many as ran | `X`, by the name of their node | `job` |
+/// | nodes without items | `X` | `empty` |
 /// | idle times | `X`: `searching`, `asleep` | `idle` |
 /// | spans | `X` | `span` |
 /// | the device's passes | `X` | `device` |
 /// | dependencies, from the end of the last chunk to the beginning of the first | `s` and `f` | `dependency` |
 /// | frames | `i` | `frame` |
-/// | counters, and `ready processes`: how many could have been opened, and were later | `C` | `counter` |
+/// | counters, and `ready nodes`: how many could have been opened, and were later | `C` | `counter` |
 ///
 /// The arguments of a chunk say what it is a part of, its items, the frame, the place of its run among [`Log::runs`], when
-/// its process was opened (`opened_us`), how long after the last of what that waits for it began (`queued_us`), and
+/// its node was opened (`opened_us`), how long after the last of what that waits for it began (`queued_us`), and
 /// whether it was stolen. `otherData` says how much was dropped, and how many dependencies have no arrow since there is no
 /// chunk at one of their ends, as in a run that failed or is not complete.
 ///
@@ -72,8 +72,8 @@ const DEVICE: usize = 2;
 ///
 /// # Errors
 ///
-/// What `writer` returns; and [`InvalidInput`](io::ErrorKind::InvalidInput) if the log names a process, a worker or a thread
-/// that it does not list, or has a process wait for a later one.
+/// What `writer` returns; and [`InvalidInput`](io::ErrorKind::InvalidInput) if the log names a node, a worker or a thread
+/// that it does not list, or has a node wait for a later one.
 pub fn write_chrome_trace(log: &Log, writer: impl io::Write) -> io::Result<()> {
     check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidInput, problem))?;
     let events = Events::begin(BufWriter::new(writer))?;
@@ -136,7 +136,7 @@ impl<W: io::Write> Trace<'_, W> {
             self.left_out += passages.left_out;
             waits.add(passages.waits());
             for (slice_place, (is_empty, chunk)) in slices(run).enumerate() {
-                if let Some(passage) = &passages.processes[chunk.process] {
+                if let Some(passage) = &passages.nodes[chunk.node] {
                     let category = if is_empty { "empty" } else { "job" };
                     self.write_chunk(category, chunk, (place, run), passage)?;
                     self.write_arrows(slice_place, chunk, passage)?;
@@ -153,7 +153,7 @@ impl<W: io::Write> Trace<'_, W> {
         (place, run): (usize, &Run),
         passage: &Passage,
     ) -> io::Result<()> {
-        let Process { name, labels, .. } = &run.graph.processes[chunk.process];
+        let NodeInfo { name, labels, .. } = &run.graph.nodes[chunk.node];
         let slice = self.events.slice(category, name, lane_of(chunk.worker), chunk.started, chunk.ended)?;
         let slice = slice.object("args", |mut arguments| {
             for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
@@ -283,7 +283,7 @@ fn lane_of(worker: usize) -> Lane {
     Lane { process: CPU, thread: worker + 1 }
 }
 
-/// How many processes could be opened and are not yet, in runs that may overlap.
+/// How many nodes could be opened and are not yet, in runs that may overlap.
 #[derive(Default)]
 struct Waits {
     changes: Vec<(Duration, i64)>,
@@ -307,7 +307,7 @@ impl Waits {
             let change: i64 = together.iter().map(|(_, change)| change).sum();
             ready += change;
             if change != 0 {
-                events.reading("ready processes", lane_of(0), together[0].0, ready)?;
+                events.reading("ready nodes", lane_of(0), together[0].0, ready)?;
             }
         }
         self.changes.clear();

@@ -1,11 +1,11 @@
-//! Where the processes of a run have their slices: when each could have been opened, when it was, and which dependencies
+//! Where the nodes of a run have their slices: when each could have been opened, when it was, and which dependencies
 //! lead to it and from it.
 
 use std::{iter, time::Duration};
 
 use crate::timeline::{Chunk, Run};
 
-/// What a process did in a run.
+/// What a node did in a run.
 #[derive(Clone, Debug)]
 pub(super) struct Passage {
     pub(super) opened: Duration,
@@ -20,7 +20,7 @@ pub(super) struct Passage {
     pub(super) arrows_out: Vec<u64>,
 }
 
-/// The first or the last slice of a process.
+/// The first or the last slice of a node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
     pub(super) place: usize,
@@ -28,24 +28,24 @@ pub(super) struct Edge {
     ended: Duration,
 }
 
-/// The processes of a run.
+/// The nodes of a run.
 #[derive(Debug, Default)]
 pub(super) struct Passages {
-    /// By process; `None` for one without slices.
-    pub(super) processes: Vec<Option<Passage>>,
+    /// By node; `None` for one without slices.
+    pub(super) nodes: Vec<Option<Passage>>,
     /// How many dependencies have slices at both ends.
     pub(super) arrows: u64,
     /// How many have not.
     pub(super) left_out: u64,
 }
 
-/// A run's chunks, and its [empty](Run::empty) ones, with whether they are: by process, so that each comes after all it
+/// A run's chunks, and its [empty](Run::empty) ones, with whether they are: by node, so that each comes after all it
 /// waits for.
 pub(super) fn slices(run: &Run) -> impl Iterator<Item = (bool, &Chunk)> {
     let (mut chunks, mut empty) = (run.chunks.iter().peekable(), run.empty.iter().peekable());
     iter::from_fn(move || {
         let is_empty = match (chunks.peek(), empty.peek()) {
-            (Some(chunk), Some(empty)) => empty.process < chunk.process,
+            (Some(chunk), Some(empty)) => empty.node < chunk.node,
             (chunk, _) => chunk.is_none(),
         };
         let next = if is_empty { empty.next() } else { chunks.next() };
@@ -56,41 +56,41 @@ pub(super) fn slices(run: &Run) -> impl Iterator<Item = (bool, &Chunk)> {
 impl Passages {
     /// Those of a run, whose dependencies are numbered from there on.
     pub(super) fn new(run: &Run, first_arrow: u64) -> Self {
-        let mut passages = Self { processes: vec![None; run.graph.processes.len()], ..Self::default() };
+        let mut passages = Self { nodes: vec![None; run.graph.nodes.len()], ..Self::default() };
         for (place, (_, chunk)) in slices(run).enumerate() {
             let edge = Edge { place, started: chunk.started, ended: chunk.ended };
-            passages.processes[chunk.process]
+            passages.nodes[chunk.node]
                 .get_or_insert_with(|| Passage::new(chunk.opened, edge))
                 .take_in(chunk.opened, edge);
         }
-        for (process, node) in run.graph.processes.iter().enumerate() {
+        for (index, node) in run.graph.nodes.iter().enumerate() {
             let mut ready = Some(run.began);
             for &dependency in &node.dependencies {
-                let ended = passages.processes[dependency].as_ref().map(|passage| passage.last.ended);
+                let ended = passages.nodes[dependency].as_ref().map(|passage| passage.last.ended);
                 ready = ready.zip(ended).map(|(ready, ended)| ready.max(ended));
-                passages.connect(dependency, process, first_arrow);
+                passages.connect(dependency, index, first_arrow);
             }
-            if let Some(passage) = &mut passages.processes[process] {
+            if let Some(passage) = &mut passages.nodes[index] {
                 passage.ready = ready;
             }
         }
         passages
     }
 
-    fn connect(&mut self, dependency: usize, process: usize, first_arrow: u64) {
+    fn connect(&mut self, dependency: usize, node: usize, first_arrow: u64) {
         let arrow = first_arrow + self.arrows;
-        if self.processes[dependency].is_none() || self.processes[process].is_none() {
+        if self.nodes[dependency].is_none() || self.nodes[node].is_none() {
             self.left_out += 1;
             return;
         }
         self.arrows += 1;
-        self.processes[dependency].iter_mut().for_each(|passage| passage.arrows_out.push(arrow));
-        self.processes[process].iter_mut().for_each(|passage| passage.arrows_in.push(arrow));
+        self.nodes[dependency].iter_mut().for_each(|passage| passage.arrows_out.push(arrow));
+        self.nodes[node].iter_mut().for_each(|passage| passage.arrows_in.push(arrow));
     }
 
-    /// When processes could have been opened and were not yet: the moments at which their number changes, and by how much.
+    /// When nodes could have been opened and were not yet: the moments at which their number changes, and by how much.
     pub(super) fn waits(&self) -> impl Iterator<Item = (Duration, i64)> {
-        let waits = self.processes.iter().flatten().filter_map(|passage| Some((passage.ready?, passage.opened)));
+        let waits = self.nodes.iter().flatten().filter_map(|passage| Some((passage.ready?, passage.opened)));
         waits.flat_map(|(ready, opened)| [(ready, 1), (opened.max(ready), -1)])
     }
 }

@@ -1,69 +1,127 @@
-//! Which stays of its workers made a run as long as it was, and how much later its processes could have ended.
+//! The critical path of a frame: those of its runs, and what its threads did before, between and after them.
 
-use std::time::Duration;
+use std::{cmp::Reverse, collections::BinaryHeap, ops::Range, time::Duration};
 
-use crate::timeline::{Log, Run};
-
-use super::{
-    Slack,
-    stays::{ProcessTimes, Stay, stays},
+use crate::{
+    report::intervals::{difference, union},
+    timeline::{Log, Span},
 };
 
-/// A run, and when what went on in it.
-pub(super) struct RunTimes<'log> {
-    /// The run's index in the log.
-    pub(super) place: usize,
-    pub(super) run: &'log Run,
-    pub(super) processes: Vec<ProcessTimes>,
-    stays: Vec<Stay>,
+use super::{
+    run_spans::RunSpans,
+    step::{HeldBy, Step},
+    worker_spans::WorkerSpan,
+};
+
+/// The name of the step from the end of a run's last node to the end of the run: workers find that nothing is left, and the
+/// calling thread is woken if it sleeps.
+const END_OF_RUN: &str = "end of the run";
+
+/// All steps of the frame, from its beginning to its end.
+pub(super) fn critical_path(
+    log: &Log,
+    frame: u64,
+    frame_intervals: &[Range<Duration>],
+    runs: &[RunSpans<'_>],
+) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let mut until = Duration::ZERO;
+    for run in runs {
+        // Where runs of two threads overlap, the path follows the first to its end.
+        let start = until.max(run.run.began);
+        let within = start..start.max(run.run.ended);
+        steps.extend(steps_of_run(run).into_iter().filter_map(|step| clip(step, &within)));
+        until = within.end;
+    }
+    let of_runs = union(runs.iter().map(|run| run.run.began..run.run.ended));
+    steps.extend(steps_of_spans(log, frame, &difference(frame_intervals, &of_runs), runs));
+    steps.sort_by_key(|step| step.ready);
+    steps
 }
 
-impl<'log> RunTimes<'log> {
-    /// Of a run of that log.
-    pub(super) fn new(log: &Log, run: &'log Run) -> Self {
-        let place = log.runs.iter().position(|other| std::ptr::eq(other, run)).unwrap_or(0);
-        let (processes, stays) = stays(run);
-        Self { place, run, processes, stays }
+fn steps_of_run(run: &RunSpans<'_>) -> Vec<Step> {
+    let step = |span: &WorkerSpan| {
+        let node = &run.run.graph.nodes[span.node];
+        Step {
+            name: node.name.clone(),
+            group: node.group().to_owned(),
+            node: Some((run.index, span.node)),
+            worker: span.worker,
+            held_by: span.held_by,
+            ready: span.ready,
+            started: span.started,
+            ended: span.ended,
+        }
+    };
+    let mut steps: Vec<_> = run.critical_path().into_iter().map(step).collect();
+    let end = steps.last().map_or(run.run.began, |step| step.ended);
+    if end < run.run.ended {
+        steps.push(step_outside_nodes(END_OF_RUN.to_owned(), END_OF_RUN, end..run.run.ended));
     }
+    steps
+}
 
-    /// The stay that ended last, before it the one that held that up, and so on: from the first to the last.
-    pub(super) fn critical_path(&self) -> Vec<&Stay> {
-        let holder = |stay: &&Stay| stay.holder.map(|holder| &self.stays[holder]);
-        let mut path: Vec<_> = std::iter::successors(self.stays.last(), holder).collect();
-        path.reverse();
-        path
+fn clip(mut step: Step, within: &Range<Duration>) -> Option<Step> {
+    let is_outside = step.ended < within.start || step.ready > within.end;
+    for time in [&mut step.ready, &mut step.started, &mut step.ended] {
+        *time = (*time).clamp(within.start, within.end);
     }
+    (!is_outside).then_some(step)
+}
 
-    /// How much later each process could have ended: see [`Slack::time`].
-    pub(super) fn slack(&self) -> Vec<Slack> {
-        let processes = &self.run.graph.processes;
-        let end = self.stays.last().map_or(self.run.began, |stay| stay.ended);
-        // Every stay of a process has to end before any stay of its dependents is ready. One moment for each process says
-        // the same as an edge for each pair of stays.
-        let mut latest_ends_of_processes = vec![end; processes.len()];
-        let mut latest_ready = vec![end; processes.len()];
-        let mut latest_ends_of_stays = vec![end; self.stays.len()];
-        let mut times = vec![Duration::MAX; processes.len()];
-        let mut stays_left = vec![0_usize; processes.len()];
-        self.stays.iter().for_each(|stay| stays_left[stay.process] += 1);
-        for (place, stay) in self.stays.iter().enumerate().rev() {
-            let process = stay.process;
-            let latest_end = latest_ends_of_stays[place].min(latest_ends_of_processes[process]);
-            times[process] = times[process].min(latest_end.saturating_sub(stay.ended));
-            let ready = latest_end.saturating_sub(stay.weight());
-            latest_ready[process] = latest_ready[process].min(ready);
-            if let Some(previous) = stay.previous {
-                latest_ends_of_stays[previous] = latest_ends_of_stays[previous].min(ready);
+/// What threads did in these intervals, which lie outside of all runs. Each part belongs to its innermost span, which is the
+/// one that began last.
+fn steps_of_spans(log: &Log, frame: u64, intervals: &[Range<Duration>], runs: &[RunSpans<'_>]) -> Vec<Step> {
+    let mut spans: Vec<_> = log.spans_of(frame).collect();
+    spans.sort_by_key(|span| span.began);
+    let mut upcoming = spans.iter().enumerate().peekable();
+    let mut open = BinaryHeap::new();
+    let mut steps: Vec<(usize, Step)> = Vec::new();
+    for interval in intervals {
+        let mut now = interval.start;
+        while now < interval.end {
+            while let Some((index, span)) = upcoming.next_if(|(_index, span)| span.began <= now) {
+                open.push((span.began, Reverse(span.ended), index));
             }
-            stays_left[process] -= 1;
-            if stays_left[process] == 0 {
-                for &dependency in &processes[process].dependencies {
-                    let latest_end = &mut latest_ends_of_processes[dependency];
-                    *latest_end = (*latest_end).min(latest_ready[process]);
+            while open.peek().is_some_and(|&(_began, Reverse(ended), _index)| ended <= now) {
+                open.pop();
+            }
+            let next = upcoming.peek().map_or(interval.end, |(_index, span)| span.began.min(interval.end));
+            let Some(&(_began, Reverse(ended), index)) = open.peek() else {
+                now = next;
+                continue;
+            };
+            let until = next.min(ended);
+            match steps.last_mut() {
+                // `now > interval.start`: a step does not go on across a run, even one of zero length.
+                Some((last, step)) if *last == index && step.ended == now && now > interval.start => step.ended = until,
+                _ => {
+                    let span = spans[index];
+                    let name = name_of_part(span, &(now..until), runs);
+                    steps.push((index, step_outside_nodes(name, &span.name, now..until)));
                 }
             }
+            now = until;
         }
-        let slack = |(index, time)| Slack { process: (self.place, index), name: processes[index].name.clone(), time };
-        times.into_iter().enumerate().map(slack).collect()
     }
+    steps.into_iter().map(|(_index, step)| step).collect()
+}
+
+/// The name of a part of a span that lies outside of these runs.
+fn name_of_part(span: &Span, part: &Range<Duration>, runs: &[RunSpans<'_>]) -> String {
+    let is_after = runs.iter().any(|run| span.began <= run.run.began && run.run.ended <= part.start);
+    let is_before = runs.iter().any(|run| part.end <= run.run.began && run.run.ended <= span.ended);
+    let name = &span.name;
+    match (is_after, is_before) {
+        (false, false) => name.clone(),
+        (false, true) => format!("{name}, before its jobs"),
+        (true, false) => format!("{name}, after its jobs"),
+        (true, true) => format!("{name}, between its jobs"),
+    }
+}
+
+fn step_outside_nodes(name: String, group: &str, interval: Range<Duration>) -> Step {
+    let Range { start, end } = interval;
+    let (group, held_by) = (group.to_owned(), HeldBy::Start);
+    Step { name, group, node: None, worker: None, held_by, ready: start, started: start, ended: end }
 }

@@ -5,8 +5,8 @@ use std::{collections::HashMap, io, sync::Arc, time::Duration};
 use serde::Serialize;
 
 use crate::{
-    report::{FrameReport, Prices, consistency::check_log},
-    timeline::{Chunk, Graph, IdleKind, Log, Process},
+    report::{FrameReport, SchedulerCosts, consistency::check_log},
+    timeline::{Chunk, Graph, IdleKind, Log, NodeInfo},
 };
 
 /// A log and its reports, as `model.js` reads them. Texts are indices of `texts`. Times are in nanoseconds: moments since the
@@ -39,7 +39,7 @@ struct Frame {
     ended: i64,
     /// The report in words, or why there is none.
     words: usize,
-    /// The critical path. Group, which is the span's name where it is no process; run, process and worker (−1 for what a thread
+    /// The critical path. Group, which is the span's name where it is no node; run, node and worker (−1 for what a thread
     /// did outside of all runs), ready, waited, took.
     path: Vec<i64>,
 }
@@ -60,9 +60,9 @@ struct RunData {
     graph: usize,
     began: i64,
     ended: i64,
-    /// Process, first item, number of items, worker, stolen (1) or not (0), opened, waited from then on, took.
+    /// NodeInfo, first item, number of items, worker, stolen (1) or not (0), opened, waited from then on, took.
     chunks: Vec<i64>,
-    /// The same of processes that had no items.
+    /// The same of nodes that had no items.
     empty: Vec<i64>,
 }
 
@@ -70,12 +70,12 @@ struct RunData {
 struct Device {
     name: usize,
     error: i64,
-    /// Process, view, frame, began, took.
+    /// NodeInfo, view, frame, began, took.
     passes: Vec<i64>,
 }
 
 impl Data {
-    pub(super) fn new(log: &Log, prices: &Prices) -> io::Result<Self> {
+    pub(super) fn new(log: &Log, prices: &SchedulerCosts) -> io::Result<Self> {
         check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidData, problem))?;
         let start = first_moment(log);
         let mut texts = Texts::default();
@@ -100,10 +100,10 @@ impl Data {
             let words = report.as_ref().map_or_else(ToString::to_string, ToString::to_string);
             let steps = report.map(|report| report.critical_path).unwrap_or_default();
             let path = steps.iter().flat_map(|step| {
-                let (run, process) = step.process.map_or((-1, -1), |(run, process)| (run as i64, process as i64));
+                let (run, node) = step.node.map_or((-1, -1), |(run, node)| (run as i64, node as i64));
                 let worker = step.worker.map_or(-1, |worker| worker as i64);
                 let (waited, took) = (between(step.ready, step.started), between(step.started, step.ended));
-                [texts.add(&step.group) as i64, run, process, worker, between(start, step.ready), waited, took]
+                [texts.add(&step.group) as i64, run, node, worker, between(start, step.ready), waited, took]
             });
             Frame {
                 path: path.collect(),
@@ -167,20 +167,20 @@ impl Texts {
 }
 
 fn nodes(graph: &Graph, texts: &mut Texts) -> Vec<Node> {
-    let node = |process: &Process| Node {
-        name: texts.add(&process.name),
-        group: texts.add(process.group()),
-        color: texts.add(process.labels.stage.as_deref().unwrap_or(process.group())),
-        view: process.labels.view.as_ref().map(|view| texts.add(view)),
-        pinned: process.pinned,
-        dependencies: process.dependencies.clone(),
+    let node = |node: &NodeInfo| Node {
+        name: texts.add(&node.name),
+        group: texts.add(node.group()),
+        color: texts.add(node.labels.stage.as_deref().unwrap_or(node.group())),
+        view: node.labels.view.as_ref().map(|view| texts.add(view)),
+        pinned: node.pinned,
+        dependencies: node.dependencies.clone(),
     };
-    graph.processes.iter().map(node).collect()
+    graph.nodes.iter().map(node).collect()
 }
 
 fn numbers(chunk: &Chunk, start: Duration) -> [i64; 8] {
     [
-        chunk.process as i64,
+        chunk.node as i64,
         chunk.items.start as i64,
         chunk.items.len() as i64,
         chunk.worker as i64,

@@ -29,8 +29,8 @@ function colorsByText() {
     const name = (text) => data.texts[text];
     const inOrder = (texts) => [...new Set(texts)].sort((one, other) => (name(one) < name(other) ? -1 : 1));
     const passes = data.device ? data.device.passes.filter((_, at) => at % PASS_NUMBERS === 0) : [];
-    const phases = data.graphs.flatMap((nodes) => nodes.map((node) => node.color));
-    const ordered = new Set([...inOrder(phases), ...inOrder(passes)]);
+    const stages = data.graphs.flatMap((nodes) => nodes.map((node) => node.color));
+    const ordered = new Set([...inOrder(stages), ...inOrder(passes)]);
     const taken = new Set();
     let round = 0;
     const pick = (text) => {

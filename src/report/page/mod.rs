@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Serializer, ser::Formatter};
 
 use self::data::Data;
-use super::Prices;
+use super::SchedulerCosts;
 use crate::timeline::Log;
 
 /// The document, with the names of its parts in braces where they go.
@@ -22,14 +22,14 @@ const CONTROLS: &str = include_str!("controls.js");
 
 /// Writes a page that shows the log, to be opened in a browser: one HTML file, which loads nothing.
 ///
-/// Workers are lanes and phases colours. Beside them stands, for each frame, its [report](super::FrameReport), which every
+/// Workers are lanes and stages colours. Beside them stands, for each frame, its [report](super::FrameReport), which every
 /// frame is replayed for: so a long log takes its time. A chunk takes some 40 bytes, and the words of a frame's report some 4 KiB.
 ///
 /// # Errors
 ///
 /// If the writer fails; if the log speaks of a process, a worker or a thread that it does not have
 /// ([`InvalidData`](io::ErrorKind::InvalidData)), as none does that a [`Timeline`](crate::timeline::Timeline) has recorded.
-pub fn write_page(log: &Log, prices: &Prices, writer: impl Write) -> io::Result<()> {
+pub fn write_page(log: &Log, prices: &SchedulerCosts, writer: impl Write) -> io::Result<()> {
     let data = Data::new(log, prices)?;
     let mut writer = BufWriter::new(writer);
     let mut rest = DOCUMENT;

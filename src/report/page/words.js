@@ -54,7 +54,7 @@ function tellSlice(slice) {
         tell("process", written(node.group));
     }
     if (node.color !== node.group) {
-        tell("phase", written(node.color));
+        tell("stage", written(node.color));
     }
     if (node.view !== null) {
         tell("view", written(node.view));
@@ -96,10 +96,10 @@ function fillLegend() {
         swatch.style.background = css;
         return element("li", "", [swatch, text]);
     };
-    const phases = [...colors].map(([text, color]) => item(shortened(data.texts[text], 60), "", color.css));
+    const stages = [...colors].map(([text, color]) => item(shortened(data.texts[text], 60), "", color.css));
     const spans = data.spans.length > 0 ? [item("span of a thread", "", "var(--span)")] : [];
     const others = [item("searching", "searching"), item("asleep", "asleep"), item("critical path", "critical")];
-    part("legend").replaceChildren(...phases, ...spans, ...others);
+    part("legend").replaceChildren(...stages, ...spans, ...others);
 }
 
 function fillChooser() {
