@@ -373,7 +373,7 @@ impl Drop for OpenRun<'_> {
             workers: self.timeline.tracks.len(),
             began: self.began,
             ended: self.timeline.now(),
-            shared_from: self.parallel_from.take(),
+            parallel_from: self.parallel_from.take(),
             always_parallel,
             in_background: self.in_background,
             failed,

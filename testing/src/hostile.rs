@@ -1,10 +1,10 @@
-//! Names as nobody should choose them, and a log full of them.
+//! Names that break careless writers, and a log full of them.
 
 use std::{sync::Arc, time::Duration};
 
 use drawloom::timeline::{Chunk, DeviceLog, DevicePass, Frame, Graph, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 
-/// Names as nobody should choose them.
+/// Names that break careless writers.
 pub fn hostile_names() -> Vec<String> {
     let plain =
         ["", "</script>", "</SCRIPT >", "<!--<script>", "]]>", "\"", "\\", "\\\"", "'", "&lt;&amp;", "{data}{script}"];

@@ -60,8 +60,8 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     assert!(run.complete && !run.failed);
     assert_eq!((run.workers, log.workers.len(), log.all_dropped()), (workers, workers, 0));
     assert_eq!(run.graph.nodes.len(), schedule.len());
-    assert!(workers > 1 || run.shared_from.is_none());
-    assert!(run.shared_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
+    assert!(workers > 1 || run.parallel_from.is_none());
+    assert!(run.parallel_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
     for (index, (process, (name, busy))) in run.graph.nodes.iter().zip(schedule.nodes()).enumerate() {
         assert_eq!(process.name, name);
         assert_eq!(process.dependencies, schedule.dependencies(index));
@@ -81,7 +81,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
                 let before = run.chunks_of(dependency).iter();
                 before.for_each(|before| assert!(before.ended <= part.opened, "{before:?} and {part:?}"));
             }
-            let is_alone = run.shared_from.is_none_or(|from| part.started < from);
+            let is_alone = run.parallel_from.is_none_or(|from| part.started < from);
             assert!(!is_alone || part.worker == 0, "{part:?} of a worker that was not let in");
         }
         assert_eq!(next, busy.width);
@@ -138,10 +138,10 @@ fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
     let mut schedule = one_process(Busy { width: 20_000, pinned: false });
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
     check(&log, &schedule, 16, 2);
-    assert!(log.runs[0].shared_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].shared_from);
+    assert!(log.runs[0].parallel_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].parallel_from);
     schedule.always_parallel(true);
     let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
-    assert!(log.runs[0].shared_from <= log.runs[0].chunks.iter().map(|chunk| chunk.opened).min());
+    assert!(log.runs[0].parallel_from <= log.runs[0].chunks.iter().map(|chunk| chunk.opened).min());
 }
 
 #[test]

@@ -17,21 +17,22 @@ use libtest_mimic::Failed;
 
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// How long a page may take on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(180);
+/// How long a page may take to load on a busy machine.
+const TIMEOUT: Duration = Duration::from_secs(180);
 
 pub struct Browser {
     program: PathBuf,
 }
 
-/// A page as it stood when everything on it had happened.
-pub struct Shown {
-    /// The opening tag of its body, which tells how it is.
+/// A page after all its scripts have run.
+pub struct LoadedPage {
+    /// The opening tag of its body, whose data attributes describe the page's state.
     body: String,
-    /// How many bytes the file has.
+    /// The size of the file in bytes.
     pub length: u64,
 }
 
+/// How often a page is loaded until it is ready.
 const ATTEMPTS: usize = 4;
 
 impl Browser {
@@ -43,26 +44,26 @@ impl Browser {
         programs.find(|program| program.is_file()).map(|program| Self { program })
     }
 
-    /// Opens the log's page, with a script of the test's added to it. It has to get ready, and to complain of nothing.
+    /// Opens the log's page, with a script added to it. The page has to become ready without writing to the console.
     ///
-    /// The browser's clock runs ahead while nothing happens. On a machine that is short of time its budget may be spent before the
-    /// compositor has drawn anything, so a page that was not ready is opened anew.
-    pub fn open(&self, name: &str, log: &Log, script: &str) -> Result<Shown, Failed> {
+    /// The browser runs on virtual time, which advances while nothing happens. On a busy machine its budget may be spent before
+    /// the compositor has drawn anything, so a page that is not ready is loaded again.
+    pub fn open(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
         let mut body = String::new();
         for _ in 0..ATTEMPTS {
-            let shown = self.look(name, log, script)?;
-            if shown.value("ready") == "true" {
-                return Ok(shown);
+            let page = self.load(name, log, script)?;
+            if page.value("ready") == "true" {
+                return Ok(page);
             }
-            body = shown.body;
+            body = page.body;
         }
-        Err(format!("{name} never got ready: {body}").into())
+        Err(format!("{name} did not become ready: {body}").into())
     }
 
-    fn look(&self, name: &str, log: &Log, script: &str) -> Result<Shown, Failed> {
+    fn load(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("page_{name}"));
         fs::create_dir_all(&folder)?;
-        let [page, tree, messages] = ["page.html", "tree.html", "messages"].map(|file| folder.join(file));
+        let [page, dom, console] = ["page.html", "dom.html", "console"].map(|file| folder.join(file));
         let mut html = Vec::new();
         write_page(log, &SchedulerCosts::ZERO, &mut html)?;
         let length = html.len() as u64;
@@ -75,36 +76,36 @@ impl Browser {
             .arg(format!("--user-data-dir={}", folder.join("profile").display()))
             .arg(format!("file://{}", page.display()))
             .stdin(Stdio::null())
-            .stdout(File::create(&tree)?)
-            .stderr(File::create(&messages)?)
+            .stdout(File::create(&dom)?)
+            .stderr(File::create(&console)?)
             .spawn()?;
         let start = Instant::now();
         let status = loop {
             match child.try_wait()? {
                 Some(status) => break status,
-                None if start.elapsed() > PATIENCE => {
+                None if start.elapsed() > TIMEOUT => {
                     child.kill()?;
-                    return Err(format!("{name} was not shown within {PATIENCE:?}").into());
+                    return Err(format!("{name} did not load within {TIMEOUT:?}").into());
                 }
                 None => thread::sleep(Duration::from_millis(20)),
             }
         };
 
-        let (tree, messages) = (fs::read(&tree)?, fs::read(&messages)?);
-        let (tree, messages) = (String::from_utf8_lossy(&tree), String::from_utf8_lossy(&messages));
-        let complaints: Vec<_> = messages.lines().filter(|line| line.contains("CONSOLE")).collect();
-        if !complaints.is_empty() {
-            return Err(complaints.join("\n").into());
+        let (dom, console) = (fs::read(&dom)?, fs::read(&console)?);
+        let (dom, console) = (String::from_utf8_lossy(&dom), String::from_utf8_lossy(&console));
+        let messages: Vec<_> = console.lines().filter(|line| line.contains("CONSOLE")).collect();
+        if !messages.is_empty() {
+            return Err(messages.join("\n").into());
         }
-        let body = tree.split_once("<body").and_then(|(_, rest)| rest.split_once('>')).map(|(body, _)| body);
-        let body = body.ok_or_else(|| format!("{status}: no page, but {messages}"))?.to_owned();
+        let body = dom.split_once("<body").and_then(|(_, rest)| rest.split_once('>')).map(|(body, _)| body);
+        let body = body.ok_or_else(|| format!("{status}: there is no body, but {console}"))?.to_owned();
         fs::remove_dir_all(&folder)?;
-        Ok(Shown { body, length })
+        Ok(LoadedPage { body, length })
     }
 }
 
-impl Shown {
-    /// What the body's data attribute of that name is; empty if there is none.
+impl LoadedPage {
+    /// The value of the body's data attribute of that name, or an empty string.
     pub fn value(&self, name: &str) -> String {
         let start = format!(" data-{name}=\"");
         let found = self.body.split_once(&start).and_then(|(_, rest)| rest.split_once('"'));

@@ -9,23 +9,23 @@ use drawloom::{
 };
 use libtest_mimic::Failed;
 
-/// Numbers without a pattern that anybody sees: a linear congruence's upper bits.
-struct Dice(u64);
+/// A linear congruential generator, of which only the upper bits are used.
+struct Random(u64);
 
-impl Dice {
-    fn roll(&mut self, sides: usize) -> usize {
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % sides
+        (self.0 >> 33) as usize % bound
     }
 }
 
-/// What a random graph does on two workers, five times.
-pub fn of_a_real_run() -> Result<Log, Failed> {
-    let mut dice = Dice(7);
+/// Five runs of a random graph on two workers.
+pub fn real_runs() -> Result<Log, Failed> {
+    let mut random = Random(7);
     let mut graph = FrameGraph::new();
     let mut nodes = Vec::new();
     for index in 0..40 {
-        let width = dice.roll(400);
+        let width = random.below(400);
         let body = Closure::new(|_: &(), range, _worker| {
             range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
             Ok(())
@@ -33,8 +33,8 @@ pub fn of_a_real_run() -> Result<Log, Failed> {
         let node = graph.add(format!("node {index}"), body.with_width(move |_| width).with_chunk(16));
         let stage = Some(["cull", "fill", "sort"][index % 3].to_owned());
         graph.label(node, Labels { stage, ..Labels::default() });
-        for _ in 0..dice.roll(3).min(nodes.len()) {
-            graph.order(nodes[dice.roll(nodes.len())], node);
+        for _ in 0..random.below(3).min(nodes.len()) {
+            graph.order(nodes[random.below(nodes.len())], node);
         }
         graph.keep(node);
         nodes.push(node);
@@ -50,38 +50,38 @@ pub fn of_a_real_run() -> Result<Log, Failed> {
     Ok(scheduler.timeline().take())
 }
 
-/// So many chunks on eight workers, in so many frames: a chain of passes with gaps between them.
-pub fn of_chunks(count: usize, frames: usize) -> Log {
+/// `count` chunks on eight workers, in `frames` frames: a chain of wide nodes with gaps between them.
+pub fn many_chunks(count: usize, frames: usize) -> Log {
     const WORKERS: usize = 8;
     const CHUNKS: usize = 250;
-    let passes = count / frames / CHUNKS;
+    let nodes = count / frames / CHUNKS;
     let node = |index: usize| NodeInfo {
-        name: format!("pass {index}"),
+        name: format!("node {index}"),
         labels: Labels { stage: Some(format!("stage {}", index % 9)), ..Labels::default() },
         dependencies: index.checked_sub(1).into_iter().collect(),
         ..NodeInfo::default()
     };
-    let graph = Arc::new(Graph { nodes: (0..passes).map(node).collect() });
-    let mut dice = Dice(1);
+    let graph = Arc::new(Graph { nodes: (0..nodes).map(node).collect() });
+    let mut random = Random(1);
     let mut log = Log::default();
     log.workers.resize(WORKERS, WorkerLog { name: "worker".to_owned(), ..WorkerLog::default() });
     let mut now = Duration::from_secs(5);
     for number in 0..frames as u64 {
         let began = now;
         let mut chunks = Vec::new();
-        for node in 0..passes {
+        for node in 0..nodes {
             let opened = now;
-            let mut free = [now; WORKERS];
-            for place in 0..CHUNKS {
-                let worker = (0..WORKERS).min_by_key(|&worker| free[worker]).unwrap_or_default();
-                let started = free[worker];
-                let ended = started + Duration::from_nanos(500 + dice.roll(9_000) as u64);
-                let items = place * 16..place * 16 + 16;
+            let mut free_at = [now; WORKERS];
+            for chunk in 0..CHUNKS {
+                let worker = (0..WORKERS).min_by_key(|&worker| free_at[worker]).unwrap_or_default();
+                let started = free_at[worker];
+                let ended = started + Duration::from_nanos(500 + random.below(9_000) as u64);
+                let items = chunk * 16..chunk * 16 + 16;
                 chunks.push(Chunk { node, items, worker, opened, started, ended, stolen: worker > 0 });
-                free[worker] = ended;
+                free_at[worker] = ended;
             }
-            now = free.into_iter().max().unwrap_or(now) + Duration::from_micros(2);
-            for (worker, &began) in free.iter().enumerate() {
+            now = free_at.into_iter().max().unwrap_or(now) + Duration::from_micros(2);
+            for (worker, &began) in free_at.iter().enumerate() {
                 let kind = if worker % 2 == 0 { IdleKind::Searching } else { IdleKind::Asleep };
                 log.workers[worker].idle.push(Idle { kind, began, ended: now });
             }
@@ -95,9 +95,9 @@ pub fn of_chunks(count: usize, frames: usize) -> Log {
     log
 }
 
-/// Three frames, the second twice as long as the others. In each a node, two that wait for it, the second of which ends
-/// later, and one that waits for both, in two chunks; and a thread at work before that and after.
-pub fn of_diamonds() -> Log {
+/// Three frames with a diamond of nodes each: two depend on the root, of which the second ends later, and the end depends on
+/// both, in two chunks. A thread works before and after them. The second frame is twice as long as the others.
+pub fn diamonds() -> Log {
     let node = |name: &str, dependencies: &[usize]| NodeInfo {
         name: name.to_owned(),
         dependencies: dependencies.to_vec(),

@@ -1,6 +1,6 @@
-//! Pages in a real browser: they show what is in the log, react to their reader, and complain of nothing.
+//! Pages in a real browser: they show their log, react to input, and write nothing to the console.
 //!
-//! All cases are ignored, and never pass, where there is no Chromium; with `DRAWLOOM_REQUIRE_BROWSER` set they fail there.
+//! Without Chromium all cases are ignored, or fail if `DRAWLOOM_REQUIRE_BROWSER` is set.
 
 mod browser;
 mod logs;
@@ -11,46 +11,46 @@ use drawloom::timeline::Log;
 use drawloom_testing::hostile;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
-use browser::{Browser, Shown};
+use self::browser::{Browser, LoadedPage};
 
-/// Does what a reader does, and tells what came of it.
-const READER: &str = include_str!("reader.js");
+/// Dispatches input events, and reports their effects.
+const USER_INPUT: &str = include_str!("user_input.js");
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = vec![
-        trial("nothing_at_all", |browser| {
-            let shown = browser.open("nothing", &Log::default(), "")?;
-            expect("jobs", shown.value("jobs"), "")
+        trial("an_empty_log", |browser| {
+            let page = browser.open("empty", &Log::default(), "")?;
+            expect("jobs", page.value("jobs"), "")
         }),
-        trial("a_real_log", |browser| {
-            let log = logs::of_a_real_run()?;
-            let shown = browser.open("real", &log, "")?;
-            shows_the_longest_frame(&shown, &log)
+        trial("real_runs", |browser| {
+            let log = logs::real_runs()?;
+            let page = browser.open("real", &log, "")?;
+            shows_the_longest_frame(&page, &log)
         }),
         trial("hostile_names", |browser| {
             let mut log = hostile::log_of(&hostile::hostile_names());
             log.dropped = 3;
-            let shown = browser.open("hostile", &log, "")?;
-            expect("frame", shown.value("frame"), "0")?;
-            expect("jobs", shown.value("jobs"), &log.runs[0].chunks.len().to_string())
+            let page = browser.open("hostile", &log, "")?;
+            expect("frame", page.value("frame"), "0")?;
+            expect("jobs", page.value("jobs"), &log.runs[0].chunks.len().to_string())
         }),
         trial("a_hundred_thousand_chunks", |browser| {
-            let log = logs::of_chunks(100_000, 20);
-            let shown = browser.open("many", &log, "")?;
-            shows_the_longest_frame(&shown, &log)?;
-            if shown.length <= 6_000_000 { Ok(()) } else { Err(format!("{} bytes are too many", shown.length).into()) }
+            let log = logs::many_chunks(100_000, 20);
+            let page = browser.open("many", &log, "")?;
+            shows_the_longest_frame(&page, &log)?;
+            if page.length <= 6_000_000 { Ok(()) } else { Err(format!("{} bytes are too many", page.length).into()) }
         }),
         trial("a_hundred_thousand_chunks_in_one_frame", |browser| {
-            let log = logs::of_chunks(100_000, 1);
+            let log = logs::many_chunks(100_000, 1);
             shows_the_longest_frame(&browser.open("one_frame", &log, "")?, &log)
         }),
-        trial("a_reader", |browser| {
-            let outcome = browser.open("reader", &logs::of_diamonds(), READER)?.value("outcome");
+        trial("user_input", |browser| {
+            let outcome = browser.open("user_input", &logs::diamonds(), USER_INPUT)?.value("outcome");
             let is_done = outcome.ends_with(" done");
             let failed: Vec<_> = outcome.split(' ').filter(|step| step.ends_with("=false")).collect();
-            let is_right = is_done && failed.is_empty();
-            if is_right { Ok(()) } else { Err(format!("of {outcome:?} failed {failed:?}").into()) }
+            let has_passed = is_done && failed.is_empty();
+            if has_passed { Ok(()) } else { Err(format!("failed: {failed:?} of {outcome:?}").into()) }
         }),
     ];
     run(&arguments, trials).exit_code()
@@ -62,17 +62,17 @@ fn trial(name: &str, test: impl FnOnce(&Browser) -> Result<(), Failed> + Send + 
     Trial::test(name, move || test(&browser.ok_or("there is no Chromium in PATH")?)).with_ignored_flag(is_ignored)
 }
 
-fn shows_the_longest_frame(shown: &Shown, log: &Log) -> Result<(), Failed> {
-    // Of frames equally long the first.
+fn shows_the_longest_frame(page: &LoadedPage, log: &Log) -> Result<(), Failed> {
+    // Of equally long frames the first.
     let longest = log.frames.iter().rev().max_by_key(|frame| frame.ended - frame.began).ok_or("no frame")?;
     let jobs: usize = log.runs_of(longest.number).map(|run| run.chunks.len()).sum();
     if jobs == 0 {
-        return Err("the log is to have jobs".into());
+        return Err("the log has no jobs".into());
     }
-    expect("frame", shown.value("frame"), &longest.number.to_string())?;
-    expect("jobs", shown.value("jobs"), &jobs.to_string())
+    expect("frame", page.value("frame"), &longest.number.to_string())?;
+    expect("jobs", page.value("jobs"), &jobs.to_string())
 }
 
-fn expect(what: &str, is: String, expected: &str) -> Result<(), Failed> {
-    if is == expected { Ok(()) } else { Err(format!("{what}: {is:?} instead of {expected:?}").into()) }
+fn expect(name: &str, actual: String, expected: &str) -> Result<(), Failed> {
+    if actual == expected { Ok(()) } else { Err(format!("{name}: {actual:?} instead of {expected:?}").into()) }
 }

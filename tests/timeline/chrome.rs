@@ -1,4 +1,4 @@
-//! Chrome traces: what viewers need of one, checked against the log, of real runs and of any log.
+//! Chrome traces, checked against their logs: what viewers need of a trace, for real runs and for any log.
 
 use std::{
     collections::HashSet,
@@ -18,11 +18,12 @@ use serde_json::json;
 
 use crate::trace::{Event, Trace, nanoseconds};
 
-/// A node of so many items, in chunks of the caller's size. The item of that number fails.
+/// A node whose chunks have the size that the run is called with.
 #[derive(Clone, Debug)]
 struct Busy {
     width: usize,
     pinned: bool,
+    /// The item that fails.
     fails_at: Option<usize>,
 }
 
@@ -41,45 +42,49 @@ impl Node<usize> for Busy {
 
     fn run(&self, _chunk: &usize, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         range.clone().for_each(|item| _ = black_box((0..100).fold(item, |sum, step| black_box(sum ^ step))));
-        if self.fails_at.is_some_and(|item| range.contains(&item)) { Err("it was to fail".into()) } else { Ok(()) }
+        if self.fails_at.is_some_and(|item| range.contains(&item)) {
+            Err("the item fails on purpose".into())
+        } else {
+            Ok(())
+        }
     }
 }
 
-/// A graph as plain data: each node, and which of those before it it waits for.
-type Sketch = Vec<(Busy, HashSet<usize>)>;
+/// A graph as plain data: each node, with its dependencies among the nodes before it.
+type GraphSpec = Vec<(Busy, HashSet<usize>)>;
 
-/// Of ten nodes, so many have an item that fails.
-fn any_sketch(fails: u32) -> impl Strategy<Value = Sketch> {
+/// Any graph in which `failing` of ten nodes have an item that fails.
+fn any_graph(failing: u32) -> impl Strategy<Value = GraphSpec> {
     let width = prop_oneof![1 => Just(0), 2 => 1..4_usize, 2 => 0..60_usize];
-    let fails_at = (0..10_u32, 0..30_usize).prop_map(move |(roll, item)| (roll < fails).then_some(item));
+    let fails_at = (0..10_u32, 0..30_usize).prop_map(move |(roll, item)| (roll < failing).then_some(item));
     let busy = (width, prop::bool::weighted(0.2), fails_at).prop_map(|(width, pinned, fails_at)| Busy {
         width,
         pinned,
         fails_at,
     });
     vec((busy, vec(any::<prop::sample::Index>(), 0..4)), 1..20).prop_map(|nodes| {
-        let waits_for = |index: usize, picks: Vec<prop::sample::Index>| {
+        let dependencies = |index: usize, picks: Vec<prop::sample::Index>| {
             picks.iter().filter(|_| index > 0).map(|pick| pick.index(index)).collect()
         };
         let nodes = nodes.into_iter().enumerate();
-        nodes.map(|(index, (busy, picks))| (busy, waits_for(index, picks))).collect()
+        nodes.map(|(index, (busy, picks))| (busy, dependencies(index, picks))).collect()
     })
 }
 
-fn compile(sketch: &[(Busy, HashSet<usize>)]) -> Schedule<Busy> {
+fn compile(spec: &[(Busy, HashSet<usize>)]) -> Schedule<Busy> {
     let mut graph = FrameGraph::new();
     let mut nodes = Vec::new();
-    for (index, (busy, before)) in sketch.iter().enumerate() {
+    for (index, (busy, dependencies)) in spec.iter().enumerate() {
         let node = graph.add(format!("p{index}"), busy.clone());
         graph.keep(node);
-        before.iter().for_each(|&before| graph.order(nodes[before], node));
+        dependencies.iter().for_each(|&dependency| graph.order(nodes[dependency], node));
         nodes.push(node);
     }
-    graph.compile().expect("it has no cycle")
+    graph.compile().expect("dependencies are among the nodes before, so there is no cycle")
 }
 
-/// What the timeline says of a few runs, two a frame, each within a span.
-fn recorded(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, chunks: &[usize]) -> Log {
+/// Records one run for each chunk size: two runs in a frame, each in a span.
+fn record(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, chunks: &[usize]) -> Log {
     let timeline = scheduler.timeline();
     timeline.take();
     timeline.start();
@@ -96,10 +101,10 @@ fn recorded(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, chunks: &[usiz
     timeline.take()
 }
 
-/// What must hold of the trace of every log.
+/// Checks what must hold for the trace of every log.
 pub fn check(log: &Log) {
     let trace = Trace::of(log);
-    check_lanes(log, &trace);
+    check_tracks(log, &trace);
     check_jobs(log, &trace);
     check_arrows(log, &trace);
     check_ready(log, &trace);
@@ -112,10 +117,10 @@ pub fn check(log: &Log) {
     assert_eq!(trace.other_data["incomplete_runs"], log.runs.iter().filter(|run| !run.complete).count());
 }
 
-fn check_lanes(log: &Log, trace: &Trace) {
+fn check_tracks(log: &Log, trace: &Trace) {
     let names = trace.thread_names();
-    let lanes: HashSet<_> = names.iter().map(|&(_, thread, _)| thread).collect();
-    assert_eq!(lanes.len(), names.len(), "no two lanes are one");
+    let tracks: HashSet<_> = names.iter().map(|&(_, thread, _)| thread).collect();
+    assert_eq!(tracks.len(), names.len(), "two tracks have the same number");
     for (worker, record) in log.workers.iter().enumerate() {
         assert_eq!(names[worker], (1, worker as u64 + 1, record.name.clone()));
     }
@@ -125,10 +130,10 @@ fn check_lanes(log: &Log, trace: &Trace) {
     assert!(order.is_sorted() && order.windows(2).all(|pair| pair[0].1 < pair[1].1), "{order:?}");
     let slices: Vec<&Event> = trace.of_kind("X").collect();
     for (index, slice) in slices.iter().enumerate() {
-        assert!(lanes.contains(&slice.thread), "{slice:?} is on a lane without a name");
-        for other in slices[..index].iter().filter(|other| other.is_on_lane_of(slice)) {
-            let apart = slice.ended <= other.began || other.ended <= slice.began;
-            assert!(apart || slice.contains(other) || other.contains(slice), "{slice:?} and {other:?}");
+        assert!(tracks.contains(&slice.thread), "{slice:?} is on a track without a name");
+        for other in slices[..index].iter().filter(|other| other.is_on_track_of(slice)) {
+            let are_disjoint = slice.ended <= other.began || other.ended <= slice.began;
+            assert!(are_disjoint || slice.contains(other) || other.contains(slice), "{slice:?} and {other:?}");
         }
     }
     for (worker, record) in log.workers.iter().enumerate() {
@@ -184,9 +189,9 @@ fn check_arrows(log: &Log, trace: &Trace) {
     let mut arrows = Vec::new();
     let mut ids = HashSet::new();
     for end in trace.of_kind("f") {
-        assert!(ids.insert(end.id.unwrap()), "{end:?} is not the only one of that number");
+        assert!(ids.insert(end.id.unwrap()), "{end:?} is not the only arrow with this number");
         let begins: Vec<&Event> = trace.of_kind("s").filter(|begin| begin.id == end.id).collect();
-        let [begin] = begins.as_slice() else { panic!("{} arrows begin as {end:?} ends", begins.len()) };
+        let [begin] = begins.as_slice() else { panic!("{} arrows begin with the number of {end:?}", begins.len()) };
         assert_eq!((end.category.as_str(), end.all["bp"].as_str()), ("dependency", Some("e")));
         assert_eq!((&begin.category, &begin.name), (&end.category, &end.name));
         assert!(begin.began <= end.began);
@@ -208,55 +213,55 @@ fn check_arrows(log: &Log, trace: &Trace) {
                     continue;
                 };
                 assert!(last.ended <= first.began, "{last:?} and {first:?}");
-                let place = arrows.iter().position(|(begin, end)| {
-                    // A nanosecond inside, where there is an inside.
-                    let (before_end, last_moment) =
+                let index = arrows.iter().position(|(begin, end)| {
+                    // A nanosecond inside the slice, if it is long enough.
+                    let (before_end, latest_start) =
                         ((last.ended - 1).max(last.began), (first.ended - 1).max(first.began));
-                    begin.is_on_lane_of(last)
+                    begin.is_on_track_of(last)
                         && begin.began == before_end
-                        && end.is_on_lane_of(first)
-                        && end.began == (first.began + 1).min(last_moment)
+                        && end.is_on_track_of(first)
+                        && end.began == (first.began + 1).min(latest_start)
                 });
-                arrows.swap_remove(place.unwrap_or_else(|| panic!("no arrow from {last:?} to {first:?}")));
+                arrows.swap_remove(index.unwrap_or_else(|| panic!("no arrow from {last:?} to {first:?}")));
             }
         }
     }
-    assert_eq!(arrows.len(), 0, "arrows along no dependency: {arrows:?}");
+    assert_eq!(arrows.len(), 0, "arrows without a dependency: {arrows:?}");
     assert_eq!(trace.other_data["dependencies_left_out"], left_out);
 }
 
-/// At the moment of each reading, and no other, as many nodes are ready and not opened as it says, or others than before.
+/// Checks that the counter has a value at each time at which the number of ready nodes changes, and at no other.
 fn check_ready(log: &Log, trace: &Trace) {
     let mut waits = Vec::new();
     for run in &log.runs {
         for node in 0..run.graph.nodes.len() {
-            let opened = parts(run, node).map(|part| part.opened).min();
+            let opened = slices_of(run, node).map(|slice| slice.opened).min();
             waits.extend(ready(run, node).zip(opened).map(|(ready, opened)| (nanos(ready), nanos(opened))));
         }
     }
     let count = |at: u64| waits.iter().filter(|&&(ready, opened)| ready <= at && at < opened).count() as f64;
-    let mut moments: Vec<u64> = waits.iter().flat_map(|&(ready, opened)| [ready, opened]).collect();
-    moments.sort_unstable();
-    moments.dedup();
+    let mut times: Vec<u64> = waits.iter().flat_map(|&(ready, opened)| [ready, opened]).collect();
+    times.sort_unstable();
+    times.dedup();
     let mut expected: Vec<(u64, f64)> = Vec::new();
-    for at in moments {
+    for at in times {
         if count(at) != expected.last().map_or(0.0, |last| last.1) {
             expected.push((at, count(at)));
         }
     }
-    assert_eq!(trace.readings("ready nodes"), expected);
+    assert_eq!(trace.counter_values("ready nodes"), expected);
 }
 
-/// When the last of what a node waits for had ended, unless something of that has left nothing.
+/// When the last dependency of a node had ended, or `None` if one of them has no slices.
 fn ready(run: &Run, node: usize) -> Option<Duration> {
-    let ends = |&before: &usize| parts(run, before).map(|part| part.ended).max();
+    let ends = |&dependency: &usize| slices_of(run, dependency).map(|slice| slice.ended).max();
     let dependencies = &run.graph.nodes[node].dependencies;
     let ends: Option<Vec<Duration>> = dependencies.iter().map(ends).collect();
     Some(ends?.into_iter().chain([run.began]).max().unwrap_or_default())
 }
 
-fn parts(run: &Run, node: usize) -> impl Iterator<Item = &Chunk> {
-    run.chunks.iter().chain(&run.empty).filter(move |part| part.node == node)
+fn slices_of(run: &Run, node: usize) -> impl Iterator<Item = &Chunk> {
+    run.chunks.iter().chain(&run.empty).filter(move |slice| slice.node == node)
 }
 
 fn nanos(time: Duration) -> u64 {
@@ -267,44 +272,44 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
     #[test]
-    fn what_ran_is_in_the_trace_with_its_dependencies(
-        sketch in any_sketch(0),
+    fn a_trace_has_all_chunks_and_dependencies(
+        spec in any_graph(0),
         chunks in vec(1..30_usize, 1..4),
         always_parallel in any::<bool>(),
     ) {
-        let mut schedule = compile(&sketch);
+        let mut schedule = compile(&spec);
         schedule.always_parallel(always_parallel);
-        for scheduler in &*RECORDED {
+        for scheduler in &*SCHEDULERS {
             let scheduler = scheduler.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            let log = recorded(&mut schedule, &scheduler, &chunks);
+            let log = record(&mut schedule, &scheduler, &chunks);
             prop_assert!(log.runs.iter().all(|run| run.complete));
             check(&log);
         }
     }
 
     #[test]
-    fn what_a_failed_run_left_is_in_the_trace(sketch in any_sketch(3), chunks in vec(1..30_usize, 1..4)) {
-        let mut schedule = compile(&sketch);
-        for scheduler in &*RECORDED {
+    fn a_trace_has_the_chunks_of_a_failed_run(spec in any_graph(3), chunks in vec(1..30_usize, 1..4)) {
+        let mut schedule = compile(&spec);
+        for scheduler in &*SCHEDULERS {
             let scheduler = scheduler.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            check(&recorded(&mut schedule, &scheduler, &chunks));
+            check(&record(&mut schedule, &scheduler, &chunks));
         }
     }
 }
 
 #[test]
-fn a_full_ring_makes_a_trace_that_says_what_is_missing() {
+fn the_trace_of_an_incomplete_log_says_what_is_missing() {
     let scheduler = Scheduler::builder().workers(2).timeline_capacity(16).build().unwrap();
-    let node =
-        |width, before: &[usize]| (Busy { width, pinned: false, fails_at: None }, before.iter().copied().collect());
+    let node = |width, dependencies: &[usize]| {
+        (Busy { width, pinned: false, fails_at: None }, dependencies.iter().copied().collect())
+    };
     let mut schedule = compile(&[node(9, &[]), node(0, &[0]), node(30, &[0]), node(4, &[1])]);
-    let log = recorded(&mut schedule, &scheduler, &[3, 1, 1]);
+    let log = record(&mut schedule, &scheduler, &[3, 1, 1]);
     assert!(log.all_dropped() > 0 && log.runs.iter().any(|run| !run.complete));
     check(&log);
     assert!(Trace::of(&log).other_data["dependencies_left_out"].as_u64() > Some(0));
 }
 
-/// Tests share them, one at a time, or one test's runs would be in another one's log.
-static RECORDED: LazyLock<[Mutex<Scheduler>; 3]> = LazyLock::new(|| {
-    [1, 2, 4].map(|workers| Mutex::new(Scheduler::new(workers).expect("four threads can be started")))
-});
+/// Used by one test at a time, because a log has all runs of its scheduler.
+static SCHEDULERS: LazyLock<[Mutex<Scheduler>; 3]> =
+    LazyLock::new(|| [1, 2, 4].map(|workers| Mutex::new(Scheduler::new(workers).expect("threads can be started"))));

@@ -1,4 +1,4 @@
-//! A whole trace, letter by letter.
+//! A whole trace, compared byte by byte.
 
 use std::{
     sync::atomic::{AtomicU64, Ordering},
@@ -14,16 +14,16 @@ use drawloom::{
 
 #[test]
 fn a_frame_makes_the_golden_trace() {
-    // What calls has a name of its own, since a test's thread has the one that the harness gives it.
+    // The calling thread gets a name, because the test harness decides how a test's own thread is called.
     let trace = thread::Builder::new().name("engine".to_owned()).spawn(trace_of_a_frame).unwrap().join().unwrap();
     let golden = include_str!("golden_trace.json");
-    assert!(trace == golden, "golden_trace.json is another one:\n{trace}");
+    assert!(trace == golden, "the trace differs from golden_trace.json:\n{trace}");
 }
 
-/// Four nodes, one of them without items, within a span, on a clock that goes on by a microsecond a look.
+/// Four nodes, one of them without items, in a span. The clock advances by about a microsecond with each reading.
 fn trace_of_a_frame() -> String {
-    let looks = AtomicU64::new(0);
-    let clock = move || Duration::from_nanos(looks.fetch_add(1_001, Ordering::Relaxed));
+    let readings = AtomicU64::new(0);
+    let clock = move || Duration::from_nanos(readings.fetch_add(1_001, Ordering::Relaxed));
     let scheduler = Scheduler::builder().workers(1).timeline_clock(clock).build().unwrap();
     let mut graph = FrameGraph::new();
     let mut add = |name: &str, width: usize| {

@@ -1,7 +1,7 @@
-//! What timelines record, and what is made of it for those who look at one.
+//! Reports, pages and Chrome traces of logs.
 
 mod chrome;
-mod chrome_by_hand;
+mod chrome_edge_cases;
 mod chrome_golden;
 mod page;
 mod report;

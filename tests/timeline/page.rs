@@ -1,4 +1,4 @@
-//! Pages: whatever is in a log comes back out of the page, and nothing in it ends a script early.
+//! Pages: all data of a log can be read back from its page, and no name in it ends a script element early.
 
 use std::{sync::Arc, time::Duration};
 
@@ -12,11 +12,11 @@ use serde_json::Value;
 
 fn page_of(log: &Log) -> String {
     let mut page = Vec::new();
-    write_page(log, &SchedulerCosts::ZERO, &mut page).expect("the log is whole");
+    write_page(log, &SchedulerCosts::ZERO, &mut page).expect("the log is consistent");
     String::from_utf8(page).expect("a page is text")
 }
 
-/// What is embedded in a page.
+/// The data that is embedded in a page.
 fn data_of(page: &str) -> Value {
     let (_, rest) = page.split_once(r#"<script id="data" type="application/json">"#).expect("the page has data");
     let (data, _) = rest.split_once("</script>").expect("the data ends");
@@ -41,7 +41,7 @@ fn hostile_names_stay_names() {
     let page = page_of(&log);
     assert_is_closed(&page);
     let data = data_of(&page);
-    let text = |place: &Value| data["texts"][place.as_u64().unwrap() as usize].as_str().unwrap().to_owned();
+    let text = |index: &Value| data["texts"][index.as_u64().unwrap() as usize].as_str().unwrap().to_owned();
     let listed = |list: &Value| list.as_array().unwrap().iter().map(text).collect::<Vec<_>>();
     let nodes = data["graphs"][0].as_array().unwrap();
     for field in ["name", "group", "color", "view"] {
@@ -68,7 +68,7 @@ fn a_page_loads_nothing() {
 }
 
 #[test]
-fn an_empty_log_is_a_page_too() {
+fn an_empty_log_makes_a_page() {
     let data = data_of(&page_of(&Log::default()));
     assert_eq!(data["frames"], Value::Array(Vec::new()));
 }
@@ -78,38 +78,38 @@ fn a_frame_without_a_report_says_why() {
     let mut log = log_of(&["a".to_owned()]);
     log.runs[0].complete = false;
     let data = data_of(&page_of(&log));
-    let words = data["frames"][0]["words"].as_u64().unwrap() as usize;
-    assert!(data["texts"][words].as_str().unwrap().contains("does not have all of frame 0"));
+    let report = data["frames"][0]["report"].as_u64().unwrap() as usize;
+    assert!(data["texts"][report].as_str().unwrap().contains("does not have all of frame 0"));
 }
 
 #[test]
-fn a_log_that_contradicts_itself_is_an_error() {
-    type Break = fn(&mut Log);
-    let breaks: [Break; 5] = [
+fn an_inconsistent_log_is_an_error() {
+    type Corruption = fn(&mut Log);
+    let corruptions: [Corruption; 5] = [
         |log| log.runs[0].chunks[0].node = 1,
         |log| log.runs[0].chunks[0].worker = 1,
         |log| log.runs[0].empty.push(Chunk { worker: 7, ..Chunk::default() }),
         |log| log.spans[0].thread = 1,
         |log| Arc::make_mut(&mut log.runs[0].graph).nodes[0].dependencies.push(0),
     ];
-    for (index, change) in breaks.into_iter().enumerate() {
+    for (index, corrupt) in corruptions.into_iter().enumerate() {
         let mut log = log_of(&["a".to_owned()]);
-        change(&mut log);
-        let error = write_page(&log, &SchedulerCosts::ZERO, Vec::new()).expect_err("the log contradicts itself");
+        corrupt(&mut log);
+        let error = write_page(&log, &SchedulerCosts::ZERO, Vec::new()).expect_err("the log is inconsistent");
         assert_eq!(error.kind(), std::io::ErrorKind::InvalidData, "{index}: {error}");
     }
 }
 
 #[test]
 fn a_writer_that_fails_is_an_error() {
-    let (mut room, log) = ([0; 1_000], log_of(&["a".to_owned()]));
-    assert!(write_page(&log, &SchedulerCosts::ZERO, &mut room[..]).is_err());
+    let (mut buffer, log) = ([0; 1_000], log_of(&["a".to_owned()]));
+    assert!(write_page(&log, &SchedulerCosts::ZERO, &mut buffer[..]).is_err());
 }
 
-/// NodeInfo, first item, number of items, worker, whether it was stolen; when it was opened, and how long it waited and took.
-type Pick = (usize, usize, usize, usize, bool, u64, u64, u64);
+/// Node, first item, number of items, worker, whether it was stolen, when it was opened, how long it waited, its duration.
+type ChunkNumbers = (usize, usize, usize, usize, bool, u64, u64, u64);
 
-fn any_chunk() -> impl Strategy<Value = Pick> {
+fn any_chunk() -> impl Strategy<Value = ChunkNumbers> {
     let short = 0..1_u64 << 30;
     (0..3_usize, 0..1_000_usize, 1..50_usize, 0..2_usize, any::<bool>(), 0..1_u64 << 40, short.clone(), short)
 }
@@ -118,19 +118,19 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
     #[test]
-    fn every_chunk_comes_back_to_the_nanosecond(
+    fn every_chunk_can_be_read_back_to_the_nanosecond(
         start in 0..1_u64 << 60,
-        picks in vec(any_chunk(), 0..40),
+        chunks_as_numbers in vec(any_chunk(), 0..40),
         idle in vec((any::<bool>(), 0..1_u64 << 40, 0..1_u64 << 40), 0..10),
     ) {
         let at = |after: u64| Duration::from_nanos(start) + Duration::from_nanos(after);
-        let chunk = |&(node, first, items, worker, stolen, opened, waited, took): &Pick| Chunk {
+        let chunk = |&(node, first, items, worker, stolen, opened, waited, duration): &ChunkNumbers| Chunk {
             node,
             items: first..first + items,
             worker,
             opened: at(opened),
             started: at(opened + waited),
-            ended: at(opened + waited + took),
+            ended: at(opened + waited + duration),
             stolen,
         };
         let kind = |asleep| if asleep { IdleKind::Asleep } else { IdleKind::Searching };
@@ -138,34 +138,34 @@ proptest! {
         log.frames[0].began = at(0);
         (log.runs[0].began, log.runs[0].ended) = (at(0), at(1 << 42));
         (log.spans, log.device) = (Vec::new(), None);
-        log.runs[0].chunks = picks.iter().map(chunk).collect();
+        log.runs[0].chunks = chunks_as_numbers.iter().map(chunk).collect();
         log.runs[0].chunks.sort_by_key(|chunk| (chunk.node, chunk.items.start));
-        let idle_time = |&(asleep, began, took): &_| Idle { kind: kind(asleep), began: at(began), ended: at(began + took) };
-        log.workers[1].idle = idle.iter().map(idle_time).collect();
+        let idle_interval = |&(asleep, began, duration): &_| Idle { kind: kind(asleep), began: at(began), ended: at(began + duration) };
+        log.workers[1].idle = idle.iter().map(idle_interval).collect();
         log.runs[0].complete = false;
 
         let data = data_of(&page_of(&log));
         let chunk = |numbers: &[i64]| {
-            let moment = |number: i64| at(u64::try_from(number).unwrap());
+            let time = |number: i64| at(u64::try_from(number).unwrap());
             Chunk {
                 node: numbers[0] as usize,
                 items: numbers[1] as usize..(numbers[1] + numbers[2]) as usize,
                 worker: numbers[3] as usize,
                 stolen: numbers[4] == 1,
-                opened: moment(numbers[5]),
-                started: moment(numbers[5] + numbers[6]),
-                ended: moment(numbers[5] + numbers[6] + numbers[7]),
+                opened: time(numbers[5]),
+                started: time(numbers[5] + numbers[6]),
+                ended: time(numbers[5] + numbers[6] + numbers[7]),
             }
         };
         let chunks: Vec<_> = numbers(&data["runs"][0]["chunks"]).chunks(8).map(chunk).collect();
         prop_assert_eq!(&chunks, &log.runs[0].chunks);
-        let expected = idle.iter().flat_map(|&(asleep, began, took)| [i64::from(asleep), began as i64, took as i64]);
+        let expected = idle.iter().flat_map(|&(asleep, began, duration)| [i64::from(asleep), began as i64, duration as i64]);
         let expected: Vec<_> = expected.collect();
         prop_assert_eq!(numbers(&data["workers"][1]["idle"]), expected);
     }
 
     #[test]
-    fn any_name_leaves_the_page_closed(name in "(</?(?i:script)>?|<!--|\\PC|[\\x00-\\x1f\u{2028}\u{2029}]){0,12}") {
+    fn no_name_ends_a_script_element(name in "(</?(?i:script)>?|<!--|\\PC|[\\x00-\\x1f\u{2028}\u{2029}]){0,12}") {
         let page = page_of(&log_of(std::slice::from_ref(&name)));
         assert_is_closed(&page);
         let data = data_of(&page);

@@ -26,8 +26,8 @@ fn span(name: &str, times: Range<u64>) -> Span {
     Span { name: name.to_owned(), thread: 0, frame: 12, began, ended }
 }
 
-/// A frame of two workers, from 1,000 µs on: `record` with a run in it, and `submit` after a while. `lighting` could begin
-/// as soon as `shadows`, but the caller is at `shadows` then, and the other worker wakes up for these as well.
+/// A frame of two workers, from 1,000 µs on: `record` with a run in it, and `submit` after a pause. `lighting` is ready at the
+/// same time as `shadows`, but the caller begins with `shadows`, and the other worker wakes up for these as well.
 ///
 /// ```text
 /// caller    | record 100 | cull 200 | . shadows 290 | lighting 200 | end 20, record 80 |   | submit 100 |
@@ -47,7 +47,7 @@ fn log() -> Log {
         workers: 2,
         began: micros(1_100),
         ended: micros(1_820),
-        shared_from: Some(micros(1_100)),
+        parallel_from: Some(micros(1_100)),
         always_parallel: true,
         complete: true,
         chunks: vec![
@@ -84,7 +84,7 @@ fn report_of(log: &Log) -> FrameReport {
 }
 
 #[test]
-fn of_a_frame_made_by_hand_all_is_known() {
+fn the_report_of_a_frame_made_by_hand_is_as_calculated() {
     let report = report_of(&log());
     assert_eq!((report.frame, report.began, report.duration), (12, micros(1_000), micros(1_000)));
     let steps = report.critical_path.iter();
@@ -104,11 +104,11 @@ fn of_a_frame_made_by_hand_all_is_known() {
     ];
     assert_eq!(steps, expected);
     let holders = report.critical_path.iter().map(|step| (step.node, step.worker, step.held_by));
-    let stay = |node, held_by| (Some((0, node)), Some(0), held_by);
+    let span = |node, held_by| (Some((0, node)), Some(0), held_by);
     let outside = [(None, None, HeldBy::Start); 3];
-    let stays =
-        [stay(0, HeldBy::Start), stay(2, HeldBy::Dependency), stay(1, HeldBy::Worker), stay(4, HeldBy::Dependency)];
-    assert_eq!(holders.collect::<Vec<_>>(), [outside.as_slice(), &stays, &outside].concat());
+    let spans =
+        [span(0, HeldBy::Start), span(2, HeldBy::Dependency), span(1, HeldBy::Worker), span(4, HeldBy::Dependency)];
+    assert_eq!(holders.collect::<Vec<_>>(), [outside.as_slice(), &spans, &outside].concat());
     let shares: Vec<_> = report.shares.iter().map(|share| (share.group.as_str(), share.duration())).collect();
     let expected = [
         ("shadows", 300),
@@ -132,58 +132,58 @@ fn of_a_frame_made_by_hand_all_is_known() {
     assert_eq!((wait.name.as_str(), wait.waited()), ("lighting, record", micros(300)));
     assert_eq!(wait.meanwhile, [("shadows".to_owned(), micros(290 + 250))]);
     assert_eq!((short.name.as_str(), short.waited()), ("shadows, record", micros(10)));
-    // On paper nobody is late: 280 µs outside of the run, cull's two chunks side by side, then lighting and a chunk of shadows
-    // beside the other chunk of shadows, then bloom.
+    // Without scheduler costs: 280 µs outside of the run, the two chunks of cull in parallel, then lighting and a chunk of shadows
+    // in parallel with the other chunk of shadows, then bloom.
     assert_eq!(report.replayed, micros(280 + 100 + 200 + 270 + 80));
     let what_if: Vec<_> = report.what_if.iter().map(|what_if| (what_if.group.as_str(), what_if.saved)).collect();
-    // Without shadows only lighting is left after cull; without lighting shadows are side by side.
+    // Without shadows only lighting is left after cull. Without lighting both chunks of shadows run in parallel.
     let expected = [("shadows", 350), ("lighting", 180), ("visibility", 100), ("post", 80)];
     assert_eq!(what_if, expected.map(|(group, saved)| (group, micros(saved))));
     assert_eq!(report.on_workers, [(1, 1_320), (2, 930), (4, 750), (8, 750), (16, 750)].map(|(w, t)| (w, micros(t))));
 }
 
 #[test]
-fn its_words_say_what_is_to_blame_first() {
-    let words = report_of(&log()).to_string();
-    assert_eq!(words, include_str!("report.txt"));
+fn the_text_is_as_expected() {
+    let text = report_of(&log()).to_string();
+    assert_eq!(text, include_str!("report.txt"));
 }
 
 #[test]
-fn its_words_leave_out_what_hardly_matters() {
+fn the_text_leaves_out_small_savings_and_short_waits() {
     let mut report = report_of(&log());
     report.what_if[2].saved = micros(4);
     report.what_if[3].saved = Duration::ZERO;
     report.queue_waits = vec![report.queue_waits[0].clone(); 10];
-    let words = report.to_string();
-    assert!(words.contains("if lighting cost nothing") && !words.contains("if visibility cost nothing"), "{words}");
-    assert!(words.contains("\n  and 2 groups that would save less\n"), "{words}");
-    assert_eq!(words.matches("lighting, record: 1.8 shadows").count(), 5, "{words}");
+    let text = report.to_string();
+    assert!(text.contains("if lighting cost nothing") && !text.contains("if visibility cost nothing"), "{text}");
+    assert!(text.contains("\n  and 2 groups that would save less\n"), "{text}");
+    assert_eq!(text.matches("lighting, record: 1.8 shadows").count(), 5, "{text}");
     report.what_if[0].saved = micros(4);
     report.what_if[1].saved = micros(4);
-    let words = report.to_string();
-    assert!(!words.contains("could be saved") && !words.contains("cost nothing"), "{words}");
+    let text = report.to_string();
+    assert!(!text.contains("could be saved") && !text.contains("cost nothing"), "{text}");
 }
 
 #[test]
-fn a_worker_that_helps_out_amid_a_chunk_is_held_by_what_was_before_that() {
+fn a_worker_span_inside_another_is_not_held_up_by_it() {
     let mut log = log();
-    // The caller takes up lighting while a chunk of shadows waits for something, and is done with it before that chunk is.
+    // The caller runs lighting while its chunk of shadows waits for something, and finishes it before that chunk.
     log.runs[0].chunks[2] = chunk(1, 0, 0, 1_400..1_500);
     log.runs[0].chunks[3] = chunk(2, 0, 0, 1_310..1_650);
     log.runs[0].chunks[5] = chunk(3, 0, 1, 1_650..1_700);
     let path = report_of(&log).critical_path;
-    let stays: Vec<_> = path[3..6].iter().map(|step| (step.name.as_str(), step.ended, step.held_by)).collect();
-    let stay = |name, ended, held_by| (name, micros(ended), held_by);
+    let spans: Vec<_> = path[3..6].iter().map(|step| (step.name.as_str(), step.ended, step.held_by)).collect();
+    let span = |name, ended, held_by| (name, micros(ended), held_by);
     let expected = [
-        stay("cull", 1_300, HeldBy::Start),
-        stay("shadows, record", 1_650, HeldBy::Dependency),
-        stay("bloom", 1_700, HeldBy::Dependency),
+        span("cull", 1_300, HeldBy::Start),
+        span("shadows, record", 1_650, HeldBy::Dependency),
+        span("bloom", 1_700, HeldBy::Dependency),
     ];
-    assert_eq!(stays, expected);
+    assert_eq!(spans, expected);
 }
 
 #[test]
-fn a_run_amid_a_chunk_of_another_counts_once() {
+fn a_run_inside_a_chunk_of_another_counts_once() {
     let mut log = log();
     let inner = Run {
         graph: Arc::new(Graph { nodes: vec![node("inner", "inner", &[])] }),
@@ -194,19 +194,19 @@ fn a_run_amid_a_chunk_of_another_counts_once() {
         ..log.runs[0].clone()
     };
     log.runs.insert(0, inner);
-    // The calling thread waits for the others inside of the chunk.
+    // Inside the chunk the calling thread waits for the other workers.
     log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: micros(1_480), ended: micros(1_500) });
     let (report, without) = (report_of(&log), report_of(&self::log()));
     let names = |report: &FrameReport| report.critical_path.iter().map(|step| step.name.clone()).collect::<Vec<_>>();
     assert_eq!((report.duration, names(&report)), (without.duration, names(&without)));
-    assert_eq!(report.critical_path[3].node, Some((1, 0)), "its run is the log's second");
+    assert_eq!(report.critical_path[3].node, Some((1, 0)), "its run is the second one of the log");
     let caller = &report.workers[0];
     assert_eq!([caller.busy, caller.searching, caller.other], [670, 20, 310].map(micros));
     assert_eq!((caller.chunks, report.what_if), (5, without.what_if));
 }
 
 #[test]
-fn of_two_threads_the_one_that_began_last_counts() {
+fn of_two_overlapping_spans_the_one_that_began_last_is_on_the_path() {
     let mut log = log();
     log.spans.push(span("stream", 1_880..1_950));
     let path = report_of(&log).critical_path;
@@ -218,7 +218,7 @@ fn of_two_threads_the_one_that_began_last_counts() {
 }
 
 #[test]
-fn between_runs_a_span_says_so() {
+fn the_part_of_a_span_between_two_runs_is_named_so() {
     let mut log = log();
     let later = |time: Duration| time + micros(740);
     let mut second = log.runs[0].clone();
@@ -242,7 +242,7 @@ fn between_runs_a_span_says_so() {
 }
 
 #[test]
-fn what_is_not_whole_is_not_reported_on() {
+fn a_missing_incomplete_or_failed_frame_is_an_error() {
     let report = |log: &Log, frame| FrameReport::new(log, frame, &SchedulerCosts::ZERO).map(|_| ());
     assert_eq!(report(&log(), 13), Err(ReportError::NoRun { frame: 13 }));
     let mut incomplete = log();
@@ -254,21 +254,21 @@ fn what_is_not_whole_is_not_reported_on() {
 }
 
 #[test]
-fn a_log_that_names_what_is_not_there_is_an_error() {
-    let refused = |spoil: fn(&mut Run)| {
+fn an_inconsistent_log_is_an_error() {
+    let is_refused = |corrupt: fn(&mut Run)| {
         let mut log = log();
-        spoil(&mut log.runs[0]);
+        corrupt(&mut log.runs[0]);
         FrameReport::new(&log, 12, &SchedulerCosts::ZERO) == Err(ReportError::Contradictory { frame: 12 })
     };
-    assert!(refused(|run| run.chunks[0].worker = 99));
-    assert!(refused(|run| run.chunks[0].node = 77));
-    assert!(refused(|run| run.empty[0].node = 77));
-    assert!(refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(3)));
-    assert!(refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(0)));
+    assert!(is_refused(|run| run.chunks[0].worker = 99));
+    assert!(is_refused(|run| run.chunks[0].node = 77));
+    assert!(is_refused(|run| run.empty[0].node = 77));
+    assert!(is_refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(3)));
+    assert!(is_refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(0)));
 }
 
 #[test]
-fn times_that_make_no_sense_are_reported_on_all_the_same() {
+fn times_that_run_backwards_do_not_break_the_report() {
     let range = |start, end| Range { start, end };
     let mut log = log();
     let run = &mut log.runs[0];
@@ -276,9 +276,9 @@ fn times_that_make_no_sense_are_reported_on_all_the_same() {
     run.ended = micros(1_500);
     log.spans.push(span("backwards", range(1_500, 1_400)));
     log.workers[1].idle.push(Idle { kind: IdleKind::Asleep, began: micros(1_500), ended: micros(1_200) });
-    let mut beside = log.runs[0].clone();
-    (beside.began, beside.ended) = (micros(1_400), micros(1_850));
-    log.runs.push(beside);
+    let mut overlapping = log.runs[0].clone();
+    (overlapping.began, overlapping.ended) = (micros(1_400), micros(1_850));
+    log.runs.push(overlapping);
     let backwards = |times: Range<u64>| {
         let [began, ended] = [times.start, times.end].map(micros);
         Run { frame: 12, began, ended, complete: true, ..Run::default() }
@@ -293,7 +293,7 @@ fn times_that_make_no_sense_are_reported_on_all_the_same() {
 }
 
 #[test]
-fn words_are_few_and_keep_to_their_lines_whatever_the_names() {
+fn the_text_stays_short_whatever_the_names() {
     let mut log = log();
     let names = (0..200).map(|index| format!("{index}\n\u{1b}[31m{}", "x".repeat(10_000)));
     let nodes = names.enumerate().map(|(index, name)| {
@@ -309,28 +309,28 @@ fn words_are_few_and_keep_to_their_lines_whatever_the_names() {
     let long = |index: usize| format!("{index}{}", "x".repeat(10_000));
     report.shares.iter_mut().enumerate().for_each(|(index, share)| share.group = long(index));
     report.queue_waits[0].meanwhile = (0..9).map(|index| (long(index), micros(200))).collect();
-    let words = report.to_string();
-    assert!(words.lines().count() < 110, "{words}");
-    let longest = words.lines().map(|line| line.chars().count()).max().unwrap();
+    let text = report.to_string();
+    assert!(text.lines().count() < 110, "{text}");
+    let longest = text.lines().map(|line| line.chars().count()).max().unwrap();
     assert!(longest <= 120, "{longest}");
-    assert!(!words.chars().any(|character| character.is_control() && character != '\n'));
-    assert!(words.contains("shorter steps") && words.contains("more in between") && words.contains("and 84 workers"));
+    assert!(!text.chars().any(|character| character.is_control() && character != '\n'));
+    assert!(text.contains("shorter steps") && text.contains("more in between") && text.contains("and 84 workers"));
 }
 
 #[test]
-fn many_steps_of_one_group_are_one_line() {
+fn neighbouring_steps_of_one_group_are_merged_to_one_line() {
     let mut log = log();
     let nodes = (0..30).map(|index: usize| node(&format!("p{index}"), "chain", index.checked_sub(1).as_slice()));
     log.runs[0].graph = Arc::new(Graph { nodes: nodes.collect() });
     log.runs[0].empty.clear();
     log.runs[0].chunks =
         (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();
-    let words = report_of(&log).to_string();
-    assert!(words.contains("  0.100       0.300           -  -            chain, 30 steps\n"), "{words}");
+    let text = report_of(&log).to_string();
+    assert!(text.contains("  0.100       0.300           -  -            chain, 30 steps\n"), "{text}");
 }
 
 #[test]
-fn a_line_of_many_steps_says_what_their_names_have_in_common() {
+fn a_line_of_several_steps_has_their_common_prefix() {
     let mut log = log();
     let name = |index: usize| format!("shadows, view {} \"sun\", stage {index}", index / 15);
     let group = |index: usize| if index / 15 == 0 { "one" } else { "other" };
@@ -339,7 +339,7 @@ fn a_line_of_many_steps_says_what_their_names_have_in_common() {
     log.runs[0].empty.clear();
     log.runs[0].chunks =
         (0..30).map(|index| chunk(index, 0, 0, 1_100 + index as u64 * 10..1_110 + index as u64 * 10)).collect();
-    let words = report_of(&log).to_string();
-    assert!(words.contains("  shadows, view 0 \"sun\", 15 steps\n"), "{words}");
-    assert!(words.contains("  shadows, view 1 \"sun\", 15 steps\n"), "{words}");
+    let text = report_of(&log).to_string();
+    assert!(text.contains("  shadows, view 0 \"sun\", 15 steps\n"), "{text}");
+    assert!(text.contains("  shadows, view 1 \"sun\", 15 steps\n"), "{text}");
 }

@@ -1,4 +1,4 @@
-//! Reports of any graph that was really run, against naive oracles.
+//! Reports of real runs of any graph, checked against naive oracles.
 
 use std::{
     collections::BTreeSet,
@@ -18,29 +18,31 @@ use drawloom::{
 };
 use proptest::{collection::vec, prelude::*, sample::Index};
 
-/// A node: what it depends on, how many items it has, what each costs, and what it counts as.
+/// A node: its dependencies, how many items it has, how long each takes, and its group.
 #[derive(Clone, Debug)]
-struct Sketch {
+struct NodeSpec {
     dependencies: Vec<Index>,
     width: usize,
     cost: u64,
     group: usize,
 }
 
-fn any_graph() -> impl Strategy<Value = Vec<Sketch>> {
+fn any_graph() -> impl Strategy<Value = Vec<NodeSpec>> {
     let node = (vec(any::<Index>(), 0..4), 0..9_usize, 0..50_u64, 0..4_usize);
-    let node = node.prop_map(|(dependencies, width, cost, group)| Sketch { dependencies, width, cost, group });
+    let node = node.prop_map(|(dependencies, width, cost, group)| NodeSpec { dependencies, width, cost, group });
     vec(node, 1..10)
 }
 
-/// What a run is lent: the clock that its chunks move, where it is no real one, and the group that has nothing to do.
+/// The context of a run.
 #[derive(Default)]
-struct Call {
+struct Context {
+    /// The simulated clock that chunks advance, unless time is real.
     clock: Option<Arc<AtomicU64>>,
+    /// The group that has nothing to do.
     free: Option<String>,
 }
 
-impl Call {
+impl Context {
     fn spend(&self, time: u64) {
         match &self.clock {
             Some(clock) => _ = clock.fetch_add(time, Ordering::Relaxed),
@@ -49,17 +51,17 @@ impl Call {
     }
 }
 
-fn schedule_of(sketch: &[Sketch]) -> Schedule<Closure<'static, Call>> {
+fn schedule_of(specs: &[NodeSpec]) -> Schedule<Closure<'static, Context>> {
     let mut graph = FrameGraph::new();
     let mut nodes = Vec::new();
-    for (index, &Sketch { ref dependencies, width, cost, group }) in sketch.iter().enumerate() {
+    for (index, &NodeSpec { ref dependencies, width, cost, group }) in specs.iter().enumerate() {
         let group = format!("group {group}");
         let label = Labels { process: Some(group.clone()), ..Labels::default() };
-        let body = Closure::new(move |call: &Call, range, _worker| {
-            range.for_each(|item| call.spend(cost + item as u64));
+        let body = Closure::new(move |context: &Context, range, _worker| {
+            range.for_each(|item| context.spend(cost + item as u64));
             Ok(())
         });
-        let width = move |call: &Call| if call.free.as_ref() == Some(&group) { 0 } else { width };
+        let width = move |context: &Context| if context.free.as_ref() == Some(&group) { 0 } else { width };
         let node = graph.add(format!("p{index}"), body.with_width(width));
         graph.label(node, label);
         graph.keep(node);
@@ -71,22 +73,22 @@ fn schedule_of(sketch: &[Sketch]) -> Schedule<Closure<'static, Call>> {
     graph.compile().unwrap()
 }
 
-/// What is recorded of a frame of two runs, and what the thread does before, between and after them; and the frame's number.
-fn frame_of(schedule: &mut Schedule<Closure<'_, Call>>, scheduler: &Scheduler, call: &Call) -> (Log, u64) {
+/// Records a frame of two runs, and of spans before, between and after them. Returns the log and the frame's number.
+fn record_frame(schedule: &mut Schedule<Closure<'_, Context>>, scheduler: &Scheduler, context: &Context) -> (Log, u64) {
     let timeline = scheduler.timeline();
     timeline.take();
     timeline.start();
     timeline.mark_frame();
     let record = timeline.span("record");
     for serial in [30, 20] {
-        call.spend(serial);
-        schedule.run(scheduler, call).unwrap();
+        context.spend(serial);
+        schedule.run(scheduler, context).unwrap();
     }
-    call.spend(40);
+    context.spend(40);
     drop(record);
-    call.spend(1_000);
+    context.spend(1_000);
     let submit = timeline.span("submit");
-    call.spend(10);
+    context.spend(10);
     drop(submit);
     timeline.stop();
     let log = timeline.take();
@@ -94,9 +96,9 @@ fn frame_of(schedule: &mut Schedule<Closure<'_, Call>>, scheduler: &Scheduler, c
     (log, frame)
 }
 
-/// A worker's stay at a node.
+/// A worker span: see [`Step`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stay {
+struct WorkerSpan {
     node: usize,
     worker: usize,
     started: Duration,
@@ -106,7 +108,7 @@ struct Stay {
 /// When each node could have begun, and when it did.
 fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
     let chunks_of = |node| run.chunks.iter().chain(&run.empty).filter(move |chunk| chunk.node == node);
-    let ended = |node| chunks_of(node).map(|chunk| chunk.ended).max().expect("it has chunks, or none to be seen");
+    let ended = |node| chunks_of(node).map(|chunk| chunk.ended).max().expect("every node has a chunk or an empty one");
     let nodes = run.graph.nodes.iter().enumerate();
     let times = nodes.map(|(index, node)| {
         let ready = node.dependencies.iter().map(|&dependency| ended(dependency)).max().unwrap_or(run.began);
@@ -115,33 +117,33 @@ fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
     times.collect()
 }
 
-/// All stays in the order in which they ended, and which of them had to end before which.
-fn stays_and_edges(run: &Run) -> (Vec<Stay>, Vec<[usize; 2]>) {
+/// All worker spans by when they ended, and pairs of which the first had to end before the second.
+fn spans_and_edges(run: &Run) -> (Vec<WorkerSpan>, Vec<[usize; 2]>) {
     let mut chunks: Vec<_> = run.chunks.iter().chain(&run.empty).collect();
     chunks.sort_by_key(|chunk| (chunk.ended, chunk.started, chunk.node));
-    let mut stays: Vec<Stay> = Vec::new();
+    let mut spans: Vec<WorkerSpan> = Vec::new();
     for chunk in chunks {
         let &Chunk { node, worker, started, ended, .. } = chunk;
-        match stays.iter_mut().rfind(|stay| stay.worker == worker) {
+        match spans.iter_mut().rfind(|span| span.worker == worker) {
             Some(last) if last.node == node => last.ended = ended,
-            _ => stays.push(Stay { node, worker, started, ended }),
+            _ => spans.push(WorkerSpan { node, worker, started, ended }),
         }
     }
-    stays.sort_by_key(|stay| (stay.ended, stay.started, stay.node));
+    spans.sort_by_key(|span| (span.ended, span.started, span.node));
     let mut edges = Vec::new();
-    for (to, stay) in stays.iter().enumerate() {
-        let dependencies = &run.graph.nodes[stay.node].dependencies;
-        let is_before = |&from: &usize| dependencies.contains(&stays[from].node);
-        edges.extend((0..stays.len()).filter(is_before).map(|from| [from, to]));
-        let previous = (0..to).rfind(|&from| stays[from].worker == stay.worker);
+    for (to, span) in spans.iter().enumerate() {
+        let dependencies = &run.graph.nodes[span.node].dependencies;
+        let is_before = |&from: &usize| dependencies.contains(&spans[from].node);
+        edges.extend((0..spans.len()).filter(is_before).map(|from| [from, to]));
+        let previous = (0..to).rfind(|&from| spans[from].worker == span.worker);
         edges.extend(previous.map(|from| [from, to]));
     }
-    (stays, edges)
+    (spans, edges)
 }
 
-/// When each stay ends that begins when it can and takes so long; each no earlier than it has to.
+/// When each span ends if it begins as early as possible, takes as long as its weight, and ends no earlier than `at_least`.
 fn ends(run: &Run, weights: &[Duration], edges: &[[usize; 2]], at_least: impl Fn(usize) -> Duration) -> Vec<Duration> {
-    let mut ends: Vec<_> = (0..weights.len()).map(|stay| at_least(stay).max(run.began + weights[stay])).collect();
+    let mut ends: Vec<_> = (0..weights.len()).map(|span| at_least(span).max(run.began + weights[span])).collect();
     loop {
         let before = ends.clone();
         for &[from, to] in edges {
@@ -154,41 +156,41 @@ fn ends(run: &Run, weights: &[Duration], edges: &[[usize; 2]], at_least: impl Fn
 }
 
 fn check_run(run: &Run, path: &[&Step], slack: &[Slack]) -> Result<(), TestCaseError> {
-    let (stays, edges) = stays_and_edges(run);
-    let ready = |stay: usize| {
-        let before = edges.iter().filter(|[_, to]| *to == stay);
-        before.map(|&[from, _]| stays[from].ended).max().unwrap_or(run.began)
+    let (spans, edges) = spans_and_edges(run);
+    let ready = |span: usize| {
+        let before = edges.iter().filter(|[_, to]| *to == span);
+        before.map(|&[from, _]| spans[from].ended).max().unwrap_or(run.began)
     };
-    let weights: Vec<_> = (0..stays.len()).map(|stay| stays[stay].ended - ready(stay).max(run.began)).collect();
-    let end = stays.iter().map(|stay| stay.ended).max().unwrap();
+    let weights: Vec<_> = (0..spans.len()).map(|span| spans[span].ended - ready(span).max(run.began)).collect();
+    let end = spans.iter().map(|span| span.ended).max().unwrap();
     let longest = ends(run, &weights, &edges, |_| Duration::ZERO).into_iter().max().unwrap();
     prop_assert_eq!(longest, end);
     prop_assert_eq!(path.iter().map(|step| step.duration()).sum::<Duration>(), end - run.began);
-    let mut places = Vec::new();
+    let mut path_spans = Vec::new();
     for step in path {
         let (_, node) = step.node.unwrap();
-        let stay = Stay { node, worker: step.worker.unwrap(), started: step.started, ended: step.ended };
-        places.extend(stays.iter().position(|other| *other == stay));
+        let span = WorkerSpan { node, worker: step.worker.unwrap(), started: step.started, ended: step.ended };
+        path_spans.extend(spans.iter().position(|other| *other == span));
         prop_assert!(slack[node].time.is_zero());
     }
-    prop_assert_eq!(places.len(), path.len());
+    prop_assert_eq!(path_spans.len(), path.len());
     prop_assert_eq!(path[0].held_by, HeldBy::Start);
-    for (pair, steps) in places.windows(2).zip(path.windows(2)) {
+    for (pair, steps) in path_spans.windows(2).zip(path.windows(2)) {
         prop_assert!(edges.iter().any(|edge| edge == pair), "{:?}", steps);
-        let [from, to] = [stays[pair[0]], stays[pair[1]]];
+        let [from, to] = [spans[pair[0]], spans[pair[1]]];
         let depends = run.graph.nodes[to.node].dependencies.contains(&from.node);
         prop_assert_eq!(steps[1].held_by, if depends { HeldBy::Dependency } else { HeldBy::Worker });
         prop_assert!(depends || from.worker == to.worker);
     }
     if run.workers == 1 {
-        let all = (0..stays.len()).filter(|&stay| !weights[stay].is_zero()).collect::<Vec<_>>();
-        places.retain(|&stay| !weights[stay].is_zero());
-        prop_assert_eq!(places, all);
+        let all = (0..spans.len()).filter(|&span| !weights[span].is_zero()).collect::<Vec<_>>();
+        path_spans.retain(|&span| !weights[span].is_zero());
+        prop_assert_eq!(path_spans, all);
     }
     for (node, slack) in slack.iter().enumerate() {
         let end_if_late = |by| {
-            let late = |stay: usize| stays[stay].node == node;
-            let at_least = |stay| if late(stay) { stays[stay].ended + by } else { Duration::ZERO };
+            let late = |span: usize| spans[span].node == node;
+            let at_least = |span| if late(span) { spans[span].ended + by } else { Duration::ZERO };
             ends(run, &weights, &edges, at_least).into_iter().max().unwrap()
         };
         prop_assert_eq!(end_if_late(slack.time), end);
@@ -235,8 +237,8 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
     waits.truncate(10);
     prop_assert_eq!(report.queue_waits.iter().map(|wait| wait.waited()).collect::<Vec<_>>(), waits);
     for wait in &report.queue_waits {
-        let at_work: Duration = wait.meanwhile.iter().map(|(_, time)| *time).sum();
-        prop_assert!(at_work <= wait.waited() * report.workers.len() as u32);
+        let worked: Duration = wait.meanwhile.iter().map(|(_, time)| *time).sum();
+        prop_assert!(worked <= wait.waited() * report.workers.len() as u32);
     }
     Ok(())
 }
@@ -245,13 +247,13 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
 
     #[test]
-    fn a_report_agrees_with_naive_oracles(sketch in any_graph(), always_parallel in any::<bool>(), wake in 0..20_u64) {
-        let mut schedule = schedule_of(&sketch);
+    fn a_report_agrees_with_naive_oracles(specs in any_graph(), always_parallel in any::<bool>(), wake in 0..20_u64) {
+        let mut schedule = schedule_of(&specs);
         schedule.always_parallel(always_parallel);
         let costs = SchedulerCosts { wake: Duration::from_micros(wake), ..SchedulerCosts::ZERO };
         for scheduler in &*SCHEDULERS {
             let scheduler = scheduler.lock().unwrap();
-            let (log, frame) = frame_of(&mut schedule, &scheduler, &Call::default());
+            let (log, frame) = record_frame(&mut schedule, &scheduler, &Context::default());
             let report = FrameReport::new(&log, frame, &costs).unwrap();
             check(&report, &log)?;
             let replay = Replay::of_frame(&log, frame, costs).unwrap();
@@ -261,7 +263,7 @@ proptest! {
                 prop_assert_eq!(what_if.time, time.min(report.replayed));
                 prop_assert_eq!(what_if.saved, report.replayed - what_if.time);
             }
-            let groups: BTreeSet<_> = sketch.iter().map(|node| node.group).collect();
+            let groups: BTreeSet<_> = specs.iter().map(|node| node.group).collect();
             prop_assert_eq!(report.what_if.len(), groups.len());
             prop_assert!(report.what_if.is_sorted_by(|one, other| one.saved >= other.saved));
             let on = [1, 2, 4, 8, 16].map(|workers| (workers, replay.frame_time(workers)));
@@ -270,15 +272,15 @@ proptest! {
     }
 
     #[test]
-    fn what_a_group_would_save_is_what_it_does_save(sketch in any_graph()) {
+    fn removing_a_group_saves_what_was_predicted(specs in any_graph()) {
         let clock = Arc::new(AtomicU64::new(0));
-        let of_scheduler = Arc::clone(&clock);
-        let now = move || Duration::from_micros(of_scheduler.load(Ordering::Relaxed));
+        let clock_of_scheduler = Arc::clone(&clock);
+        let now = move || Duration::from_micros(clock_of_scheduler.load(Ordering::Relaxed));
         let scheduler = Scheduler::builder().workers(1).timeline_clock(now).build().unwrap();
-        let mut schedule = schedule_of(&sketch);
+        let mut schedule = schedule_of(&specs);
         let mut report = |free: Option<&str>| {
-            let call = Call { clock: Some(Arc::clone(&clock)), free: free.map(str::to_owned) };
-            let (log, frame) = frame_of(&mut schedule, &scheduler, &call);
+            let context = Context { clock: Some(Arc::clone(&clock)), free: free.map(str::to_owned) };
+            let (log, frame) = record_frame(&mut schedule, &scheduler, &context);
             let report = FrameReport::new(&log, frame, &SchedulerCosts::ZERO).unwrap();
             check(&report, &log).map(|()| report)
         };
@@ -290,7 +292,6 @@ proptest! {
     }
 }
 
-/// Each is used by one test at a time, as others' runs would be recorded too.
-static SCHEDULERS: LazyLock<[Mutex<Scheduler>; 3]> = LazyLock::new(|| {
-    [1, 2, 4].map(|workers| Mutex::new(Scheduler::new(workers).expect("four threads can be started")))
-});
+/// Used by one test at a time, because a log has all runs of its scheduler.
+static SCHEDULERS: LazyLock<[Mutex<Scheduler>; 3]> =
+    LazyLock::new(|| [1, 2, 4].map(|workers| Mutex::new(Scheduler::new(workers).expect("threads can be started"))));

@@ -1,9 +1,9 @@
-//! A trace, read again.
+//! Reads a trace as a viewer does.
 
 use drawloom::{report::write_chrome_trace, timeline::Log};
 use serde_json::Value;
 
-/// What a viewer makes of the file of a log.
+/// The trace of a log, parsed.
 pub struct Trace {
     pub text: String,
     pub other_data: Value,
@@ -28,7 +28,7 @@ pub struct Event {
 impl Trace {
     pub fn of(log: &Log) -> Self {
         let mut bytes = Vec::new();
-        write_chrome_trace(log, &mut bytes).expect("a vector takes everything");
+        write_chrome_trace(log, &mut bytes).expect("a vector does not fail");
         let text = String::from_utf8(bytes).expect("JSON is UTF-8");
         check_decimals(&text);
         let whole: Value = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"));
@@ -45,13 +45,13 @@ impl Trace {
         self.of_kind("X").filter(move |event| event.category == category)
     }
 
-    /// The readings of a counter: when, and what.
-    pub fn readings(&self, name: &str) -> Vec<(u64, f64)> {
-        let readings = self.of_kind("C").filter(|event| event.name == name);
-        readings.map(|event| (event.began, event.arguments["value"].as_f64().expect("it is a number"))).collect()
+    /// The values of a counter, each with its time.
+    pub fn counter_values(&self, name: &str) -> Vec<(u64, f64)> {
+        let values = self.of_kind("C").filter(|event| event.name == name);
+        values.map(|event| (event.began, event.arguments["value"].as_f64().expect("it is a number"))).collect()
     }
 
-    /// What is told of the threads, by the number of the process and their own.
+    /// The names of the threads, each with the numbers of its process and its own.
     pub fn thread_names(&self) -> Vec<(u64, u64, String)> {
         let names = self.of_kind("M").filter(|event| event.name == "thread_name");
         names.map(|event| (event.process, event.thread, text_of(&event.arguments["name"]))).collect()
@@ -60,15 +60,15 @@ impl Trace {
 
 impl Event {
     pub fn contains(&self, other: &Event) -> bool {
-        self.is_on_lane_of(other) && self.began <= other.began && other.ended <= self.ended
+        self.is_on_track_of(other) && self.began <= other.began && other.ended <= self.ended
     }
 
-    pub fn is_on_lane_of(&self, other: &Event) -> bool {
+    pub fn is_on_track_of(&self, other: &Event) -> bool {
         (self.process, self.thread) == (other.process, other.thread)
     }
 }
 
-/// All that are told by their own members, or by arguments whose names end so, are microseconds with three decimals.
+/// All times are microseconds with three decimals: `ts`, `dur`, and arguments whose names end in `_us`.
 fn check_decimals(text: &str) {
     for key in ["\"ts\":", "\"dur\":", "_us\":"] {
         for (at, _) in text.match_indices(key) {

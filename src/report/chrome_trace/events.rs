@@ -1,4 +1,4 @@
-//! Events of the Trace Event Format, written one after another.
+//! Writes events of the Trace Event Format, one after another.
 
 use std::{
     fmt,
@@ -8,77 +8,84 @@ use std::{
 
 use serde::Serialize;
 
-/// A trace that is being written.
-pub(super) struct Events<W> {
+/// Writes the events of a trace.
+pub(super) struct EventWriter<W> {
     writer: W,
     is_empty: bool,
 }
 
-/// Where an event stands.
+/// The track of an event: a process and a thread in the terms of the format.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lane {
+pub(super) struct Track {
     pub(super) process: usize,
     pub(super) thread: usize,
 }
 
-impl<W: Write> Events<W> {
-    pub(super) fn begin(mut writer: W) -> io::Result<Self> {
+impl<W: Write> EventWriter<W> {
+    pub(super) fn new(mut writer: W) -> io::Result<Self> {
         writer.write_all(b"{\"displayTimeUnit\":\"ns\",\"traceEvents\":[")?;
         Ok(Self { writer, is_empty: true })
     }
 
-    /// An event, to be ended by the caller.
-    pub(super) fn event(&mut self, kind: &str, category: &str, name: &str, lane: Lane) -> io::Result<Object<'_, W>> {
+    /// Begins an event. The caller ends it.
+    pub(super) fn event(
+        &mut self,
+        kind: &str,
+        category: &str,
+        name: &str,
+        track: Track,
+    ) -> io::Result<ObjectWriter<'_, W>> {
         self.writer.write_all(if self.is_empty { b"\n" } else { b",\n" })?;
         self.is_empty = false;
-        let event = Object::begin(&mut self.writer)?.value("ph", kind)?.value("cat", category)?.value("name", name)?;
-        event.value("pid", lane.process)?.value("tid", lane.thread)
+        let event =
+            ObjectWriter::begin(&mut self.writer)?.value("ph", kind)?.value("cat", category)?.value("name", name)?;
+        event.value("pid", track.process)?.value("tid", track.thread)
     }
 
-    /// A complete event: something that began and ended.
+    /// Begins a complete event, which has a start and a duration. The caller ends it.
     pub(super) fn slice(
         &mut self,
         category: &str,
         name: &str,
-        lane: Lane,
+        track: Track,
         began: Duration,
         ended: Duration,
-    ) -> io::Result<Object<'_, W>> {
-        let event = self.event("X", category, name, lane)?;
+    ) -> io::Result<ObjectWriter<'_, W>> {
+        let event = self.event("X", category, name, track)?;
         event.time("ts", began)?.time("dur", ended.saturating_sub(began))
     }
 
-    /// A reading of a counter.
-    pub(super) fn reading(&mut self, name: &str, lane: Lane, at: Duration, value: impl Serialize) -> io::Result<()> {
-        let event = self.event("C", "counter", name, lane)?.time("ts", at)?;
+    /// Writes a counter event.
+    pub(super) fn counter(&mut self, name: &str, track: Track, at: Duration, value: impl Serialize) -> io::Result<()> {
+        let event = self.event("C", "counter", name, track)?.time("ts", at)?;
         event.object("args", |arguments| arguments.value("value", value))?.end()
     }
 
-    /// What is told of a process or a thread itself: `thread_name`, say.
-    pub(super) fn metadata(&mut self, what: &str, lane: Lane, key: &str, value: impl Serialize) -> io::Result<()> {
-        self.event("M", "__metadata", what, lane)?.object("args", |arguments| arguments.value(key, value))?.end()
+    /// Writes a metadata event about a process or a thread: `thread_name`, for example.
+    pub(super) fn metadata(&mut self, name: &str, track: Track, key: &str, value: impl Serialize) -> io::Result<()> {
+        self.event("M", "__metadata", name, track)?.object("args", |arguments| arguments.value(key, value))?.end()
     }
 
-    /// Ends the trace, with what is to be said of it as a whole.
+    /// Ends the trace, with an object about the trace as a whole.
     pub(super) fn finish(
         mut self,
-        other_data: impl FnOnce(Object<'_, W>) -> io::Result<Object<'_, W>>,
+        other_data: impl FnOnce(ObjectWriter<'_, W>) -> io::Result<ObjectWriter<'_, W>>,
     ) -> io::Result<()> {
         self.writer.write_all(b"\n],\"otherData\":")?;
-        other_data(Object::begin(&mut self.writer)?)?.end()?;
+        other_data(ObjectWriter::begin(&mut self.writer)?)?.end()?;
         self.writer.write_all(b"}\n")?;
         self.writer.flush()
     }
 }
 
-/// A JSON object that is being written.
-#[must_use = "it is to be ended"]
-pub(super) struct Object<'writer, W> {
+/// Writes a JSON object.
+#[must_use = "without `end` the object is not closed"]
+pub(super) struct ObjectWriter<'writer, W> {
     writer: &'writer mut W,
     is_empty: bool,
 }
 
-impl<'writer, W: Write> Object<'writer, W> {
+impl<'writer, W: Write> ObjectWriter<'writer, W> {
     fn begin(writer: &'writer mut W) -> io::Result<Self> {
         writer.write_all(b"{")?;
         Ok(Self { writer, is_empty: true })
@@ -99,10 +106,10 @@ impl<'writer, W: Write> Object<'writer, W> {
     pub(super) fn object(
         mut self,
         key: &str,
-        fill: impl FnOnce(Object<'_, W>) -> io::Result<Object<'_, W>>,
+        fill: impl FnOnce(ObjectWriter<'_, W>) -> io::Result<ObjectWriter<'_, W>>,
     ) -> io::Result<Self> {
         self.key(key)?;
-        fill(Object::begin(self.writer)?)?.end()?;
+        fill(ObjectWriter::begin(self.writer)?)?.end()?;
         Ok(self)
     }
 
@@ -117,7 +124,7 @@ impl<'writer, W: Write> Object<'writer, W> {
     }
 }
 
-/// With three decimals: all nanoseconds are told apart, however many there are.
+/// With three decimals, so that times of any size are exact to the nanosecond.
 pub(super) fn microseconds(time: Duration) -> impl fmt::Display {
     let nanoseconds = time.as_nanos();
     fmt::from_fn(move |formatter| write!(formatter, "{}.{:03}", nanoseconds / 1000, nanoseconds % 1000))

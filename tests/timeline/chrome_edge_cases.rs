@@ -1,4 +1,4 @@
-//! Chrome traces of logs that are made by hand: what real runs do not have, or seldom.
+//! Chrome traces of logs made by hand: cases that real runs rarely have.
 
 use std::{
     io::{self, Write},
@@ -30,7 +30,7 @@ fn chunk(node: usize, worker: usize, opened: u64, started: u64, ended: u64) -> C
     Chunk { node, items: 0..1, worker, opened, started, ended, stolen: false }
 }
 
-/// A complete run from 0 on.
+/// A complete run that begins at 0.
 fn run(nodes: Vec<NodeInfo>, ended: u64, chunks: Vec<Chunk>) -> Run {
     Run { graph: Arc::new(Graph { nodes }), workers: 2, ended: at(ended), complete: true, chunks, ..Run::default() }
 }
@@ -57,7 +57,7 @@ fn an_empty_log_makes_a_trace() {
 }
 
 #[test]
-fn a_chunk_says_what_it_is_a_part_of_how_long_it_was_queued_and_that_it_was_stolen() {
+fn the_arguments_of_a_chunk_are_its_labels_its_wait_and_whether_it_was_stolen() {
     let labels =
         Labels { process: Some("g-buffer".into()), stage: Some("record".into()), view: Some("main \"1\"".into()) };
     let record = NodeInfo { labels, ..node("record main", &[0]) };
@@ -70,7 +70,7 @@ fn a_chunk_says_what_it_is_a_part_of_how_long_it_was_queued_and_that_it_was_stol
     let trace = Trace::of(&log);
     let arguments = r#""args":{"process":"g-buffer","stage":"record","view":"main \"1\"","items":"512..1024","queued_us":68.767,"opened_us":2.500,"stolen":true,"frame":7,"run":0}"#;
     assert!(trace.text.contains(arguments), "{}", trace.text);
-    assert_eq!(trace.readings("ready nodes"), [(0, 1.0), (5, 0.0), (1_234, 1.0), (2_500, 0.0)]);
+    assert_eq!(trace.counter_values("ready nodes"), [(0, 1.0), (5, 0.0), (1_234, 1.0), (2_500, 0.0)]);
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn times_are_exact_even_after_centuries() {
 }
 
 #[test]
-fn runs_inside_of_another_ones_chunk_lie_inside_of_it_and_their_ready_processes_are_counted_together() {
+fn runs_inside_a_chunk_nest_in_it_and_their_ready_nodes_are_counted_together() {
     let inner = |name: &str, began: u64, opened: u64, ended: u64| {
         let chunks = vec![chunk(0, 0, opened, opened, ended)];
         Run { began: at(began), ..run(vec![node(name, &[])], ended, chunks) }
@@ -92,13 +92,13 @@ fn runs_inside_of_another_ones_chunk_lie_inside_of_it_and_their_ready_processes_
     check(&log);
     let trace = Trace::of(&log);
     let names: Vec<_> = trace.slices("job").map(|slice| slice.name.clone()).collect();
-    assert_eq!(names, ["outer", "other", "early", "late"], "what lies around others is read first");
-    let ready = trace.readings("ready nodes");
+    assert_eq!(names, ["outer", "other", "early", "late"], "an outer slice comes before those inside it");
+    let ready = trace.counter_values("ready nodes");
     assert_eq!(ready, [(10, 1.0), (50, 2.0), (55, 1.0), (85, 0.0)]);
 }
 
 #[test]
-fn arrows_lead_from_the_last_chunk_to_the_first_wherever_their_items_are() {
+fn arrows_lead_from_the_last_chunk_to_the_first_by_time_not_by_items() {
     let chunks = vec![
         chunk(0, 0, 0, 5, 30),
         chunk(0, 1, 0, 0, 20),
@@ -112,11 +112,11 @@ fn arrows_lead_from_the_last_chunk_to_the_first_wherever_their_items_are() {
     let only = |kind: &str| trace.of_kind(kind).map(|event| (event.thread, event.began)).collect::<Vec<_>>();
     assert_eq!((only("s"), only("f")), (vec![(1, 29)], vec![(2, 36)]));
     let end = trace.events.iter().position(|event| event.kind == "f").unwrap();
-    assert_eq!(trace.events[end - 1].ended, 60, "of two that begin at once, the one with an inside");
+    assert_eq!(trace.events[end - 1].ended, 60, "of two slices that begin at once the longer one");
 }
 
 #[test]
-fn spans_that_begin_at_once_lie_one_inside_of_the_other() {
+fn spans_that_begin_at_once_are_nested() {
     let spans = vec![span("inner", 0, 1, 5), span("outer", 0, 1, 8)];
     let trace = Trace::of(&Log { spans, threads: vec!["engine".into()], ..log(vec![]) });
     let spans: Vec<_> = trace.slices("span").map(|slice| (slice.name.as_str(), slice.thread)).collect();
@@ -124,7 +124,7 @@ fn spans_that_begin_at_once_lie_one_inside_of_the_other() {
 }
 
 #[test]
-fn chunks_that_took_no_time_have_arrows_in_reading_order() {
+fn arrows_of_chunks_of_no_duration_are_in_topological_order() {
     let nodes = vec![node("a", &[]), node("b", &[0]), node("c", &[1])];
     let mut run = run(nodes, 50, vec![chunk(0, 0, 10, 10, 10), chunk(2, 0, 10, 10, 10)]);
     run.empty = vec![Chunk { items: 0..0, ..chunk(1, 0, 10, 10, 10) }];
@@ -141,33 +141,33 @@ fn chunks_that_took_no_time_have_arrows_in_reading_order() {
 }
 
 #[test]
-fn counters_are_read_as_they_are_and_what_is_no_number_is_left_out() {
+fn counters_keep_their_values_and_those_that_are_not_finite_are_left_out() {
     let values = [0.5, -3.0, f64::NAN, f64::INFINITY, 1e300];
     let counters =
         values.iter().enumerate().map(|(index, &value)| Counter { name: "bytes".into(), at: at(index as u64), value });
     let trace = Trace::of(&Log { counters: counters.collect(), ..log(vec![]) });
-    assert_eq!(trace.readings("bytes"), [(0, 0.5), (1, -3.0), (4, 1e300)]);
+    assert_eq!(trace.counter_values("bytes"), [(0, 0.5), (1, -3.0), (4, 1e300)]);
 }
 
 #[test]
-fn the_device_is_a_process_of_its_own_and_says_how_far_off_it_may_be() {
+fn the_device_is_a_process_of_its_own_with_its_error() {
     let passes = vec![pass("depth", 1_000, 5_000), pass("light", 5_000, 9_000), pass("post", 8_000, 12_000)];
     let device = DeviceLog { name: "Fast \"9\"".into(), error: at(12_345), passes };
     let log = Log { device: Some(device), threads: vec!["engine".into()], ..log(vec![]) };
     check(&log);
     let trace = Trace::of(&log);
     let of_device: Vec<_> = trace.events.iter().filter(|event| event.process == 2).collect();
-    let said = |what: &str, key: &str| {
-        let event = of_device.iter().find(|event| event.kind == "M" && event.name == what).expect(what);
+    let metadata = |name: &str, key: &str| {
+        let event = of_device.iter().find(|event| event.kind == "M" && event.name == name).expect(name);
         event.arguments[key].clone()
     };
     assert_eq!(
-        (said("process_name", "name"), said("process_labels", "labels")),
+        (metadata("process_name", "name"), metadata("process_labels", "labels")),
         ("Fast \"9\"".into(), "±12.345 µs".into())
     );
     assert!(trace.text.contains(r#""device_error_us":12.345"#));
-    let lanes: Vec<_> = trace.thread_names().into_iter().filter(|(process, ..)| *process == 2).collect();
-    assert_eq!(lanes, [(2, 4, "passes".to_owned()), (2, 5, "passes (2)".to_owned())]);
+    let tracks: Vec<_> = trace.thread_names().into_iter().filter(|(process, ..)| *process == 2).collect();
+    assert_eq!(tracks, [(2, 4, "passes".to_owned()), (2, 5, "passes (2)".to_owned())]);
     let slices: Vec<_> =
         trace.slices("device").map(|slice| (slice.name.as_str(), slice.thread, slice.began, slice.ended)).collect();
     assert_eq!(slices, [("depth", 4, 1_000, 5_000), ("light", 4, 5_000, 9_000), ("post", 5, 8_000, 12_000)]);
@@ -175,7 +175,7 @@ fn the_device_is_a_process_of_its_own_and_says_how_far_off_it_may_be() {
 }
 
 #[test]
-fn without_a_device_there_is_no_device() {
+fn without_a_device_there_is_no_device_process() {
     let log = log(vec![run(vec![node("cull", &[])], 9, vec![chunk(0, 0, 1, 2, 3)])]);
     let trace = Trace::of(&log);
     assert!(trace.events.iter().all(|event| event.process == 1));
@@ -183,27 +183,27 @@ fn without_a_device_there_is_no_device() {
 }
 
 #[test]
-fn hundred_thousand_chunks_are_as_many_slices() {
+fn a_large_trace_is_not_in_memory_as_a_whole() {
     let chunks =
         (0..100_000).map(|index| chunk(0, index as usize % 2, 0, index / 2 * 10, index / 2 * 10 + 10)).collect();
     let log = log(vec![run(vec![node("wide", &[])], 500_000, chunks)]);
-    let mut trace = Lines::default();
+    let mut trace = SliceCounter::default();
     write_chrome_trace(&log, &mut trace).unwrap();
     assert_eq!(trace.slices, 100_000);
-    assert!(trace.longest < 64 << 10, "{} bytes were in memory at once", trace.longest);
+    assert!(trace.largest_write < 64 << 10, "{} bytes were in memory at once", trace.largest_write);
 }
 
-/// Counts the slices that are written, and the most bytes that are written at once.
+/// Counts the slices that are written, and the largest write.
 #[derive(Default)]
-struct Lines {
+struct SliceCounter {
     slices: usize,
-    longest: usize,
+    largest_write: usize,
     rest: Vec<u8>,
 }
 
-impl Write for Lines {
+impl Write for SliceCounter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.longest = self.longest.max(bytes.len());
+        self.largest_write = self.largest_write.max(bytes.len());
         self.rest.extend(bytes);
         while let Some(end) = self.rest.iter().position(|&byte| byte == b'\n') {
             let line: Vec<u8> = self.rest.drain(..=end).collect();
@@ -218,16 +218,16 @@ impl Write for Lines {
 }
 
 #[test]
-fn what_the_writer_returns_is_returned() {
-    for room in 0..300 {
-        let mut small = vec![0; room];
+fn errors_of_the_writer_are_returned() {
+    for length in 0..300 {
+        let mut small = vec![0; length];
         let error = write_chrome_trace(&log(vec![]), small.as_mut_slice()).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::WriteZero);
     }
 }
 
 #[test]
-fn a_log_that_names_what_it_does_not_list_is_refused() {
+fn a_log_that_refers_to_what_it_does_not_list_is_an_error() {
     let fine = run(vec![node("a", &[]), node("b", &[0])], 9, vec![chunk(1, 1, 0, 0, 9)]);
     let cases = [
         (Run { chunks: vec![chunk(2, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 2 of 2"),
@@ -248,7 +248,7 @@ fn a_log_that_names_what_it_does_not_list_is_refused() {
     assert_eq!(error.to_string(), "there is a span of thread 0 of 0");
 }
 
-/// Names that have undone others.
+/// Names that break careless writers.
 fn any_name() -> impl Strategy<Value = String> {
     let hostile = prop::sample::select(vec![
         "",
@@ -270,7 +270,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
 
     #[test]
-    fn any_names_come_out_as_they_went_in(names in vec(any_name(), 12)) {
+    fn any_name_can_be_read_back_unchanged(names in vec(any_name(), 12)) {
         let [name, process_label, stage, view, worker, thread, span_name, counter, device, pass_name, pass_view, idle_worker] = &names[..] else {
             unreachable!("there are twelve")
         };
@@ -294,7 +294,7 @@ proptest! {
         }
         prop_assert_eq!((&only("span").name, &only("device").name), (span_name, pass_name));
         prop_assert_eq!(only("device").arguments["view"].as_str(), Some(pass_view.as_str()));
-        prop_assert_eq!(trace.readings(counter), [(4, 1.0)]);
+        prop_assert_eq!(trace.counter_values(counter), [(4, 1.0)]);
         let threads: Vec<_> = trace.thread_names().into_iter().map(|(.., name)| name).collect();
         prop_assert_eq!(threads, [idle_worker, worker, thread, "passes"]);
         let processes = trace.of_kind("M").filter(|event| event.name == "process_name");
@@ -303,12 +303,12 @@ proptest! {
     }
 
     #[test]
-    fn spans_and_passes_that_overlap_nest_on_their_lanes(
+    fn overlapping_spans_and_passes_nest_on_their_tracks(
         spans in vec((0..2_usize, 0..40_u64, 0..20_u64), 0..20),
         passes in vec((0..40_u64, 0..20_u64), 0..20),
     ) {
-        let spans = spans.into_iter().map(|(thread, began, took)| span("work", thread, began, began + took)).collect();
-        let passes: Vec<_> = passes.into_iter().map(|(began, took)| pass("draw", began, began + took)).collect();
+        let spans = spans.into_iter().map(|(thread, began, duration)| span("work", thread, began, began + duration)).collect();
+        let passes: Vec<_> = passes.into_iter().map(|(began, duration)| pass("draw", began, began + duration)).collect();
         let count = passes.len();
         let device = Some(DeviceLog { name: "device".into(), error: at(0), passes });
         let log = Log { spans, threads: vec!["one".into(), "two".into()], device, ..log(vec![]) };
@@ -316,10 +316,10 @@ proptest! {
         let trace = Trace::of(&log);
         prop_assert_eq!(trace.slices("device").count(), count);
         for (thread, name) in ["one", "two"].into_iter().enumerate() {
-            let lanes: Vec<u64> =
-                trace.thread_names().into_iter().filter(|(.., lane)| lane.starts_with(name)).map(|(_, lane, _)| lane).collect();
+            let tracks: Vec<u64> =
+                trace.thread_names().into_iter().filter(|(.., track)| track.starts_with(name)).map(|(_, track, _)| track).collect();
             let mut found: Vec<_> =
-                trace.slices("span").filter(|slice| lanes.contains(&slice.thread)).map(|slice| (slice.began, slice.ended)).collect();
+                trace.slices("span").filter(|slice| tracks.contains(&slice.thread)).map(|slice| (slice.began, slice.ended)).collect();
             let own = log.spans.iter().filter(|span| span.thread == thread);
             let mut expected: Vec<_> =
                 own.map(|span| (span.began.as_nanos() as u64, span.ended.as_nanos() as u64)).collect();
