@@ -1,23 +1,23 @@
-//! The most accurate settings that fit into a budget.
+//! Searches the most accurate settings within a frame time budget.
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Scene};
 
 use crate::Failure;
+use crate::backend::BackendUnderTest;
 use crate::measure::time_along;
 use crate::results::Results;
 use crate::settings::{Knob, Setting};
-use crate::stage::Stage;
 
-/// From the most accurate settings on, turns down what saves most time for the error it makes, until a frame fits; then turns back up
-/// what it fits without, the greatest error first; and says what that is. What knobs save together is measured, since it is not the sum
-/// of what each saves alone.
+/// Starts at the most accurate settings, and turns down the knob that saves most time per error until a frame fits. Then turns knobs
+/// back up, greatest error first, as long as the frame still fits. Prints the result. Combinations are measured, as their savings do
+/// not add up.
 ///
 /// # Errors
-/// If a frame fails.
+/// Returns an error if a frame fails.
 pub fn answer(
     budget_ms: f64,
-    stage: &mut dyn Stage,
+    backend: &mut dyn BackendUnderTest,
     scene: &Scene,
     path: &[Camera],
     settings: &[Setting],
@@ -25,25 +25,25 @@ pub fn answer(
 ) -> Result<(), Failure> {
     let exact = Quality::exact();
     let mut time_of =
-        |quality: &Quality| Ok::<_, Failure>(time_along(stage, scene, path, quality)?.frame.as_secs_f64() * 1e3);
+        |quality: &Quality| Ok::<_, Failure>(time_along(backend, scene, path, quality)?.frame.as_secs_f64() * 1e3);
     let mut quality = exact;
     let mut time = time_of(&quality)?;
-    let mut turned: Vec<&Setting> = Vec::new();
+    let mut reduced: Vec<&Setting> = Vec::new();
     let mut steps = steps(settings, results);
     while time > budget_ms {
         let Some(step) = steps.pop() else {
-            println!("Nothing fits into {budget_ms} ms: with {} it is {time:.2} ms.", names(&turned));
+            println!("Nothing fits into {budget_ms} ms: with {} it is {time:.2} ms.", names(&reduced));
             return Ok(());
         };
         let changed = step.knob.changed(&quality, &step.quality);
-        // Some do not go together with what was turned before.
+        // Some settings exclude each other.
         if quality == changed || changed.check().is_err() {
             continue;
         }
         let faster = time_of(&changed)?;
         if faster < time {
-            turned.retain(|other| other.knob != step.knob);
-            turned.push(step);
+            reduced.retain(|other| other.knob != step.knob);
+            reduced.push(step);
             (quality, time) = (changed, faster);
         }
     }
@@ -54,7 +54,7 @@ pub fn answer(
             .find(|(setting, _)| setting.name == step.name && setting.knob == step.knob);
         entry.map_or(0.0, |(_, entry)| entry.rmse)
     };
-    let mut by_error = turned.clone();
+    let mut by_error = reduced.clone();
     by_error.sort_by(|one, other| error_of(other).total_cmp(&error_of(one)));
     for step in by_error {
         let changed = step.knob.changed(&quality, &exact);
@@ -63,26 +63,26 @@ pub fn answer(
         }
         let slower = time_of(&changed)?;
         if slower <= budget_ms {
-            turned.retain(|other| other.knob != step.knob);
+            reduced.retain(|other| other.knob != step.knob);
             (quality, time) = (changed, slower);
         }
     }
     println!("The most accurate found that fits into {budget_ms} ms takes {time:.2} ms:\n");
-    if turned.is_empty() {
+    if reduced.is_empty() {
         println!("Quality::exact()");
     } else {
-        println!("Quality::exact() with {}", names(&turned));
+        println!("Quality::exact() with {}", names(&reduced));
     }
     println!("\n{quality:#?}");
     Ok(())
 }
 
-fn names(turned: &[&Setting]) -> String {
-    let names: Vec<_> = turned.iter().map(|setting| format!("{}: {}", setting.knob.name(), setting.name)).collect();
+fn names(reduced: &[&Setting]) -> String {
+    let names: Vec<_> = reduced.iter().map(|setting| format!("{}: {}", setting.knob.name(), setting.name)).collect();
     names.join(", ")
 }
 
-/// What to turn down, the best last: by the time it saves for the error that it makes.
+/// The settings to turn down, the best last, by saved time per error.
 fn steps<'a>(settings: &'a [Setting], results: &Results) -> Vec<&'a Setting> {
     let Some(exact) = results.entries.first() else { return Vec::new() };
     let alone = settings.iter().zip(&results.entries).filter(|(setting, _)| setting.knob != Knob::Preset);
@@ -90,12 +90,12 @@ fn steps<'a>(settings: &'a [Setting], results: &Results) -> Vec<&'a Setting> {
         .filter(|(_, entry)| entry.frame_ns < exact.frame_ns)
         .map(|(setting, entry)| {
             let saved = (exact.frame_ns - entry.frame_ns) as f64;
-            (saved / entry.rmse.max(SMALLEST_ERROR), setting)
+            (saved / entry.rmse.max(MIN_ERROR), setting)
         })
         .collect();
     steps.sort_by(|(one, _), (other, _)| one.total_cmp(other));
     steps.into_iter().map(|(_, setting)| setting).collect()
 }
 
-/// Of a picture of bytes, a difference below this is none.
-const SMALLEST_ERROR: f64 = 1e-6;
+/// Smaller differences of pictures of bytes count as this.
+const MIN_ERROR: f64 = 1e-6;

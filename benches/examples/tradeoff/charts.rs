@@ -1,4 +1,4 @@
-//! A chart for each knob: what its settings take, how far off they are and can be, and how far their pictures are. And one of all.
+//! A chart per knob, and one of all knobs: frame times, errors with their bounds, and the distances of pictures.
 
 use std::path::Path;
 
@@ -13,11 +13,11 @@ use crate::settings::Knob;
 /// Writes `KNOB.svg` into the folder for each knob, and `knobs.svg` with all of them.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     for knob in Knob::ALL {
         let entries = of_knob(&results.entries, knob);
-        // That of exact's entry is another's.
+        // The entry of exact has another metric.
         let metric = entries.iter().find(|entry| entry.knob == knob.name()).map_or("", |entry| &entry.metric);
         let own = Column {
             title: metric.to_owned(),
@@ -28,11 +28,11 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         };
         draw_one(&folder.join(file_name(knob)), knob.name(), results, &entries, own)?;
     }
-    // Each has a unit of its own, so they have their bounds in common.
+    // Units differ, so errors are shown relative to their bounds.
     let of_bound = Column {
         title: String::from("error, % of its bound"),
         value: &|entry| entry.error.zip(entry.bound).map(|(error, bound)| share(error, bound) * 100.0),
-        bound: &nothing,
+        bound: &none,
         longest: Some(100.0),
         color: RGBColor(213, 94, 0),
     };
@@ -47,16 +47,16 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How much of its bound an error is; nothing is all right where nothing may be wrong.
+/// The error as a share of its bound; 0 of 0 is 0.
 fn share(error: f64, bound: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / bound }
 }
 
-fn nothing(_: &Entry) -> Option<f64> {
+fn none(_: &Entry) -> Option<f64> {
     None
 }
 
-/// The file of a knob's chart.
+/// The file name of a knob's chart.
 pub fn file_name(knob: Knob) -> String {
     format!("{}.svg", knob.name())
 }
@@ -66,19 +66,19 @@ const HEAD: i32 = 66;
 const ROW: i32 = 26;
 const NAMES: i32 = 250;
 const COLUMN: i32 = 220;
-/// Between a bar's longest and the next column: room for its figure.
+/// Space for values between columns.
 const FIGURE: i32 = 90;
 
-/// Times the bar in the middle: longer ones are cut.
-const MOST: f64 = 6.0;
+/// Bars longer than this multiple of the median bar are cut.
+const MAX_LENGTH: f64 = 6.0;
 
-/// What a column of bars shows.
+/// A column of bars.
 struct Column<'a> {
     title: String,
     value: &'a dyn Fn(&Entry) -> Option<f64>,
-    /// What it can be at most.
+    /// The bound of the value.
     bound: &'a dyn Fn(&Entry) -> Option<f64>,
-    /// How long a bar can be; from what there is, if not given.
+    /// The value of the longest bar. Default: from the values.
     longest: Option<f64>,
     color: RGBColor,
 }
@@ -104,27 +104,27 @@ fn draw_one(
         Column {
             title: String::from("a frame, ms"),
             value: &|entry| Some(entry.frame_ms()),
-            bound: &nothing,
+            bound: &none,
             longest: None,
             color: RGBColor(0, 114, 178),
         },
         Column {
             title: String::from("picture: RMSE from f64, of 255"),
             value: &|entry| Some(entry.rmse_from_reference * 255.0),
-            bound: &nothing,
+            bound: &none,
             longest: None,
             color: RGBColor(230, 159, 0),
         },
         of_knobs,
     ];
-    for (place, column) in (0..).zip(&columns) {
-        draw_column(&root, NAMES + place * (COLUMN + FIGURE), column, entries)?;
+    for (index, column) in (0..).zip(&columns) {
+        draw_column(&root, NAMES + index * (COLUMN + FIGURE), column, entries)?;
     }
     root.present()?;
     Ok(())
 }
 
-/// Bars from 0 on, each with its figure, and a mark where it can end at most. Those that are cut have dots before it.
+/// Draws bars with their values, and a mark at the bound. Values of cut bars begin with dots.
 fn draw_column(
     root: &DrawingArea<SVGBackend<'_>, Shift>,
     left: i32,
@@ -145,27 +145,27 @@ fn draw_column(
         let style = text(13).pos(Pos::new(HPos::Left, VPos::Center));
         root.draw(&Text::new(figure, (end + 6, top + ROW / 2), style))?;
         if let Some(bound) = bound.filter(|bound| *bound <= longest) {
-            let place = left + (bound / longest * f64::from(COLUMN)) as i32;
-            root.draw(&PathElement::new([(place, top + 2), (place, top + ROW - 2)], BLACK.stroke_width(2)))?;
+            let x = left + (bound / longest * f64::from(COLUMN)) as i32;
+            root.draw(&PathElement::new([(x, top + 2), (x, top + ROW - 2)], BLACK.stroke_width(2)))?;
         }
     }
     Ok(())
 }
 
-/// The longest bar. What is many times as long as most would leave nothing to see of these.
+/// The longest bar. It is limited, as an outlier would hide the others.
 fn longest(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<_> = values.collect();
     values.sort_by(f64::total_cmp);
     let middle = values.get(values.len() / 2).copied().unwrap_or_default();
     let longest = values.last().copied().unwrap_or_default();
-    if middle > 0.0 { longest.min(middle * MOST) } else { longest.max(f64::MIN_POSITIVE) }
+    if middle > 0.0 { longest.min(middle * MAX_LENGTH) } else { longest.max(f64::MIN_POSITIVE) }
 }
 
 pub fn text(size: i32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&BLACK)
 }
 
-/// What a setting is called in a chart of this knob.
+/// The label of a setting in a chart of this knob.
 pub fn label(entry: &Entry, knob: &str) -> String {
     if entry.knob == knob || entry.knob == Knob::Preset.name() {
         entry.setting.clone()

@@ -1,4 +1,4 @@
-//! How far pictures are apart.
+//! Distances between pictures.
 
 use drawloom::backend::Picture;
 use image::{RgbImage, RgbaImage};
@@ -6,24 +6,24 @@ use image_compare::Algorithm;
 
 use crate::Failure;
 
-/// How far a picture is from another.
+/// The distance of two pictures.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Distance {
-    /// Root of the mean square over pixels and channels, 0 to 1.
+    /// Root mean square error over pixels and channels, 0 to 1.
     pub rmse: f64,
-    /// Structural similarity in the mean: 1 for two that are the same.
+    /// Mean structural similarity: 1 for equal pictures.
     pub mssim: f64,
-    /// What eyes see of the difference, 0 to 1 (Andersson et al. 2020); only with the feature `flip`.
+    /// The visible difference, 0 to 1 (FLIP, Andersson et al. 2020); only with the feature `flip`.
     pub flip: Option<f64>,
 }
 
 impl Distance {
     /// # Errors
-    /// If the two differ in size.
+    /// Returns an error if the two differ in size.
     pub fn between(one: &Picture, other: &Picture) -> Result<Self, Failure> {
         let (one, other) = (without_alpha(one)?, without_alpha(other)?);
         if one.dimensions() != other.dimensions() {
-            return Err("pictures of two sizes cannot be compared".into());
+            return Err("pictures of different sizes cannot be compared".into());
         }
         let squares =
             one.as_raw().iter().zip(other.as_raw()).map(|(one, other)| f64::from(one.abs_diff(*other)).powi(2));
@@ -32,7 +32,7 @@ impl Distance {
         Ok(Self { rmse, mssim, flip: flip(&one, &other) })
     }
 
-    /// Of several pairs together.
+    /// The distance of several pairs together.
     pub fn together(distances: &[Self]) -> Self {
         let count = distances.len().max(1) as f64;
         let mean = |of: fn(&Self) -> f64| distances.iter().map(of).sum::<f64>() / count;
@@ -53,7 +53,7 @@ pub fn share_that_differs(one: &Picture, other: &Picture, tolerance: u8) -> f64 
     pixels.filter(differs).count() as f64 / (one.bytes.len() / 4).max(1) as f64
 }
 
-/// As `image` has it.
+/// Converts to an RGB image.
 pub fn without_alpha(picture: &Picture) -> Result<RgbImage, Failure> {
     let image = RgbaImage::from_raw(picture.width, picture.height, picture.bytes.clone());
     Ok(image::DynamicImage::ImageRgba8(image.ok_or("the bytes do not fit the size")?).to_rgb8())

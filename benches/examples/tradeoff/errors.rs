@@ -1,5 +1,5 @@
-//! How far off a knob is, in its own unit, and how far it can be. Bounds are derived here or in the knob's documentation, from what it
-//! does, and never from what was measured.
+//! The error of each knob in its own unit, and its bound. Bounds are derived here or in the knob's documentation from what the knob does,
+//! never from measurements.
 
 use std::f64::consts::PI;
 
@@ -14,21 +14,21 @@ use crate::settings::{Knob, Setting};
 use crate::targets::{colors, directions};
 use crate::vertices;
 
-/// How far off a knob is.
+/// The error of a knob.
 pub struct KnobError {
-    /// None where the scene has nothing that the knob is about.
+    /// `None` if the knob affects nothing in the scene.
     pub error: Option<f64>,
     pub metric: &'static str,
-    /// None where nobody knows.
+    /// `None` if no bound is known.
     pub bound: Option<f64>,
     /// What the error is measured against.
     pub oracle: &'static str,
 }
 
-/// What was measured of a setting.
+/// The measurement of one setting.
 struct Case<'a> {
     scene: &'a Scene,
-    /// At the last place of the path.
+    /// At the last position of the path.
     camera: &'a Camera,
     quality: &'a Quality,
     measured: &'a Measurement,
@@ -36,7 +36,7 @@ struct Case<'a> {
 }
 
 /// # Errors
-/// If a target cannot be understood.
+/// Returns an error if a target cannot be decoded.
 pub fn of(
     setting: &Setting,
     scene: &Scene,
@@ -44,22 +44,22 @@ pub fn of(
     measurements: &Measurements,
     measured: &Measurement,
 ) -> Result<KnobError, Failure> {
-    let camera = path.last().ok_or("the path has no place")?;
-    let exact = measurements.of_settings.first().ok_or("nothing was measured")?;
+    let camera = path.last().ok_or("the path has no position")?;
+    let exact = measurements.settings.first().ok_or("nothing was measured")?;
     let case = Case { scene, camera, quality: &setting.quality, measured, exact };
     match setting.knob {
         Knob::Preset => Ok(KnobError {
             error: Some(measured.from_reference.rmse * 255.0),
             metric: "RMSE of 255",
-            // What a device may make of the same frame in f32, asked of `exact` alone.
+            // The bound holds for `exact` alone: the error of a device that draws the same frame in f32.
             bound: (setting.name == "exact").then_some(2.0),
             oracle: "f64 reference",
         }),
-        Knob::OpaqueOrder => Ok(case.order(setting.quality.opaque_order, &measured.insides.opaque, Blend::None)),
-        Knob::BlendedOrder => Ok(case.order(setting.quality.blended_order, &measured.insides.blended, Blend::Alpha)),
-        // It takes away nothing that is seen.
+        Knob::OpaqueOrder => Ok(case.order(setting.quality.opaque_order, &measured.contents.opaque, Blend::None)),
+        Knob::BlendedOrder => Ok(case.order(setting.quality.blended_order, &measured.contents.blended, Blend::Alpha)),
+        // Culling must not remove visible objects.
         Knob::Culling => Ok(KnobError { bound: Some(0.0), ..case.pixels_that_differ() }),
-        // It says something only where something is hidden.
+        // It has an effect only if an object is occluded.
         Knob::Occlusion => {
             let error = (measured.occluded > 0).then_some(measured.differing[0]);
             Ok(KnobError { error, bound: Some(0.0), ..case.pixels_that_differ() })
@@ -68,7 +68,7 @@ pub fn of(
         Knob::Normals | Knob::Vertices => case.normals(setting.knob),
         Knob::Diffuse => case.diffuse(),
         Knob::ShadowSide | Knob::ShadowFilter | Knob::ShadowBias | Knob::ShadowInterval => {
-            Ok(case.pixels_seen_to_differ())
+            Ok(case.pixels_that_visibly_differ())
         }
         Knob::ShadowEdge => Ok(case.shadow_edges()),
         Knob::LightCutOff => case.light_cut_off(),
@@ -81,7 +81,7 @@ pub fn of(
         Knob::Transforms => Ok(KnobError {
             error: vertices::greatest_error(scene, camera, setting.quality.transforms),
             metric: "pixels",
-            // What is asked of places relative to the camera, wherever the world's origin is.
+            // The bound holds for camera-relative transforms, at any distance from the world's origin.
             bound: (setting.quality.transforms == TransformPrecision::CameraRelative).then_some(1e-3),
             oracle: "f64 from the camera's definition",
         }),
@@ -94,20 +94,19 @@ impl Case<'_> {
         KnobError { error: Some(self.measured.differing[0]), metric, bound: None, oracle: "exact" }
     }
 
-    fn pixels_seen_to_differ(&self) -> KnobError {
+    fn pixels_that_visibly_differ(&self) -> KnobError {
         let metric = "share of pixels off by more than 3 of 255";
         KnobError { error: Some(self.measured.differing[1]), metric, bound: None, oracle: "exact" }
     }
 
-    /// The greatest distance by which an object is drawn too early, of those that the order is about: opaque ones of one mesh and
-    /// state, and all blended ones. It is at most [`DepthKey::step`], and what distances are off by because they are f32: some ten
-    /// roundings of 2⁻²⁴ each.
+    /// The greatest depth difference of two objects in the wrong order. The order applies to opaque objects of one mesh and state, and
+    /// to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: some ten roundings of 2⁻²⁴ each.
     fn order(&self, key: DepthKey, commands: &[RenderCommand], blend: Blend) -> KnobError {
         let is_opaque = blend == Blend::None;
         let runs = commands.chunk_by(|one, other| !is_opaque || (one.mesh, one.state) == (other.mesh, other.state));
         let mut worst: Option<f64> = None;
         for run in runs {
-            // Opaque ones go from near to far, so each is to be compared with the farthest before it; blended ones the other way round.
+            // Opaque objects are sorted front to back, so each is compared with the farthest before it; blended ones back to front.
             let mut extreme: Option<f64> = None;
             for command in run {
                 let depth = self.depth_of(command.object as usize);
@@ -126,63 +125,63 @@ impl Case<'_> {
         KnobError { error: worst, metric: "of the key's step in the wrong order", bound: Some(1.0), oracle }
     }
 
-    /// Along the view's axis, of the middle of the object's bounds.
+    /// The depth of the centre of the object's bounds, along the view's axis.
     fn depth_of(&self, object: usize) -> f64 {
         let scene = self.scene.as_scene_ref();
         let local = scene.scales[object].as_dvec3() * scene.bounds[object].center.as_dvec3();
         let center = scene.positions[object] + scene.orientations[object].as_dquat().normalize() * local;
         let forward = self.camera.orientation.as_dquat().normalize() * drawloom::glam::DVec3::NEG_Z;
-        // What lies behind the camera counts as there.
+        // Objects behind the camera count as depth 0.
         forward.dot(center - self.camera.position).max(0.0)
     }
 
-    /// The greatest angle between a pixel's normal and what `exact` has there, of either side. Both cover the same pixels.
+    /// The greatest angle between a pixel's normal and that of `exact`, ignoring the side. Both cover the same pixels.
     ///
-    /// `exact` is itself off by as much as its format is. A packed vertex's normal is off by δ; a mixture of three normals at no more than
-    /// right angles is at least 1/√3 as long as they are, so its direction is off by √3·δ at most. Where a mesh has a triangle with
-    /// others, or an object is scaled unevenly, which turns normals farther, nothing is known.
+    /// `exact` has the error of its own format. A packed vertex's normal has the error δ. An interpolation of three normals at right
+    /// angles at most is at least 1/√3 as long as they are, so its direction has the error √3·δ at most. No bound is known if a triangle
+    /// has larger angles, or if an object is scaled non-uniformly, which rotates normals farther.
     fn normals(&self, knob: Knob) -> Result<KnobError, Failure> {
-        let own = directions(&self.measured.insides.normal, self.quality.normals)?;
-        let exact = directions(&self.exact.insides.normal, Quality::exact().normals)?;
+        let own = directions(&self.measured.contents.normal, self.quality.normals)?;
+        let exact = directions(&self.exact.contents.normal, Quality::exact().normals)?;
         let angles = own.iter().zip(&exact).filter_map(|(one, other)| {
             let (one, other) = ((*one)?, (*other)?);
-            // The cross product tells small angles, which a cosine does not.
+            // The cross product resolves small angles, which a cosine does not.
             Some(one.cross(other).length().atan2(one.dot(other).abs()).to_degrees())
         });
         let bound = match knob {
             Knob::Vertices => {
                 let of_mixtures = 3.0_f64.sqrt() * self.quality.vertices.max_normal_error_degrees();
-                vertices::normals_are_tame(self.scene)
+                vertices::normals_are_bounded(self.scene)
                     .then_some(of_mixtures + 2.0 * Quality::exact().normals.max_error_degrees())
             }
             _ => Some(self.quality.normals.max_error_degrees() + Quality::exact().normals.max_error_degrees()),
         };
-        let error = angles.reduce(worse);
+        let error = angles.reduce(worst_of);
         Ok(KnobError { error, metric: "degrees", bound, oracle: "the same target of exact" })
     }
 
-    /// The greatest difference of a pixel's diffuse colour from what `exact` has there, in steps of sRGB bytes.
+    /// The greatest difference of a pixel's diffuse colour from that of `exact`, in steps of sRGB bytes.
     ///
-    /// Half a step from rounding to bytes, of which devices may be off by another tenth (Direct3D 11.3 functional specification,
-    /// 3.2.3.6), and 255 · 0.44 · 2⁻¹⁰ from the half float on the other side: cut short, it is off by 2⁻¹⁰ of itself, and the curve is
-    /// nowhere steeper than that times 1.055 / 2.4.
+    /// The bound is half a step from rounding to bytes, a tenth of a step for devices (Direct3D 11.3 functional specification, 3.2.3.6),
+    /// and 255 · 0.44 · 2⁻¹⁰ from the half float of `exact`: truncation has a relative error of 2⁻¹⁰, and the curve magnifies it by
+    /// 1.055 / 2.4 at most.
     fn diffuse(&self) -> Result<KnobError, Failure> {
-        let (own, exact) = (colors(&self.measured.insides.diffuse)?, colors(&self.exact.insides.diffuse)?);
+        let (own, exact) = (colors(&self.measured.contents.diffuse)?, colors(&self.exact.contents.diffuse)?);
         let steps = own.iter().zip(&exact).flat_map(|(one, other)| {
-            [0, 1, 2].map(|channel| (encoded(one[channel]) - encoded(other[channel])).abs() * 255.0)
+            [0, 1, 2].map(|channel| (srgb_encoded(one[channel]) - srgb_encoded(other[channel])).abs() * 255.0)
         });
-        let error = steps.reduce(worse);
+        let error = steps.reduce(worst_of);
         Ok(KnobError { error, metric: "steps of 1/255", bound: Some(0.6 + 0.11), oracle: "the same target of exact" })
     }
 
-    /// The greatest difference of a pixel's radiance from what `exact` has there.
+    /// The greatest difference of a pixel's radiance from that of `exact`.
     ///
-    /// Each light is off by 1.089 times the cut-off at most ([`Quality::light_cut_off`]), of which a surface reflects its diffuse share
-    /// over π; whatever covers it by its opacity only takes from that, and each additive or subtractive object may add as much
-    /// again. Half floats that are cut short are off by 2⁻¹⁰ of what is there for each light. Where such a light casts shadows its map
-    /// ends with it, and so a shadow's edge may move: nothing is known then.
+    /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]), of which a surface reflects its diffuse
+    /// share over π. Alpha-blended objects in front reduce it, and each additive or subtractive object may add as much again.
+    /// Truncation to half floats adds 2⁻¹⁰ of the radiance per light. No bound is known if such a light casts shadows: its map ends
+    /// with its range, so a shadow's edge may move.
     fn light_cut_off(&self) -> Result<KnobError, Failure> {
-        let (own, exact) = (colors(&self.measured.insides.radiance)?, colors(&self.exact.insides.radiance)?);
+        let (own, exact) = (colors(&self.measured.contents.radiance)?, colors(&self.exact.contents.radiance)?);
         let differences = own
             .iter()
             .zip(&exact)
@@ -192,18 +191,18 @@ impl Case<'_> {
         let lights = scene.lights.iter().filter(|light| !matches!(light, Light::Directional { .. })).count();
         let materials = || scene.assets.iter::<Material>().map(|(_, material)| material);
         let diffuse = materials().map(|material| f64::from(material.diffuse.max_element())).fold(1.0, f64::max);
-        let adds = |object: usize| {
+        let is_added = |object: usize| {
             let material = scene.assets.get(scene.materials[object]);
             material.is_ok_and(|material| matches!(material.blend, Blend::Additive | Blend::Subtractive))
         };
-        let layers = 1 + (0..scene.object_count()).filter(|&object| adds(object)).count();
+        let layers = 1 + (0..scene.object_count()).filter(|&object| is_added(object)).count();
         let of_light = 1.089 * f64::from(self.quality.light_cut_off) * diffuse / PI;
         let bound = (of_light * lights as f64 + brightest * lights as f64 * 2_f64.powi(-10)) * layers as f64;
         let has_maps = scene.lights.iter().any(|light| match *light {
             Light::Spot { casts_shadow, .. } | Light::Hemispherical { casts_shadow, .. } => casts_shadow,
             _ => false,
         });
-        let error = if lights == 0 { None } else { differences.reduce(worse) };
+        let error = if lights == 0 { None } else { differences.reduce(worst_of) };
         Ok(KnobError {
             error,
             metric: "radiance",
@@ -212,7 +211,7 @@ impl Case<'_> {
         })
     }
 
-    /// How far an edge is drawn from where a paraboloid shows it, in pixels of a map of 1024. The bounds are those of Brabec et al.
+    /// The distance of a drawn edge from its paraboloid projection, in pixels of a map of 1024. The bounds are those of Brabec et al.
     /// (2002) for edges of that angle.
     fn shadow_edges(&self) -> KnobError {
         let bound = match self.quality.shadows.widest_edge {
@@ -222,16 +221,16 @@ impl Case<'_> {
             edge if edge <= 20.0 => 7.7,
             _ => 38.0,
         };
-        let error = paraboloid::greatest_error(self.scene, &self.measured.insides.shadow_maps);
+        let error = paraboloid::greatest_error(self.scene, &self.measured.contents.shadow_maps);
         KnobError { error, metric: "pixels of a map of 1024", bound: Some(bound), oracle: "f64 along each edge" }
     }
 }
 
-/// The greater; what is no number is worst.
-pub fn worse(one: f64, other: f64) -> f64 {
+/// The greater of two errors; NaN counts as the greatest.
+pub fn worst_of(one: f64, other: f64) -> f64 {
     if one.is_nan() || one > other { one } else { other }
 }
 
-fn encoded(linear: f64) -> f64 {
+fn srgb_encoded(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

@@ -1,4 +1,4 @@
-//! The Pareto front as a picture: what each setting takes, and how far its picture is from the reference.
+//! The chart of the Pareto front: frame time against distance from the reference.
 
 use std::path::Path;
 
@@ -10,18 +10,18 @@ use crate::charts::{label, text};
 use crate::results::{Entry, Results};
 use crate::settings::Knob;
 
-/// Writes `front.svg` into the folder: a dot for each setting, and a line through those to which no other is preferable.
+/// Writes `front.svg` into the folder: a dot for each setting, and a line through the Pareto front.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     let path = folder.join("front.svg");
     let root = SVGBackend::new(&path, (WIDTH, 420)).into_drawing_area();
     root.fill(&WHITE)?;
-    let places = || results.entries.iter().map(place);
-    let slowest = places().map(|(time, _)| time).fold(f64::MIN_POSITIVE, f64::max);
-    let nearest = places().map(|(_, distance)| distance).fold(f64::MAX, f64::min);
-    let farthest = places().map(|(_, distance)| distance).fold(nearest, f64::max);
+    let points = || results.entries.iter().map(point);
+    let slowest = points().map(|(time, _)| time).fold(f64::MIN_POSITIVE, f64::max);
+    let nearest = points().map(|(_, distance)| distance).fold(f64::MAX, f64::min);
+    let farthest = points().map(|(_, distance)| distance).fold(nearest, f64::max);
     let mut chart = ChartBuilder::on(&root)
         .caption(format!("{}, {}", results.scene(), results.backend()), text(17))
         .margin(12)
@@ -39,14 +39,14 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         .y_desc("RMSE of 255 from the reference in f64")
         .draw()?;
     let others = results.entries.iter().filter(|entry| !entry.pareto);
-    chart.draw_series(others.map(|entry| Circle::new(place(entry), 4, OTHERS.filled())))?;
+    chart.draw_series(others.map(|entry| Circle::new(point(entry), 4, OTHERS.filled())))?;
     let front = results.front();
-    chart.draw_series(LineSeries::new(front.iter().map(|entry| place(entry)), FRONT.stroke_width(2)))?;
-    chart.draw_series(front.iter().map(|entry| Circle::new(place(entry), 5, FRONT.filled())))?;
+    chart.draw_series(LineSeries::new(front.iter().map(|entry| point(entry)), FRONT.stroke_width(2)))?;
+    chart.draw_series(front.iter().map(|entry| Circle::new(point(entry), 5, FRONT.filled())))?;
     let numbered = || front.iter().enumerate().map(|(index, entry)| (index + 1, entry));
     chart.draw_series(numbered().map(|(number, entry)| {
         let style = text(13).color(&FRONT).pos(Pos::new(HPos::Center, VPos::Center));
-        EmptyElement::at(place(entry)) + Text::new(number.to_string(), (0, -14), style)
+        EmptyElement::at(point(entry)) + Text::new(number.to_string(), (0, -14), style)
     }))?;
     for (number, entry) in numbered() {
         let name = format!("{number}  {}", label(entry, Knob::Preset.name()));
@@ -57,14 +57,14 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
     Ok(())
 }
 
-/// In pixels: the picture, and the names to the right of what they are of.
+/// In pixels: the chart, and the names to its right.
 const WIDTH: u32 = 960;
 const NAMES: i32 = 210;
 
 const FRONT: RGBColor = RGBColor(213, 94, 0);
 const OTHERS: RGBAColor = RGBAColor(0, 114, 178, 0.45);
 
-/// A frame in milliseconds, and the distance of 255; there is no place for 0 on a scale of factors.
-fn place(entry: &Entry) -> (f64, f64) {
+/// The frame time in milliseconds, and the distance of 255. The logarithmic scale has no 0.
+fn point(entry: &Entry) -> (f64, f64) {
     (entry.frame_ms(), (entry.rmse_from_reference * 255.0).max(1e-3))
 }

@@ -1,9 +1,10 @@
-//! What accuracy costs on a scene: every knob of `Quality` alone, and the presets, with what each saves and how far off it is.
+//! What accuracy costs on a scene: measures the frame time and the error of every knob of `Quality` alone, and of the presets.
 //!
 //!     cargo run --release -p drawloom-benches --example tradeoff
 //!     cargo run --release -p drawloom-benches --example tradeoff -- scene.obj --camera-path orbit --budget-ms 8
 
 mod arguments;
+mod backend;
 mod budget;
 mod camera_path;
 mod charts;
@@ -15,7 +16,6 @@ mod page;
 mod paraboloid;
 mod results;
 mod settings;
-mod stage;
 mod targets;
 mod vertices;
 
@@ -31,7 +31,6 @@ use arguments::Arguments;
 use measure::Measurements;
 use results::Results;
 
-/// What may go wrong here, to be printed.
 type Failure = Box<dyn Error>;
 
 fn main() -> ExitCode {
@@ -46,8 +45,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// How many triangles nobody sees: what culling them on the CPU would save the device (S 9.6).
-fn tell_triangles(scene: &Scene, path: &[Camera]) {
+/// Prints how many triangles are not visible: what culling them on the CPU would save the device (S 9.6).
+fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
     let Some(view) = path.first().map(RenderView::new) else { return };
     let (scene, mut kept) = (scene.as_scene_ref(), Vec::new());
     let mut culled = CulledTriangles::default();
@@ -58,8 +57,8 @@ fn tell_triangles(scene: &Scene, path: &[Camera]) {
     }
     let each = start.elapsed().as_nanos() as f64 / culled.triangles.max(1) as f64;
     println!(
-        "triangles: {}, of which the CPU could leave out {:.1}%: {} face away, {} are outside of the picture, {} cover no pixel, {} \
-         are none; {each:.0} ns each\n",
+        "triangles: {}, of which the CPU could cull {:.1}%: {} face away, {} are off screen, {} cover no pixel, {} \
+         are degenerate; {each:.0} ns each\n",
         culled.triangles,
         culled.share() * 100.0,
         culled.back_facing,
@@ -69,21 +68,21 @@ fn tell_triangles(scene: &Scene, path: &[Camera]) {
     );
 }
 
-/// Whether every error measured is within its bound.
+/// Returns whether every measured error is within its bound.
 fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let scene = arguments.load_scene()?;
     let path = camera_path::of(&scene, arguments)?;
     let settings = settings::all();
-    let mut stage = stage::open(arguments)?;
-    println!("drawn by {}", stage.name());
+    let mut backend = backend::open(arguments)?;
+    println!("drawn by {}", backend.name());
 
-    let measurements = Measurements::take(&mut *stage, &scene, &path, &settings, arguments)?;
-    let results = Results::new(arguments.scene_name(), stage.name(), &scene, &path, &settings, &measurements)?;
+    let measurements = Measurements::take(&mut *backend, &scene, &path, &settings, arguments)?;
+    let results = Results::new(arguments.scene_name(), backend.name(), &scene, &path, &settings, &measurements)?;
     results.print();
-    tell_triangles(&scene, &path);
+    print_culled_triangles(&scene, &path);
 
     let folder = drawloom_benches::results::folder()?;
-    let pictures = folder.join("tradeoff").join(format!("{}-{}", results.scene(), stage.kind()));
+    let pictures = folder.join("tradeoff").join(format!("{}-{}", results.scene(), backend.kind()));
     std::fs::create_dir_all(&pictures)?;
     results.write(&folder.join("tradeoff.json"))?;
     charts::draw(&pictures, &results)?;
@@ -91,7 +90,7 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     page::write(&pictures, &results, &measurements)?;
 
     if let Some(budget) = arguments.budget_ms {
-        budget::answer(budget, &mut *stage, &scene, &path, &settings, &results)?;
+        budget::answer(budget, &mut *backend, &scene, &path, &settings, &results)?;
     }
     let exceeded: Vec<_> = results.exceeded().collect();
     for entry in &exceeded {

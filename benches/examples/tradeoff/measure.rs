@@ -11,79 +11,78 @@ use drawloom_benches::statistics::median_duration;
 
 use crate::Failure;
 use crate::arguments::Arguments;
+use crate::backend::{self, BackendUnderTest, FrameTime};
 use crate::comparison::{Distance, share_that_differs};
 use crate::settings::Setting;
-use crate::stage::{self, FrameTime, Stage};
 
-/// What was measured of all settings, in their order.
+/// The measurements of all settings, in their order.
 pub struct Measurements {
-    pub of_settings: Vec<Measurement>,
-    /// What the reference draws at each place of the path.
+    pub settings: Vec<Measurement>,
+    /// The reference's picture at each position of the path.
     pub reference: Vec<Picture>,
 }
 
-/// What was measured of a setting.
+/// The measurement of one setting.
 pub struct Measurement {
-    /// Of the mean frame along the path, of each round.
+    /// Mean times along the path, by round.
     pub times: Vec<FrameTime>,
-    /// At the path's first place.
+    /// At the first position of the path.
     pub picture: Picture,
-    /// At the last place of the path.
-    pub insides: Insides,
-    /// From the pictures of [`Quality::exact`](drawloom::quality::Quality::exact).
+    /// At the last position of the path.
+    pub contents: FrameContents,
+    /// The distance from the pictures of [`Quality::exact`].
     pub from_exact: Distance,
-    /// From the reference's pictures.
+    /// The distance from the reference's pictures.
     pub from_reference: Distance,
-    /// The largest share of pixels that differ at all from those of exact, at one place; and by more than what is seen.
+    /// The largest share of pixels at one position that differ from those of exact: at all, and by more than [`VISIBLE`].
     pub differing: [f64; 2],
-    /// Objects that were left out because others hide them, in all pictures.
+    /// Objects that occlusion culling removed, in all pictures.
     pub occluded: usize,
 }
 
-/// Of 255: what a look from one picture to the other shows.
+/// The least difference of 255 that is visible when switching between two pictures.
 const VISIBLE: u8 = 3;
 
-/// What a frame was made of.
-pub struct Insides {
-    /// What the geometry buffer drew, in order.
+/// The commands and targets of a frame.
+pub struct FrameContents {
+    /// The geometry buffer's commands, in order.
     pub opaque: Vec<RenderCommand>,
-    /// What the transparency drew, in order.
+    /// The transparency's commands, in order.
     pub blended: Vec<RenderCommand>,
-    /// Of each shadow map, its light's index in the scene and what was drawn into it.
+    /// The light's index in the scene and the commands of each shadow map.
     pub shadow_maps: Vec<(usize, Vec<RenderCommand>)>,
     pub normal: Picture,
     pub diffuse: Picture,
     pub radiance: Picture,
 }
 
-impl Insides {
-    /// Of the frame drawn last.
+impl FrameContents {
+    /// Reads the last frame.
     ///
     /// # Errors
-    /// If a target cannot be read.
-    fn of(stage: &dyn Stage) -> Result<Self, Failure> {
+    /// Returns an error if a target cannot be read.
+    fn of(backend: &dyn BackendUnderTest) -> Result<Self, Failure> {
         let light_of = |name: &String| name.strip_prefix("shadow of light ")?.parse().ok();
-        let maps = stage.views().iter().enumerate().filter_map(|(view, name)| Some((view, light_of(name)?)));
+        let maps = backend.views().iter().enumerate().filter_map(|(view, name)| Some((view, light_of(name)?)));
         Ok(Self {
-            opaque: stage.commands("geometry buffer", 0),
-            blended: stage.commands("transparency", 0),
-            shadow_maps: maps.map(|(view, light)| (light, stage.commands("shadow casters", view))).collect(),
-            normal: stage.read("normal")?,
-            diffuse: stage.read("diffuse")?,
-            radiance: stage.read("radiance")?,
+            opaque: backend.commands("geometry buffer", 0),
+            blended: backend.commands("transparency", 0),
+            shadow_maps: maps.map(|(view, light)| (light, backend.commands("shadow casters", view))).collect(),
+            normal: backend.read("normal")?,
+            diffuse: backend.read("diffuse")?,
+            radiance: backend.read("radiance")?,
         })
     }
 }
 
-/// Frames drawn before those that count: pipelines are made, memory is there, and a view has found out whether it pays to look for
-/// what is hidden.
-const UNCOUNTED: usize = 6;
+/// Warm-up frames: pipelines are created, memory is allocated, and views decide whether occlusion culling is worth it.
+const WARM_UP: usize = 6;
 
 impl Measurements {
     /// # Errors
-    /// If a frame fails.
+    /// Returns an error if a frame fails.
     pub fn take(
-        stage: &mut dyn Stage,
+        backend: &mut dyn BackendUnderTest,
         scene: &Scene,
         path: &[Camera],
         settings: &[Setting],
@@ -94,24 +93,24 @@ impl Measurements {
         progress.set_length((path.len() + settings.len()) as u64);
 
         let mut reference = Vec::new();
-        let mut judge = stage::reference()?;
+        let mut reference_backend = backend::reference()?;
         for camera in path {
             progress.set_message("the reference in f64");
-            judge.draw(seen_from(scene, camera))?;
-            reference.push(judge.read("picture")?);
+            reference_backend.draw(seen_from(scene, camera))?;
+            reference.push(reference_backend.read("picture")?);
             progress.inc(1);
         }
-        drop(judge);
+        drop(reference_backend);
 
         let mut exact: Vec<Picture> = Vec::new();
-        let mut of_settings: Vec<Measurement> = Vec::new();
+        let mut measurements: Vec<Measurement> = Vec::new();
         for (index, setting) in settings.iter().enumerate() {
             progress.set_message(format!("pictures of {}: {}", setting.knob.name(), setting.name));
-            let drawn = draw_pictures(stage, scene, path, setting)?;
+            let drawn = draw_pictures(backend, scene, path, setting)?;
             if index == 0 {
                 exact.clone_from(&drawn.pictures);
             }
-            of_settings.push(drawn.compare(stage, &exact, &reference, rounds == 0)?);
+            measurements.push(drawn.compare(backend, &exact, &reference, rounds == 0)?);
             progress.inc(1);
         }
 
@@ -120,61 +119,61 @@ impl Measurements {
             &mut contenders,
             |setting, _round| {
                 progress.set_message(format!("times of {}: {}", setting.knob.name(), setting.name));
-                time_along(stage, scene, path, &setting.quality)
+                time_along(backend, scene, path, &setting.quality)
             },
         )?;
-        for (measurement, times) in of_settings.iter_mut().zip(times) {
+        for (measurement, times) in measurements.iter_mut().zip(times) {
             measurement.times.extend(times);
         }
         progress.finish_and_clear();
-        Ok(Self { of_settings, reference })
+        Ok(Self { settings: measurements, reference })
     }
 }
 
 impl Measurement {
-    /// From the scene's hand-over to the return of submit, in the round in the middle.
+    /// From the hand-over of the scene to the return of submit, in the median round.
     pub fn cpu(&self) -> Duration {
         median_duration(self.times.iter().map(|time| time.cpu))
     }
 
-    /// Until it is drawn, in the round in the middle.
+    /// Until the frame is drawn, in the median round.
     pub fn frame(&self) -> Duration {
         median_duration(self.times.iter().map(|time| time.frame))
     }
 }
 
-/// Pictures along the path.
+/// The pictures and times along the path.
 struct Pictures {
     pictures: Vec<Picture>,
     times: Vec<FrameTime>,
 }
 
-/// Draws each place of the path. Where what is hidden is looked for it is looked for in each picture, whether it pays or not.
+/// Draws each position of the path. Occlusion culling, if enabled, runs in each picture, whether it is worth it or not.
 fn draw_pictures(
-    stage: &mut dyn Stage,
+    backend: &mut dyn BackendUnderTest,
     scene: &Scene,
     path: &[Camera],
     setting: &Setting,
 ) -> Result<Pictures, Failure> {
     let mut drawn = Pictures { pictures: Vec::new(), times: Vec::new() };
-    stage.set_quality(&setting.quality)?;
+    backend.set_quality(&setting.quality)?;
     for camera in path {
         if setting.quality.occlusion.is_some() {
-            // With another quality it is tried anew, in the first frame.
-            stage.set_quality(&Quality::exact())?;
-            stage.set_quality(&setting.quality)?;
+            // A change of quality makes the next frame try occlusion culling again.
+            backend.set_quality(&Quality::exact())?;
+            backend.set_quality(&setting.quality)?;
         }
-        drawn.times.push(stage.draw(seen_from(scene, camera))?);
-        drawn.pictures.push(stage.read("picture")?);
+        drawn.times.push(backend.draw(seen_from(scene, camera))?);
+        drawn.pictures.push(backend.read("picture")?);
     }
     Ok(drawn)
 }
 
 impl Pictures {
-    /// If `timed`, these frames are all that is timed of the setting.
+    /// If `timed`, these frames are the only timed ones of the setting.
     fn compare(
         self,
-        stage: &dyn Stage,
+        backend: &dyn BackendUnderTest,
         exact: &[Picture],
         reference: &[Picture],
         timed: bool,
@@ -186,36 +185,36 @@ impl Pictures {
         });
         Ok(Measurement {
             times: if timed { vec![FrameTime::mean(&times)] } else { Vec::new() },
-            insides: Insides::of(stage)?,
+            contents: FrameContents::of(backend)?,
             from_exact: distance(&pictures, exact)?,
             from_reference: distance(&pictures, reference)?,
-            picture: pictures.into_iter().next().ok_or("the path has no place")?,
+            picture: pictures.into_iter().next().ok_or("the path has no position")?,
             differing,
             occluded: times.iter().map(|time| time.occluded).sum(),
         })
     }
 }
 
-/// What the mean frame along the path takes, after as many frames as it takes for that to mean something.
+/// Returns the mean frame time along the path, after a warm-up.
 ///
 /// # Errors
-/// If a frame fails.
+/// Returns an error if a frame fails.
 pub fn time_along(
-    stage: &mut dyn Stage,
+    backend: &mut dyn BackendUnderTest,
     scene: &Scene,
     path: &[Camera],
     quality: &Quality,
 ) -> Result<FrameTime, Failure> {
-    stage.set_quality(quality)?;
-    let start = path.first().ok_or("the path has no place")?;
-    for _ in 0..UNCOUNTED {
-        stage.draw(seen_from(scene, start))?;
+    backend.set_quality(quality)?;
+    let start = path.first().ok_or("the path has no position")?;
+    for _ in 0..WARM_UP {
+        backend.draw(seen_from(scene, start))?;
     }
-    let times: Vec<_> = path.iter().map(|camera| stage.draw(seen_from(scene, camera))).collect::<Result<_, _>>()?;
+    let times: Vec<_> = path.iter().map(|camera| backend.draw(seen_from(scene, camera))).collect::<Result<_, _>>()?;
     Ok(FrameTime::mean(&times))
 }
 
-/// The scene with this camera and no other.
+/// The scene with this camera alone.
 fn seen_from<'a>(scene: &'a Scene, camera: &'a Camera) -> SceneRef<'a> {
     SceneRef { cameras: std::slice::from_ref(camera), ..scene.as_scene_ref() }
 }

@@ -1,4 +1,4 @@
-//! A page with the table, the charts and the pictures side by side.
+//! A page with the charts and the pictures side by side.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -12,14 +12,14 @@ use crate::measure::Measurements;
 use crate::results::{Entry, Results, short};
 use crate::settings::Knob;
 
-/// Writes the pictures of the path's first place and `index.html` beside them.
+/// Writes the pictures of the path's first position, and `index.html`.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn write(folder: &Path, results: &Results, measurements: &Measurements) -> Result<(), Failure> {
-    let reference = measurements.reference.first().ok_or("the path has no place")?;
+    let reference = measurements.reference.first().ok_or("the path has no position")?;
     save(&folder.join("reference.png"), reference)?;
-    for (number, measured) in measurements.of_settings.iter().enumerate() {
+    for (number, measured) in measurements.settings.iter().enumerate() {
         save(&folder.join(picture_name(number)), &measured.picture)?;
         save(&folder.join(difference_name(number)), &difference(&measured.picture, reference))?;
     }
@@ -41,10 +41,10 @@ fn save(path: &Path, picture: &Picture) -> Result<(), Failure> {
     without_alpha(picture)?.save(path).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
-/// Around grey, sixteen times as large as it is.
+/// The difference of two pictures, magnified 16 times, around grey.
 fn difference(picture: &Picture, reference: &Picture) -> Picture {
-    let grown = |(one, other): (&u8, &u8)| (128 + (i32::from(*one) - i32::from(*other)) * 16).clamp(0, 255) as u8;
-    let bytes = picture.bytes.iter().zip(&reference.bytes).map(grown).collect();
+    let magnified = |(one, other): (&u8, &u8)| (128 + (i32::from(*one) - i32::from(*other)) * 16).clamp(0, 255) as u8;
+    let bytes = picture.bytes.iter().zip(&reference.bytes).map(magnified).collect();
     Picture { bytes, ..picture.clone() }
 }
 
@@ -77,7 +77,7 @@ fn html(results: &Results) -> String {
                 picture_name(number),
                 difference_name(number),
                 entry.frame_ms(),
-                told_error(entry),
+                error_text(entry),
                 entry.rmse_from_reference * 255.0,
                 setting = escaped(&entry.setting),
             );
@@ -87,7 +87,7 @@ fn html(results: &Results) -> String {
     page
 }
 
-fn told_error(entry: &Entry) -> String {
+fn error_text(entry: &Entry) -> String {
     let bound = entry.bound.map_or_else(String::new, |bound| format!(" (at most {})", short(bound)));
     entry.error.map_or_else(String::new, |error| format!("{} {}{bound}, ", short(error), escaped(&entry.metric)))
 }

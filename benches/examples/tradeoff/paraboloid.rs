@@ -1,13 +1,13 @@
-//! How far straight edges are from where a paraboloid shows them.
+//! The error of straight edges in a paraboloid projection.
 
 use drawloom::command::RenderCommand;
 use drawloom::glam::{DQuat, DVec2, DVec3, Vec3};
 use drawloom::scene::{Light, Scene};
 
-use crate::errors::worse;
+use crate::errors::worst_of;
 
-/// In pixels of a map of 1024: the farthest that an edge, halved as often as it was when it was drawn, is from its curve. None where
-/// no hemispherical light has a map with an edge in it.
+/// The greatest distance of a subdivided edge from its curve, in pixels of a map of 1024. `None` if no hemispherical light has a map with
+/// an edge in it.
 pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]) -> Option<f64> {
     let view = scene.as_scene_ref();
     let mut worst: Option<f64> = None;
@@ -20,24 +20,24 @@ pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]
             let (scale, orientation) =
                 (view.scales[object].as_dvec3(), view.orientations[object].as_dquat().normalize());
             let offset = view.positions[object] - position;
-            let place = |index: u32| {
+            let position = |index: u32| {
                 let local = Vec3::from(mesh.vertices()[index as usize].position).as_dvec3();
                 turn * (offset + orientation * (local * scale))
             };
-            // No edge is longer than this after it was halved as often as it has to be.
+            // No edge is longer than this after subdivision.
             let longest = mesh.longest_edge() / (1_u64 << command.state.subdivision_level()) as f32;
             for corners in mesh.triangles() {
                 for [one, other] in [[0, 1], [1, 2], [2, 0]].map(|edge| edge.map(|corner| corners[corner])) {
                     let [first, last] =
                         [one, other].map(|corner| Vec3::from(mesh.vertices()[corner as usize].position));
-                    let halvings = (first.distance(last) / longest).log2().ceil().clamp(0.0, 12.0);
-                    let parts = 1 << halvings as u32;
-                    let (start, end) = (place(one), place(other));
-                    // What is nearer to the light than a thousandth of its range counts as there, as the crate has it.
-                    let is_seen = [start, end].iter().all(|place| -place.z > f64::from(range) * 1e-3);
+                    let level = (first.distance(last) / longest).log2().ceil().clamp(0.0, 12.0);
+                    let segments = 1 << level as u32;
+                    let (start, end) = (position(one), position(other));
+                    // The crate clamps distances to the light to a thousandth of its range.
+                    let is_seen = [start, end].iter().all(|point| -point.z > f64::from(range) * 1e-3);
                     if is_seen {
-                        let error = edge_error(start, end, parts);
-                        worst = Some(worst.map_or(error, |worst| worse(worst, error)));
+                        let error = edge_error(start, end, segments);
+                        worst = Some(worst.map_or(error, |worst| worst_of(worst, error)));
                     }
                 }
             }
@@ -46,26 +46,26 @@ pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]
     worst
 }
 
-/// The farthest that any of the parts of an edge is from its curve.
-fn edge_error(start: DVec3, end: DVec3, parts: u32) -> f64 {
+/// The greatest distance of an edge's segments from its curve.
+fn edge_error(start: DVec3, end: DVec3, segments: u32) -> f64 {
     const SAMPLES: u32 = 8;
-    let at = |share: f64| shown(start.lerp(end, share));
+    let at = |share: f64| project(start.lerp(end, share));
     let mut worst: f64 = 0.0;
-    for part in 0..parts {
-        let [first, last] = [part, part + 1].map(|end| f64::from(end) / f64::from(parts));
+    for segment in 0..segments {
+        let [first, last] = [segment, segment + 1].map(|end| f64::from(end) / f64::from(segments));
         let (from, to) = (at(first), at(last));
         let along = (to - from).normalize_or_zero();
         for sample in 1..SAMPLES {
-            let place = at(first + (last - first) * f64::from(sample) / f64::from(SAMPLES)) - from;
-            worst = worst.max(place.perp_dot(along).abs());
+            let offset = at(first + (last - first) * f64::from(sample) / f64::from(SAMPLES)) - from;
+            worst = worst.max(offset.perp_dot(along).abs());
         }
     }
-    // Clip space is two wide.
+    // Clip space is 2 wide.
     worst * 512.0
 }
 
-/// Where a paraboloid that looks along −Z shows a place (Brabec et al. 2002).
-fn shown(place: DVec3) -> DVec2 {
-    let distance = place.length();
-    place.truncate() / (distance - place.z)
+/// Projects a point with a paraboloid that looks along −Z (Brabec et al. 2002).
+fn project(point: DVec3) -> DVec2 {
+    let distance = point.length();
+    point.truncate() / (distance - point.z)
 }

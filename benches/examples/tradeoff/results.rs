@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The results, as a table and as JSON.
 
 use std::error::Error;
 use std::path::Path;
@@ -11,49 +11,49 @@ use crate::errors::{self, KnobError};
 use crate::measure::Measurements;
 use crate::settings::{Knob, Setting};
 
-/// What was measured of a scene.
+/// The results on one scene.
 pub struct Results {
     scene: String,
     backend: String,
     pub entries: Vec<Entry>,
 }
 
-/// What was measured of a knob at a setting.
+/// The results of one setting of a knob.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Entry {
     pub scene: String,
     pub backend: String,
     pub knob: String,
     pub setting: String,
-    /// From the scene's hand-over to the return of submit, in nanoseconds; of the mean frame in the median round.
+    /// From the hand-over of the scene to the return of submit, in nanoseconds: the mean frame of the median round.
     pub cpu_ns: u64,
-    /// Until the frame is drawn, in nanoseconds; of the mean frame in the median round.
+    /// Until the frame is drawn, in nanoseconds: the mean frame of the median round.
     pub frame_ns: u64,
-    /// How far off the knob is, in the unit of its metric; none where the scene has nothing that it is about.
+    /// In the unit of the metric; `None` if the knob affects nothing in the scene.
     pub error: Option<f64>,
     pub metric: String,
-    /// What the error can be at most; none where nobody knows.
+    /// The bound of the error, if known.
     pub bound: Option<f64>,
     /// What the error is measured against.
     pub oracle: String,
-    /// Of the picture, from that of `Quality::exact`: 0 to 1.
+    /// Distance of the picture from that of `Quality::exact`: 0 to 1.
     pub rmse: f64,
-    /// Of the picture, from that of `Quality::exact`: 1 if they are the same.
+    /// Similarity of the picture to that of `Quality::exact`: 1 if they are equal.
     pub mssim: f64,
-    /// Of the picture, from that of the reference in f64: 0 to 1.
+    /// Distance of the picture from the f64 reference: 0 to 1.
     pub rmse_from_reference: f64,
-    /// Of the picture, from that of the reference in f64: 1 if they are the same.
+    /// Similarity of the picture to the f64 reference: 1 if they are equal.
     pub mssim_from_reference: f64,
-    /// Of the picture, from that of the reference in f64, as eyes see it; none without the feature `flip`.
+    /// Visible distance of the picture from the f64 reference; `None` without the feature `flip`.
     pub flip_from_reference: Option<f64>,
     /// Whether it is on the front: see [`mark_front`].
     pub pareto: bool,
 }
 
 impl Entry {
-    /// Whether it is farther off than it can be.
+    /// Whether the error exceeds its bound.
     pub fn exceeds(&self) -> bool {
-        // What is no number is beyond every bound.
+        // NaN exceeds every bound.
         self.error.zip(self.bound).is_some_and(|(error, bound)| error > bound || error.is_nan())
     }
 
@@ -64,7 +64,7 @@ impl Entry {
 
 impl Results {
     /// # Errors
-    /// If an error cannot be worked out.
+    /// Returns an error if the error of a knob cannot be computed.
     pub fn new(
         scene_name: String,
         backend: &str,
@@ -74,7 +74,7 @@ impl Results {
         measurements: &Measurements,
     ) -> Result<Self, Failure> {
         let mut entries = Vec::new();
-        for (setting, measured) in settings.iter().zip(&measurements.of_settings) {
+        for (setting, measured) in settings.iter().zip(&measurements.settings) {
             let KnobError { error, metric, bound, oracle } = errors::of(setting, scene, path, measurements, measured)?;
             entries.push(Entry {
                 scene: scene_name.clone(),
@@ -99,29 +99,27 @@ impl Results {
         Ok(Self { scene: scene_name, backend: backend.to_owned(), entries })
     }
 
-    /// What the scene is called.
     pub fn scene(&self) -> &str {
         &self.scene
     }
 
-    /// What drew.
     pub fn backend(&self) -> &str {
         &self.backend
     }
 
-    /// Those that are farther off than they can be.
+    /// The entries whose error exceeds its bound.
     pub fn exceeded(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| entry.exceeds())
     }
 
-    /// Those on the Pareto front, from the fastest to the most accurate.
+    /// The Pareto front, from the fastest to the most accurate.
     pub fn front(&self) -> Vec<&Entry> {
         let mut front: Vec<_> = self.entries.iter().filter(|entry| entry.pareto).collect();
         front.sort_by_key(|entry| entry.frame_ns);
         front
     }
 
-    /// The table, in Markdown, and the front.
+    /// Prints the table, in Markdown, and the front.
     pub fn print(&self) {
         println!("{}, {}; each knob alone, all else as in exact\n", self.scene, self.backend);
         println!("| knob | setting | CPU, ms | frame, ms | of exact | error | bound | metric | RMSE × 255 | MSSIM |");
@@ -157,38 +155,38 @@ impl Results {
         println!();
     }
 
-    /// Writes the entries, beside those of other scenes and backends that the file has already.
+    /// Writes the entries, and keeps those of other scenes and backends in the file.
     ///
     /// # Errors
-    /// If the file cannot be written, or what is there is something else.
+    /// Returns an error if the file cannot be read, parsed or written.
     pub fn write(&self, path: &Path) -> Result<(), Failure> {
         let mut all: Vec<Entry> = match std::fs::read(path) {
-            Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| told(path, &error))?,
+            Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| with_path(path, &error))?,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(told(path, &error)),
+            Err(error) => return Err(with_path(path, &error)),
         };
         all.retain(|entry| entry.scene != self.scene || entry.backend != self.backend);
         all.extend(self.entries.iter().cloned());
-        std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n").map_err(|error| told(path, &error))?;
+        std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n").map_err(|error| with_path(path, &error))?;
         println!("{} written", path.display());
         Ok(())
     }
 }
 
-fn told(path: &Path, error: &dyn Error) -> Failure {
+fn with_path(path: &Path, error: &dyn Error) -> Failure {
     format!("{}: {error}", path.display()).into()
 }
 
-/// Marks those to which no other is preferable: `exact`, and from the nearest to the reference on, each whose frames take less than those
-/// of all that were marked before, by an eighth at least: nearer times are not told apart. Each knob alone counts, and each preset.
+/// Marks the Pareto front: `exact`, and then, by increasing distance from the reference, each entry that is at least an eighth faster
+/// than all marked before it. Smaller differences of times are noise.
 fn mark_front(entries: &mut [Entry]) {
     let mut order: Vec<_> = (0..entries.len()).collect();
     let distance = |entry: usize| entries[entry].rmse_from_reference;
-    // That something else comes out nearer than `exact`, which is the first, is an accident of rounding.
+    // `exact`, which is the first entry, comes first: another entry can be nearer by rounding only.
     order.sort_by(|&one, &other| (one > 0).cmp(&(other > 0)).then(distance(one).total_cmp(&distance(other))));
     let mut fastest: Option<u64> = None;
-    for place in order {
-        let entry = &mut entries[place];
+    for index in order {
+        let entry = &mut entries[index];
         entry.pareto = fastest.is_none_or(|fastest| entry.frame_ns * 8 < fastest * 7);
         if entry.pareto {
             fastest = Some(entry.frame_ns);
@@ -196,7 +194,7 @@ fn mark_front(entries: &mut [Entry]) {
     }
 }
 
-/// A number to three digits.
+/// A number with three digits.
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => String::from("0"),
@@ -207,7 +205,7 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// The entries of one knob, with `exact` behind them.
+/// The entries of one knob, followed by `exact`.
 pub fn of_knob(entries: &[Entry], knob: Knob) -> Vec<&Entry> {
     let own = entries.iter().filter(|entry| entry.knob == knob.name() && entry.setting != "exact");
     own.chain(entries.first()).collect()

@@ -1,20 +1,20 @@
-//! What is measured: each knob by itself at each of its settings, and the presets.
+//! The settings that are measured: each knob alone at each of its settings, and the presets.
 
 use drawloom::quality::{
     CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, ShadowQuality, ToneCurve,
     TransformPrecision, VertexFormat,
 };
 
-/// A knob at a setting, all else as in [`Quality::exact`]; or a preset.
+/// A setting of one knob, with all others as in [`Quality::exact`]; or a preset.
 #[derive(Clone, Debug)]
 pub struct Setting {
     pub knob: Knob,
-    /// As reports print it.
+    /// Its name in reports.
     pub name: String,
     pub quality: Quality,
 }
 
-/// What can be turned.
+/// A quality knob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Knob {
     Preset,
@@ -37,7 +37,7 @@ pub enum Knob {
 }
 
 impl Knob {
-    /// All, in the order of reports.
+    /// All knobs, in the order of reports.
     pub const ALL: [Self; 17] = [
         Self::Preset,
         Self::OpaqueOrder,
@@ -58,7 +58,7 @@ impl Knob {
         Self::Transforms,
     ];
 
-    /// As the field of `Quality` is called.
+    /// The name of the field of `Quality`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Preset => "preset",
@@ -81,7 +81,7 @@ impl Knob {
         }
     }
 
-    /// A quality with this knob where it stands in another.
+    /// `quality` with this knob set as in `other`.
     pub fn changed(self, quality: &Quality, other: &Quality) -> Quality {
         let mut changed = *quality;
         match self {
@@ -107,7 +107,7 @@ impl Knob {
     }
 }
 
-/// Everything that is measured; [`Quality::exact`] first.
+/// All settings; [`Quality::exact`] first.
 pub fn all() -> Vec<Setting> {
     let mut settings = Vec::new();
     let mut add = |knob, name: &str, quality| settings.push(Setting { knob, name: name.to_owned(), quality });

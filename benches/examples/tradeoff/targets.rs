@@ -1,4 +1,4 @@
-//! What a target's bytes say, read anew from what its format means.
+//! Decodes the bytes of targets, independently of the crate.
 
 use drawloom::backend::Picture;
 use drawloom::glam::DVec3;
@@ -8,10 +8,10 @@ use half::f16;
 
 use crate::Failure;
 
-/// The colour of each pixel, linear.
+/// The linear colour of each pixel.
 ///
 /// # Errors
-/// If the format has none.
+/// Returns an error if the format has no colours.
 pub fn colors(picture: &Picture) -> Result<Vec<[f64; 3]>, Failure> {
     match picture.format {
         Format::Rgba8Srgb => {
@@ -31,15 +31,15 @@ pub fn colors(picture: &Picture) -> Result<Vec<[f64; 3]>, Failure> {
     }
 }
 
-/// The direction of each pixel's normal; none where nothing was drawn.
+/// The direction of each pixel's normal; `None` where nothing was drawn.
 ///
 /// # Errors
-/// If the format is not one that normals are stored in so.
+/// Returns an error if the target's format does not store normals this way.
 pub fn directions(picture: &Picture, stored: NormalFormat) -> Result<Vec<Option<DVec3>>, Failure> {
     let byte = |byte: u8| f64::from(byte) / 127.0 - 1.0;
     let short = |high: u8, low: u8| f64::from(u16::from_be_bytes([high, low])) / 32_767.0 - 1.0;
     let half = |bytes: &[u8]| f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
-    let ten = |word: u32, place: u32| f64::from(word >> place & 0x3ff) / 511.0 - 1.0;
+    let ten = |word: u32, shift: u32| f64::from(word >> shift & 0x3ff) / 511.0 - 1.0;
     let decode: &dyn Fn(&[u8]) -> [f64; 2] = match (stored, picture.format) {
         (NormalFormat::Octahedral8, Format::Rg8Unorm) => &|pixel| [byte(pixel[0]), byte(pixel[1])],
         (NormalFormat::Octahedral10, Format::Rgb10a2Unorm) => &|pixel| {
@@ -57,7 +57,7 @@ pub fn directions(picture: &Picture, stored: NormalFormat) -> Result<Vec<Option<
     Ok(pixels.map(|pixel| (!cleared(pixel)).then(|| direction(decode(pixel)))).collect())
 }
 
-/// Of a point of the unfolded octahedron (Cigolle et al. 2014).
+/// The direction of a point of the unfolded octahedron (Cigolle et al. 2014).
 fn direction([x, y]: [f64; 2]) -> DVec3 {
     let z = 1.0 - x.abs() - y.abs();
     let folded = |one: f64, other: f64| (1.0 - other.abs()) * 1.0_f64.copysign(one);

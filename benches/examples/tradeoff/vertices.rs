@@ -1,14 +1,14 @@
-//! How far vertices are drawn from where they are.
+//! The error of vertex positions.
 
 use drawloom::glam::{DVec2, Vec3};
 use drawloom::quality::TransformPrecision;
 use drawloom::scene::{Camera, Mesh, Projection, Scene};
 use drawloom::view::{FixedPosition, RenderView};
 
-use crate::errors::worse;
+use crate::errors::worst_of;
 
-/// In pixels: the greatest error of a vertex in the picture that is at least its mesh's radius away from the camera, worked out in f32 as
-/// shaders do, against f64 from the camera's definition. None where there is no such vertex, or where the camera is not one in
+/// The greatest error in pixels of a vertex in the picture that is at least its mesh's radius away from the camera. Positions are computed
+/// in f32, as shaders do, and compared with f64 from the camera's definition. `None` if there is no such vertex, or if the camera has no
 /// perspective.
 pub fn greatest_error(scene: &Scene, camera: &Camera, precision: TransformPrecision) -> Option<f64> {
     let Projection::Perspective { field_of_view } = camera.projection else { return None };
@@ -47,15 +47,15 @@ pub fn greatest_error(scene: &Scene, camera: &Camera, precision: TransformPrecis
             let error = pixel(clip.x / clip.w, clip.y / clip.w).distance(right);
             let is_in_picture = (right / pixel(1.0, 1.0)).abs().max_element() <= 1.0;
             if is_in_picture {
-                worst = Some(worst.map_or(error, |worst| worse(worst, error)));
+                worst = Some(worst.map_or(error, |worst| worst_of(worst, error)));
             }
         }
     }
     worst
 }
 
-/// Whether no triangle of the scene has normals at more than right angles, and no object is scaled unevenly.
-pub fn normals_are_tame(scene: &Scene) -> bool {
+/// Whether the normals of each triangle are at right angles at most, and all objects are scaled uniformly.
+pub fn normals_are_bounded(scene: &Scene) -> bool {
     let objects = scene.as_scene_ref();
     let is_even = |scale: &Vec3| scale.abs().max_element() <= scale.abs().min_element() * 1.001;
     objects.scales.iter().all(is_even)

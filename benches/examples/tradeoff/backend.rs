@@ -1,4 +1,4 @@
-//! What draws: wgpu, or the software backend, behind one trait.
+//! The backend under test: wgpu or the software backend, behind one trait.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,48 +15,48 @@ use drawloom_testing::adapter;
 use crate::Failure;
 use crate::arguments::{Arguments, BackendName};
 
-/// Draws frames.
-pub trait Stage {
-    /// What draws.
+/// A backend whose frames are timed and read.
+pub trait BackendUnderTest {
+    /// The name of the adapter.
     fn name(&self) -> &str;
 
-    /// The same in a word, for the names of files.
+    /// One word for file names.
     fn kind(&self) -> &'static str;
 
     /// # Errors
-    /// If there can be no frames of that quality.
+    /// Returns an error if the renderer rejects the quality.
     fn set_quality(&mut self, quality: &Quality) -> Result<(), Failure>;
 
     /// # Errors
-    /// If the frame fails.
+    /// Returns an error if the frame fails.
     fn draw(&mut self, scene: SceneRef<'_>) -> Result<FrameTime, Failure>;
 
-    /// A target of the first view of the frame drawn last.
+    /// Reads a target of the last frame's first view.
     ///
     /// # Errors
-    /// If there is none, or it cannot be read.
+    /// Returns an error if there is no such target, or if it cannot be read.
     fn read(&self, target: &str) -> Result<Picture, Failure>;
 
-    /// The names of the last frame's views, in order.
+    /// The names of the last frame's views.
     fn views(&self) -> &[String];
 
-    /// What a process drew in a view of the last frame, in order; nothing where it drew none.
+    /// The commands that a process drew in a view of the last frame, in order.
     fn commands(&self, process: &str, view: usize) -> Vec<RenderCommand>;
 }
 
-/// What a frame took.
+/// The times of a frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameTime {
-    /// From the scene's hand-over to the return of submit.
+    /// From the hand-over of the scene to the return of submit.
     pub cpu: Duration,
-    /// Until it is drawn.
+    /// Until the frame is drawn.
     pub frame: Duration,
-    /// Objects that were left out because others hide them.
+    /// Objects that occlusion culling removed.
     pub occluded: usize,
 }
 
 impl FrameTime {
-    /// Of the mean of some frames.
+    /// The mean of several frames.
     pub fn mean(times: &[Self]) -> Self {
         let count = times.len().max(1) as u32;
         let mean = |of: fn(&Self) -> Duration| times.iter().map(of).sum::<Duration>() / count;
@@ -65,40 +65,41 @@ impl FrameTime {
     }
 }
 
-/// What the command line asks for: wgpu, unless there is no adapter and nobody insists.
+/// Opens the requested backend. By default it is wgpu, or software if there is no adapter.
 ///
 /// # Errors
-/// If there is no adapter and somebody does.
-pub fn open(arguments: &Arguments) -> Result<Box<dyn Stage>, Failure> {
+/// Returns an error if wgpu is requested and there is no adapter.
+pub fn open(arguments: &Arguments) -> Result<Box<dyn BackendUnderTest>, Failure> {
     if arguments.backend == Some(BackendName::Software) {
         return software();
     }
     match adapter::device() {
         Ok((device, queue)) => {
             let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-            Ok(Box::new(Painter::new(WgpuBackend::new(device, queue)?, scheduler)?))
+            Ok(Box::new(Runner::new(WgpuBackend::new(device, queue)?, scheduler)?))
         }
         Err(_) if arguments.backend.is_none() => software(),
         Err(error) => Err(error),
     }
 }
 
-/// The reference that all others are measured by: f64, nothing rounded, and [`Quality::exact`].
+/// Opens the reference: the software backend in f64, with [`Quality::exact`].
 ///
 /// # Errors
-/// If it cannot be made.
-pub fn reference() -> Result<Box<dyn Stage>, Failure> {
-    let mut painter = Painter::new(SoftwareBackend::reference(), Arc::new(Scheduler::new(1)?))?;
-    painter.set_quality(&Quality::exact())?;
-    Ok(Box::new(painter))
+/// Returns an error if the renderer cannot be built.
+pub fn reference() -> Result<Box<dyn BackendUnderTest>, Failure> {
+    let mut runner = Runner::new(SoftwareBackend::reference(), Arc::new(Scheduler::new(1)?))?;
+    runner.set_quality(&Quality::exact())?;
+    Ok(Box::new(runner))
 }
 
-fn software() -> Result<Box<dyn Stage>, Failure> {
+fn software() -> Result<Box<dyn BackendUnderTest>, Failure> {
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-    Ok(Box::new(Painter::new(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler)?))
+    Ok(Box::new(Runner::new(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler)?))
 }
 
-struct Painter<B: Backend> {
+/// A renderer on one backend.
+struct Runner<B: Backend> {
     name: String,
     renderer: Renderer<B>,
     submitter: Submitter<B>,
@@ -106,7 +107,7 @@ struct Painter<B: Backend> {
     last: Option<B::Submission>,
 }
 
-impl<B: Backend> Painter<B> {
+impl<B: Backend> Runner<B> {
     fn new(backend: B, scheduler: Arc<Scheduler>) -> Result<Self, Failure> {
         let name = backend.adapter();
         let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
@@ -115,9 +116,9 @@ impl<B: Backend> Painter<B> {
     }
 }
 
-impl<B: Backend> Stage for Painter<B>
+impl<B: Backend> BackendUnderTest for Runner<B>
 where
-    B::Submission: Drawn,
+    B::Submission: DrawnFrame,
 {
     fn name(&self) -> &str {
         &self.name
@@ -157,15 +158,15 @@ where
     }
 }
 
-/// A frame that was submitted, whoever draws it.
-trait Drawn {
+/// A submitted frame of any backend.
+trait DrawnFrame {
     const KIND: &str;
 
     fn wait_until_drawn(&self) -> Result<(), Failure>;
     fn read_target(&self, target: &str) -> Result<Picture, Failure>;
 }
 
-impl Drawn for WgpuSubmission {
+impl DrawnFrame for WgpuSubmission {
     const KIND: &str = "wgpu";
 
     fn wait_until_drawn(&self) -> Result<(), Failure> {
@@ -177,10 +178,10 @@ impl Drawn for WgpuSubmission {
     }
 }
 
-impl Drawn for SoftwareSubmission {
+impl DrawnFrame for SoftwareSubmission {
     const KIND: &str = "software";
 
-    /// It is drawn when it is submitted.
+    /// The frame is drawn by the time it is submitted.
     fn wait_until_drawn(&self) -> Result<(), Failure> {
         Ok(())
     }
