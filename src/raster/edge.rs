@@ -14,7 +14,7 @@ pub(super) struct Edge {
     pub across: i64,
     /// The change to the next row.
     down: i64,
-    /// The min_inside value that counts as inside, by the top-left rule of Direct3D, Metal and Vulkan's devices: of two
+    /// The least value that counts as inside, by the top-left rule of Direct3D, Metal and Vulkan's devices: of two
     /// triangles with a common edge, pixels on it belong to the one for which it is a left edge or a horizontal top
     /// edge.
     min_inside: i64,

@@ -19,11 +19,11 @@ pub(crate) struct Fill<'a> {
     pub(crate) table: &'a ObjectTable,
     /// The view.
     pub(crate) view: &'a RenderView,
-    /// The objects that it sees.
+    /// The view's visible set.
     pub(crate) visible: &'a VisibleSet,
-    /// Which of them the process draws.
+    /// The objects that the render process draws.
     pub(crate) selection: Selection,
-    /// The scene, for what few views need to know about an object.
+    /// The scene, for the subdivision level.
     pub(crate) scene: &'a SceneRef<'a>,
     /// The precision of the depth order, and of the subdivision for paraboloids.
     pub(crate) quality: &'a Quality,

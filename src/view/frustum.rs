@@ -175,7 +175,7 @@ impl Frustum {
         }
     }
 
-    /// The min of a point's signed distances from all planes; positive inside.
+    /// The least of a point's signed distances from all planes; positive inside.
     #[inline(always)]
     fn signed_distance(&self, CameraPoint { forward, across, .. }: CameraPoint) -> f32 {
         let from_sides = |pair: usize| {
@@ -245,7 +245,7 @@ mod tests {
     use super::*;
     use crate::view::BoundingSphere;
 
-    /// The min distance of a point inside the camera's planes, in f64, from the camera's definition.
+    /// The least distance of a point inside the camera's planes, in f64, from the camera's definition.
     fn depth_inside(camera: &Camera, center: DVec3) -> f64 {
         let local = camera.orientation.as_dquat().normalize().inverse() * (center - camera.position);
         let away = -local.z;

@@ -17,7 +17,7 @@ pub struct GpuLight {
     pub direction: Vec3,
     /// The light's range in metres; for a directional light, the far plane of its shadow map.
     pub range: f32,
-    /// The intensity; for a directional light, the illuminance of a surface that faces it.
+    /// The illuminance at 1 m; for a directional light, that of a surface that faces it.
     pub intensity: Vec3,
     /// The cosine of the angle at which a spot light begins to fade.
     pub cone_begin: f32,

@@ -15,8 +15,8 @@ use crate::view::{ObjectBlock, ObjectDraw, ObjectTable, RenderView, VisibleSet, 
 /// into a [`CoarseDepth`], and [`OcclusionCuller::hidden`] tests every object against that.
 ///
 /// It is conservative: an object that it reports as hidden is hidden. An occluder counts only in tiles of the picture
-/// that it is_covered entirely, at its farthest depth there; an object is tested as a rectangle around its box, at the
-/// box's nearest corner. Both are moved by the bound of a device's f32 errors, in the direction that is_hidden less. An
+/// that it covers entirely, at its farthest depth there; an object is tested as a rectangle around its box, at the
+/// box's nearest corner. Both are moved by the bound of a device's f32 errors, in the direction that hides less. An
 /// object that crosses the near plane is never hidden.
 ///
 /// An object is hidden if no sample of the picture would show it, wherever in a pixel samples are, provided that every
@@ -46,7 +46,7 @@ struct Occluders {
 /// A possible occluder.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Its apparent_width width in pixels.
+    /// Its apparent width in pixels.
     width: f32,
     /// The depth of its centre in metres.
     depth: f32,
@@ -103,7 +103,7 @@ impl OcclusionCuller {
             occluders.candidates.select_nth_unstable_by(Self::MAX_OCCLUDERS, by_width);
             occluders.candidates.truncate(Self::MAX_OCCLUDERS);
         }
-        // Nearest first, so that farther ones fail the depth test early.
+        // Nearest first, which keeps the nearness of merged tiles as great as possible.
         let by_depth =
             |one: &Candidate, other: &Candidate| one.depth.total_cmp(&other.depth).then(one.object.cmp(&other.object));
         occluders.candidates.sort_unstable_by(by_depth);
@@ -250,10 +250,11 @@ impl Occluders {
             }
             self.planes.push(plane);
         }
-        // Clipping opens the part: a ray that enters through the opening hits a face from behind. So nothing is known
-        // where all planes are nearer than the clip depth, less the slack that the faces were moved inwards by: at most
-        // 1 part in 128.
-        let nearest = if is_clipped { camera.min_nearness(clip_depth) * (127.0 / 128.0) } else { f64::INFINITY };
+        // The part is open at the clip depth. A ray that enters through the opening meets no face before it, so nothing
+        // is covered where all planes are nearer than the clip depth. The faces were moved inwards by the slack, which
+        // changes their nearness by at most 1 part in 128.
+        let opening_nearness =
+            if is_clipped { camera.min_nearness(clip_depth) * (127.0 / 128.0) } else { f64::INFINITY };
         let depth = self.clipped.iter().map(|point| point.z).fold(f64::INFINITY, f64::min);
         let corners = self.clipped.iter().map(|&point| camera.project(point));
         let max_nearness = camera.max_nearness(depth);
@@ -261,7 +262,7 @@ impl Occluders {
             corners,
             camera.pixel_error(slack, depth),
             self.planes.iter().copied(),
-            [nearest, max_nearness],
+            [opening_nearness, max_nearness],
         );
     }
 }
@@ -273,6 +274,7 @@ fn exact_mesh_corners(scene: &SceneRef<'_>, object: usize) -> Option<[Vec3; 2]> 
     (scene.bounds[object] == mesh.bounds()).then(|| mesh.corners())
 }
 
+/// An object's orientation and scale.
 fn transform(objects: &ObjectBlock, entry: usize) -> (Quat, Vec3) {
     let object = &objects.gpu_objects[entry];
     (Quat::from_array(object.orientation), Vec3::from(object.scale))
