@@ -1,7 +1,7 @@
 //! A rasteriser for the CPU: the software backend and occlusion culling use it.
 //!
-//! It is generic over [`Real`] numbers: f32 for speed, f64 as the reference that other results are measured against. Engines use
-//! its vectors in CPU shaders; the rasteriser itself is private.
+//! It is generic over [`Real`] numbers: f32 for speed, f64 as the reference that other results are measured against.
+//! Engines use its vectors in CPU shaders; the rasteriser itself is private.
 
 mod coarse_depth;
 mod convex;

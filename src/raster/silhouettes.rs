@@ -7,8 +7,8 @@ use glam::DVec2;
 /// Convex polygons in the picture with bounds of their nearness: the lines of their edges and the planes of their
 /// faces, in one array each for all silhouettes.
 ///
-/// Nearness is any measure that grows towards the camera and is linear in the picture for a flat face, as 1 ÷ depth is in
-/// perspective. Points are in pixels, x to the right and y down.
+/// Nearness is any measure that grows towards the camera and is linear in the picture for a flat face, as 1 ÷ depth is
+/// in perspective. Points are in pixels, x to the right and y down.
 #[derive(Clone, Debug, Default)]
 pub struct Silhouettes {
     shapes: Vec<Shape>,

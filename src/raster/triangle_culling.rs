@@ -46,8 +46,7 @@ impl AddAssign for CulledTriangles {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CullVertex {
     /// The clip-space position, with reversed depth: visible points have 0 ≤ z ≤ w. A device's position may differ by
-    /// 2⁻¹³ of
-    /// |x| + |y| + |z| + |w|.
+    /// 2⁻¹³ of |x| + |y| + |z| + |w|.
     pub clip: Vector4<f64>,
     /// Whether a device's position in the picture, before snapping, differs by less than a 256th of a pixel.
     pub is_accurate: bool,
