@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::{Parser, ValueEnum, error::ErrorKind};
 use drawloom::Granularity;
-use drawloom::backend::Record;
+use drawloom::backend::RecordingStrategy;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
 
@@ -127,12 +127,12 @@ impl RecordName {
     }
 
     /// What it stands for.
-    pub fn way(self) -> Record {
+    pub fn way(self) -> RecordingStrategy {
         match self {
-            Self::Direct => Record::Direct,
-            Self::Bundles => Record::Bundles,
-            Self::Kept => Record::Kept,
-            Self::Indirect => Record::Indirect,
+            Self::Direct => RecordingStrategy::Direct,
+            Self::Bundles => RecordingStrategy::Bundles,
+            Self::Kept => RecordingStrategy::CachedBundles,
+            Self::Indirect => RecordingStrategy::Indirect,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use drawloom::backend::{Backend, DeviceClock, PassTimes, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Backend, DeviceClock, DevicePassTimes, WgpuBackend, WgpuSubmission};
 use drawloom::timeline::{DeviceLog, Timeline};
 
 /// A backend's device, as frames are drawn.
@@ -49,7 +49,7 @@ pub struct WgpuDevice {
     /// Whether it is to say when it drew which pass.
     pub is_timed: bool,
     clock: Option<DeviceClock>,
-    times: Vec<(u64, PassTimes)>,
+    times: Vec<(u64, DevicePassTimes)>,
 }
 
 impl WgpuDevice {

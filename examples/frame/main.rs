@@ -110,7 +110,7 @@ fn wgpu_backend(
     let backend = WgpuBackend::new(device, queue)?;
     Ok(match arguments.record {
         None => backend,
-        Some(record) => backend.record(record.way())?,
+        Some(record) => backend.recording_strategy(record.way())?,
     })
 }
 
@@ -211,7 +211,7 @@ fn draw<B: Backend>(
 
     timeline.stop();
     let log = Log { device: device.end(renderer.backend(), &timeline)?, ..timeline.take() };
-    let report = Report::new(renderer.backend().adapter(), name, arguments, workers, &measured);
+    let report = Report::new(renderer.backend().adapter_name(), name, arguments, workers, &measured);
     Ok(Drawn { last: last.ok_or("no frame was drawn")?, report, log })
 }
 

@@ -1,63 +1,68 @@
-//! A backend without a device: it counts what it is given, and checks it.
+//! A backend without a device: it checks the rules between frame and backend, and counts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use parking_lot::Mutex;
 
-use super::{Backend, BackendError, FrameRequest, PassRequest};
+use super::backend_trait::Backend;
+use super::error::BackendError;
+use super::requests::{FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, Pass};
 use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::view::{GpuView, ObjectTable};
 
-/// Draws nothing and refuses what breaks a rule of the frame: objects uploaded twice or not at all, batches that overlap,
-/// that draw what is no mesh, that lie beyond a bundle or of which all remains though they are partial, passes recorded twice or submitted out of order.
+/// Draws nothing, and returns an error if the frame breaks a rule between frame and backend:
+///
+/// - an object is uploaded twice, or not at all;
+/// - batches overlap, draw no mesh, exceed a bundle, or are partial though all their triangles remain;
+/// - a pass is recorded twice, or submitted out of order.
 #[derive(Debug, Default)]
 pub struct NullBackend;
 
-/// What was submitted.
+/// A submitted frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NullSubmission {
-    /// In the order they were submitted.
+    /// In submission order.
     pub passes: Vec<NullPass>,
 }
 
-/// One process in one view, as it was submitted.
+/// A submitted pass: one render process in one view.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NullPass {
-    /// The process.
+    /// The render process' name.
     pub process: String,
     /// The view's index.
     pub view: usize,
-    /// How many bundles.
+    /// The number of bundles.
     pub bundles: usize,
-    /// How many batches in all of them.
+    /// The number of batches in all bundles.
     pub batches: usize,
-    /// How many objects.
+    /// The number of objects.
     pub objects: usize,
-    /// How many triangles.
+    /// The number of triangles.
     pub triangles: usize,
-    /// How many lights, for a process that draws lights.
+    /// The number of lights, for a render process that draws lights.
     pub lights: usize,
 }
 
-/// A frame on its way.
+/// A frame in flight.
 #[derive(Debug)]
 pub struct NullFrame {
     passes: Vec<Pass>,
-    /// Triangles of the mesh in each slot; `None` where there is none.
+    /// The number of triangles of the mesh in each slot; `None` for an empty slot.
     triangles: Vec<Option<usize>>,
     object_count: usize,
     uploaded: Mutex<BTreeSet<usize>>,
-    /// How many objects each pass was prepared for.
+    /// The number of objects that each pass was prepared for.
     prepared: Mutex<BTreeMap<Pass, usize>>,
     recorded: Mutex<BTreeSet<(Pass, usize)>>,
     finished: Mutex<BTreeSet<Pass>>,
 }
 
-/// A bundle on its way.
+/// A recorded bundle.
 #[derive(Debug)]
 pub struct NullBundle {
     batches: usize,
@@ -71,7 +76,7 @@ impl Backend for NullBackend {
     type Commands = NullPass;
     type Submission = NullSubmission;
 
-    fn adapter(&self) -> String {
+    fn adapter_name(&self) -> String {
         String::from("none (null backend)")
     }
 
@@ -126,11 +131,11 @@ impl Backend for NullBackend {
         ensure(list.objects.len() == list.commands().count(), || "objects and commands differ in number".to_owned())?;
         let ordered = list.commands().is_sorted_by_key(|command| (command.key, command.object));
         ensure(ordered, || "commands are not sorted".to_owned())?;
-        let beyond = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
-        ensure(beyond.is_none(), || format!("object {beyond:?} is not in the scene"))
+        let out_of_range = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
+        ensure(out_of_range.is_none(), || format!("object {out_of_range:?} is not in the scene"))
     }
 
-    fn parts(&self, _frame: &NullFrame, pass: &PassRequest<'_>) -> usize {
+    fn part_count(&self, _frame: &NullFrame, pass: &PassRequest<'_>) -> usize {
         pass.list.bundle_count()
     }
 
@@ -140,12 +145,12 @@ impl Backend for NullBackend {
         frame: &NullFrame,
         &PassRequest { pass, list, .. }: &PassRequest<'_>,
         bundles: Range<usize>,
-        put: &mut dyn FnMut(NullBundle),
+        emit: &mut dyn FnMut(NullBundle),
     ) -> Result<(), BackendError> {
         for bundle in bundles {
             let first_time = frame.recorded.lock().insert((pass, bundle));
             ensure(first_time, || format!("bundle {bundle} of {pass:?} was recorded twice"))?;
-            put(record_bundle(frame, list, bundle)?);
+            emit(record_bundle(frame, list, bundle)?);
         }
         Ok(())
     }
@@ -199,17 +204,17 @@ fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<Nu
     ensure(within, || format!("a bundle of {} batches", batches.len()))?;
     let start = batches[0].first;
     let (mut end, mut triangles) = (start, 0);
-    for (place, batch) in (bundle * DrawList::BATCHES_PER_BUNDLE..).zip(batches) {
+    for (index, batch) in (bundle * DrawList::BATCHES_PER_BUNDLE..).zip(batches) {
         ensure(batch.first == end && batch.count > 0, || format!("a gap or an overlap at object {end}"))?;
         let mesh = frame.triangles.get(batch.mesh as usize).copied().flatten();
-        let Some(of_mesh) = mesh else {
+        let Some(mesh_triangles) = mesh else {
             return Err(BackendError::BrokenRule { rule: format!("slot {} holds no mesh", batch.mesh) });
         };
-        triangles += match list.remaining(place) {
-            None => of_mesh * batch.count as usize,
+        triangles += match list.remaining(index) {
+            None => mesh_triangles * batch.count as usize,
             Some(remaining) => {
-                let holds = batch.count == 1 && remaining.len() < of_mesh * 3;
-                ensure(holds, || format!("what remains of batch {place} is a part of one object"))?;
+                let holds = batch.count == 1 && remaining.len() < mesh_triangles * 3;
+                ensure(holds, || format!("partial batch {index} draws some triangles of one object"))?;
                 remaining.len() / 3
             }
         };

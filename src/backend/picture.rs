@@ -1,15 +1,15 @@
-//! Pictures brought back from where they were drawn.
+//! Pictures read back from a device.
 
 use crate::process::Format;
 
-/// A target's pixels.
+/// The pixels of a target.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// In pixels.
     pub width: u32,
     /// In pixels.
     pub height: u32,
-    /// What a pixel is.
+    /// The format of a pixel.
     pub format: Format,
     /// Rows from top to bottom, without padding.
     pub bytes: Vec<u8>,

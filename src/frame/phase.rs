@@ -403,7 +403,7 @@ fn pass_request<'a, B: Backend>(frame: &FrameContext<'a, B>, pass: usize, list: 
 }
 
 fn part_count<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
-    frame.backend.parts(frame.frame, &pass_request(frame, pass, &frame.tables.passes[pass].list.read()))
+    frame.backend.part_count(frame.frame, &pass_request(frame, pass, &frame.tables.passes[pass].list.read()))
 }
 
 /// Whether a pass looks at the triangles of meshes that ask.

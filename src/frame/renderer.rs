@@ -149,7 +149,7 @@ impl<B: Backend> Renderer<B> {
             rejections: self.tables.objects.rejections(),
         };
 
-        let uploaded_before = self.backend.uploaded();
+        let uploaded_before = self.backend.uploaded_bytes();
         let frame = clock.measure(Stage::Record, || self.backend.begin(&request)).0?;
         self.recordings.resize_with(request.passes.len(), Recording::default);
         self.recordings.iter_mut().for_each(|recording| drop(recording.take()));
@@ -178,7 +178,7 @@ impl<B: Backend> Renderer<B> {
         outcome?;
 
         let queues = queues_of(&request, &mut self.recordings)?;
-        let uploaded = self.backend.uploaded().saturating_sub(uploaded_before);
+        let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
         let keeps_maps = views.iter().any(|view| view.is_cached);

@@ -18,7 +18,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 use drawloom::Renderer;
-use drawloom::backend::{Encode, Record, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuSubmission};
 use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
@@ -69,7 +69,11 @@ fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let (device, queue) = adapter::noop_device().unwrap();
     // To try another way takes memory once.
-    let backend = WgpuBackend::new(device, queue).unwrap().record(Record::Kept).unwrap().encode(Encode::PerPass);
+    let backend = WgpuBackend::new(device, queue)
+        .unwrap()
+        .recording_strategy(RecordingStrategy::CachedBundles)
+        .unwrap()
+        .encoding_strategy(EncodingStrategy::PerPass);
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {

@@ -4,7 +4,10 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, BackendError, DeviceClock, Encode, PassTimes, Record, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{
+    Backend, BackendError, DeviceClock, DevicePassTimes, EncodingStrategy, RecordingStrategy, WgpuBackend,
+    WgpuSubmission,
+};
 use drawloom::process::{
     ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess,
 };
@@ -52,7 +55,7 @@ fn names_of(studio: &Studio, recorded: &Recorded<WgpuBackend>) -> Vec<(String, S
     passes.into_iter().map(|pass| names((pass.process, pass.view))).collect()
 }
 
-fn told(times: &PassTimes) -> Vec<(String, String)> {
+fn told(times: &DevicePassTimes) -> Vec<(String, String)> {
     times.passes.iter().map(|pass| (pass.process.clone(), pass.view.clone())).collect()
 }
 
@@ -84,7 +87,7 @@ fn timed(studio: &mut Studio, scene: &Scene) -> Result<(WgpuSubmission, DeviceLo
     expect(of_log == of_frame, || format!("the log has {of_log:?}"))?;
     expect(log.passes.iter().all(|pass| pass.frame == 7), || "passes of another frame".to_owned())?;
     expect(log.passes.is_sorted_by_key(|pass| pass.began), || "not by when they began".to_owned())?;
-    expect(log.name == studio.renderer.backend().adapter(), || log.name.clone())?;
+    expect(log.name == studio.renderer.backend().adapter_name(), || log.name.clone())?;
     for pass in &log.passes {
         let while_drawn = pass.began + log.error >= before && pass.ended <= after + log.error;
         expect(while_drawn, || format!("not from {before:?} to {after:?}, ± {:?}: {pass:?}", log.error))?;
@@ -97,12 +100,14 @@ fn however_recorded() -> Result<(), Failed> {
     let expected = drawn_anew(&scene)?;
     for (record, encode) in techniques()? {
         let Some(backend) = timing()? else { return Ok(()) };
-        let mut studio = studio_of(backend.record(record)?.encode(encode))?;
+        let mut studio = studio_of(backend.recording_strategy(record)?.encoding_strategy(encode))?;
         for frame in 0..2 {
             let named = |failed: Failed| Failed::from(format!("{record:?}, {encode:?}, frame {frame}: {failed:?}"));
             timed(&mut studio, &scene).map_err(named)?;
-            let split = studio.renderer.backend().passes().iter().any(|pass| pass.encoders > 1);
-            expect(split == (encode == Encode::Split), || format!("{encode:?}, and passes are split: {split}"))?;
+            let split = studio.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
+            expect(split == (encode == EncodingStrategy::Split), || {
+                format!("{encode:?}, and passes are split: {split}")
+            })?;
         }
         let recorded = studio.record(&scene)?;
         let same = pictures(&studio, recorded, &scene)? == expected;
@@ -130,7 +135,7 @@ fn on_their_way() -> Result<(), Failed> {
         }
         let counts: Vec<_> = submitted.iter().map(|(names, _)| names.len()).collect();
         expect(counts[0] < counts[1] && counts[2] < counts[0], || format!("{counts:?} passes"))?;
-        let mut earlier: Vec<PassTimes> = Vec::new();
+        let mut earlier: Vec<DevicePassTimes> = Vec::new();
         for (names, submission) in &submitted {
             let times = submission.pass_times()?;
             expect(told(&times) == *names, || format!("round {round}: {times:?} instead of {names:?}"))?;
@@ -146,7 +151,8 @@ fn on_their_way() -> Result<(), Failed> {
 
 fn many_passes() -> Result<(), Failed> {
     let Some(backend) = timing()? else { return Ok(()) };
-    let mut studio = studio_of(backend.record(Record::Direct)?.encode(Encode::PerPass))?;
+    let mut studio =
+        studio_of(backend.recording_strategy(RecordingStrategy::Direct)?.encoding_strategy(EncodingStrategy::PerPass))?;
     let mut scene = field(20);
     let camera = scene.cameras[0].clone();
     for cameras in [2, 130, 30] {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::{BackendError, Encode, Record, WgpuBackend};
+use drawloom::backend::{BackendError, EncodingStrategy, RecordingStrategy, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::Light;
@@ -58,10 +58,10 @@ fn low_limits() -> Result<(), Failed> {
 
 fn no_indirect_draws() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
-    for record in [Record::Direct, Record::Bundles, Record::Kept] {
-        WgpuBackend::new(device.clone(), queue.clone())?.record(record)?;
+    for record in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
+        WgpuBackend::new(device.clone(), queue.clone())?.recording_strategy(record)?;
     }
-    match WgpuBackend::new(device, queue)?.record(Record::Indirect).err() {
+    match WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::Indirect).err() {
         Some(BackendError::MissingFeature { missing }) if missing.contains("INDIRECT_FIRST_INSTANCE") => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
@@ -86,9 +86,10 @@ fn no_timestamps() -> Result<(), Failed> {
 
 /// On wgpu's own backend its check of indirect draws panics as a pass is finished, on whatever thread that is.
 fn indirect_draws_on_noop() -> Result<(), Failed> {
-    for encode in [Encode::PerPass, Encode::OnSubmit] {
+    for encode in [EncodingStrategy::PerPass, EncodingStrategy::OnSubmit] {
         let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, WgpuBackend::OPTIONAL_FEATURES)?;
-        let backend = WgpuBackend::new(device, queue)?.record(Record::Indirect)?.encode(encode);
+        let backend =
+            WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::Indirect)?.encoding_strategy(encode);
         let (mut renderer, submitter) =
             Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
         let scene = field(500);
@@ -184,18 +185,18 @@ fn many_textures() -> Result<(), Failed> {
 }
 
 fn lost_device() -> Result<(), Failed> {
-    for record in [Record::Direct, Record::Bundles, Record::Kept] {
-        for encode in [Encode::PerPass, Encode::Split, Encode::OnSubmit] {
+    for record in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
+        for encode in [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit] {
             lost_while(record, encode).map_err(|failed| format!("{record:?} {encode:?}: {failed:?}"))?;
         }
     }
     Ok(())
 }
 
-fn lost_while(record: Record, encode: Encode) -> Result<(), Failed> {
+fn lost_while(record: RecordingStrategy, encode: EncodingStrategy) -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let backend = WgpuBackend::new(device.clone(), queue)?.record(record)?.encode(encode);
+    let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(record)?.encoding_strategy(encode);
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
     let scene = field(500);
     submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::Renderer;
-use drawloom::backend::{Encode, Record, WgpuBackend};
+use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 use drawloom::task::Scheduler;
@@ -75,7 +75,9 @@ fn painted_otherwise() -> Result<(), Failed> {
     let step = Arc::new(AtomicU32::new(0));
     let studio = |record| {
         let (device, queue) = device()?;
-        let builder = Renderer::builder(WgpuBackend::new(device, queue)?.record(record)?.encode(Encode::PerPass));
+        let builder = Renderer::builder(
+            WgpuBackend::new(device, queue)?.recording_strategy(record)?.encoding_strategy(EncodingStrategy::PerPass),
+        );
         let builder = builder.process(Painted { step: Arc::clone(&step) }).output("paint");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         Ok::<_, Failed>(Studio { renderer, submitter })
@@ -84,12 +86,12 @@ fn painted_otherwise() -> Result<(), Failed> {
         let recorded = studio.record(&scene)?;
         Ok::<_, Failed>(studio.submit(recorded)?.read(0, "paint")?)
     };
-    let mut kept = studio(Record::Kept)?;
+    let mut kept = studio(RecordingStrategy::CachedBundles)?;
     // Other bytes in the same place are read by the bundles that are there.
     let steps = [(0, true), (4, true), (1, true), (2, false), (5, true), (3, true), (0, true), (3, true), (1, true)];
     for (next, is_recorded) in steps {
         step.store(next, Ordering::Relaxed);
-        let expected = paint(&mut studio(Record::Direct)?)?;
+        let expected = paint(&mut studio(RecordingStrategy::Direct)?)?;
         for turn in 0..2 {
             expect(paint(&mut kept)? == expected, || format!("step {next}, frame {turn}: another picture"))?;
             let (recorded, replayed) = counts(&kept, |_| true);

@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use drawloom::backend::{BackendError, Encode, Picture, Record, WgpuBackend, WgpuPass};
+use drawloom::backend::{BackendError, EncodingStrategy, Picture, RecordingStrategy, WgpuBackend, WgpuPassStatistics};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
 use drawloom::scene::{Blend, Light, Material, RenderObject, Scene, Texture};
@@ -28,8 +28,13 @@ pub const CASES: &[Case] = &[
     ("a_pass_refused_at_submission_is_named", refused_at_submission),
 ];
 
-const RECORDS: [Record; 4] = [Record::Direct, Record::Bundles, Record::Kept, Record::Indirect];
-const ENCODES: [Encode; 3] = [Encode::PerPass, Encode::Split, Encode::OnSubmit];
+const RECORDS: [RecordingStrategy; 4] = [
+    RecordingStrategy::Direct,
+    RecordingStrategy::Bundles,
+    RecordingStrategy::CachedBundles,
+    RecordingStrategy::Indirect,
+];
+const ENCODES: [EncodingStrategy; 3] = [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit];
 
 /// The machine's adapter with all features that Drawloom has a use for.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
@@ -52,9 +57,9 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
 }
 
 /// The techniques that the adapter has.
-pub fn techniques() -> Result<Vec<(Record, Encode)>, Failed> {
+pub fn techniques() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
     let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
-    let records = RECORDS.into_iter().filter(|record| has_indirect || *record != Record::Indirect);
+    let records = RECORDS.into_iter().filter(|record| has_indirect || *record != RecordingStrategy::Indirect);
     Ok(records.flat_map(|record| ENCODES.map(|encode| (record, encode))).collect())
 }
 
@@ -71,9 +76,9 @@ pub fn small_maps() -> Deferred {
 }
 
 /// One that draws by one technique alone.
-pub fn technique(record: Record, encode: Encode) -> Result<Studio, Failed> {
+pub fn technique(record: RecordingStrategy, encode: EncodingStrategy) -> Result<Studio, Failed> {
     let (device, queue) = device()?;
-    studio_of(WgpuBackend::new(device, queue)?.record(record)?.encode(encode))
+    studio_of(WgpuBackend::new(device, queue)?.recording_strategy(record)?.encoding_strategy(encode))
 }
 
 /// Every main view's picture, and the light in it.
@@ -90,7 +95,7 @@ fn draw(studio: &mut Studio, scene: &Scene) -> Result<Vec<Picture>, Failed> {
 
 /// What a renderer draws that has drawn nothing before.
 pub fn drawn_anew(scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    draw(&mut technique(Record::Bundles, Encode::PerPass)?, scene)
+    draw(&mut technique(RecordingStrategy::Bundles, EncodingStrategy::PerPass)?, scene)
 }
 
 /// The colonnade in a small picture. Its lamp casts no shadow: to halve the edges of all that is near it takes each technique
@@ -182,8 +187,9 @@ fn alike() -> Result<(), Failed> {
                 if *expected.get_or_insert_with(|| drawn.clone()) != drawn {
                     return Err(format!("frame {frame} differs with {record:?}, {encode:?}").into());
                 }
-                let passes = studio.renderer.backend().passes();
-                if passes.is_empty() || passes.iter().any(|pass| (pass.record, pass.encode) != (*record, *encode)) {
+                let passes = studio.renderer.backend().pass_statistics();
+                if passes.is_empty() || passes.iter().any(|pass| (pass.recording, pass.encoding) != (*record, *encode))
+                {
                     return Err(format!("these should be {record:?}, {encode:?}: {passes:?}").into());
                 }
             }
@@ -241,12 +247,12 @@ fn measured() -> Result<(), Failed> {
     scene.cameras[1].size = [20, 20];
     let expected = drawn_anew(&scene)?;
     let mut studio = studio_of(WgpuBackend::new(device, queue)?)?;
-    let mut seen: Vec<(Record, bool)> = Vec::new();
+    let mut seen: Vec<(RecordingStrategy, bool)> = Vec::new();
     for frame in 0..40 {
         if draw(&mut studio, &scene)? != expected {
-            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().passes()).into());
+            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().pass_statistics()).into());
         }
-        seen.extend(studio.renderer.backend().passes().iter().map(|pass| (pass.record, pass.encoders > 1)));
+        seen.extend(studio.renderer.backend().pass_statistics().iter().map(|pass| (pass.recording, pass.encoders > 1)));
     }
     for (record, _) in techniques()? {
         if !seen.contains(&(record, false)) {
@@ -257,10 +263,11 @@ fn measured() -> Result<(), Failed> {
 }
 
 /// Bundles that were recorded and that were replayed, over the passes that `is_meant` picks.
-pub fn counts(studio: &Studio, is_meant: impl Fn(&WgpuPass) -> bool) -> (usize, usize) {
-    let passes = studio.renderer.backend().passes();
+pub fn counts(studio: &Studio, is_meant: impl Fn(&WgpuPassStatistics) -> bool) -> (usize, usize) {
+    let passes = studio.renderer.backend().pass_statistics();
     let meant = passes.iter().filter(|pass| is_meant(pass));
-    meant.fold((0, 0), |(recorded, replayed), pass| (recorded + pass.recorded, replayed + pass.replayed))
+    meant
+        .fold((0, 0), |(recorded, replayed), pass| (recorded + pass.recorded_bundles, replayed + pass.replayed_bundles))
 }
 
 pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> {
@@ -269,12 +276,12 @@ pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> 
 
 fn moving() -> Result<(), Failed> {
     for encode in ENCODES {
-        let (mut scene, mut studio) = (many_batches(), technique(Record::Kept, encode)?);
+        let (mut scene, mut studio) = (many_batches(), technique(RecordingStrategy::CachedBundles, encode)?);
         draw(&mut studio, &scene)?;
         let (recorded, replayed) = counts(&studio, |_| true);
         expect(recorded > 10 && replayed == 0, || format!("at first {recorded} and {replayed}"))?;
-        for pass in studio.renderer.backend().passes() {
-            expect(pass.view != 0 || pass.recorded > 3, || format!("not many bundles: {pass:?}"))?;
+        for pass in studio.renderer.backend().pass_statistics() {
+            expect(pass.view != 0 || pass.recorded_bundles > 3, || format!("not many bundles: {pass:?}"))?;
         }
         for frame in 0..4 {
             if frame > 1 {
@@ -293,7 +300,8 @@ fn moving() -> Result<(), Failed> {
 }
 
 fn recorded_anew() -> Result<(), Failed> {
-    let (mut scene, mut studio) = (many_batches(), technique(Record::Kept, Encode::PerPass)?);
+    let (mut scene, mut studio) =
+        (many_batches(), technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
     let steady = |studio: &mut Studio, scene: &Scene, after: &str| {
         draw(studio, scene)?;
         let (recorded, replayed) = counts(studio, |_| true);
@@ -343,7 +351,8 @@ fn recorded_anew() -> Result<(), Failed> {
 
 /// As the lamp of `everything` comes near, edges are halved more often; and as meshes change, what is subdivided does.
 fn subdivided_otherwise() -> Result<(), Failed> {
-    let (mut scene, mut studio) = (everything(), technique(Record::Kept, Encode::PerPass)?);
+    let (mut scene, mut studio) =
+        (everything(), technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
     draw(&mut studio, &scene)?;
     draw(&mut studio, &scene)?;
     let shadows = |studio: &Studio| counts(studio, |pass| pass.process == "shadow casters");
@@ -409,7 +418,9 @@ impl RenderProcess for Head {
 
 fn refused_at_submission() -> Result<(), Failed> {
     let (device, queue) = device()?;
-    let backend = WgpuBackend::new(device, queue)?.record(Record::Kept)?.encode(Encode::OnSubmit);
+    let backend = WgpuBackend::new(device, queue)?
+        .recording_strategy(RecordingStrategy::CachedBundles)?
+        .encoding_strategy(EncodingStrategy::OnSubmit);
     let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros);
     let (mut renderer, submitter) = builder.output("tail").build(Arc::new(Scheduler::new(2)?))?;
     let scene = everything();

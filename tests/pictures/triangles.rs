@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use drawloom::Recorded;
-use drawloom::backend::{Encode, Record, WgpuBackend};
+use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::quality::{Quality, TransformPrecision};
 use drawloom::scene::{RenderObject, Scene};
@@ -74,8 +74,8 @@ fn any_technique() -> Result<(), Failed> {
                 }
                 change(&mut asking)?;
             }
-            let is_split = studio.renderer.backend().passes().iter().any(|pass| pass.encoders > 1);
-            let has_to_be = encode == Encode::Split && every > 1;
+            let is_split = studio.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
+            let has_to_be = encode == EncodingStrategy::Split && every > 1;
             expect(is_split || !has_to_be, || "no pass was split".to_owned())?;
         }
     }
@@ -95,7 +95,7 @@ fn whatever_else_changes() -> Result<(), Failed> {
     change(&mut whole)?;
     let second = expected(&whole)?;
 
-    let mut studio = technique(Record::Kept, Encode::PerPass)?;
+    let mut studio = technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?;
     studio.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
     let mut scene = asking(everything(), 1);
     for _ in 0..2 {
@@ -136,7 +136,7 @@ fn measured() -> Result<(), Failed> {
         let recorded = studio.record(&scene)?;
         let culled = culled_in(&recorded);
         if culled == 0 || pictures(&studio, recorded, &scene)? != expected {
-            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().passes()).into());
+            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().pass_statistics()).into());
         }
     }
     Ok(())

@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scheduler = Arc::new(scheduler.build()?);
     let (device, queue) = device()?;
     let backend = WgpuBackend::new(device, queue)?;
-    println!("Rendering on {} with {} workers.", backend.adapter(), scheduler.workers());
+    println!("Rendering on {} with {} workers.", backend.adapter_name(), scheduler.workers());
     let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
     let scene = demo::colonnade()?;

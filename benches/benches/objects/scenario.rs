@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::Record;
+use drawloom::backend::RecordingStrategy;
 use drawloom::task::Scheduler;
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::{Harness, Rounds};
@@ -48,7 +48,7 @@ pub fn measure(
     progress.set_message(format!("{objects} objects, {}", backend.name()));
     let (one, two) = (Arc::new(Scheduler::new(1)?), Arc::new(Scheduler::new(WORKERS)?));
     let mut runners = [
-        Runner::new(backend.open()?.record(Record::Direct)?, &one, false)?,
+        Runner::new(backend.open()?.recording_strategy(RecordingStrategy::Direct)?, &one, false)?,
         Runner::new(backend.open()?, &two, false)?,
         Runner::new(backend.open()?, &two, true)?,
     ];

@@ -16,7 +16,7 @@ impl Backend for NoopBackend {
     type Commands = ();
     type Submission = ();
 
-    fn adapter(&self) -> String {
+    fn adapter_name(&self) -> String {
         "no-op backend".to_owned()
     }
 
@@ -38,7 +38,7 @@ impl Backend for NoopBackend {
         Ok(())
     }
 
-    fn parts(&self, _frame: &(), _pass: &PassRequest<'_>) -> usize {
+    fn part_count(&self, _frame: &(), _pass: &PassRequest<'_>) -> usize {
         0
     }
 

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use drawloom::backend::Record;
+use drawloom::backend::RecordingStrategy;
 use drawloom::scene::SceneRef;
 use drawloom_benches::backends::BackendName;
 
@@ -52,10 +52,10 @@ impl Contender {
         ];
         let strategies = [
             ("drawloom", None),
-            ("drawloom-direct", Some(Record::Direct)),
-            ("drawloom-bundles", Some(Record::Bundles)),
-            ("drawloom-kept", Some(Record::Kept)),
-            ("drawloom-indirect", Some(Record::Indirect)),
+            ("drawloom-direct", Some(RecordingStrategy::Direct)),
+            ("drawloom-bundles", Some(RecordingStrategy::Bundles)),
+            ("drawloom-kept", Some(RecordingStrategy::CachedBundles)),
+            ("drawloom-indirect", Some(RecordingStrategy::Indirect)),
         ];
         for workers in [1, 2] {
             for (name, strategy) in strategies {
@@ -63,7 +63,7 @@ impl Contender {
                 let opened = match strategy {
                     None => opened,
                     // Some adapters lack a feature that it requires.
-                    Some(strategy) => match opened.record(strategy) {
+                    Some(strategy) => match opened.recording_strategy(strategy) {
                         Ok(opened) => opened,
                         Err(error) => {
                             eprintln!("{name} is left out: {error}");

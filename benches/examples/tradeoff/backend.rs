@@ -109,7 +109,7 @@ struct Runner<B: Backend> {
 
 impl<B: Backend> Runner<B> {
     fn new(backend: B, scheduler: Arc<Scheduler>) -> Result<Self, Failure> {
-        let name = backend.adapter();
+        let name = backend.adapter_name();
         let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
         let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
         Ok(Self { name, renderer, submitter, views: Vec::new(), last: None })

@@ -81,7 +81,7 @@ impl Backend for SoftwareBackend {
     type Commands = SoftwareCommands;
     type Submission = SoftwareSubmission;
 
-    fn adapter(&self) -> String {
+    fn adapter_name(&self) -> String {
         self.rasterizer.adapter_name()
     }
 
@@ -105,7 +105,7 @@ impl Backend for SoftwareBackend {
         frame.recording.prepare(pass)
     }
 
-    fn parts(&self, _frame: &SoftwareFrame, _pass: &PassRequest<'_>) -> usize {
+    fn part_count(&self, _frame: &SoftwareFrame, _pass: &PassRequest<'_>) -> usize {
         0
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use parking_lot::Mutex;
 
 use super::executor::Executor;
-use crate::backend::subdivisions::Subdivisions;
+use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::scene::Mesh;
 
 /// What the frames of one rasterizer share while they are drawn.
@@ -13,5 +13,5 @@ pub(super) struct DrawContext {
     pub(super) executor: Executor,
     /// Held while a frame is drawn: one frame is drawn at a time.
     pub(super) drawing: Mutex<()>,
-    pub(super) subdivisions: Subdivisions<Arc<Mesh>>,
+    pub(super) subdivisions: SubdivisionCache<Arc<Mesh>>,
 }

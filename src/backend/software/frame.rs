@@ -19,7 +19,7 @@ use super::software_pass::{SoftwareDraws, SoftwarePass};
 use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
-use crate::backend::subdivisions::{SubdividedMeshes, no_such_mesh};
+use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
 use crate::backend::{BackendError, PassRequest};
 use crate::command::Batch;
 use crate::process::Pass;
@@ -81,9 +81,9 @@ impl<R: Precision> TypedFrame<R> {
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
                         0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
-                        level => subdivided.get(&(batch.mesh, level)).map(|mesh| &mesh.drawn),
+                        level => subdivided.get(&(batch.mesh, level)).map(|mesh| &mesh.geometry),
                     };
-                    mesh.cloned().ok_or_else(no_such_mesh)
+                    mesh.cloned().ok_or_else(missing_mesh_error)
                 };
                 let chunks = setup_chunks(commands, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use crate::backend::texels::{SIDES, array_for, linear, mip_chain};
+use crate::backend::mip_generation::{ARRAY_SIDES, array_for, mip_chain, srgb_to_linear};
 use crate::raster::{Real, Vector, Vector2, Vector4};
 use crate::scene::Texture;
 
@@ -14,11 +14,11 @@ pub(super) struct MipChain {
 }
 
 /// What the bytes of red, green and blue stand for.
-static LIGHT: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|byte| linear(byte as f64 / 255.0)));
+static LIGHT: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f64 / 255.0)));
 
 impl MipChain {
     pub(super) fn of(texture: &Texture) -> Self {
-        let side = SIDES[array_for(texture)];
+        let side = ARRAY_SIDES[array_for(texture)];
         Self { side: side as usize, levels: mip_chain(texture, side) }
     }
 

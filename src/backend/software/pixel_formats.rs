@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use half::f16;
 
 use super::precision::Precision;
-use crate::backend::texels::linear;
+use crate::backend::mip_generation::srgb_to_linear;
 use crate::process::Format;
 use crate::raster::Vector4;
 use crate::scene::Blend;
@@ -122,11 +122,12 @@ fn srgb_byte_of(value: f64) -> u8 {
 }
 
 /// The linear value of each sRGB byte.
-static LINEAR_OF_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| from_fn(|byte| linear(byte as f64 / 255.0) as f32));
+static LINEAR_OF_BYTES: LazyLock<[f32; 256]> =
+    LazyLock::new(|| from_fn(|byte| srgb_to_linear(byte as f64 / 255.0) as f32));
 
 /// The linear value from which on the next sRGB byte is nearest.
 static BYTE_THRESHOLDS: LazyLock<[f32; 255]> =
-    LazyLock::new(|| from_fn(|byte| linear((byte as f64 + 0.5) / 255.0) as f32));
+    LazyLock::new(|| from_fn(|byte| srgb_to_linear((byte as f64 + 0.5) / 255.0) as f32));
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {

@@ -16,7 +16,7 @@ use super::shader_inputs::CameraPosition;
 use super::software_pass::{SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
-use crate::backend::subdivisions::Subdivisions;
+use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
@@ -34,7 +34,7 @@ pub(super) struct Rasterizer<R: Precision> {
 
 impl<R: Precision> Rasterizer<R> {
     pub(super) fn new(executor: Executor) -> Self {
-        let (drawing, subdivisions) = (Mutex::default(), Subdivisions::default());
+        let (drawing, subdivisions) = (Mutex::default(), SubdivisionCache::default());
         Self {
             context: Arc::new(DrawContext { executor, drawing, subdivisions }),
             meshes: Mutex::default(),
@@ -62,7 +62,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let targets = self.targets.lock().update(plan, views)?;
         let pass = |&pass: &Pass| software_pass(request, pass, &shaders[pass.process], &targets);
         let passes = passes.iter().map(pass).collect::<Result<_, _>>()?;
-        self.context.subdivisions.begin(scene.assets);
+        self.context.subdivisions.begin_frame(scene.assets);
         // The reference draws the scene's own vertices.
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
         let meshes = self.meshes.lock().update(scene.assets, vertices);

@@ -1,0 +1,94 @@
+//! The interface between frames and devices.
+
+use std::ops::Range;
+
+use super::error::BackendError;
+use super::requests::{FrameRequest, PassRequest};
+use crate::process::Pass;
+use crate::task::Worker;
+use crate::view::ObjectTable;
+
+/// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded, most of
+/// them by several workers at once. Those take the worker as proof that they run in a job (M 10.3 asserts it).
+///
+/// The order within a frame: `begin`; then `upload_objects` for every block of objects; for every pass `prepare`, `record` for
+/// each range of its parts, and `finish`; later, on the device thread, `submit`.
+pub trait Backend: Send + Sync + 'static {
+    /// The state of a frame in flight, from `begin` to `submit`.
+    type Frame: Send + Sync;
+    /// A part of a pass that is recorded before the pass is finished, such as a bundle.
+    type Part: Send;
+    /// A finished pass, ready to be submitted.
+    type Commands: Send;
+    /// A submitted frame.
+    type Submission;
+
+    /// The name of the device, for reports.
+    fn adapter_name(&self) -> String;
+
+    /// The number of bytes uploaded to the device so far; 0 for a backend without uploads.
+    fn uploaded_bytes(&self) -> u64 {
+        0
+    }
+
+    /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines.
+    ///
+    /// # Errors
+    /// If the device lacks room for the frame's resources, or refuses them.
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
+
+    /// Uploads blocks of the object table.
+    ///
+    /// # Errors
+    /// If the device refuses.
+    fn upload_objects(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        objects: &ObjectTable,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError>;
+
+    /// Prepares a pass of commands for recording: uploads the indices of its objects, and creates missing pipelines.
+    ///
+    /// # Errors
+    /// If the device refuses. Compile errors of the process' shader are reported here at the latest.
+    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
+
+    /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant throughout a
+    /// frame.
+    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize;
+
+    /// Records a range of a pass's parts, and calls `emit` with each of them, in order.
+    ///
+    /// # Errors
+    /// If the device refuses what was recorded.
+    fn record(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        emit: &mut dyn FnMut(Self::Part),
+    ) -> Result<(), BackendError>;
+
+    /// Finishes a pass from its parts, or records it if it has none. The list of a pass without commands is empty. The caller drops
+    /// the remaining parts and reuses the memory of their list.
+    ///
+    /// # Errors
+    /// If the device refuses the pass.
+    fn finish(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<Self::Part>,
+    ) -> Result<Self::Commands, BackendError>;
+
+    /// Submits a frame's passes in this order. Called only on the device thread.
+    ///
+    /// # Errors
+    /// If the device refuses.
+    fn submit(&self, frame: Self::Frame, passes: Vec<(Pass, Self::Commands)>)
+    -> Result<Self::Submission, BackendError>;
+}

@@ -1,0 +1,39 @@
+//! What frames request of a backend.
+
+use crate::command::DrawList;
+use crate::process::{Draws, FramePlan, Pass};
+use crate::quality::Quality;
+use crate::scene::SceneRef;
+use crate::view::{LightTable, Rejections, RenderView};
+
+/// Everything that a backend needs to know of a frame.
+#[derive(Clone, Copy)]
+pub struct FrameRequest<'a> {
+    /// The render processes and their targets.
+    pub plan: &'a FramePlan,
+    /// What each render process draws, in the plan's order.
+    pub draws: &'a [Draws<'a>],
+    /// The views. The targets of a cached view still hold what an earlier frame drew: see [`RenderView::is_cached`].
+    pub views: &'a [RenderView],
+    /// The lights that reach each view.
+    pub lights: &'a [LightTable],
+    /// Each render process in each of its views, in submission order.
+    pub passes: &'a [Pass],
+    /// The scene.
+    pub scene: &'a SceneRef<'a>,
+    /// The frame's accuracy.
+    pub quality: &'a Quality,
+    /// Counts what the backend leaves out.
+    pub rejections: &'a Rejections,
+}
+
+/// Everything that a backend needs to know of one pass of a frame.
+#[derive(Clone, Copy)]
+pub struct PassRequest<'a> {
+    /// The frame.
+    pub frame: &'a FrameRequest<'a>,
+    /// The render process and the view.
+    pub pass: Pass,
+    /// Its batches; empty for a pass without commands.
+    pub list: &'a DrawList,
+}

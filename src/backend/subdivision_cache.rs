@@ -1,0 +1,135 @@
+//! The cache of subdivided meshes, for views whose projection bends straight edges.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use parking_lot::Mutex;
+
+use super::error::BackendError;
+use super::requests::FrameRequest;
+use crate::command::{Batch, DrawList};
+use crate::quality::VertexFormat;
+use crate::scene::{Assets, Mesh};
+use crate::view::RejectionReason;
+
+/// Keeps subdivided meshes, as a backend's geometry `T`, for as long as frames draw them and a while longer.
+pub(super) struct SubdivisionCache<T> {
+    meshes: Mutex<HashMap<Key, Arc<CachedSubdivision<T>>>>,
+    /// The identity of the assets that the meshes belong to.
+    assets: AtomicU64,
+    frame: AtomicU64,
+}
+
+/// A subdivided mesh.
+pub(crate) struct CachedSubdivision<T> {
+    /// The backend's geometry.
+    pub(super) geometry: T,
+    /// Whether its edges are too long, because shorter ones would take too many triangles.
+    pub(super) is_coarse: bool,
+    used_in: AtomicU64,
+}
+
+/// The subdivided meshes of a frame, by mesh slot and subdivision level.
+pub(crate) type SubdividedMeshes<T> = HashMap<(u32, u32), Arc<CachedSubdivision<T>>>;
+
+/// Mesh slot, the mesh's revision, subdivision level, and vertex format.
+type Key = (u32, u64, u32, VertexFormat);
+
+/// The maximum number of triangles of a subdivided mesh.
+const MAX_TRIANGLES: usize = 1 << 18;
+
+impl<T> Default for SubdivisionCache<T> {
+    fn default() -> Self {
+        Self { meshes: Mutex::default(), assets: AtomicU64::new(0), frame: AtomicU64::new(0) }
+    }
+}
+
+impl<T> SubdivisionCache<T> {
+    /// Meshes that were not drawn for this many frames are dropped.
+    const MAX_UNUSED_FRAMES: u64 = 120;
+
+    /// Begins a frame: drops meshes of other assets and long unused ones.
+    pub(super) fn begin_frame(&self, assets: &Assets) {
+        // Relaxed, here and below: frames begin one after the other, and the end of a frame's run orders its jobs' stores.
+        let frame = self.frame.fetch_add(1, Ordering::Relaxed) + 1;
+        let identity = assets.meshes.identity();
+        let same_assets = self.assets.swap(identity, Ordering::Relaxed) == identity;
+        let is_used =
+            |mesh: &CachedSubdivision<T>| mesh.used_in.load(Ordering::Relaxed) + Self::MAX_UNUSED_FRAMES >= frame;
+        self.meshes.lock().retain(|_, mesh| same_assets && is_used(mesh));
+    }
+
+    /// Drops everything.
+    #[cfg(feature = "wgpu")]
+    pub(super) fn clear(&self) {
+        self.meshes.lock().clear();
+    }
+
+    /// Calls `emit` with each subdivided mesh that a list draws, by slot and level. `create` makes the geometry of missing ones.
+    /// Counts objects whose edges stay too long.
+    ///
+    /// # Errors
+    /// If there is no such mesh, or `create` fails.
+    pub(super) fn collect(
+        &self,
+        request: &FrameRequest<'_>,
+        list: &DrawList,
+        vertices: VertexFormat,
+        mut create: impl FnMut(Mesh) -> Result<T, BackendError>,
+        mut emit: impl FnMut((u32, u32), Arc<CachedSubdivision<T>>),
+    ) -> Result<(), BackendError> {
+        for &Batch { mesh, state, first, count } in
+            list.batches.iter().filter(|batch| batch.state.subdivision_level() > 0)
+        {
+            let level = state.subdivision_level();
+            let found = self.get_or_create(request.scene.assets, mesh, level, vertices, &mut create)?;
+            if found.is_coarse {
+                for &object in &list.objects[first as usize..][..count as usize] {
+                    request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
+                }
+            }
+            emit((mesh, level), found);
+        }
+        Ok(())
+    }
+
+    fn get_or_create(
+        &self,
+        assets: &Assets,
+        slot: u32,
+        level: u32,
+        vertices: VertexFormat,
+        create: impl FnOnce(Mesh) -> Result<T, BackendError>,
+    ) -> Result<Arc<CachedSubdivision<T>>, BackendError> {
+        let (revision, mesh) = assets.meshes.get_with_revision(slot).ok_or_else(missing_mesh_error)?;
+        let key = (slot, revision, level, vertices);
+        let cached = self.meshes.lock().get(&key).cloned();
+        let found = match cached {
+            Some(cached) => cached,
+            None => {
+                // Two passes may do this at once. One result is discarded, which is cheaper than holding the lock meanwhile.
+                let (mesh, is_coarse) = subdivided(mesh, level);
+                let created =
+                    Arc::new(CachedSubdivision { geometry: create(mesh)?, is_coarse, used_in: AtomicU64::new(0) });
+                Arc::clone(self.meshes.lock().entry(key).or_insert(created))
+            }
+        };
+        found.used_in.store(self.frame.load(Ordering::Relaxed), Ordering::Relaxed);
+        Ok(found)
+    }
+}
+
+/// The mesh subdivided to a level, and whether its edges are still too long.
+fn subdivided(mesh: &Mesh, level: u32) -> (Mesh, bool) {
+    // A little longer, so that halves that were rounded up are not halved again.
+    let max_edge = mesh.longest_edge() / (1_u64 << level) as f32 * 1.001;
+    let subdivided = mesh.subdivided(max_edge, MAX_TRIANGLES);
+    let is_coarse = subdivided.longest_edge() > max_edge;
+    (subdivided, is_coarse)
+}
+
+/// The error for a batch without a mesh: a bug of Drawloom's.
+pub(super) fn missing_mesh_error() -> BackendError {
+    BackendError::BrokenRule { rule: "a batch draws an existing mesh".to_owned() }
+}

@@ -1,0 +1,194 @@
+//! The wgpu backend: its configuration, and the resources that it keeps from frame to frame.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize};
+
+use parking_lot::Mutex;
+
+use super::error_scope::with_error_scope;
+use super::frame::{BufferPool, WgpuPassStatistics};
+use super::pipelines::PipelineCache;
+use super::resources::{
+    AssetCache, BindGroupLayouts, LightMeshes, SubdividedMesh, TargetCache, UploadQueue, new_buffer,
+};
+use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
+use super::timing::{DeviceClock, DeviceTiming};
+use crate::backend::subdivision_cache::SubdivisionCache;
+use crate::backend::{Backend, BackendError};
+use crate::timeline::Timeline;
+
+/// Draws with wgpu, on the engine's device.
+///
+/// Drawloom builds wgpu with Vulkan, Metal, DX12 and `noop`, and WGSL. An engine that depends on wgpu 30 itself can enable
+/// more of it.
+///
+/// Errors in what Drawloom records are returned. Other device errors are not: for those an engine sets its own
+/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`. Submitting to a lost device reports nothing; the next
+/// [`WgpuSubmission::wait`](super::WgpuSubmission::wait) or [`WgpuSubmission::read`](super::WgpuSubmission::read) returns the
+/// error, and so does the next frame.
+pub struct WgpuBackend {
+    pub(super) device: wgpu::Device,
+    pub(super) uploads: UploadQueue,
+    pub(super) layouts: BindGroupLayouts,
+    pub(super) pipelines: Mutex<PipelineCache>,
+    /// Created when a plan draws lights for the first time.
+    pub(super) light_meshes: Mutex<Option<Arc<LightMeshes>>>,
+    pub(super) assets: Mutex<AssetCache>,
+    pub(super) subdivisions: SubdivisionCache<SubdividedMesh>,
+    pub(super) targets: Mutex<TargetCache>,
+    pub(super) buffers: Arc<BufferPool>,
+    pub(super) strategies: StrategySet,
+    /// The number of frames begun.
+    pub(super) frames: AtomicU64,
+    /// The number of workers that have recorded so far.
+    pub(super) workers: AtomicUsize,
+    /// Of the passes of commands of the frame that was submitted last.
+    pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
+    /// `None` if passes are not timed.
+    pub(super) device_timing: Option<DeviceTiming>,
+}
+
+impl WgpuBackend {
+    /// The features that a device must have: none beyond WebGPU's own.
+    pub const REQUIRED_FEATURES: wgpu::Features = wgpu::Features::empty();
+
+    /// Optional features, used by [`RecordingStrategy::Indirect`].
+    pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
+
+    /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times raw passes
+    /// as well.
+    pub const TIMING_FEATURES: wgpu::Features =
+        wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+
+    /// The limits that a device must have. Higher limits allow larger pictures and more objects.
+    pub const REQUIRED_LIMITS: wgpu::Limits = wgpu::Limits::downlevel_defaults();
+
+    /// A backend on the engine's device. It tunes the recording and encoding strategy of each pass by measurement.
+    ///
+    /// # Errors
+    /// If the device lacks a feature or a limit, naming it.
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, BackendError> {
+        let missing = Self::REQUIRED_FEATURES - device.features();
+        if !missing.is_empty() {
+            return Err(BackendError::MissingFeature { missing: missing.to_string() });
+        }
+        let mut insufficient = None;
+        let limits = device.limits();
+        Self::REQUIRED_LIMITS.check_limits_with_fail_fn(&limits, true, |limit, needed, allowed| {
+            insufficient.get_or_insert(BackendError::Limit { limit, allowed, needed });
+        });
+        if let Some(error) = insufficient {
+            return Err(error);
+        }
+        let layouts = with_error_scope(&device, "Drawloom's bind group layouts", || BindGroupLayouts::new(&device))?;
+        let supports_indirect =
+            device.features().contains(Self::OPTIONAL_FEATURES) && supports_indirect_buffers(&device);
+        // On the noop backend wgpu panics over the arguments' alignment, unless its check of indirect calls is switched off.
+        let tunes_indirect = supports_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
+        Ok(Self {
+            device,
+            uploads: UploadQueue::new(queue),
+            layouts,
+            pipelines: Mutex::default(),
+            light_meshes: Mutex::default(),
+            assets: Mutex::default(),
+            subdivisions: SubdivisionCache::default(),
+            targets: Mutex::default(),
+            buffers: Arc::default(),
+            strategies: StrategySet::new(supports_indirect, tunes_indirect),
+            frames: AtomicU64::new(0),
+            workers: AtomicUsize::new(1),
+            latest: Mutex::default(),
+            device_timing: None,
+        })
+    }
+
+    /// Fixes the recording strategy of all passes, instead of tuning it.
+    ///
+    /// # Errors
+    /// If the device lacks a feature for it, naming it.
+    pub fn recording_strategy(self, recording: RecordingStrategy) -> Result<Self, BackendError> {
+        if recording == RecordingStrategy::Indirect && !self.strategies.supports_indirect() {
+            let missing = (Self::OPTIONAL_FEATURES - self.device.features()).to_string();
+            // WebGPU requires it, so wgpu has no feature for it, but some OpenGL devices lack it.
+            let missing = if missing.is_empty() { "INDIRECT_EXECUTION".to_owned() } else { missing };
+            return Err(BackendError::MissingFeature { missing });
+        }
+        Ok(Self { strategies: self.strategies.with_recording(recording), ..self })
+    }
+
+    /// Fixes the encoding strategy of all passes, instead of tuning it.
+    pub fn encoding_strategy(self, encoding: EncodingStrategy) -> Self {
+        Self { strategies: self.strategies.with_encoding(encoding), ..self }
+    }
+
+    /// Has the device write timestamps at the begin and end of each pass: see
+    /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a timeline's
+    /// log. [Raw passes](crate::process::RawPass) are timed only if the device has `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
+    ///
+    /// # Errors
+    /// If the device lacks `TIMESTAMP_QUERY`, or is wgpu's `noop` backend, which claims it and writes nothing.
+    pub fn time_passes(self) -> Result<Self, BackendError> {
+        let device_timing = Some(DeviceTiming::new(&self.device, self.queue())?);
+        Ok(Self { device_timing, ..self })
+    }
+
+    /// How the passes of commands of the frame that was submitted last were recorded, in submission order.
+    pub fn pass_statistics(&self) -> Vec<WgpuPassStatistics> {
+        self.latest.lock().clone()
+    }
+
+    /// The device.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// The device's queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        self.uploads.queue()
+    }
+
+    /// What the backend keeps on the device from frame to frame, beside the scene's meshes and textures.
+    pub fn resources(&self) -> WgpuResources {
+        let pipelines = self.pipelines.lock().pipeline_count();
+        let (targets, target_bytes) = self.targets.lock().current().sizes();
+        WgpuResources { pipelines, targets, target_bytes, buffer_bytes: self.buffers.bytes() }
+    }
+
+    /// Reads the device's clock. It waits for all earlier submissions, so do not call it amid a frame; and it takes several
+    /// submissions, so do not call it every frame.
+    ///
+    /// # Errors
+    /// If the device lacks `TIMESTAMP_QUERY`, is wgpu's `noop` backend, refuses or is lost.
+    pub fn device_clock(&self, timeline: &Timeline) -> Result<DeviceClock, BackendError> {
+        DeviceClock::read(&self.device, self.queue(), self.adapter_name(), timeline)
+    }
+
+    /// Drops all cached resources, because a device error may have left some unusable. The next frame creates them again.
+    pub(super) fn clear(&self) {
+        *self.assets.lock() = AssetCache::default();
+        *self.light_meshes.lock() = None;
+        self.subdivisions.clear();
+        *self.targets.lock() = TargetCache::default();
+        self.buffers.clear();
+    }
+}
+
+/// Whether the device can have buffers of indirect arguments.
+fn supports_indirect_buffers(device: &wgpu::Device) -> bool {
+    let create = || new_buffer(device, "indirect draws", 256, wgpu::BufferUsages::INDIRECT);
+    matches!(with_error_scope(device, "indirect draws", create), Ok(Ok(_)))
+}
+
+/// What a [`WgpuBackend`] keeps on the device from frame to frame, beside the scene's meshes and textures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WgpuResources {
+    /// The number of pipelines of all render processes drawn so far.
+    pub pipelines: usize,
+    /// The number of textures that the latest frame's views draw into. A shared one counts once.
+    pub targets: usize,
+    /// The size of these textures in bytes.
+    pub target_bytes: u64,
+    /// The size in bytes of all buffers for objects, views, lights, parameters and triangles that no frame in flight uses.
+    pub buffer_bytes: u64,
+}

@@ -1,0 +1,153 @@
+//! The [`Backend`] implementation.
+
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+use super::backend::WgpuBackend;
+use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
+use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
+use super::strategy::{EncodingStrategy, RecordingStrategy};
+use super::submission::WgpuSubmission;
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
+use crate::process::Pass;
+use crate::task::Worker;
+use crate::view::ObjectTable;
+
+impl Backend for WgpuBackend {
+    type Frame = WgpuFrame;
+    type Part = WgpuPart;
+    type Commands = WgpuCommands;
+    type Submission = WgpuSubmission;
+
+    fn adapter_name(&self) -> String {
+        let info = self.device.adapter_info();
+        format!("{} ({})", info.name, info.backend)
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        self.uploads.bytes()
+    }
+
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
+        self.begin_frame(request).inspect_err(|_| self.clear())
+    }
+
+    fn upload_objects(
+        &self,
+        _worker: &Worker,
+        frame: &WgpuFrame,
+        objects: &ObjectTable,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, objects, blocks))
+            .inspect_err(|_| self.buffers.clear())
+    }
+
+    fn prepare(
+        &self,
+        _worker: &Worker,
+        frame: &WgpuFrame,
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+    ) -> Result<(), BackendError> {
+        let index = frame.pass_index(pass);
+        let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
+        pass.timing.set_size(list.batches.len(), list.bundle_count(), pass.strategy.part_count(list));
+        let created = with_error_scope(&self.device, &pass.label, || {
+            frame.buffers.write_object_indices(&self.uploads, index, &list.objects);
+            pass.upload_partial_indices(&self.device, &self.uploads, list.remaining_indices())?;
+            self.subdivide(frame, request, list)?;
+            match pass.strategy.recording {
+                RecordingStrategy::CachedBundles => pass.bundle_cache.set_bundle_count(list.bundle_count()),
+                RecordingStrategy::Indirect => {
+                    let upload = || pass.indirect_arguments.upload(&self.device, &self.uploads, &frame.assets, list);
+                    pass.timing.time_serial(upload)?;
+                }
+                RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
+            }
+            Ok::<_, BackendError>(pipelines.create_missing(&self.device, &list.batches))
+        })
+        .flatten()
+        // Some of the resources just created may be unusable.
+        .inspect_err(|_| {
+            self.subdivisions.clear();
+            self.buffers.clear();
+        })?;
+        pipelines.insert(created);
+        Ok(())
+    }
+
+    fn part_count(&self, frame: &WgpuFrame, pass: &PassRequest<'_>) -> usize {
+        frame.pass(frame.pass_index(pass.pass)).strategy.part_count(pass.list)
+    }
+
+    fn record(
+        &self,
+        worker: &Worker,
+        frame: &WgpuFrame,
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        mut parts: Range<usize>,
+        emit: &mut dyn FnMut(WgpuPart),
+    ) -> Result<(), BackendError> {
+        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        let index = frame.pass_index(pass);
+        let pass = frame.pass(index);
+        let encoders = pass.strategy.encoder_count(list.bundle_count());
+        // Cached bundles need no error scope, which locks the device twice.
+        pass.timing.time_parallel(|| {
+            while !parts.is_empty()
+                && let Some(cached) = cached_bundle(frame, index, list, parts.start)
+            {
+                emit(cached);
+                parts.start += 1;
+            }
+        });
+        if parts.is_empty() {
+            return Ok(());
+        }
+        let record = |part| match encoders {
+            1 => record_bundle(&self.device, frame, index, list, part).map(RecordedPart::Bundle),
+            _ => encode_segment(&self.device, frame, request, index, list, part),
+        };
+        let all = || parts.map(record).try_for_each(|part| part.map(|part| emit(WgpuPart(part))));
+        // One error scope for all other parts.
+        pass.timing
+            .time_parallel(|| with_error_scope(&self.device, &pass.label, || catch_wgpu_panic(&pass.label, all)))
+            .flatten()
+            .flatten()
+            .inspect_err(|_| self.buffers.clear())
+    }
+
+    fn finish(
+        &self,
+        worker: &Worker,
+        frame: &WgpuFrame,
+        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        parts: &mut Vec<WgpuPart>,
+    ) -> Result<WgpuCommands, BackendError> {
+        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        if matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_)))) {
+            return Ok(WgpuCommands(PassCommands::Parts(std::mem::take(parts))));
+        }
+        let index = frame.pass_index(pass);
+        let pass = frame.pass(index);
+        let finish = || {
+            let encoder = encode_pass(&self.device, frame, request, index, list, parts)?;
+            Ok(match pass.strategy.encoding {
+                EncodingStrategy::OnSubmit => PassCommands::Open(encoder),
+                EncodingStrategy::PerPass | EncodingStrategy::Split => PassCommands::Finished(encoder.finish()),
+            })
+        };
+        let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
+        commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
+    }
+
+    fn submit(&self, frame: WgpuFrame, passes: Vec<(Pass, WgpuCommands)>) -> Result<WgpuSubmission, BackendError> {
+        self.submit_frame(&frame, passes).inspect_err(|_| {
+            self.buffers.clear();
+            if let Some(timing) = &self.device_timing {
+                timing.readback_pool.clear();
+            }
+        })
+    }
+}

@@ -1,0 +1,134 @@
+//! The begin of a frame: uploads, cached resources, and the strategy of each pass.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::backend::WgpuBackend;
+use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::frame::{BundleKey, WgpuFrame};
+use super::pipelines::ProcessBindGroup;
+use super::resources::{LightMeshes, SubdividedMesh};
+use super::strategy::RecordingStrategy;
+use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawList;
+use crate::process::{Access, Draws, Pass};
+use crate::scene::Mesh;
+
+impl WgpuBackend {
+    /// Begins a frame: creates or reuses the resources of its passes.
+    ///
+    /// # Errors
+    /// If the device lacks room, or refuses a resource.
+    pub(super) fn begin_frame(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
+        let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
+        let vertices = request.quality.vertices;
+        self.check_device()?;
+        let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, request)?;
+        let light_meshes = self.light_meshes(draws)?;
+        self.subdivisions.begin_frame(scene.assets);
+        let assets = with_error_scope(&self.device, "meshes, materials and textures", || {
+            self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, vertices, rejections)
+        })??;
+        let targets =
+            with_error_scope(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
+        with_error_scope(&self.device, "the frame's buffers", || {
+            let mut buffers = self.buffers.take();
+            buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
+            if let Some(timing) = &self.device_timing {
+                buffers.begin_timestamps(&self.device, request, timing.times_raw_passes)?;
+            }
+            // Relaxed: a counter that orders nothing.
+            let number = self.frames.fetch_add(1, Ordering::Relaxed);
+            let background = scene.background.as_dvec3().to_array();
+            let mut frame = WgpuFrame { number, pipelines, assets, light_meshes, targets, background, buffers };
+            self.begin_passes(&mut frame, request);
+            Ok(frame)
+        })?
+    }
+
+    /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have none.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn check_device(&self) -> Result<(), BackendError> {
+        let finish = || {
+            let descriptor = wgpu::RenderBundleEncoderDescriptor {
+                color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
+                sample_count: 1,
+                ..wgpu::RenderBundleEncoderDescriptor::default()
+            };
+            self.device.create_render_bundle_encoder(&descriptor).finish(&wgpu::RenderBundleDescriptor::default())
+        };
+        catch_wgpu_panic("the device", finish).map(|_| ())
+    }
+
+    /// Updates the bind group of each pass, and chooses its strategy.
+    fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) {
+        let (strategies, mut may_try) = (self.strategies.strategies(), true);
+        let WgpuFrame { number, pipelines, assets, targets, buffers, .. } = frame;
+        let (passes, parameters) = buffers.passes_mut();
+        for pass in passes {
+            let Pass { process, view } = pass.pass;
+            let pipelines = &pipelines[process];
+            let sampled = |(name, access): &(String, Access)| match access {
+                Access::Sample => targets.find(view, name).map(|target| &target.view),
+                Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
+                _ => None,
+            };
+            let sampled = request.plan.processes()[process].declaration.accesses.iter().filter_map(sampled);
+            let parameters = pass.parameters.and_then(|(offset, length)| parameters.binding(offset, length));
+            let before = pass.process_bind_group.take();
+            pass.process_bind_group = ProcessBindGroup::update(before, &self.device, pipelines, parameters, sampled);
+
+            let (mut index, mut is_trial) = (0, false);
+            if strategies.len() > 1 && pass.command_pass_index.is_some() {
+                (index, is_trial) = pipelines
+                    .with_tuner(view, strategies.len(), |tuner| tuner.choose(strategies, *number, &mut may_try));
+            }
+            pass.set_strategy(strategies[index], index, is_trial);
+            let caches_bundles =
+                pass.command_pass_index.is_some() && pass.strategy.recording == RecordingStrategy::CachedBundles;
+            if let Some(frame_bind_group) = pass.frame_bind_group.as_ref().filter(|_| caches_bundles) {
+                pass.bundle_cache.begin_frame(BundleKey {
+                    frame_bind_group: frame_bind_group.clone(),
+                    process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
+                    assets: Arc::clone(assets),
+                    pipelines: Arc::clone(pipelines),
+                });
+            }
+        }
+    }
+
+    /// Creates or reuses the subdivided meshes that a list draws.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(super) fn subdivide(
+        &self,
+        frame: &WgpuFrame,
+        request: &FrameRequest<'_>,
+        list: &DrawList,
+    ) -> Result<(), BackendError> {
+        let vertices = request.quality.vertices;
+        let make = |mesh: Mesh| SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices);
+        self.subdivisions.collect(request, list, vertices, make, |key, mesh| {
+            frame.buffers.subdivided().write().insert(key, mesh);
+        })
+    }
+
+    /// The light volumes if a process draws lights; created on first use.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn light_meshes(&self, draws: &[Draws<'_>]) -> Result<Option<Arc<LightMeshes>>, BackendError> {
+        if !draws.iter().any(|draws| matches!(draws, Draws::Lights(_))) {
+            return Ok(None);
+        }
+        let mut meshes = self.light_meshes.lock();
+        if meshes.is_none() {
+            let create = || LightMeshes::new(&self.device, &self.uploads);
+            *meshes = Some(Arc::new(with_error_scope(&self.device, "light volumes", create)??));
+        }
+        Ok(meshes.clone())
+    }
+}

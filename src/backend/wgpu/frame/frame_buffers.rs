@@ -1,0 +1,337 @@
+//! The buffers of one frame in flight, pooled for later frames.
+
+use std::mem;
+use std::num::NonZeroU64;
+use std::ops::Range;
+use std::sync::Arc;
+
+use parking_lot::{Mutex, RwLock};
+
+use super::pass_state::WgpuPassState;
+use crate::backend::subdivision_cache::SubdividedMeshes;
+use crate::backend::wgpu::resources::{
+    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
+    check_storage_binding_size, size_with_headroom,
+};
+use crate::backend::wgpu::timing::Timestamps;
+use crate::backend::{BackendError, FrameRequest};
+use crate::process::{Draws, Pass};
+use crate::view::{GpuObject, GpuView, ObjectTable};
+
+/// A pool of frame buffers.
+///
+/// A frame owns its buffers from `begin` until it is submitted or dropped. Then the next frame may write them at once, because
+/// wgpu orders the writes after earlier submissions.
+#[derive(Default)]
+pub(crate) struct BufferPool {
+    free: Mutex<FreeBuffers>,
+}
+
+#[derive(Default)]
+struct FreeBuffers {
+    buffers: Vec<Buffers>,
+    /// How often the pool was cleared. Buffers of an earlier generation do not return.
+    generation: u64,
+}
+
+impl BufferPool {
+    /// Buffers that no frame has taken for this many frames lose their bundles and bind groups.
+    const MAX_UNUSED_FRAMES: u32 = 8;
+
+    /// The size of all pooled buffers in bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let index_bytes =
+            |buffers: &Buffers| buffers.passes.iter().map(|pass| pass.partial_indices.read().size()).sum::<u64>();
+        let total =
+            |buffers: &Buffers| buffers.all().map(GrowingBuffer::size).iter().sum::<u64>() + index_bytes(buffers);
+        self.free.lock().buffers.iter().map(total).sum()
+    }
+
+    /// Drops all buffers, and those of frames in flight when these end, because a device error may have left them unusable.
+    pub(crate) fn clear(&self) {
+        let mut free = self.free.lock();
+        free.buffers.clear();
+        free.generation += 1;
+    }
+
+    pub(crate) fn take(self: &Arc<Self>) -> FrameBuffers {
+        let mut free = self.free.lock();
+        let mut buffers = free.buffers.pop().unwrap_or_default();
+        buffers.unused = 0;
+        for idle in &mut free.buffers {
+            idle.unused += 1;
+            if idle.unused == Self::MAX_UNUSED_FRAMES {
+                idle.passes.iter_mut().for_each(WgpuPassState::clear_caches);
+            }
+        }
+        FrameBuffers { buffers, pool: Arc::clone(self), generation: free.generation }
+    }
+}
+
+/// A frame's buffers. They return to the pool when they are dropped.
+pub(crate) struct FrameBuffers {
+    buffers: Buffers,
+    pool: Arc<BufferPool>,
+    generation: u64,
+}
+
+impl Drop for FrameBuffers {
+    fn drop(&mut self) {
+        // Subdivided meshes must not outlive the frame, however it ends.
+        self.buffers.subdivided.get_mut().clear();
+        let mut free = self.pool.free.lock();
+        if free.generation == self.generation {
+            free.buffers.push(mem::take(&mut self.buffers));
+        }
+    }
+}
+
+impl FrameBuffers {
+    /// Makes room for a frame, and uploads its views, lights and parameters. After an error the buffers are unusable.
+    ///
+    /// # Errors
+    /// If the device has no room, or a camera is out of reach.
+    pub(crate) fn begin(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        layouts: &BindGroupLayouts,
+        request: &FrameRequest<'_>,
+    ) -> Result<(), BackendError> {
+        let buffers = &mut self.buffers;
+        buffers.set_passes(request);
+        let limits = device.limits();
+        let objects = request.scene.object_count().max(1);
+        let object_bytes = objects * size_of::<GpuObject>();
+        let light_bytes = request.lights.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
+        for bytes in [object_bytes, objects * 4, light_bytes] {
+            check_storage_binding_size(device, bytes)?;
+        }
+        write_views(buffers.views.rewrite(), request)?;
+        buffers.next_key.passes.clear();
+        buffers.next_key.passes.extend(buffers.passes.iter().map(|pass| (pass.pass, pass.command_pass_index)));
+        buffers.set_light_ranges(request, limits.max_storage_buffer_binding_size);
+        let command_passes = buffers.passes.iter().filter(|pass| pass.command_pass_index.is_some()).count();
+        let max_stride =
+            limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / command_passes.max(1) as u64);
+        let stride = size_with_headroom(buffers.key.object_indices_stride, objects * 4, max_stride);
+        buffers.next_key.object_indices_stride = stride;
+
+        let mut reallocated = buffers.objects.reserve(device, object_bytes)?;
+        reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
+        for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
+            reallocated |= mirrored.upload(device, uploads)?;
+        }
+        if reallocated || buffers.key != buffers.next_key {
+            mem::swap(&mut buffers.key, &mut buffers.next_key);
+            let objects_bound = buffers.objects.size().min(limits.max_storage_buffer_binding_size & !3) as usize;
+            for index in 0..buffers.passes.len() {
+                buffers.passes[index].frame_bind_group =
+                    Some(buffers.new_frame_bind_group(device, layouts, index, objects_bound));
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes room for timestamps of the frame's passes. After an error the buffers are unusable.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(crate) fn begin_timestamps(
+        &mut self,
+        device: &wgpu::Device,
+        request: &FrameRequest<'_>,
+        times_raw_passes: bool,
+    ) -> Result<(), BackendError> {
+        let Buffers { timestamps, passes, .. } = &mut self.buffers;
+        let is_timed = |process: usize| times_raw_passes || !matches!(request.draws[process], Draws::Raw(_));
+        let mut timed_pass_indices = 0..;
+        for pass in passes.iter_mut() {
+            pass.timed_pass_index = if is_timed(pass.pass.process) { timed_pass_indices.next() } else { None };
+        }
+        let names =
+            passes.iter().filter(|pass| pass.timed_pass_index.is_some()).map(|WgpuPassState { pass, .. }| {
+                (request.plan.processes()[pass.process].process.name(), request.views[pass.view].name())
+            });
+        timestamps.get_or_insert_default().begin_frame(device, names)
+    }
+
+    /// `None` if passes are not timed.
+    pub(crate) fn timestamps(&self) -> Option<&Timestamps> {
+        self.buffers.timestamps.as_ref()
+    }
+
+    /// The passes in submission order.
+    pub(crate) fn passes(&self) -> &[WgpuPassState] {
+        &self.buffers.passes
+    }
+
+    /// The passes, and the buffer of their parameters.
+    pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], &GrowingBuffer) {
+        (&mut self.buffers.passes, &self.buffers.parameters.on_device)
+    }
+
+    /// The meshes that the frame draws subdivided.
+    pub(crate) fn subdivided(&self) -> &RwLock<SubdividedMeshes<SubdividedMesh>> {
+        &self.buffers.subdivided
+    }
+
+    /// Uploads blocks of objects in one write, because each write has a fixed cost.
+    pub(crate) fn write_objects(&self, uploads: &UploadQueue, objects: &ObjectTable, blocks: Range<usize>) {
+        let first = blocks.start * ObjectTable::BLOCK_SIZE;
+        let end = objects.len().min(blocks.end * ObjectTable::BLOCK_SIZE);
+        let bytes = |objects: usize| objects * size_of::<GpuObject>();
+        let size = NonZeroU64::new(bytes(end - first) as u64);
+        let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
+        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
+        for block in blocks {
+            let (start, records) = objects.gpu_objects(block);
+            let range = bytes(start - first)..bytes(start - first + records.len());
+            staged.slice(range).copy_from_slice(bytemuck::cast_slice(&records));
+        }
+    }
+
+    /// Uploads the objects that a pass draws, in the order of instances.
+    pub(crate) fn write_object_indices(&self, uploads: &UploadQueue, pass: usize, objects: &[u32]) {
+        if let Some(index) = self.buffers.passes[pass].command_pass_index {
+            self.buffers.object_indices.write(
+                uploads,
+                index * self.buffers.key.object_indices_stride,
+                bytemuck::cast_slice(objects),
+            );
+        }
+    }
+}
+
+struct Buffers {
+    objects: GrowingBuffer,
+    /// One [`GpuView`] per view.
+    views: MirroredBuffer,
+    /// The lights that reach each view, relative to its camera.
+    lights: MirroredBuffer,
+    /// For each pass of commands the objects that it draws, `object_indices_stride` bytes apart.
+    object_indices: GrowingBuffer,
+    /// Each pass's parameters.
+    parameters: MirroredBuffer,
+    passes: Vec<WgpuPassState>,
+    /// The key of the passes' bind groups, and the key of this frame.
+    key: BindGroupKey,
+    next_key: BindGroupKey,
+    subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
+    timestamps: Option<Timestamps>,
+    /// For how many frames no frame has taken them.
+    unused: u32,
+}
+
+/// The key of bind groups, beside the buffers themselves.
+#[derive(Default, PartialEq)]
+struct BindGroupKey {
+    /// Each with its index in `object_indices`.
+    passes: Vec<(Pass, Option<usize>)>,
+    /// Offset and size of each view's lights in their buffer.
+    light_ranges: Vec<(usize, usize)>,
+    object_indices_stride: usize,
+}
+
+impl Default for Buffers {
+    fn default() -> Self {
+        use wgpu::BufferUsages;
+        Self {
+            objects: GrowingBuffer::new("objects", BufferUsages::STORAGE),
+            views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
+            lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
+            object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
+            parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
+            passes: Vec::new(),
+            key: BindGroupKey::default(),
+            next_key: BindGroupKey::default(),
+            subdivided: RwLock::default(),
+            timestamps: None,
+            unused: 0,
+        }
+    }
+}
+
+impl Buffers {
+    fn all(&self) -> [&GrowingBuffer; 5] {
+        let Self { objects, views, lights, object_indices, parameters, .. } = self;
+        [objects, &views.on_device, &lights.on_device, object_indices, &parameters.on_device]
+    }
+
+    /// Sets the passes of this frame, and collects their parameters.
+    fn set_passes(&mut self, request: &FrameRequest<'_>) {
+        let bytes = self.parameters.rewrite();
+        self.passes.resize_with(request.passes.len(), WgpuPassState::default);
+        let mut command_pass_indices = 0..;
+        for (state, &pass) in self.passes.iter_mut().zip(request.passes) {
+            let draws = &request.draws[pass.process];
+            state.pass = pass;
+            state.set_label(request.plan.processes()[pass.process].process.name(), request.views[pass.view].name());
+            state.command_pass_index =
+                if matches!(draws, Draws::Commands(_)) { command_pass_indices.next() } else { None };
+            if state.command_pass_index.is_none() {
+                state.clear_partial_indices();
+            }
+            let parameters = draws.parameters();
+            state.parameters = (!parameters.is_empty()).then_some((bytes.len(), parameters.len()));
+            append_aligned(bytes, parameters);
+        }
+    }
+
+    /// Allots each view a range for its lights, and collects them.
+    fn set_light_ranges(&mut self, request: &FrameRequest<'_>, max: u64) {
+        let bytes = self.lights.rewrite();
+        let ranges = &mut self.next_key.light_ranges;
+        ranges.clear();
+        for (view, lights) in request.lights.iter().enumerate() {
+            let before = self.key.light_ranges.get(view).map_or(0, |(_, length)| *length);
+            // The layout requires a binding even if no light reaches the view.
+            let size = size_with_headroom(before, size_of_val(lights.gpu_lights()), max);
+            let start = bytes.len();
+            bytes.extend_from_slice(bytemuck::cast_slice(lights.gpu_lights()));
+            bytes.resize(start + size, 0);
+            ranges.push((start, size));
+        }
+    }
+
+    fn new_frame_bind_group(
+        &self,
+        device: &wgpu::Device,
+        layouts: &BindGroupLayouts,
+        pass: usize,
+        objects_bound: usize,
+    ) -> wgpu::BindGroup {
+        let WgpuPassState { pass: Pass { view, .. }, command_pass_index, .. } = self.passes[pass];
+        // The layout requires a binding even if the pass draws no commands; it reads nothing from it.
+        let stride = self.key.object_indices_stride;
+        let (offset, size) = command_pass_index.map_or((0, ALIGNMENT), |index| (index * stride, stride));
+        let bindings = [
+            self.views.on_device.binding(view * ALIGNMENT, size_of::<GpuView>()),
+            self.objects.binding(0, objects_bound),
+            self.object_indices.binding(offset, size),
+            self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(bindings.into_iter().flatten())
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Buffer(buffer) })
+            .collect();
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &layouts.frame,
+            entries: &entries,
+        })
+    }
+}
+
+/// Appends the views' GPU layouts.
+///
+/// # Errors
+/// If a camera is out of reach.
+fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
+    for (view, lights) in request.views.iter().zip(request.lights) {
+        let record = GpuView::new(view, request.scene, lights.gpu_lights().len())
+            .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
+        append_aligned(bytes, bytemuck::bytes_of(&record));
+    }
+    Ok(())
+}

@@ -1,0 +1,19 @@
+//! A frame in flight: its buffers, its passes, and what they cache for later frames.
+
+mod bundle_cache;
+mod commands;
+mod frame_buffers;
+mod indirect_arguments;
+mod pass_state;
+mod pass_statistics;
+mod wgpu_frame;
+
+pub(crate) use bundle_cache::BundleKey;
+pub(crate) use commands::{PassCommands, RecordedPart};
+pub(crate) use frame_buffers::BufferPool;
+pub(crate) use indirect_arguments::IndirectArguments;
+pub(crate) use pass_state::WgpuPassState;
+
+pub use commands::{WgpuCommands, WgpuPart};
+pub use pass_statistics::WgpuPassStatistics;
+pub use wgpu_frame::WgpuFrame;

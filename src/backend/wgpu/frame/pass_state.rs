@@ -1,0 +1,145 @@
+//! The state of one pass in a frame's buffers.
+
+use std::fmt::Write;
+
+use parking_lot::RwLock;
+
+use super::bundle_cache::BundleCache;
+use super::indirect_arguments::IndirectArguments;
+use super::pass_statistics::WgpuPassStatistics;
+use crate::backend::BackendError;
+use crate::backend::wgpu::pipelines::ProcessBindGroup;
+use crate::backend::wgpu::resources::{GrowingBuffer, UploadQueue};
+use crate::backend::wgpu::strategy::{CostSample, EncodingStrategy, PassStrategy, RecordingStrategy};
+use crate::backend::wgpu::timing::PassTiming;
+use crate::process::Pass;
+
+/// One pass of a frame, and what it caches for the next frame that uses the same buffers.
+pub(crate) struct WgpuPassState {
+    pub(crate) pass: Pass,
+    /// Process and view, for error messages.
+    pub(crate) label: String,
+    /// Its index among the passes of commands; `None` for other passes.
+    pub(crate) command_pass_index: Option<usize>,
+    /// Its index among the timed passes; `None` for a pass that is not timed.
+    pub(crate) timed_pass_index: Option<usize>,
+    /// Offset and size of its parameters; `None` for a pass without.
+    pub(crate) parameters: Option<(usize, usize)>,
+    /// `@group(0)`.
+    pub(crate) frame_bind_group: Option<wgpu::BindGroup>,
+    /// `@group(2)`.
+    pub(crate) process_bind_group: Option<ProcessBindGroup>,
+    pub(crate) strategy: PassStrategy,
+    /// The strategy's index in the backend's set.
+    pub(crate) strategy_index: usize,
+    /// Whether the strategy's cache was there when the frame began.
+    is_warm: bool,
+    pub(crate) bundle_cache: BundleCache,
+    pub(crate) indirect_arguments: IndirectArguments,
+    /// The indices of partial batches' remaining triangles.
+    pub(crate) partial_indices: RwLock<GrowingBuffer>,
+    pub(crate) timing: PassTiming,
+}
+
+impl Default for WgpuPassState {
+    fn default() -> Self {
+        Self {
+            pass: Pass { process: 0, view: 0 },
+            label: String::new(),
+            command_pass_index: None,
+            timed_pass_index: None,
+            parameters: None,
+            frame_bind_group: None,
+            process_bind_group: None,
+            strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
+            strategy_index: 0,
+            is_warm: false,
+            bundle_cache: BundleCache::default(),
+            indirect_arguments: IndirectArguments::default(),
+            partial_indices: RwLock::new(new_index_buffer()),
+            timing: PassTiming::default(),
+        }
+    }
+}
+
+impl WgpuPassState {
+    pub(crate) fn set_label(&mut self, process: &str, view: &str) {
+        self.label.clear();
+        // Writing into a string cannot fail.
+        let _ = write!(self.label, "{process:?} in view {view:?}");
+    }
+
+    /// Sets the frame's strategy. Unless it is a trial, drops the caches of other strategies.
+    pub(crate) fn set_strategy(&mut self, strategy: PassStrategy, strategy_index: usize, is_trial: bool) {
+        (self.strategy, self.strategy_index) = (strategy, strategy_index);
+        self.is_warm = match strategy.recording {
+            RecordingStrategy::CachedBundles => self.bundle_cache.is_warm(),
+            RecordingStrategy::Indirect => self.indirect_arguments.is_warm(),
+            RecordingStrategy::Direct | RecordingStrategy::Bundles => true,
+        };
+        if !is_trial && strategy.recording != RecordingStrategy::CachedBundles {
+            self.bundle_cache.clear();
+        }
+        if !is_trial && strategy.recording != RecordingStrategy::Indirect {
+            self.indirect_arguments.clear();
+        }
+        self.timing = PassTiming::default();
+    }
+
+    /// Drops the caches that keep other resources alive.
+    pub(crate) fn clear_caches(&mut self) {
+        self.process_bind_group = None;
+        self.bundle_cache.clear();
+    }
+
+    /// Uploads the remaining triangles of partial batches; drops the buffer if there are none.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(crate) fn upload_partial_indices(
+        &self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        indices: &[u32],
+    ) -> Result<(), BackendError> {
+        let mut buffer = self.partial_indices.write();
+        if indices.is_empty() {
+            *buffer = new_index_buffer();
+        } else {
+            buffer.reserve(device, size_of_val(indices))?;
+            buffer.write(uploads, 0, bytemuck::cast_slice(indices));
+        }
+        Ok(())
+    }
+
+    /// Drops the index buffer that an earlier frame's pass at this index has left.
+    pub(crate) fn clear_partial_indices(&mut self) {
+        *self.partial_indices.get_mut() = new_index_buffer();
+    }
+
+    /// How the pass was recorded.
+    pub(crate) fn statistics(&self, process: String) -> WgpuPassStatistics {
+        WgpuPassStatistics {
+            process,
+            view: self.pass.view,
+            recording: self.strategy.recording,
+            encoding: self.strategy.encoding,
+            encoders: self.strategy.encoder_count(self.timing.bundles()),
+            batches: self.timing.batches(),
+            recorded_bundles: self.timing.recorded_bundles(),
+            replayed_bundles: self.timing.replayed_bundles(),
+        }
+    }
+
+    /// The pass's cost in a frame whose passes cost `all` nanoseconds in total, on `workers` workers. If the pass's critical path
+    /// is longer than the other passes can fill all workers, the idle time counts as its cost.
+    pub(crate) fn cost_sample(&self, all: f64, workers: usize) -> CostSample {
+        let own = self.timing.total();
+        let cost = own.max(self.timing.critical_path(workers) * workers as f64 - (all - own));
+        CostSample { cost, batches: self.timing.batches(), is_warm: self.is_warm }
+    }
+}
+
+fn new_index_buffer() -> GrowingBuffer {
+    GrowingBuffer::new("remaining triangles", wgpu::BufferUsages::INDEX)
+}

@@ -1,0 +1,79 @@
+//! The key of a process's pipelines: what they are made from.
+
+use std::borrow::Cow;
+
+use crate::command::{Cull, DrawState};
+use crate::process::{Draws, SHADER_PRELUDE};
+use crate::quality::{Quality, TransformPrecision, VertexFormat};
+use crate::scene::{Blend, LightKind, Topology};
+
+/// The inputs of pipelines that a process, or the quality, may change from frame to frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PipelineKey<'a> {
+    shader: Cow<'a, str>,
+    pub(crate) vertices: VertexSource,
+    pub(crate) fragment: Option<Cow<'a, str>>,
+    pub(crate) parameter_bytes: usize,
+    pub(crate) writes_depth: bool,
+    /// The only draw state of a process without commands.
+    pub(crate) state: Option<DrawState>,
+    transforms: TransformPrecision,
+}
+
+/// Where a process's vertices come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum VertexSource {
+    Meshes(VertexFormat),
+    /// One triangle at infinite distance.
+    FullScreen,
+    LightVolumes,
+    /// A raw pass encodes itself.
+    None,
+}
+
+impl<'a> PipelineKey<'a> {
+    /// Borrows the shader, because every frame compares this key with the pipelines' own.
+    pub(crate) fn new(draws: &Draws<'a>, quality: &Quality) -> Self {
+        let (transforms, format) = (quality.transforms, quality.vertices);
+        let parameter_bytes = draws.parameters().len();
+        let state = fixed_state(draws);
+        let with = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
+            let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
+            Self { shader, vertices, fragment, parameter_bytes, writes_depth, state, transforms }
+        };
+        match draws {
+            Draws::Commands(draws) => {
+                with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth)
+            }
+            Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
+            Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
+            Draws::Raw(_) => with("", VertexSource::None, None, false),
+        }
+    }
+
+    pub(crate) fn into_owned(self) -> PipelineKey<'static> {
+        let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
+        PipelineKey { shader: owned(self.shader), fragment: self.fragment.map(owned), ..self }
+    }
+
+    /// The complete WGSL.
+    pub(crate) fn source(&self) -> String {
+        let is_absolute = self.transforms == TransformPrecision::Absolute;
+        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{SHADER_PRELUDE}\n{}", self.shader)
+    }
+}
+
+/// The draw state of a process that draws no commands; `None` for commands, which have one each, and for raw passes.
+pub(crate) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
+    match draws {
+        Draws::FullScreen(full_screen) => {
+            Some(DrawState::new(Topology::TriangleList, Cull::Nothing, full_screen.blend))
+        }
+        Draws::Lights(lights) => {
+            // Only far sides, which the camera also sees from inside a volume.
+            let cull = if lights.class.kind == LightKind::Directional { Cull::Nothing } else { Cull::Front };
+            Some(DrawState::new(Topology::TriangleList, cull, Blend::Additive))
+        }
+        _ => None,
+    }
+}

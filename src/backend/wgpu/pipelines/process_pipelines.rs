@@ -1,0 +1,345 @@
+//! The pipelines of a render process, one for each draw state.
+
+use std::collections::HashMap;
+
+use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+
+use super::pipeline_key::{PipelineKey, VertexSource};
+use crate::backend::wgpu::resources::{
+    BindGroupLayouts, SampledTarget, process_layout, texture_format, vertex_attributes, vertex_stride,
+};
+use crate::backend::wgpu::strategy::StrategyTuner;
+use crate::command::Batch;
+use crate::command::{Cull, DrawState};
+use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess};
+use crate::quality::Quality;
+use crate::scene::{Blend, Topology, ViewKind};
+
+/// The pipelines of one render process: one for each draw state that a scene has needed so far.
+pub(crate) struct ProcessPipelines {
+    name: String,
+    key: PipelineKey<'static>,
+    attachments: AttachmentFormats,
+    /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
+    process_layout: Option<wgpu::BindGroupLayout>,
+    /// `None` for a raw pass.
+    shader: Option<CompiledShader>,
+    by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
+    /// The tuner of each view's pass.
+    tuners: Mutex<Vec<Option<StrategyTuner>>>,
+}
+
+/// The formats of the targets that a process draws into and samples.
+#[derive(Clone, Debug, PartialEq)]
+struct AttachmentFormats {
+    colors: Vec<Option<wgpu::TextureFormat>>,
+    depth: Option<DepthAttachmentFormat>,
+    sampled: Vec<SampledTarget>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct DepthAttachmentFormat {
+    format: wgpu::TextureFormat,
+    /// Whether the pass may write it; a draw state may still switch that off.
+    writable: bool,
+    /// Whether only fragments of exactly the stored depth are drawn.
+    tests_equal: bool,
+}
+
+impl AttachmentFormats {
+    fn new(plan: &FramePlan, declaration: &Declaration) -> Self {
+        let planned = |views: ViewKind, target: &str| {
+            plan.targets().iter().find(|planned| planned.views == views && planned.name == target)
+        };
+        let format_of =
+            |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
+        let colors = declaration.colors().map(|(target, _)| Some(texture_format(format_of(declaration.views, target))));
+        let depth = declaration.depth().map(|(target, access)| DepthAttachmentFormat {
+            format: texture_format(format_of(declaration.views, target)),
+            writable: access.writes(),
+            tests_equal: access == Access::MatchDepth,
+        });
+        let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
+            Access::Sample => Some(SampledTarget { format: format_of(declaration.views, target), layered: false }),
+            Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
+            _ => None,
+        });
+        Self { colors: colors.collect(), depth, sampled: sampled.collect() }
+    }
+}
+
+struct CompiledShader {
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+}
+
+impl ProcessPipelines {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        layouts: &BindGroupLayouts,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> Self {
+        let name = planned.process.name();
+        let key = PipelineKey::new(draws, quality).into_owned();
+        let attachments = AttachmentFormats::new(plan, &planned.declaration);
+        let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
+        let shader = (key.vertices != VertexSource::None).then(|| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(key.source().into()),
+            });
+            let groups = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
+            let used = if process_layout.is_some() { 3 } else { 2 };
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(name),
+                bind_group_layouts: &groups[..used],
+                immediate_size: 0,
+            });
+            CompiledShader { module, layout }
+        });
+        let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
+        let pipelines = Self { name, key, attachments, process_layout, shader, by_state, tuners };
+        if let Some(state) = pipelines.key.state {
+            pipelines.insert(pipelines.create(device, state));
+        }
+        pipelines
+    }
+
+    /// Whether a process of this plan can use these pipelines for these draws, in frames of this quality.
+    pub(crate) fn fits(
+        &self,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> bool {
+        self.name == planned.process.name()
+            && self.fits_draws(draws, quality)
+            && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
+    }
+
+    /// Whether these pipelines still fit what their process draws.
+    pub(crate) fn fits_draws(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
+        self.key == PipelineKey::new(draws, quality)
+    }
+
+    /// Creates the missing pipelines of these batches. [Insert](Self::insert) them only if the device reports no error.
+    #[must_use]
+    pub(crate) fn create_missing(
+        &self,
+        device: &wgpu::Device,
+        batches: &[Batch],
+    ) -> HashMap<DrawState, wgpu::RenderPipeline> {
+        let mut created = HashMap::new();
+        let by_state = self.by_state();
+        for run in batches.chunk_by(|one, next| one.state == next.state) {
+            let state = run[0].state.pipeline_state();
+            if !by_state.contains_key(&state) && !created.contains_key(&state) {
+                created.extend(self.create(device, state));
+            }
+        }
+        created
+    }
+
+    /// Adds created pipelines.
+    pub(crate) fn insert(&self, created: impl IntoIterator<Item = (DrawState, wgpu::RenderPipeline)>) {
+        let mut created = created.into_iter().peekable();
+        // Recording holds the read lock. Mostly there is no pipeline to add, and then this does not wait for it.
+        if created.peek().is_some() {
+            self.by_state.write().extend(created);
+        }
+    }
+
+    /// The pipelines by draw state.
+    pub(crate) fn by_state(&self) -> RwLockReadGuard<'_, HashMap<DrawState, wgpu::RenderPipeline>> {
+        self.by_state.read()
+    }
+
+    /// Creates the bind group of `@group(2)` of one pass; `None` for a process without one.
+    pub(crate) fn create_bind_group<'a>(
+        &self,
+        device: &wgpu::Device,
+        parameters: Option<wgpu::BufferBinding<'a>>,
+        sampled: impl Iterator<Item = &'a wgpu::TextureView>,
+    ) -> Option<wgpu::BindGroup> {
+        let layout = self.process_layout.as_ref()?;
+        let parameters = parameters.map(|buffer| (0, wgpu::BindingResource::Buffer(buffer)));
+        let sampled = (1..).zip(sampled);
+        let sampled = sampled.map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));
+        let entries: Vec<_> = parameters
+            .into_iter()
+            .chain(sampled)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let descriptor = wgpu::BindGroupDescriptor { label: Some("process"), layout, entries: &entries };
+        Some(device.create_bind_group(&descriptor))
+    }
+
+    /// Describes bundles for passes of this process.
+    pub(crate) fn bundle_descriptor<'a>(&'a self, label: &'a str) -> wgpu::RenderBundleEncoderDescriptor<'a> {
+        wgpu::RenderBundleEncoderDescriptor {
+            label: Some(label),
+            color_formats: &self.attachments.colors,
+            depth_stencil: self.attachments.depth.map(|depth| wgpu::RenderBundleDepthStencil {
+                format: depth.format,
+                depth_read_only: !depth.writable,
+                stencil_read_only: true,
+            }),
+            sample_count: 1,
+            multiview: None,
+        }
+    }
+
+    /// Calls `work` with the tuner of one view's pass, of which each chooses among `strategies` strategies.
+    pub(crate) fn with_tuner<R>(
+        &self,
+        view: usize,
+        strategies: usize,
+        work: impl FnOnce(&mut StrategyTuner) -> R,
+    ) -> R {
+        let mut tuners = self.tuners.lock();
+        if tuners.len() <= view {
+            tuners.resize_with(view + 1, || None);
+        }
+        work(tuners[view].get_or_insert_with(|| StrategyTuner::new(strategies)))
+    }
+
+    /// The process's name.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// `None` for a raw pass, which has no pipelines.
+    fn create(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
+        let shader = self.shader.as_ref()?;
+        let target = |format: &Option<wgpu::TextureFormat>| {
+            let (blend, write_mask) = (blend_state(state.blend()), wgpu::ColorWrites::ALL);
+            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask })
+        };
+        let targets: Vec<_> = self.attachments.colors.iter().map(target).collect();
+        let layout = |array_stride, attributes| wgpu::VertexBufferLayout {
+            array_stride,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes,
+        };
+        let (entry_point, vertices) = match self.key.vertices {
+            VertexSource::Meshes(format) => {
+                ("vertex", Some(Some(layout(vertex_stride(format), vertex_attributes(format)))))
+            }
+            VertexSource::LightVolumes => {
+                ("light_volume", Some(Some(layout(size_of::<[f32; 3]>() as u64, &POSITION_ONLY))))
+            }
+            VertexSource::FullScreen | VertexSource::None => ("full_screen", None),
+        };
+        let (topology, strip_index_format) = match state.topology() {
+            Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
+            Topology::TriangleStrip => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
+        };
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&shader.layout),
+            vertex: wgpu::VertexState {
+                module: &shader.module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: vertices.as_slice(),
+            },
+            primitive: wgpu::PrimitiveState {
+                topology,
+                strip_index_format,
+                front_face: wgpu::FrontFace::Ccw,
+                cull_mode: match state.cull() {
+                    Cull::Back => Some(wgpu::Face::Back),
+                    Cull::Front => Some(wgpu::Face::Front),
+                    Cull::Nothing => None,
+                },
+                ..wgpu::PrimitiveState::default()
+            },
+            depth_stencil: self.attachments.depth.map(|depth| wgpu::DepthStencilState {
+                format: depth.format,
+                // A blended surface must not hide what is drawn after it.
+                depth_write_enabled: Some(depth.writable && self.key.writes_depth && state.blend() == Blend::None),
+                depth_compare: Some(self.depth_compare(depth)),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: self.key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
+                module: &shader.module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Some((state, pipeline))
+    }
+
+    /// Depth is reversed: nearer is greater.
+    fn depth_compare(&self, depth: DepthAttachmentFormat) -> wgpu::CompareFunction {
+        match self.key.vertices {
+            _ if depth.tests_equal => wgpu::CompareFunction::Equal,
+            // At infinite distance (depth 0), so it covers the pixels without geometry.
+            VertexSource::FullScreen => wgpu::CompareFunction::GreaterEqual,
+            // The far side of a light volume, where it is behind a surface; never where there is no surface.
+            VertexSource::LightVolumes => wgpu::CompareFunction::Less,
+            VertexSource::Meshes(_) | VertexSource::None => wgpu::CompareFunction::Greater,
+        }
+    }
+}
+
+/// Of light volumes.
+const POSITION_ONLY: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
+
+fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
+    use wgpu::{BlendComponent, BlendFactor, BlendOperation};
+    let both = |component: BlendComponent| wgpu::BlendState { color: component, alpha: component };
+    let add = |operation| BlendComponent { src_factor: BlendFactor::One, dst_factor: BlendFactor::One, operation };
+    match blend {
+        Blend::None => None,
+        Blend::Alpha => Some(wgpu::BlendState::ALPHA_BLENDING),
+        Blend::Additive => Some(both(add(BlendOperation::Add))),
+        Blend::Subtractive => Some(both(add(BlendOperation::ReverseSubtract))),
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::sync::{Arc, mpsc};
+    use std::time::Duration;
+
+    use super::*;
+    use crate::process::{GeometryBuffer, GeometryFormats};
+
+    #[test]
+    fn inserting_no_pipelines_does_not_wait_for_recording() {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::NOOP;
+        descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
+        let (device, _) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
+        let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
+        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let draws = plan.draws().unwrap();
+        let quality = Quality::balanced();
+        let layouts = BindGroupLayouts::new(&device);
+        let pipelines = ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality);
+
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let recording = pipelines.by_state();
+            scope.spawn(|| {
+                pipelines.insert(pipelines.create_missing(&device, &[]));
+                sender.send(()).unwrap();
+            });
+            let inserted = receiver.recv_timeout(Duration::from_secs(10));
+            drop(recording);
+            inserted.unwrap();
+        });
+    }
+}

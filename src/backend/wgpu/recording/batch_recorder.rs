@@ -1,0 +1,141 @@
+//! Recording of batches into a pass or a bundle.
+
+use std::collections::HashMap;
+use std::mem;
+use std::ops::Range;
+
+use wgpu::util::RenderEncoder;
+
+use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
+use crate::backend::subdivision_cache::SubdividedMeshes;
+use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
+use crate::backend::wgpu::resources::SubdividedMesh;
+use crate::command::DrawState;
+use crate::command::{Batch, DrawList};
+
+/// Records the batches of a pass.
+pub(crate) struct BatchRecorder<'a> {
+    pub(crate) frame: &'a WgpuFrame,
+    pub(crate) pass: &'a WgpuPassState,
+    pub(crate) list: &'a DrawList,
+    pub(crate) pipelines: &'a HashMap<DrawState, wgpu::RenderPipeline>,
+    pub(crate) subdivided: &'a SubdividedMeshes<SubdividedMesh>,
+    /// The indices of partial batches' remaining triangles.
+    pub(crate) partial_indices: Option<&'a wgpu::Buffer>,
+}
+
+impl<'a> BatchRecorder<'a> {
+    /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` draws each run of
+    /// whole batches of one state whose meshes lie in the arenas.
+    ///
+    /// # Errors
+    /// If a resource of a batch is missing: a bug of Drawloom's.
+    pub(crate) fn draw<E: RenderEncoder<'a>>(
+        &self,
+        encoder: &mut E,
+        batches: Range<usize>,
+        mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        self.set_bind_groups(encoder);
+        self.set_arenas(encoder);
+        let mut start = batches.start;
+        for run in self.list.batches[batches].chunk_by(|one, next| one.state == next.state) {
+            let state = run[0].state;
+            let pipeline = self.pipelines.get(&state.pipeline_state());
+            encoder.set_pipeline(pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?);
+            let end = start + run.len();
+            if state.subdivision_level() > 0 {
+                self.draw_subdivided(encoder, run)?;
+                self.set_arenas(encoder);
+            } else if self.list.is_whole() {
+                draw_run(encoder, start..end)?;
+            } else {
+                self.draw_with_partial(encoder, start..end, &mut draw_run)?;
+            }
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Draws batches of one state, some of them partial. `draw_run` draws each run of whole batches.
+    fn draw_with_partial<E: RenderEncoder<'a>>(
+        &self,
+        encoder: &mut E,
+        batches: Range<usize>,
+        draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        let mut whole = batches.start..batches.start;
+        let mut binds_partial_indices = false;
+        for index in batches {
+            let Some(remaining) = self.list.remaining(index) else {
+                whole.end = index + 1;
+                continue;
+            };
+            if !whole.is_empty() {
+                if mem::take(&mut binds_partial_indices) {
+                    self.set_index_arena(encoder);
+                }
+                draw_run(encoder, whole)?;
+            }
+            whole = index + 1..index + 1;
+            if remaining.is_empty() {
+                continue;
+            }
+            if !mem::replace(&mut binds_partial_indices, true) {
+                let indices = self.partial_indices;
+                let indices = indices.ok_or_else(|| broken_rule("indices are uploaded before they are used"))?;
+                encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            }
+            let batch = &self.list.batches[index];
+            let base_vertex = self.frame.assets.mesh_range(batch)?.base_vertex;
+            encoder.draw_indexed(remaining, base_vertex, batch.first..batch.first + batch.count);
+        }
+        if binds_partial_indices {
+            self.set_index_arena(encoder);
+        }
+        if whole.is_empty() { Ok(()) } else { draw_run(encoder, whole) }
+    }
+
+    /// Draws each batch of a run with a draw call of its own.
+    ///
+    /// # Errors
+    /// If a mesh is missing: a bug of Drawloom's.
+    pub(crate) fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        for batch in run {
+            let mesh = self.frame.assets.mesh_range(batch)?;
+            let indices = mesh.first_index..mesh.first_index + mesh.index_count;
+            encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
+        }
+        Ok(())
+    }
+
+    fn draw_subdivided(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        for batch in run {
+            let mesh = self.subdivided.get(&(batch.mesh, batch.state.subdivision_level()));
+            let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
+            let mesh = &mesh.geometry;
+            encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
+            encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn set_bind_groups(&self, encoder: &mut impl RenderEncoder<'a>) {
+        encoder.set_bind_group(0, self.pass.frame_bind_group.as_ref(), &[]);
+        encoder.set_bind_group(1, Some(&self.frame.assets.group), &[]);
+        if let Some(process) = &self.pass.process_bind_group {
+            encoder.set_bind_group(2, Some(&process.group), &[]);
+        }
+    }
+
+    fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) {
+        encoder.set_vertex_buffer(0, Some(self.frame.assets.vertices.slice(..)));
+        self.set_index_arena(encoder);
+    }
+
+    fn set_index_arena(&self, encoder: &mut impl RenderEncoder<'a>) {
+        encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+    }
+}

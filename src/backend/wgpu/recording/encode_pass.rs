@@ -1,0 +1,85 @@
+//! Encoding of passes: from batches and recorded parts to command encoders.
+
+use super::bundles::record_bundle;
+use super::record_pass::{encode_raw, record_batches, record_without_commands, replay_bundles};
+use crate::backend::wgpu::frame::{RecordedPart, WgpuFrame, WgpuPart, WgpuPassState};
+use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
+use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawList;
+use crate::process::Draws;
+
+/// Encodes a whole pass in one encoder: replays its bundles, or records it without bundles.
+///
+/// # Errors
+/// If a resource of the pass is missing, or a raw pass fails.
+pub(crate) fn encode_pass(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    list: &DrawList,
+    parts: &[WgpuPart],
+) -> Result<wgpu::CommandEncoder, BackendError> {
+    use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+    let WgpuPassState { pass, strategy, .. } = *frame.pass(index);
+    encode(device, frame, index, |encoder| match (&request.draws[pass.process], strategy.recording) {
+        (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
+        (Draws::Commands(_), Direct | Indirect) => {
+            record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())
+        }
+        (Draws::Commands(_), Bundles | CachedBundles) => {
+            let bundles = parts.iter().filter_map(|part| match &part.0 {
+                RecordedPart::Bundle(bundle) => Some(bundle),
+                RecordedPart::Encoder(_) => None,
+            });
+            replay_bundles(encoder, frame, request, index, PassSegment::WHOLE, bundles);
+            Ok(())
+        }
+        _ => record_without_commands(encoder, frame, request, index),
+    })
+}
+
+/// Encodes one segment of a pass that is split over several encoders.
+///
+/// # Errors
+/// If a resource of a batch is missing.
+pub(crate) fn encode_segment(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    list: &DrawList,
+    segment: usize,
+) -> Result<RecordedPart, BackendError> {
+    use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+    let strategy = frame.pass(index).strategy;
+    let bundles = strategy.bundles_of_encoder(list, segment);
+    let segment = strategy.segment_of_encoder(list, segment);
+    let encoder = match strategy.recording {
+        Direct | Indirect => encode(device, frame, index, |encoder| {
+            record_batches(encoder, frame, request, index, segment, list, bundles)
+        }),
+        Bundles | CachedBundles => {
+            let recorded = bundles.map(|bundle| record_bundle(device, frame, index, list, bundle));
+            let recorded = recorded.collect::<Result<Vec<_>, _>>()?;
+            encode(device, frame, index, |encoder| {
+                replay_bundles(encoder, frame, request, index, segment, &recorded);
+                Ok(())
+            })
+        }
+    };
+    Ok(RecordedPart::Encoder(encoder?.finish()))
+}
+
+/// Calls `record` with a new encoder, labelled as the pass.
+fn encode(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    index: usize,
+    record: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<(), BackendError>,
+) -> Result<wgpu::CommandEncoder, BackendError> {
+    let label = Some(frame.pass(index).label.as_str());
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+    record(&mut encoder)?;
+    Ok(encoder)
+}

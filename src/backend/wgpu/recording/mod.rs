@@ -1,0 +1,10 @@
+//! From batches to commands of the device.
+
+mod batch_recorder;
+mod begin_pass;
+mod bundles;
+mod encode_pass;
+mod record_pass;
+
+pub(crate) use bundles::{cached_bundle, record_bundle};
+pub(crate) use encode_pass::{encode_pass, encode_segment};

@@ -1,0 +1,135 @@
+//! Recording of whole passes, or segments of them.
+
+use std::ops::Range;
+
+use super::batch_recorder::BatchRecorder;
+use super::begin_pass::begin_pass;
+use crate::backend::error::broken_rule;
+use crate::backend::subdivision_cache::SubdividedMeshes;
+use crate::backend::wgpu::frame::{IndirectArguments, WgpuFrame, WgpuPassState};
+use crate::backend::wgpu::pipelines::fixed_state;
+use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
+use crate::backend::{BackendError, FrameRequest};
+use crate::command::DrawList;
+use crate::process::{Draws, Pass, RawPass, RawPassResources};
+
+/// Records a segment of a pass without bundles: the batches of a range of bundles.
+///
+/// # Errors
+/// If a resource of a batch is missing: a bug of Drawloom's.
+pub(crate) fn record_batches(
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    segment: PassSegment,
+    list: &DrawList,
+    bundles: Range<usize>,
+) -> Result<(), BackendError> {
+    let pass = frame.pass(index);
+    let by_state = frame.pipelines(pass.pass).by_state();
+    let subdivided = frame.buffers.subdivided().read();
+    let arguments = pass.indirect_arguments.read();
+    let indices = pass.partial_indices.read();
+    let partial_indices = indices.buffer();
+    let recorder = BatchRecorder { frame, pass, list, pipelines: &by_state, subdivided: &subdivided, partial_indices };
+    let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
+    let batches = first..end.min(list.batches.len());
+    let mut render_pass = begin_pass(encoder, frame, request, index, segment);
+    if batches.is_empty() {
+        return Ok(());
+    }
+    if pass.strategy.recording != RecordingStrategy::Indirect {
+        return recorder
+            .draw(&mut render_pass, batches, |encoder, run| recorder.draw_each(encoder, &list.batches[run]));
+    }
+    let buffer = arguments.as_ref().and_then(|arguments| arguments.on_device.buffer());
+    let buffer = buffer.ok_or_else(|| broken_rule("indirect arguments are uploaded before they are used"))?;
+    recorder.draw(&mut render_pass, batches, |render_pass, run| {
+        for start in run.clone().step_by(MAX_INDIRECT_DRAWS) {
+            let offset = start as u64 * IndirectArguments::STRIDE;
+            render_pass.multi_draw_indexed_indirect(buffer, offset, (run.end - start).min(MAX_INDIRECT_DRAWS) as u32);
+        }
+        Ok(())
+    })
+}
+
+/// Draws per indirect call: the limit that every Vulkan device with such calls supports.
+const MAX_INDIRECT_DRAWS: usize = 65_535;
+
+/// Records a segment of a pass that replays bundles.
+pub(crate) fn replay_bundles<'a>(
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    segment: PassSegment,
+    bundles: impl IntoIterator<Item = &'a wgpu::RenderBundle>,
+) {
+    begin_pass(encoder, frame, request, index, segment).execute_bundles(bundles);
+}
+
+/// Records a pass that draws lights, or a full-screen triangle.
+///
+/// # Errors
+/// If a resource of the pass is missing: a bug of Drawloom's.
+pub(crate) fn record_without_commands(
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+) -> Result<(), BackendError> {
+    let pass = frame.pass(index);
+    let Pass { process, view } = pass.pass;
+    let draws = &request.draws[process];
+    let by_state = frame.pipelines(pass.pass).by_state();
+    let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
+    let pipeline = pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?;
+    let (list, subdivided) = (DrawList::default(), SubdividedMeshes::new());
+    let (pipelines, partial_indices) = (&*by_state, None);
+    let recorder = BatchRecorder { frame, pass, list: &list, pipelines, subdivided: &subdivided, partial_indices };
+    let mut render_pass = begin_pass(encoder, frame, request, index, PassSegment::WHOLE);
+    render_pass.set_pipeline(pipeline);
+    recorder.set_bind_groups(&mut render_pass);
+    match draws {
+        Draws::Lights(draws) => {
+            let meshes = frame.light_meshes.as_ref();
+            let meshes = meshes.ok_or_else(|| broken_rule("light volumes are uploaded before they are drawn"))?;
+            let lights = request.lights[view].range(draws.class);
+            if !lights.is_empty() {
+                render_pass.set_vertex_buffer(0, meshes.vertices.slice(..));
+                render_pass.draw(meshes.range(draws.class.kind), lights);
+            }
+        }
+        _ => render_pass.draw(0..3, 0..1),
+    }
+    Ok(())
+}
+
+/// Has a raw pass encode itself.
+///
+/// # Errors
+/// If the raw pass reports an error.
+pub(crate) fn encode_raw(
+    device: &wgpu::Device,
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+    raw: &dyn RawPass,
+) -> Result<(), BackendError> {
+    let &WgpuPassState { pass, timed_pass_index, .. } = frame.pass(index);
+    let textures = |name: &str| frame.targets.find(pass.view, name).map(|target| &target.texture);
+    let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
+    let size = request.views[pass.view].camera.size;
+    let resources = RawPassResources { device, view: pass.view, size, textures: &textures, layered: &layered };
+    let queries = timed_pass_index.and_then(|timed_pass| frame.buffers.timestamps()?.queries(timed_pass));
+    if let Some((set, [begin, _])) = queries {
+        encoder.write_timestamp(set, begin);
+    }
+    raw.encode(encoder, &resources).map_err(BackendError::RawPass)?;
+    if let Some((set, [_, end])) = queries {
+        encoder.write_timestamp(set, end);
+    }
+    Ok(())
+}

@@ -1,0 +1,111 @@
+//! Bind group layouts: `@group(0)` and `@group(1)` of `drawloom.wgsl`, and `@group(2)` of each render process.
+
+use wgpu::ShaderStages;
+
+use crate::process::Format;
+use crate::view::GpuView;
+
+/// The bind group layouts that all processes share.
+pub(crate) struct BindGroupLayouts {
+    /// View, objects, the indices of drawn objects, lights.
+    pub(crate) frame: wgpu::BindGroupLayout,
+    /// Materials and textures.
+    pub(crate) assets: wgpu::BindGroupLayout,
+}
+
+impl BindGroupLayouts {
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let frame = [
+            entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(size_of::<GpuView>() as u64)),
+            entry(1, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(2, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(3, ShaderStages::VERTEX_FRAGMENT, storage()),
+        ];
+        let array = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2Array,
+            multisampled: false,
+        };
+        let assets = [
+            entry(0, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(1, ShaderStages::FRAGMENT, array),
+            entry(2, ShaderStages::FRAGMENT, array),
+            entry(3, ShaderStages::FRAGMENT, array),
+            entry(4, ShaderStages::FRAGMENT, array),
+            entry(5, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        ];
+        Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
+    }
+}
+
+/// A target that a shader samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SampledTarget {
+    pub(crate) format: Format,
+    /// Whether it is the texture array that all views of a kind share.
+    pub(crate) layered: bool,
+}
+
+/// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples. `None` if it has
+/// neither.
+pub(crate) fn process_layout(
+    device: &wgpu::Device,
+    parameter_bytes: usize,
+    samples: &[SampledTarget],
+) -> Option<wgpu::BindGroupLayout> {
+    let mut entries = Vec::new();
+    if parameter_bytes > 0 {
+        // With the size, wgpu refuses a shader that reads more when its pipeline is created.
+        entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(parameter_bytes as u64)));
+    }
+    for (binding, sampled) in (1..).zip(samples) {
+        let sample_type = if sampled.format.is_depth() {
+            wgpu::TextureSampleType::Depth
+        } else {
+            wgpu::TextureSampleType::Float { filterable: false }
+        };
+        let view_dimension =
+            if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
+        let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        entries.push(entry(binding, ShaderStages::FRAGMENT, texture));
+    }
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("process"), entries: &entries };
+    (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+}
+
+/// A target's format as a wgpu format.
+pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
+    match format {
+        Format::Rg8Unorm => wgpu::TextureFormat::Rg8Unorm,
+        Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
+        Format::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Format::Rgb10a2Unorm => wgpu::TextureFormat::Rgb10a2Unorm,
+        Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+        Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
+        Format::R32Float => wgpu::TextureFormat::R32Float,
+        Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
+    }
+}
+
+fn entry(binding: u32, visibility: ShaderStages, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+fn uniform(size: u64) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: std::num::NonZeroU64::new(size),
+    }
+}
+
+fn storage() -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}

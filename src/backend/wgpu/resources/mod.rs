@@ -1,0 +1,27 @@
+//! Buffers, textures and bind group layouts on the device.
+
+mod arena;
+mod asset_cache;
+mod bind_group_layouts;
+mod gpu_material;
+mod growing_buffer;
+mod light_meshes;
+mod mirrored_buffer;
+mod subdivided_mesh;
+mod target_cache;
+mod texture_arrays;
+mod upload_queue;
+mod vertex_layout;
+
+pub(crate) use arena::new_buffer;
+pub(crate) use asset_cache::{AssetCache, AssetSnapshot};
+pub(crate) use bind_group_layouts::{BindGroupLayouts, SampledTarget, process_layout, texture_format};
+pub(crate) use growing_buffer::{
+    ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,
+};
+pub(crate) use light_meshes::LightMeshes;
+pub(crate) use mirrored_buffer::MirroredBuffer;
+pub(crate) use subdivided_mesh::SubdividedMesh;
+pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
+pub(crate) use upload_queue::UploadQueue;
+pub(crate) use vertex_layout::{vertex_attributes, vertex_stride};

@@ -1,0 +1,213 @@
+//! The cache of the views' targets.
+
+use std::sync::Arc;
+
+use super::bind_group_layouts::texture_format;
+use crate::backend::BackendError;
+use crate::process::{Format, FramePlan, PlannedTarget};
+use crate::scene::ViewKind;
+use crate::view::RenderView;
+
+/// The targets of one frame.
+#[derive(Default)]
+pub(crate) struct WgpuTargets {
+    /// For each view its own targets, and its layers of the shared ones.
+    views: Vec<Vec<ViewTarget>>,
+    /// The targets that all views of a kind share.
+    layered: Vec<LayeredTarget>,
+}
+
+/// A target as one view draws into it.
+#[derive(Clone)]
+pub(crate) struct ViewTarget {
+    planned: Arc<PlannedTarget>,
+    pub(crate) texture: wgpu::Texture,
+    /// Of the view's layer only.
+    pub(crate) view: wgpu::TextureView,
+    pub(crate) layer: u32,
+}
+
+/// A texture array in which each view of a kind has a layer.
+#[derive(Clone)]
+struct LayeredTarget {
+    planned: Arc<PlannedTarget>,
+    texture: wgpu::Texture,
+    array: wgpu::TextureView,
+}
+
+impl ViewTarget {
+    pub(crate) fn format(&self) -> Format {
+        self.planned.format
+    }
+}
+
+impl WgpuTargets {
+    /// The target of one view by its name.
+    pub(crate) fn find(&self, view: usize, name: &str) -> Option<&ViewTarget> {
+        self.views.get(view)?.iter().find(|target| target.planned.name == name)
+    }
+
+    /// The array that all views of a kind share.
+    pub(crate) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
+        let found = self.layered.iter().find(|target| target.planned.views == kind && target.planned.name == name);
+        found.map(|target| (&target.texture, &target.array))
+    }
+
+    /// The number of textures, and their size in bytes.
+    pub(crate) fn sizes(&self) -> (usize, u64) {
+        let own = self.views.iter().flatten().filter(|target| !target.planned.layered);
+        let textures = own.map(|target| (&target.planned, &target.texture));
+        let textures = textures.chain(self.layered.iter().map(|target| (&target.planned, &target.texture)));
+        textures.fold((0, 0), |(count, bytes), (planned, texture)| {
+            let size = texture.size();
+            let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+            (count + 1, bytes + pixels * planned.format.bytes() as u64)
+        })
+    }
+}
+
+/// Keeps targets from frame to frame, makes new ones when a picture's size or the plan changes, and drops those that the
+/// current frame does not need.
+#[derive(Default)]
+pub(crate) struct TargetCache {
+    current: Arc<WgpuTargets>,
+    /// The key of the current targets: the plan's identity, and kind, size and layer of each view.
+    plan: Option<u64>,
+    views: Vec<(ViewKind, [u32; 2], u32)>,
+}
+
+impl TargetCache {
+    /// The targets of these views.
+    ///
+    /// # Errors
+    /// - If a picture is larger than the device allows.
+    /// - If more views share a target than a texture can have layers.
+    pub(crate) fn update(
+        &mut self,
+        device: &wgpu::Device,
+        plan: &FramePlan,
+        views: &[RenderView],
+    ) -> Result<Arc<WgpuTargets>, BackendError> {
+        let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
+        if self.plan == Some(plan.identity()) && self.views.iter().copied().eq(requested()) {
+            return Ok(Arc::clone(&self.current));
+        }
+        // If an error occurs below, no targets are current.
+        self.plan = None;
+        let mut next = WgpuTargets::default();
+        for planned in plan.targets().iter().filter(|planned| planned.layered) {
+            next.layered.push(self.layered_target(device, planned, views)?);
+        }
+        for (index, view) in views.iter().enumerate() {
+            let planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
+            let targets = planned.map(|planned| {
+                if !planned.layered {
+                    return self.own_target(device, planned, index, view.camera.size);
+                }
+                let shared = next.layered.iter().find(|shared| *shared.planned == *planned);
+                let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
+                Ok(self.layer_target(shared.ok_or_else(missing)?, index, view.layer))
+            });
+            let targets = targets.collect::<Result<_, _>>()?;
+            next.views.push(targets);
+        }
+        self.current = Arc::new(next);
+        self.plan = Some(plan.identity());
+        self.views.clear();
+        self.views.extend(requested());
+        Ok(Arc::clone(&self.current))
+    }
+
+    /// The latest frame's targets.
+    pub(crate) fn current(&self) -> &WgpuTargets {
+        &self.current
+    }
+
+    fn own_target(
+        &self,
+        device: &wgpu::Device,
+        planned: &PlannedTarget,
+        view: usize,
+        size: [u32; 2],
+    ) -> Result<ViewTarget, BackendError> {
+        let extent = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
+        let kept = self.current.find(view, &planned.name);
+        if let Some(kept) = kept.filter(|kept| *kept.planned == *planned && kept.texture.size() == extent) {
+            return Ok(kept.clone());
+        }
+        let texture = new_texture(device, planned, extent)?;
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, layer: 0 })
+    }
+
+    fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {
+        let kept = self.current.find(view, &shared.planned.name);
+        if let Some(kept) = kept.filter(|kept| kept.texture == shared.texture && kept.layer == layer) {
+            return kept.clone();
+        }
+        let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2),
+            base_array_layer: layer,
+            array_layer_count: Some(1),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        ViewTarget { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, layer }
+    }
+
+    fn layered_target(
+        &self,
+        device: &wgpu::Device,
+        planned: &PlannedTarget,
+        views: &[RenderView],
+    ) -> Result<LayeredTarget, BackendError> {
+        let sharing_views = || views.iter().filter(|view| view.kind() == planned.views);
+        // Without a view, shaders still bind a texture: one cleared pixel.
+        let [width, height] = sharing_views().next().map_or([1, 1], |view| view.camera.size);
+        let layers = sharing_views().count().max(1) as u32;
+        let extent = wgpu::Extent3d { width, height, depth_or_array_layers: layers };
+        // A texture of up to twice the layers is reused, so that lights that come and go do not allocate each time.
+        let fits = |size: wgpu::Extent3d| {
+            let layers = layers..=2 * layers;
+            wgpu::Extent3d { depth_or_array_layers: extent.depth_or_array_layers, ..size } == extent
+                && layers.contains(&size.depth_or_array_layers)
+        };
+        let mut kept = self.current.layered.iter().filter(|kept| *kept.planned == *planned);
+        if let Some(kept) = kept.find(|kept| fits(kept.texture.size())) {
+            return Ok(kept.clone());
+        }
+        let texture = new_texture(device, planned, extent)?;
+        let dimension = Some(wgpu::TextureViewDimension::D2Array);
+        let array = texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
+        Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
+    }
+}
+
+fn new_texture(
+    device: &wgpu::Device,
+    planned: &PlannedTarget,
+    size: wgpu::Extent3d,
+) -> Result<wgpu::Texture, BackendError> {
+    let limits = device.limits();
+    for (limit, allowed, needed) in [
+        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, size.width.max(size.height)),
+        ("max_texture_array_layers", limits.max_texture_array_layers, size.depth_or_array_layers),
+    ] {
+        if needed > allowed {
+            return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
+        }
+    }
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC
+        | wgpu::TextureUsages::COPY_DST;
+    Ok(device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(&planned.name),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: texture_format(planned.format),
+        usage: if planned.stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },
+        view_formats: &[],
+    }))
+}

@@ -1,0 +1,82 @@
+//! The strategies that a backend may use.
+
+use super::pass_strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
+
+/// The strategies that passes may be recorded with: one, or several of which each pass uses the cheapest.
+pub(crate) struct StrategySet {
+    /// Fixed by the engine.
+    recording: Option<RecordingStrategy>,
+    encoding: Option<EncodingStrategy>,
+    /// Whether the device can draw indirectly, and whether the tuner may try that.
+    supports_indirect: bool,
+    tunes_indirect: bool,
+    strategies: Vec<PassStrategy>,
+}
+
+impl StrategySet {
+    /// All strategies that a device supports.
+    pub(crate) fn new(supports_indirect: bool, tunes_indirect: bool) -> Self {
+        let strategies = Vec::new();
+        Self { recording: None, encoding: None, supports_indirect, tunes_indirect, strategies }.enumerated()
+    }
+
+    pub(crate) fn supports_indirect(&self) -> bool {
+        self.supports_indirect
+    }
+
+    pub(crate) fn with_recording(self, recording: RecordingStrategy) -> Self {
+        Self { recording: Some(recording), ..self }.enumerated()
+    }
+
+    pub(crate) fn with_encoding(self, encoding: EncodingStrategy) -> Self {
+        Self { encoding: Some(encoding), ..self }.enumerated()
+    }
+
+    /// In the order in which they are tried.
+    pub(crate) fn strategies(&self) -> &[PassStrategy] {
+        &self.strategies
+    }
+
+    fn enumerated(self) -> Self {
+        use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+        let recordings = match self.recording {
+            Some(recording) => vec![recording],
+            None if self.tunes_indirect => vec![CachedBundles, Direct, Bundles, Indirect],
+            None => vec![CachedBundles, Direct, Bundles],
+        };
+        // `OnSubmit` moves work to the device thread, which every frame waits for. So only the engine chooses it.
+        let default_encodings = || vec![EncodingStrategy::PerPass, EncodingStrategy::Split];
+        let encodings = self.encoding.map_or_else(default_encodings, |encoding| vec![encoding]);
+        // Fewer strategies are tuned sooner. Several encoders gain nothing for bundles that are replayed once, nor for
+        // indirect draws, which are few.
+        let is_tuned = self.recording.is_none() && self.encoding.is_none();
+        let is_candidate = |strategy: &PassStrategy| {
+            !is_tuned
+                || strategy.encoding == EncodingStrategy::PerPass
+                || matches!(strategy.recording, CachedBundles | Direct)
+        };
+        let combined = |encoding| recordings.iter().map(move |&recording| PassStrategy { recording, encoding });
+        let strategies = encodings.into_iter().flat_map(combined).filter(is_candidate).collect();
+        Self { strategies, ..self }
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fixed_strategy_excludes_all_others() {
+        use EncodingStrategy::{OnSubmit, PerPass};
+        use RecordingStrategy::{Bundles, CachedBundles, Indirect};
+        let all = StrategySet::new(true, true).strategies().to_vec();
+        assert_eq!(all[0], PassStrategy { recording: CachedBundles, encoding: PerPass });
+        assert!(all.iter().all(|strategy| strategy.encoding != OnSubmit));
+        let untuned = StrategySet::new(true, false);
+        assert!(untuned.strategies().iter().all(|strategy| strategy.recording != Indirect));
+        let fixed = StrategySet::new(true, false).with_recording(Indirect).with_encoding(OnSubmit);
+        assert_eq!(fixed.strategies(), [PassStrategy { recording: Indirect, encoding: OnSubmit }]);
+        let recorded = StrategySet::new(true, true).with_recording(Bundles);
+        assert!(recorded.strategies().iter().all(|strategy| strategy.recording == Bundles));
+    }
+}

@@ -1,0 +1,85 @@
+//! The submission of a frame.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::backend::WgpuBackend;
+use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
+use super::strategy::StrategyTuner;
+use super::submission::WgpuSubmission;
+use crate::backend::BackendError;
+use crate::process::Pass;
+
+impl WgpuBackend {
+    /// Finishes open encoders, and submits the frame.
+    ///
+    /// # Errors
+    /// If the device refuses.
+    pub(super) fn submit_frame(
+        &self,
+        frame: &WgpuFrame,
+        passes: Vec<(Pass, WgpuCommands)>,
+    ) -> Result<WgpuSubmission, BackendError> {
+        let mut finished = Vec::with_capacity(passes.len());
+        for (pass, WgpuCommands(commands)) in passes {
+            match commands {
+                PassCommands::Finished(commands) => finished.push(commands),
+                PassCommands::Parts(parts) => {
+                    finished.extend(parts.into_iter().filter_map(|WgpuPart(part)| match part {
+                        RecordedPart::Encoder(commands) => Some(commands),
+                        RecordedPart::Bundle(_) => None,
+                    }));
+                }
+                PassCommands::Open(encoder) => {
+                    let pass = frame.pass(frame.pass_index(pass));
+                    // This thread runs no job, so no scheduler would catch a panic of wgpu.
+                    let finish = || catch_wgpu_panic(&pass.label, || encoder.finish());
+                    let finish = || with_error_scope(&self.device, &pass.label, finish);
+                    finished.push(pass.timing.time_serial(finish)??);
+                }
+            }
+        }
+        let submission = with_error_scope(&self.device, "the frame", || {
+            let timestamps = frame.buffers.timestamps().zip(self.device_timing.as_ref());
+            let readback =
+                timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
+            let (copy, readback) = readback.unzip();
+            let index = self.queue().submit(finished.into_iter().chain(copy));
+            let (device, queue) = (self.device.clone(), self.queue().clone());
+            Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), readback))
+        })
+        .flatten()?;
+        self.report_costs(frame);
+        Ok(submission)
+    }
+
+    /// Reports the frame's measured costs to the tuners, and keeps the statistics of its passes.
+    fn report_costs(&self, frame: &WgpuFrame) {
+        let workers = self.workers.load(Ordering::Relaxed);
+        let passes = frame.buffers.passes().iter().filter(|pass| pass.command_pass_index.is_some());
+        let all = passes.clone().map(|pass| pass.timing.total()).sum();
+        let strategies = self.strategies.strategies().len();
+        let mut latest = self.latest.lock();
+        let mut count = 0;
+        for pass in passes {
+            let pipelines = frame.pipelines(pass.pass);
+            if strategies > 1 {
+                let sample = pass.cost_sample(all, workers);
+                let report = |tuner: &mut StrategyTuner| tuner.report(frame.number, pass.strategy_index, sample);
+                pipelines.with_tuner(pass.pass.view, strategies, report);
+            }
+            // Reuses the string of the frame before.
+            let mut name = latest.get_mut(count).map_or_else(String::new, |before| std::mem::take(&mut before.process));
+            name.clear();
+            name.push_str(pipelines.name());
+            let statistics = pass.statistics(name);
+            match latest.get_mut(count) {
+                Some(before) => *before = statistics,
+                None => latest.push(statistics),
+            }
+            count += 1;
+        }
+        latest.truncate(count);
+    }
+}
