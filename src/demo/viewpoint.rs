@@ -105,7 +105,7 @@ fn looking_in(bvh: &Bvh, side: Vec3) -> Viewpoint {
     }
 }
 
-/// From outside, a little above and to one side: the side from which most of what is seen faces the camera.
+/// From outside, slightly above and from the side that shows the most front faces.
 fn object(bvh: &Bvh) -> Viewpoint {
     let eyes = [[0.55, 0.4, 1.0], [-0.55, 0.4, 1.0], [0.55, 0.4, -1.0], [-0.55, 0.4, -1.0]].map(|side| {
         let side = Vec3::from(side).normalize();
@@ -115,7 +115,7 @@ fn object(bvh: &Bvh) -> Viewpoint {
         let targets = (0..64).map(|ray| fibonacci_sphere(ray, 64) * bvh.half_size * 0.7);
         targets.filter(|&target| bvh.cast(eye, (target - eye).normalize()).is_some_and(|hit| hit.front_facing)).count()
     };
-    // The first one stays unless another shows clearly more.
+    // Another side is chosen only if it shows clearly more.
     let eye = eyes[1..].iter().fold(eyes[0], |best, &eye| if shown(eye) > shown(best) * 5 / 4 { eye } else { best });
     Viewpoint { eye, target: Vec3::ZERO, field_of_view: OUTSIDE_FIELD_OF_VIEW.to_radians() }
 }

@@ -18,8 +18,8 @@ pub struct SceneRef<'a> {
     /// The rotation from object space to the world; of unit length.
     pub orientations: &'a [Quat],
     /// The scale along the object's own axes, applied before the rotation; negative factors mirror. The position of a vertex
-    /// is accurate to about a millionth of its distance. The error grows with the object's size divided by its distance: it
-    /// is visible if that is a million.
+    /// is accurate to about a millionth of its distance from the camera. The error grows with the object's size divided by its
+    /// distance: an object a million times as large as its distance appears at the wrong position.
     pub scales: &'a [Vec3],
     /// A bounding sphere of each object, in object space before scaling.
     pub bounds: &'a [Bounds],

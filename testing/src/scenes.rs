@@ -1,4 +1,4 @@
-//! Small scenes that tests are made of.
+//! Small scenes for tests.
 
 pub mod everything;
 
@@ -8,12 +8,12 @@ use drawloom::scene::{
     Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, Texture, Topology, Vertex,
 };
 
-/// A box of 2 m, its triangles wound counter-clockwise seen from outside.
+/// A cube with sides of 2 m, whose front faces are outside.
 pub fn cube() -> Mesh {
     cube_facing(1.0)
 }
 
-/// The same box with every normal turned inwards, and its triangles left as they are.
+/// The same cube with the normals pointing inwards and the same winding.
 pub fn cube_with_flipped_normals() -> Mesh {
     cube_facing(-1.0)
 }
@@ -34,7 +34,7 @@ fn cube_facing(sign: f32) -> Mesh {
     Mesh::new("cube", Topology::TriangleList, vertices, indices).unwrap()
 }
 
-/// A square of 2 m that faces +Z: the first row of its texture is at its upper edge.
+/// A square with sides of 2 m that faces +Z. The first row of its texture is at its upper edge.
 pub fn square(topology: Topology) -> Mesh {
     let corner =
         |x: f32, y: f32| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] };
@@ -46,26 +46,26 @@ pub fn square(topology: Topology) -> Mesh {
     Mesh::new("square", topology, corners, indices).unwrap()
 }
 
-/// The scene with every mesh as `change` makes it.
+/// The scene with every mesh replaced by `change` of it.
 pub fn with_meshes(mut scene: Scene, change: impl Fn(&Mesh) -> Mesh) -> Scene {
     let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, change(mesh))).collect();
     meshes.into_iter().for_each(|(handle, mesh)| scene.replace(handle, mesh).unwrap());
     scene
 }
 
-/// The mesh as a list of triangles.
+/// The mesh as a triangle list.
 pub fn as_list(mesh: &Mesh) -> Mesh {
     let indices = mesh.triangles().flatten().collect();
     Mesh::new(mesh.name(), Topology::TriangleList, mesh.vertices().to_vec(), indices).unwrap()
 }
 
-/// The mesh, whose triangles are to be looked at.
+/// The mesh with triangle culling.
 pub fn culled(mesh: &Mesh) -> Mesh {
     mesh.clone().with_triangle_culling(true)
 }
 
-/// Some hundreds of boxes in every direction, of several meshes and materials, opaque and blended, some mirrored, with
-/// several lights and two cameras. The same on every call.
+/// `count` boxes and squares in all directions, with several meshes and materials, opaque and blended, some mirrored, with two
+/// lights and two cameras. Every call returns the same scene.
 pub fn field(count: usize) -> Scene {
     make_field(count).unwrap()
 }
@@ -121,7 +121,7 @@ fn make_field(count: usize) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-/// As many squares, each of a material with a texture of its own; and the textures.
+/// `count` squares, each with a texture and a material of its own, and the textures.
 pub fn textured(count: u32) -> (Scene, Vec<Handle<Texture>>) {
     let mut scene = field(0);
     let mesh = scene.add(square(Topology::TriangleList)).unwrap();
@@ -135,13 +135,13 @@ pub fn textured(count: u32) -> (Scene, Vec<Handle<Texture>>) {
     (scene, textures)
 }
 
-/// A camera with a picture of this size.
+/// The camera with a picture of that size.
 pub fn sized(mut camera: Camera, size: [u32; 2]) -> Camera {
     camera.size = size;
     camera
 }
 
-/// Numbers from 0 to 1 that are the same on every run (Marsaglia's xorshift64*, 2003).
+/// Reproducible pseudo-random numbers from 0 to 1 (xorshift64*, Marsaglia 2003).
 struct Random(u64);
 
 impl Random {

@@ -4,7 +4,7 @@ use super::camera;
 use crate::demo::lights;
 use crate::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, Vertex};
 
-/// The sides of a cube from −1 to 1, as normal and two directions along the side.
+/// The sides of a cube: the normal, and two directions along the side.
 const SIDES: [[Vec3; 3]; 6] = [
     [Vec3::X, Vec3::Y, Vec3::Z],
     [Vec3::NEG_X, Vec3::Z, Vec3::Y],
@@ -14,7 +14,7 @@ const SIDES: [[Vec3; 3]; 6] = [
     [Vec3::NEG_Z, Vec3::Y, Vec3::X],
 ];
 
-/// A cube without the side of normal `without`, seen from inside or from outside.
+/// A cube without the side whose normal is `without`. Its front faces are inside or outside.
 fn cube(without: Vec3, inward: bool) -> Mesh {
     let mut vertices = Vec::new();
     for [normal, right, up] in SIDES.into_iter().filter(|side| side[0] != without) {
@@ -31,52 +31,52 @@ fn cube(without: Vec3, inward: bool) -> Mesh {
     Mesh::new("cube", Topology::TriangleList, vertices, indices).unwrap()
 }
 
-/// Cubes, each of a mesh, a size and the same place.
-fn scene_of(cubes: &[(Mesh, Vec3)], place: DVec3) -> Scene {
+/// Cubes at one position, each with a mesh and a scale.
+fn scene_of(cubes: &[(Mesh, Vec3)], position: DVec3) -> Scene {
     let mut scene = Scene::new();
     let material = scene.add(Material::default()).unwrap();
     for (mesh, scale) in cubes {
         let mesh = scene.add(mesh.clone()).unwrap();
-        let object = RenderObject { scale: *scale, ..RenderObject::new(mesh, material, place) };
+        let object = RenderObject { scale: *scale, ..RenderObject::new(mesh, material, position) };
         scene.add_object(object).unwrap();
     }
     scene
 }
 
-/// The camera of a scene of that size at that place, as if the size were 1 and the place the origin.
-fn camera_of(meshes: &[(Mesh, Vec3)], size: f32, place: DVec3) -> Camera {
+/// The camera for a scene of that size at that position, normalised to size 1 at the origin.
+fn camera_of(meshes: &[(Mesh, Vec3)], size: f32, position: DVec3) -> Camera {
     let scaled: Vec<_> = meshes.iter().map(|(mesh, scale)| (mesh.clone(), *scale * size)).collect();
-    let scene = scene_of(&scaled, place);
+    let scene = scene_of(&scaled, position);
     let camera = camera(scene.as_scene_ref());
     camera.check().unwrap();
     for (index, light) in lights(scene.as_scene_ref(), &camera).into_iter().enumerate() {
         light.check(index).unwrap();
     }
-    Camera { position: (camera.position - place) / f64::from(size), near: camera.near / size, ..camera }
+    Camera { position: (camera.position - position) / f64::from(size), near: camera.near / size, ..camera }
 }
 
 fn forward(camera: &Camera) -> Vec3 {
     camera.orientation * Vec3::NEG_Z
 }
 
-/// Everywhere and at every size.
-fn everywhere(check: impl Fn(f32, DVec3)) {
-    for (size, place) in [
+/// Runs `check` for several sizes and positions of the scene.
+fn for_sizes_and_positions(check: impl Fn(f32, DVec3)) {
+    for (size, position) in [
         (1.0, DVec3::ZERO),
         (1e-6, DVec3::ZERO),
         (1e-6, DVec3::new(3.0, -5.0, 7.0)),
         (1e7, DVec3::new(-1e9, 1e8, 0.0)),
         (1.0, DVec3::new(1e9, -1e9, 1e9)),
     ] {
-        check(size, place);
+        check(size, position);
     }
 }
 
 #[test]
-fn in_a_room_it_stands_inside_and_looks_along_it() {
+fn in_a_room_the_camera_stands_inside_and_looks_along_it() {
     let room = Vec3::new(3.0, 1.0, 1.0);
-    everywhere(|size, place| {
-        let camera = camera_of(&[(cube(Vec3::ZERO, true), room)], size, place);
+    for_sizes_and_positions(|size, position| {
+        let camera = camera_of(&[(cube(Vec3::ZERO, true), room)], size, position);
         assert!(camera.position.abs().cmplt(room.as_dvec3()).all(), "{camera:?}");
         assert!(camera.position.y < 0.0, "above eye height: {camera:?}");
         let forward = forward(&camera);
@@ -87,20 +87,20 @@ fn in_a_room_it_stands_inside_and_looks_along_it() {
 }
 
 #[test]
-fn where_a_wall_is_missing_it_looks_in() {
+fn the_camera_looks_in_through_a_missing_wall() {
     for side in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
-        everywhere(|size, place| {
-            let camera = camera_of(&[(cube(side, true), Vec3::ONE)], size, place);
+        for_sizes_and_positions(|size, position| {
+            let camera = camera_of(&[(cube(side, true), Vec3::ONE)], size, position);
             assert!(forward(&camera).abs_diff_eq(-side, 1e-3), "{side} {camera:?}");
             let outside = camera.position.dot(side.as_dvec3());
             assert!((2.0..5.0).contains(&outside), "{side} {camera:?}");
-            fits(&camera, Vec3::ONE);
+            assert_fits(&camera, Vec3::ONE);
         });
     }
 }
 
 #[test]
-fn a_court_without_a_roof_is_a_room() {
+fn a_courtyard_is_a_room() {
     let camera = camera_of(&[(cube(Vec3::Y, true), Vec3::new(1.0, 1.0, 3.0))], 1.0, DVec3::ZERO);
     assert!(camera.position.abs().cmplt(DVec3::new(1.0, 1.0, 3.0)).all(), "{camera:?}");
     assert!(forward(&camera).z.abs() > 0.8, "{camera:?}");
@@ -109,11 +109,11 @@ fn a_court_without_a_roof_is_a_room() {
 #[test]
 fn an_object_is_shown_whole_from_outside_and_above() {
     for half_size in [Vec3::ONE, Vec3::new(0.1, 4.0, 0.1), Vec3::new(5.0, 0.2, 1.0)] {
-        everywhere(|size, place| {
-            let camera = camera_of(&[(cube(Vec3::ZERO, false), half_size)], size, place);
+        for_sizes_and_positions(|size, position| {
+            let camera = camera_of(&[(cube(Vec3::ZERO, false), half_size)], size, position);
             let outside = camera.position.abs() / half_size.as_dvec3();
             assert!(outside.max_element() > 1.0 && camera.position.y > 0.0, "{camera:?}");
-            fits(&camera, half_size);
+            assert_fits(&camera, half_size);
         });
     }
 }
@@ -136,32 +136,32 @@ fn a_single_face_is_seen_from_its_front() {
     assert!(camera.position.z < -1.0, "{camera:?}");
 }
 
-/// Every corner of the box is in the picture, and it fills at least half of it one way.
-fn fits(camera: &Camera, half_size: Vec3) {
+/// Fails unless every corner of the box is in the picture, and the box fills at least half of its width or height.
+fn assert_fits(camera: &Camera, half_size: Vec3) {
     let Projection::Perspective { field_of_view } = camera.projection else { panic!("{camera:?}") };
     let slope = (field_of_view / 2.0).tan();
-    let mut most = Vec3::ZERO;
+    let mut max = Vec3::ZERO;
     for corner in 0..8 {
         let sign = |bit: u32| if corner & (1 << bit) == 0 { -1.0 } else { 1.0 };
         let point = Vec3::new(sign(0), sign(1), sign(2)) * half_size;
         let seen = camera.orientation.inverse() * (point.as_dvec3() - camera.position).as_vec3();
         assert!(-seen.z > camera.near, "behind the camera");
-        let place = Vec3::new(seen.x / camera.aspect(), seen.y, 0.0) / (-seen.z * slope);
-        most = most.max(place.abs());
+        let projected = Vec3::new(seen.x / camera.aspect(), seen.y, 0.0) / (-seen.z * slope);
+        max = max.max(projected.abs());
     }
-    assert!(most.max_element() <= 1.0, "outside the picture: {most}");
-    assert!(most.max_element() > 0.5, "small in the picture: {most}");
+    assert!(max.max_element() <= 1.0, "outside the picture: {max}");
+    assert!(max.max_element() > 0.5, "small in the picture: {max}");
 }
 
 #[test]
 fn the_point_light_reaches_the_scene_at_every_size() {
-    everywhere(|size, place| {
-        let scene = scene_of(&[(cube(Vec3::ZERO, false), Vec3::splat(size))], place);
+    for_sizes_and_positions(|size, position| {
+        let scene = scene_of(&[(cube(Vec3::ZERO, false), Vec3::splat(size))], position);
         let camera = camera(scene.as_scene_ref());
-        let [_, _, Light::Point { position, intensity, range }] = lights(scene.as_scene_ref(), &camera) else {
+        let [_, _, Light::Point { position: light, intensity, range }] = lights(scene.as_scene_ref(), &camera) else {
             panic!("no point light");
         };
-        let distance = position.distance(place);
+        let distance = light.distance(position);
         assert!(distance < f64::from(range) / 2.0, "{distance} {range}");
         let illuminance = f64::from(intensity.x) / (distance * distance);
         assert!((0.05..5.0).contains(&illuminance), "{illuminance}");
@@ -169,7 +169,7 @@ fn the_point_light_reaches_the_scene_at_every_size() {
 }
 
 #[test]
-fn what_cannot_be_drawn_gets_a_camera_too() {
+fn a_scene_with_nothing_to_draw_gets_a_camera() {
     let empty = Scene::new();
     camera(empty.as_scene_ref()).check().unwrap();
     lights(empty.as_scene_ref(), &camera(empty.as_scene_ref()));

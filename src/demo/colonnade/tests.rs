@@ -3,7 +3,7 @@ use glam::{Quat, Vec3};
 use super::colonnade;
 use crate::scene::{Blend, Bounds, Light, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
 
-/// A mesh's triangles as they are wound, every second one of a strip turned around.
+/// The triangles of a mesh. Every second one of a strip is reversed.
 fn triangles(mesh: &Mesh) -> Vec<[Vertex; 3]> {
     let stride = if mesh.topology() == Topology::TriangleList { 3 } else { 1 };
     let corners = mesh.indices().windows(3).step_by(stride).enumerate();
@@ -41,7 +41,7 @@ fn every_triangle_is_wound_around_its_normals_which_have_unit_length() {
 #[test]
 fn solids_are_closed_and_have_their_volume() {
     let scene = colonnade().unwrap();
-    // The published footprints, 165 and 330 high, in units of a hundredth.
+    // The blocks have their published footprints and the heights 165 and 330, in units of 1/100.
     for (name, volume) in [("block", 1.0), ("slab", 0.3), ("short block", 4.5), ("tall block", 9.1), ("ball", 4.0)] {
         let mesh = scene.assets().iter::<Mesh>().map(|(_, mesh)| mesh).find(|mesh| mesh.name() == name).unwrap();
         let triangles = triangles(mesh);
@@ -69,7 +69,7 @@ fn the_box_has_its_published_measurements() {
     for (name, expected) in published {
         assert!((area(name) * 1e4 / expected - 1.0).abs() < 1e-3, "{name}: {}", area(name));
     }
-    // Its faces look at its middle.
+    // Its faces point at its centre.
     for name in ["box floor", "box ceiling", "box back wall", "box right wall", "box left wall", "box lamp"] {
         let mesh = scene.assets().iter::<Mesh>().map(|(_, mesh)| mesh).find(|mesh| mesh.name() == name).unwrap();
         for corners in triangles(mesh) {
@@ -85,7 +85,7 @@ fn the_box_has_its_published_measurements() {
 }
 
 #[test]
-fn it_has_what_a_test_wants_of_a_scene() {
+fn the_scene_has_instances_mirrored_objects_strips_and_a_texture() {
     let scene = colonnade().unwrap();
     let reference = scene.as_scene_ref();
     let objects = reference.object_count();
@@ -102,7 +102,7 @@ fn it_has_what_a_test_wants_of_a_scene() {
 }
 
 #[test]
-fn many_small_lights_and_a_few_large_ones_shine() {
+fn there_are_many_small_lights_and_a_few_large_ones() {
     let scene = colonnade().unwrap();
     let [mut directional, mut points, mut spots, mut lamps] = [0, 0, 0, 0];
     for (index, light) in scene.lights.iter().enumerate() {
@@ -126,7 +126,7 @@ fn many_small_lights_and_a_few_large_ones_shine() {
 }
 
 #[test]
-fn the_lamp_over_the_nave_stands_in_a_ring_of_what_throws_shadows() {
+fn candlesticks_surround_the_lamp_over_the_nave() {
     let scene = colonnade().unwrap();
     let lamps = scene.lights.iter().filter_map(|light| match light {
         Light::Hemispherical { position, direction: Vec3::NEG_Y, .. } if position.z > 1.5 => Some(*position),
@@ -139,7 +139,7 @@ fn the_lamp_over_the_nave_stands_in_a_ring_of_what_throws_shadows() {
             around.iter().any(|position| position.x * x > 0.5 && position.z * z > 0.5 && position.length() < lamp.y);
         assert!(has_one, "none stands towards {x}, {z}");
     }
-    // None of the lamp is where it shines.
+    // The lamp casts no shadow of its own.
     for mesh in ["lamp shade", "ball"] {
         for object in of_mesh(&scene, mesh).filter(|object| (object.position - lamp).length() < 0.5) {
             let bottom = object.position.y - if mesh == "ball" { f64::from(object.scale.y) } else { 0.0 };
@@ -149,7 +149,7 @@ fn the_lamp_over_the_nave_stands_in_a_ring_of_what_throws_shadows() {
 }
 
 #[test]
-fn glass_stands_before_glass_and_fire_and_smoke_are_blended() {
+fn panes_overlap_and_fire_and_smoke_are_blended() {
     let scene = colonnade().unwrap();
     let material = |object: &RenderObject| scene.assets().get(object.material).unwrap();
     let panes: Vec<_> = of_mesh(&scene, "pane").collect();
@@ -161,7 +161,7 @@ fn glass_stands_before_glass_and_fire_and_smoke_are_blended() {
     glasses.sort_unstable();
     glasses.dedup();
     assert!(glasses.len() >= 4, "{glasses:?}");
-    // How many panes a look at the middle of each goes through.
+    // The number of panes that a ray to the centre of each one passes.
     let eye = scene.cameras[0].position;
     let depths = panes.iter().map(|target| {
         let towards = (target.position - eye).as_vec3();
@@ -184,14 +184,14 @@ fn glass_stands_before_glass_and_fire_and_smoke_are_blended() {
         for object in &objects {
             let made_of = material(object);
             assert_eq!(made_of.blend, blend, "{mesh}");
-            // It is as bright as it gives off, wherever it is.
+            // It only emits.
             assert!(made_of.diffuse == Vec3::ZERO && made_of.emission != Vec3::ZERO, "{mesh}");
         }
     }
 }
 
 #[test]
-fn it_is_the_same_every_time() {
+fn every_call_returns_the_same_scene() {
     let [one, other] = [colonnade().unwrap(), colonnade().unwrap()];
     assert_eq!(one.as_scene_ref().positions, other.as_scene_ref().positions);
     assert_eq!(one.as_scene_ref().orientations, other.as_scene_ref().orientations);

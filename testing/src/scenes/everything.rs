@@ -1,4 +1,4 @@
-//! A small scene that requires every process there is.
+//! A small scene that requires every render process.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -9,12 +9,11 @@ use drawloom::view::LightClass;
 
 use super::{cube, sized, square};
 
-/// Width and height of its picture.
+/// The size of its picture.
 pub const SIZE: [u32; 2] = [96, 64];
 
-/// Boxes on a floor before a wall, some of them behind a pane of each kind of glass; and a light of every class, each of
-/// which reaches what the camera sees. What is opaque comes in three states: a list, a mirrored list, and a double-sided
-/// strip.
+/// Boxes on a floor before a wall, some of them behind panes of each blend mode, and a light of every class that reaches
+/// visible objects. Opaque objects have three draw states: a list, a mirrored list, and a double-sided strip.
 pub fn everything() -> Scene {
     let mut scene = Scene::new();
     let list = scene.add(square(Topology::TriangleList)).unwrap();
@@ -54,7 +53,7 @@ fn add(
     scene.add_object(RenderObject { scale, orientation, ..RenderObject::new(mesh, material, place) }).unwrap();
 }
 
-/// `None` for the class that no light is of: point lights cast no shadows.
+/// A light of a class. `None` for shadowed point lights, which do not exist.
 fn light_of(class: LightClass) -> Option<Light> {
     let casts_shadow = class.shadowed;
     let side = if casts_shadow { 1.0 } else { -1.0 };
@@ -85,7 +84,7 @@ fn light_of(class: LightClass) -> Option<Light> {
     })
 }
 
-/// What class a light of the scene is of, where it may cast shadows.
+/// The class of a light of the scene, if shadows are enabled.
 pub fn class_of(light: &Light) -> LightClass {
     LightClass { kind: light.kind(), shadowed: light.casts_shadow() }
 }
@@ -101,7 +100,7 @@ pub fn without_shadow(mut light: Light) -> Light {
     light
 }
 
-/// The same light switched off.
+/// The same light, but black.
 pub fn dark(mut light: Light) -> Light {
     if let Light::Directional { illuminance: color, .. }
     | Light::Point { intensity: color, .. }
@@ -113,7 +112,7 @@ pub fn dark(mut light: Light) -> Light {
     light
 }
 
-/// Every material that mixes with what is behind it, in slot order.
+/// The blended materials, in slot order.
 pub fn glasses(scene: &Scene) -> Vec<(Handle<Material>, Material)> {
     let materials = scene.assets().iter::<Material>();
     materials
