@@ -1,11 +1,11 @@
-//! The frame graph: says which node waits for which, and runs them so.
+//! The frame graph: orders nodes by the resources they read and write, and runs them.
 //!
-//! An engine adds nodes, says of each which resources it reads and writes, and which resources the frame is for. The
-//! graph is compiled once, which orders and checks it and drops what nobody needs; the [`Schedule`] that comes out is run
-//! every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
+//! An engine adds nodes, declares which resources each of them reads and writes, and which resources are the outputs of the
+//! frame. The graph is compiled once: this checks it, orders the nodes, and drops those that no output needs. The resulting
+//! [`Schedule`] is run every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
 //!
 //! ```text
-//!   FrameGraph                                  Schedule              a run, whoever is free takes a chunk
+//!   FrameGraph                                  Schedule              a run: idle workers take the next chunks
 //!
 //!   geometry ──► (g-buffer) ──┐                 0 geometry ──┐        worker 0   geometry ▪▪▪▪  light ▪▪▪▪▪  post ▪
 //!                             ▼     compile                  ▼        worker 1   shadow ▪▪▪▪▪▪  light ▪▪▪▪
@@ -16,20 +16,21 @@
 //!   debug lines ──► (overlay)                   dropped: debug lines
 //! ```
 //!
-//! A run on several workers takes up first what its end waits for, as measured in runs before; and a schedule of so little
-//! work that sharing it would cost more is run by the calling thread alone ([`Schedule::run`]).
+//! A parallel run starts the nodes of the critical path first, by the costs that earlier runs measured. A schedule with so
+//! little work that parallel execution would cost more than it gains runs serially on the calling thread
+//! ([`Schedule::run`]).
 //!
-//! The graph knows nothing of what a node does. It may carry anything, and be ordered only; or carry [`Node`]s, and be
-//! run. A node is a number of items that are worked off in chunks, and how many is asked only when all it depends on is
-//! done.
+//! The graph does not know what a node does. A node's payload can be anything if the graph is only ordered. To be run, it must
+//! be a [`Node`]: a number of items that workers process in chunks. The number of items is only asked for when all
+//! dependencies of the node are complete.
 //!
-//! That all work of a frame is *render processes*, which a manager hands to whatever thread is free, is from L 3.3 (Lorenzon &
-//! Clua). In M 10.4 (McAnlis) a fixed list of kinds says which view comes before which; here it follows from what
-//! each node reads and writes, so that a mirror in a mirror is no special case.
+//! In L 3.3 (Lorenzon & Clua), all work of a frame is *render processes*, which a manager assigns to free threads. In M 10.4
+//! (McAnlis), a fixed list of kinds of views defines their order. Here the order follows from what each node reads and
+//! writes, so a mirror in a mirror is not a special case.
 //!
 //! # A graph of closures
 //!
-//! What the nodes work on is borrowed for the length of a run, through the context:
+//! The nodes access the engine's data through the context, which is borrowed for the duration of a run:
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -76,8 +77,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A context that itself borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, differs in type from frame to
-//! frame. A schedule that is compiled once for all of them holds nodes that are a node for each:
+//! A context that borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, has a different type in every frame. The
+//! nodes of a schedule that is compiled once for all frames implement [`Node`] for every lifetime:
 //!
 //! ```
 //! use std::ops::Range;
@@ -104,9 +105,9 @@
 //!     }
 //! }
 //!
-//! type Process = Box<dyn for<'frame> Node<World<'frame>>>;
+//! type WorldNode = Box<dyn for<'frame> Node<World<'frame>>>;
 //!
-//! let mut graph = FrameGraph::<Process>::new();
+//! let mut graph = FrameGraph::<WorldNode>::new();
 //! let check = graph.add("check heights", Box::new(CheckHeights));
 //! graph.keep(check);
 //! let mut schedule = graph.compile()?;

@@ -1,4 +1,4 @@
-//! What a node must be to be run.
+//! Nodes that can be run.
 
 use std::{fmt, ops::Range};
 
@@ -6,44 +6,44 @@ use crate::task::Worker;
 
 use super::error::NodeError;
 
-/// A node that can be run: a number of items, handed out in chunks to whoever is free.
+/// A node that can be run: a number of items, which workers process in chunks.
 ///
-/// `C` is what the engine lends every node for the length of a run: its world, borrowed.
+/// `C` is the context: the engine's data, borrowed for the duration of a run.
 ///
-/// A panic in any of these methods fails the run with an error that names the node, as an error does. Where the program
-/// is built with `panic = "abort"` no panic can be caught, and it ends the program instead.
+/// A panic in any of these methods fails the run with an error that names the node. In a program that is built with
+/// `panic = "abort"`, a panic ends the program instead.
 pub trait Node<C: ?Sized>: Send + Sync {
-    /// How many items there are.
+    /// The number of items.
     ///
-    /// It is asked once a run, when everything the node depends on is done, so it may depend on what that made. With 0
-    /// the node is done at once.
+    /// It is called once per run, when all dependencies of the node are complete, so it may depend on their results. A node of
+    /// width 0 is complete at once.
     fn width(&self, context: &C) -> usize;
 
-    /// How many items one call of [`run`](Self::run) is to take: 0 is treated as 1.
+    /// The number of items for each call of [`run`](Self::run). 0 counts as 1.
     ///
-    /// It is asked right after [`width`](Self::width), unless that was 0. A width beyond half the range of `usize` is
-    /// taken in chunks of 2 items at least.
+    /// It is called right after [`width`](Self::width), unless the width is 0. A width of more than half the range of `usize` is
+    /// split into chunks of at least 2 items.
     fn chunk(&self, context: &C) -> usize {
         let _ = context;
         1
     }
 
-    /// Whether the node must run on the thread that called [`Schedule::run`](super::Schedule::run), all of it: its
-    /// width is asked there, and its chunks run there one after another, first to last.
+    /// Whether the node is pinned to the thread that called [`Schedule::run`](super::Schedule::run). All its calls are then made on
+    /// that thread, and its chunks run one after another, from first to last.
     fn pinned(&self) -> bool {
         false
     }
 
-    /// Does the items of `range`, which starts at a multiple of the chunk and is one chunk long, the last one perhaps less.
+    /// Processes the items of `range`: one chunk, which starts at a multiple of the chunk size. The last chunk may be shorter.
     ///
-    /// Every item is in one range exactly. Ranges run in any order, at the same time or one after another, each on the thread
-    /// that `worker` stands for. One that waits for another may wait for ever, as one thread may have both
-    /// ([`Schedule::always_parallel`](super::Schedule::always_parallel)).
+    /// Every item is in exactly one range. Ranges run in any order, at the same time or one after another, each on the thread of
+    /// `worker`. A range must not wait for another one: the same thread may have to run both, which is a deadlock (but see
+    /// [`Schedule::always_parallel`](super::Schedule::always_parallel)).
     ///
     /// # Errors
     ///
-    /// Whatever the node cannot do. It stops the run: no further chunk starts, nothing that depends on the node runs,
-    /// and the run reports this error with the node's name.
+    /// An error stops the run: no further chunk starts, no dependent of the node runs, and the run returns the error with the
+    /// node's name.
     fn run(&self, context: &C, range: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
 }
 
@@ -68,9 +68,9 @@ impl<C: ?Sized, T: Node<C> + ?Sized> Node<C> for Box<T> {
 type Width<'a, C> = dyn Fn(&C) -> usize + Send + Sync + 'a;
 type Body<'a, C> = dyn Fn(&C, Range<usize>, &Worker) -> Result<(), NodeError> + Send + Sync + 'a;
 
-/// A [`Node`] made of closures: all of them are of one type, so a graph can hold them side by side.
+/// A [`Node`] made of closures. All of them have the same type, so a graph can contain different ones.
 ///
-/// It is one item in one chunk, and runs anywhere, unless it is told otherwise:
+/// By default, it has one item and runs on any worker:
 ///
 /// ```
 /// use drawloom::graph::Closure;
@@ -96,24 +96,24 @@ pub struct Closure<'a, C: ?Sized> {
 }
 
 impl<'a, C: ?Sized> Closure<'a, C> {
-    /// A node that does its items with `body`.
+    /// A node that processes its items with `body`.
     pub fn new(body: impl Fn(&C, Range<usize>, &Worker) -> Result<(), NodeError> + Send + Sync + 'a) -> Self {
         Self { width: None, chunk: 1, pinned: false, body: Box::new(body) }
     }
 
-    /// Has as many items as `width` says, which is asked once a run.
+    /// Sets the number of items, which is determined once per run.
     pub fn with_width(mut self, width: impl Fn(&C) -> usize + Send + Sync + 'a) -> Self {
         self.width = Some(Box::new(width));
         self
     }
 
-    /// Does `chunk` items a call: 0 is treated as 1.
+    /// Sets the number of items for each call. 0 counts as 1.
     pub fn with_chunk(mut self, chunk: usize) -> Self {
         self.chunk = chunk;
         self
     }
 
-    /// Runs on the thread that called [`Schedule::run`](super::Schedule::run), and nowhere else.
+    /// Pins the node to the thread that calls [`Schedule::run`](super::Schedule::run).
     pub fn on_calling_thread(mut self) -> Self {
         self.pinned = true;
         self

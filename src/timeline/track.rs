@@ -154,7 +154,7 @@ mod loom_tests {
     fn an_open_idle_interval_is_read_after_the_closed_ones_before_it() {
         model(|| {
             let track = Arc::new(Track::new(2));
-            track.make_room();
+            track.allocate();
             let reader = thread::spawn({
                 let track = Arc::clone(&track);
                 move || {

@@ -1,9 +1,9 @@
-//! What is kept, in which order, and what is found wrong: against the oracle, and case by case.
+//! Which nodes are kept, their order, and the reported problems: compared with the oracle, and case by case.
 
 use drawloom::graph::{FrameGraph, GraphProblem, NodeId, Schedule};
 use proptest::prelude::*;
 
-use crate::oracle::{Oracle, Role, Sketch, any_sketch, closure, sound_sketch};
+use crate::oracle::{GraphModel, Oracle, Role, any_graph, closure, valid_graph};
 
 fn number(name: &str) -> usize {
     name[1..].parse().expect("names are a letter and a number")
@@ -13,8 +13,8 @@ fn names<P>(schedule: &Schedule<P>) -> Vec<&str> {
     schedule.nodes().map(|(name, _)| name).collect()
 }
 
-fn check_schedule(sketch: &Sketch, schedule: &Schedule<usize>) -> Result<(), TestCaseError> {
-    let oracle = Oracle::new(sketch);
+fn check_schedule(model: &GraphModel, schedule: &Schedule<usize>) -> Result<(), TestCaseError> {
+    let oracle = Oracle::new(model);
     let order: Vec<usize> = schedule.nodes().map(|(_, node)| *node).collect();
     prop_assert_eq!(&order, &oracle.order());
     for (name, node) in schedule.nodes() {
@@ -40,24 +40,24 @@ fn check_schedule(sketch: &Sketch, schedule: &Schedule<usize>) -> Result<(), Tes
     Ok(())
 }
 
-fn check_problem(sketch: &Sketch, problem: &GraphProblem) -> Result<(), TestCaseError> {
-    let oracle = Oracle::new(sketch);
+fn check_problem(model: &GraphModel, problem: &GraphProblem) -> Result<(), TestCaseError> {
+    let oracle = Oracle::new(model);
     if let GraphProblem::Cycle { nodes } = problem {
-        let circle: Vec<usize> = nodes.iter().map(|name| number(name)).collect();
-        prop_assert_eq!(circle.first(), circle.iter().min());
-        for (at, &before) in circle.iter().enumerate() {
-            let after = circle[(at + 1) % circle.len()];
+        let cycle: Vec<usize> = nodes.iter().map(|name| number(name)).collect();
+        prop_assert_eq!(cycle.first(), cycle.iter().min());
+        for (index, &before) in cycle.iter().enumerate() {
+            let after = cycle[(index + 1) % cycle.len()];
             let is_edge =
-                oracle.data.iter().any(|edges| edges[before][after]) || sketch.orders.contains(&(before, after));
+                oracle.data.iter().any(|edges| edges[before][after]) || model.orders.contains(&(before, after));
             prop_assert!(is_edge, "p{} is not right before p{}", before, after);
         }
         return Ok(());
     }
     prop_assert!(!oracle.has_cycle());
-    let missing = (0..sketch.output.len()).filter(|&resource| !sketch.imported[resource]).find_map(|resource| {
-        let mut readers = sketch.with_role(resource, &[Role::Reads, Role::Modifies]);
+    let missing = (0..model.output.len()).filter(|&resource| !model.imported[resource]).find_map(|resource| {
+        let mut readers = model.with_role(resource, &[Role::Reads, Role::Modifies]);
         readers.retain(|&reader| oracle.needed[reader] && !oracle.data[resource].iter().any(|edges| edges[reader]));
-        let output = sketch.output[resource] && sketch.makers(resource).is_empty();
+        let output = model.output[resource] && model.makers(resource).is_empty();
         (output || !readers.is_empty()).then(|| GraphProblem::MissingProducer {
             resource: format!("r{resource}"),
             output,
@@ -69,35 +69,35 @@ fn check_problem(sketch: &Sketch, problem: &GraphProblem) -> Result<(), TestCase
         return Ok(());
     }
     let unordered = |resource: usize, first: usize, second: usize| {
-        let makers = sketch.makers(resource);
+        let makers = model.makers(resource);
         first != second
             && [first, second].iter().all(|maker| makers.contains(maker) && oracle.needed[*maker])
             && !oracle.before[first][second]
             && !oracle.before[second][first]
     };
     let GraphProblem::UnorderedWriters { resource, first, second } = problem else {
-        return Err(TestCaseError::fail(format!("nothing is wrong, but {problem:?}")));
+        return Err(TestCaseError::fail(format!("the graph is valid, but compiling it returned {problem:?}")));
     };
     prop_assert!(unordered(number(resource), number(first), number(second)));
-    let nodes = 0..sketch.roles.len();
+    let nodes = 0..model.roles.len();
     let any_earlier =
         (0..number(resource)).any(|resource| nodes.clone().any(|a| nodes.clone().any(|b| unordered(resource, a, b))));
-    prop_assert!(!any_earlier, "an earlier resource has writers without an order");
+    prop_assert!(!any_earlier, "an earlier resource has unordered writers");
     Ok(())
 }
 
-fn is_wrong(sketch: &Sketch) -> bool {
-    let oracle = Oracle::new(sketch);
-    let unordered = (0..sketch.output.len()).any(|resource| {
-        let mut makers = sketch.makers(resource);
+fn is_invalid(model: &GraphModel) -> bool {
+    let oracle = Oracle::new(model);
+    let unordered = (0..model.output.len()).any(|resource| {
+        let mut makers = model.makers(resource);
         makers.retain(|&maker| oracle.needed[maker]);
         makers.iter().any(|&a| makers.iter().any(|&b| a < b && !oracle.before[a][b] && !oracle.before[b][a]))
     });
-    let missing = (0..sketch.output.len()).filter(|&resource| !sketch.imported[resource]).any(|resource| {
+    let missing = (0..model.output.len()).filter(|&resource| !model.imported[resource]).any(|resource| {
         let lacks =
             |reader: &usize| oracle.needed[*reader] && !oracle.data[resource].iter().any(|edges| edges[*reader]);
-        (sketch.output[resource] && sketch.makers(resource).is_empty())
-            || sketch.with_role(resource, &[Role::Reads, Role::Modifies]).iter().any(lacks)
+        (model.output[resource] && model.makers(resource).is_empty())
+            || model.with_role(resource, &[Role::Reads, Role::Modifies]).iter().any(lacks)
     });
     oracle.has_cycle() || unordered || missing
 }
@@ -106,13 +106,13 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
 
     #[test]
-    fn any_graph_compiles_or_fails_as_the_rules_say(sketch in any_sketch()) {
-        match sketch.graph(|node| node).compile() {
+    fn compiling_any_graph_agrees_with_the_oracle(model in any_graph()) {
+        match model.graph(|node| node).compile() {
             Ok(schedule) => {
-                prop_assert!(!is_wrong(&sketch));
-                check_schedule(&sketch, &schedule)?;
+                prop_assert!(!is_invalid(&model));
+                check_schedule(&model, &schedule)?;
             }
-            Err(error) => check_problem(&sketch, &error.problem)?,
+            Err(error) => check_problem(&model, &error.problem)?,
         }
     }
 }
@@ -121,24 +121,24 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
     #[test]
-    fn sound_graphs_compile_as_the_rules_say(sketch in sound_sketch()) {
-        let schedule = sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
-        check_schedule(&sketch, &schedule)?;
+    fn compiling_valid_graphs_agrees_with_the_oracle(model in valid_graph()) {
+        let schedule = model.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+        check_schedule(&model, &schedule)?;
     }
 
     #[test]
-    fn the_same_graph_gives_the_same_schedule(sketch in sound_sketch()) {
-        let compile = || sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()));
+    fn the_same_graph_compiles_to_the_same_schedule(model in valid_graph()) {
+        let compile = || model.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()));
         prop_assert_eq!(compile()?.to_dot(), compile()?.to_dot());
     }
 }
 
-/// A graph in which all nodes are kept and all resources imported, so that only the order matters.
-struct Ordering {
+/// A graph of kept nodes and imported resources, to test the order alone.
+struct KeptGraph {
     graph: FrameGraph<()>,
 }
 
-impl Ordering {
+impl KeptGraph {
     fn new() -> Self {
         Self { graph: FrameGraph::new() }
     }
@@ -162,42 +162,42 @@ impl Ordering {
     }
 
     fn compile(self) -> Schedule<()> {
-        self.graph.compile().expect("the graph is sound")
+        self.graph.compile().expect("the graph is valid")
     }
 }
 
 #[test]
 fn writers_come_before_modifiers_and_those_before_readers() {
-    let mut ordering = Ordering::new();
-    ordering.add("read", &["image"], &[]);
-    ordering.add("modify", &["image"], &["image"]);
-    ordering.add("write", &[], &["image"]);
-    assert_eq!(names(&ordering.compile()), ["write", "modify", "read"]);
+    let mut kept = KeptGraph::new();
+    kept.add("read", &["image"], &[]);
+    kept.add("modify", &["image"], &["image"]);
+    kept.add("write", &[], &["image"]);
+    assert_eq!(names(&kept.compile()), ["write", "modify", "read"]);
 }
 
 #[test]
-fn a_reader_put_before_a_writer_is_before_its_modifiers_too() {
-    let mut ordering = Ordering::new();
-    ordering.add("modify", &["image"], &["image"]);
-    let write = ordering.add("write", &[], &["image"]);
-    let read = ordering.add("read", &["image"], &[]);
-    ordering.graph.order(read, write);
-    assert_eq!(names(&ordering.compile()), ["read", "write", "modify"]);
+fn a_reader_ordered_before_a_writer_comes_before_its_modifiers() {
+    let mut kept = KeptGraph::new();
+    kept.add("modify", &["image"], &["image"]);
+    let write = kept.add("write", &[], &["image"]);
+    let read = kept.add("read", &["image"], &[]);
+    kept.graph.order(read, write);
+    assert_eq!(names(&kept.compile()), ["read", "write", "modify"]);
 }
 
 #[test]
-fn a_reader_between_two_writers_sees_the_first() {
-    let mut ordering = Ordering::new();
-    let late = ordering.add("late", &[], &["image"]);
-    let read = ordering.add("read", &["image"], &[]);
-    let early = ordering.add("early", &[], &["image"]);
-    ordering.graph.order(early, late);
-    ordering.graph.order(read, late);
-    assert_eq!(names(&ordering.compile()), ["early", "read", "late"]);
+fn a_reader_can_run_between_two_writers() {
+    let mut kept = KeptGraph::new();
+    let late = kept.add("late", &[], &["image"]);
+    let read = kept.add("read", &["image"], &[]);
+    let early = kept.add("early", &[], &["image"]);
+    kept.graph.order(early, late);
+    kept.graph.order(read, late);
+    assert_eq!(names(&kept.compile()), ["early", "read", "late"]);
 }
 
 #[test]
-fn what_a_kept_modifier_builds_on_is_kept() {
+fn the_version_that_a_kept_modifier_modifies_is_kept() {
     let mut graph = FrameGraph::new();
     let [canvas, image] = ["canvas", "image"].map(|name| graph.resource(name));
     graph.import(canvas);
@@ -210,13 +210,13 @@ fn what_a_kept_modifier_builds_on_is_kept() {
     graph.write(second, image);
     graph.order(first, second);
     graph.order(unrelated, second);
-    let schedule = graph.compile().expect("the graph is sound");
+    let schedule = graph.compile().expect("the graph is valid");
     assert_eq!(names(&schedule), ["first", "second"]);
     assert_eq!(schedule.dropped(), ["unrelated"]);
 }
 
 #[test]
-fn what_was_overwritten_is_not_kept_for_a_modifier() {
+fn an_overwritten_version_is_not_kept_for_a_modifier() {
     let mut graph = FrameGraph::new();
     let [canvas, image] = ["canvas", "image"].map(|name| graph.resource(name));
     graph.output(image);
@@ -230,41 +230,41 @@ fn what_was_overwritten_is_not_kept_for_a_modifier() {
     graph.write(modify, image);
     graph.order(before, write);
     graph.order(before, modify);
-    let schedule = graph.compile().expect("what lacks a producer is dropped");
+    let schedule = graph.compile().expect("the node without a producer is dropped");
     assert_eq!(names(&schedule), ["write", "modify"]);
 }
 
 #[test]
-fn a_dropped_node_hands_on_the_order() {
-    let mut ordering = Ordering::new();
-    let last = ordering.add("last", &[], &["image"]);
-    let first = ordering.add("first", &[], &["image"]);
-    let dropped = ordering.graph.add("dropped", ());
-    ordering.graph.order(first, dropped);
-    ordering.graph.order(dropped, last);
-    let schedule = ordering.compile();
+fn orders_work_through_dropped_nodes() {
+    let mut kept = KeptGraph::new();
+    let last = kept.add("last", &[], &["image"]);
+    let first = kept.add("first", &[], &["image"]);
+    let dropped = kept.graph.add("dropped", ());
+    kept.graph.order(first, dropped);
+    kept.graph.order(dropped, last);
+    let schedule = kept.compile();
     assert_eq!(names(&schedule), ["first", "last"]);
     assert_eq!(schedule.dependencies(1), [0]);
 }
 
 #[test]
-fn a_dropped_node_has_no_say_in_ties() {
-    let mut ordering = Ordering::new();
-    let first = ordering.add("first", &[], &[]);
-    ordering.add("second", &[], &[]);
-    let dropped = ordering.graph.add("dropped", ());
-    ordering.graph.order(dropped, first);
-    assert_eq!(names(&ordering.compile()), ["first", "second"]);
+fn dropped_nodes_do_not_break_ties() {
+    let mut kept = KeptGraph::new();
+    let first = kept.add("first", &[], &[]);
+    kept.add("second", &[], &[]);
+    let dropped = kept.graph.add("dropped", ());
+    kept.graph.order(dropped, first);
+    assert_eq!(names(&kept.compile()), ["first", "second"]);
 }
 
 #[test]
-fn only_the_last_maker_is_waited_for() {
-    let mut ordering = Ordering::new();
-    let makers = ["a", "b", "c"].map(|name| ordering.add(name, &["image"], &["image"]));
-    ordering.graph.order(makers[0], makers[1]);
-    ordering.graph.order(makers[1], makers[2]);
-    ordering.add("read", &["image"], &[]);
-    let schedule = ordering.compile();
+fn a_reader_depends_on_the_last_maker_only() {
+    let mut kept = KeptGraph::new();
+    let makers = ["a", "b", "c"].map(|name| kept.add(name, &["image"], &["image"]));
+    kept.graph.order(makers[0], makers[1]);
+    kept.graph.order(makers[1], makers[2]);
+    kept.add("read", &["image"], &[]);
+    let schedule = kept.compile();
     assert_eq!(schedule.dependencies(3), [2]);
     assert_eq!(schedule.dependents(0), [1]);
 }
@@ -276,7 +276,7 @@ fn nodes_are_found_by_id() {
     graph.keep(late);
     graph.keep(early);
     graph.order(early, late);
-    let mut schedule = graph.compile().expect("the graph is sound");
+    let mut schedule = graph.compile().expect("the graph is valid");
     assert_eq!([dropped, late, early].map(|node| schedule.index(node)), [None, Some(1), Some(0)]);
     assert_eq!(schedule.node(late), Some(&4));
     *schedule.node_mut(early).expect("it is kept") = 7;
@@ -289,5 +289,5 @@ fn nodes_are_found_by_id() {
 
 #[test]
 fn an_empty_graph_compiles() {
-    assert!(FrameGraph::<()>::new().compile().expect("nothing is wrong with nothing").is_empty());
+    assert!(FrameGraph::<()>::new().compile().expect("an empty graph is valid").is_empty());
 }

@@ -1,20 +1,19 @@
-//! The drawings: what they show, and that any name gives a drawing that can be read.
+//! DOT files: what they contain, and that they are well-formed whatever the names.
 
 use std::collections::BTreeSet;
 
 use drawloom::graph::FrameGraph;
 use proptest::prelude::*;
 
-use crate::oracle::{any_sketch, sound_sketch};
+use crate::oracle::{any_graph, valid_graph};
 
 /// The identifiers of a node or an edge, and its attributes.
 type Statement<'a> = (Vec<&'a str>, Vec<(&'a str, String)>);
 
-/// Reads what the drawings use of Graphviz' language: a statement a line, each a node or an edge with attributes. Gives the
-/// attributes of each node or edge, by its identifiers.
+/// Parses the subset of DOT that is used here: one statement per line, each a node or an edge with attributes.
 fn parse(dot: &str) -> Result<Vec<Statement<'_>>, String> {
-    let body = dot.strip_prefix("digraph {\n").and_then(|rest| rest.strip_suffix("}\n")).ok_or("no digraph")?;
-    body.lines().map(|line| statement(line).ok_or_else(|| format!("cannot read {line:?}"))).collect()
+    let body = dot.strip_prefix("digraph {\n").and_then(|rest| rest.strip_suffix("}\n")).ok_or("not a digraph")?;
+    body.lines().map(|line| statement(line).ok_or_else(|| format!("cannot parse {line:?}"))).collect()
 }
 
 fn statement(line: &str) -> Option<Statement<'_>> {
@@ -47,13 +46,13 @@ fn word(text: &str) -> (String, &str) {
     (text[..end].to_owned(), &text[end..])
 }
 
-/// A string behind its opening quote, as it is drawn, and what follows.
+/// The text that Graphviz draws for a quoted string (without its opening quote), and the rest of the line.
 fn string(text: &str) -> Option<(String, &str)> {
     let mut drawn = String::new();
     let mut characters = text.char_indices();
     loop {
         match characters.next()? {
-            (at, '"') => return Some((drawn.replace("&amp;", "&"), &text[at + 1..])),
+            (end, '"') => return Some((drawn.replace("&amp;", "&"), &text[end + 1..])),
             (_, '\\') => match characters.next()?.1 {
                 escaped @ ('"' | '\\') => drawn.push(escaped),
                 _ => return None,
@@ -64,11 +63,11 @@ fn string(text: &str) -> Option<(String, &str)> {
     }
 }
 
-/// The attributes of the node that is drawn with that label.
+/// The identifier and the attributes of the statement with that label.
 fn statement_of<'a>(statements: &'a [Statement<'a>], label: &str) -> (String, Vec<(&'a str, &'a str)>) {
-    let is_it =
+    let has_label =
         |(_, attributes): &&Statement<'_>| attributes.iter().any(|(key, value)| *key == "label" && value == label);
-    let (identifiers, attributes) = statements.iter().find(is_it).unwrap_or_else(|| panic!("no {label:?}"));
+    let (identifiers, attributes) = statements.iter().find(has_label).unwrap_or_else(|| panic!("no {label:?}"));
     let attributes = attributes.iter().filter(|(key, _)| *key != "label");
     (identifiers[0].to_owned(), attributes.map(|(key, value)| (*key, value.as_str())).collect())
 }
@@ -90,9 +89,9 @@ fn small_graph() -> FrameGraph<()> {
 }
 
 #[test]
-fn a_graph_shows_nodes_resources_and_what_is_not_needed() {
+fn a_graph_has_nodes_resources_and_dashed_unneeded_ones() {
     let dot = small_graph().to_dot();
-    let statements = parse(&dot).expect("the drawing can be read");
+    let statements = parse(&dot).expect("the DOT file is well-formed");
     let (shadow, attributes) = statement_of(&statements, "shadow");
     assert_eq!(attributes, [("shape", "box")]);
     let (light, _) = statement_of(&statements, "light");
@@ -123,9 +122,9 @@ fn a_graph_shows_nodes_resources_and_what_is_not_needed() {
 }
 
 #[test]
-fn a_schedule_shows_the_order_and_what_was_dropped() {
-    let dot = small_graph().compile().expect("nothing is wrong").to_dot();
-    let statements = parse(&dot).expect("the drawing can be read");
+fn a_schedule_has_its_order_and_the_dropped_nodes() {
+    let dot = small_graph().compile().expect("the graph is valid").to_dot();
+    let statements = parse(&dot).expect("the DOT file is well-formed");
     let (shadow, attributes) = statement_of(&statements, "shadow");
     assert_eq!(attributes, [("shape", "box")]);
     let (light, _) = statement_of(&statements, "light");
@@ -136,7 +135,7 @@ fn a_schedule_shows_the_order_and_what_was_dropped() {
 }
 
 #[test]
-fn entities_and_control_characters_are_drawn_as_they_are_written() {
+fn entities_and_control_characters_are_escaped() {
     let mut graph = FrameGraph::new();
     graph.add("a &lt; b", ());
     assert!(graph.to_dot().contains(r#"label="a &amp;lt; b""#), "{}", graph.to_dot());
@@ -148,7 +147,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
     #[test]
-    fn any_name_is_drawn_as_it_is(name in "\\PC*|[\"\\\\&;a>\\[\\]{}=, -]{0,12}") {
+    fn any_name_is_drawn_unchanged(name in "\\PC*|[\"\\\\&;a>\\[\\]{}=, -]{0,12}") {
         let mut graph = FrameGraph::new();
         let node = graph.add(name.clone(), ());
         graph.keep(node);
@@ -165,8 +164,8 @@ proptest! {
     }
 
     #[test]
-    fn any_graph_can_be_drawn_also_one_that_does_not_compile(sketch in any_sketch()) {
-        let graph = sketch.graph(|node| node);
+    fn any_graph_can_be_drawn_even_if_it_does_not_compile(model in any_graph()) {
+        let graph = model.graph(|node| node);
         let dot = graph.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
         let dashed = |attributes: &[(&str, String)]| attributes.contains(&("style", "dashed".to_owned()));
@@ -178,8 +177,8 @@ proptest! {
     }
 
     #[test]
-    fn a_schedule_draws_who_waits_for_whom_and_nothing_that_follows_from_it(sketch in sound_sketch()) {
-        let schedule = sketch.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
+    fn a_schedule_has_the_transitive_reduction_of_its_dependencies(model in valid_graph()) {
+        let schedule = model.graph(|node| node).compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         let dot = schedule.to_dot();
         let statements = parse(&dot).map_err(TestCaseError::fail)?;
         let index = |end: &str| end.trim_start_matches("node").parse::<usize>().expect("nodes are numbered");
@@ -196,7 +195,7 @@ proptest! {
     }
 }
 
-/// Who comes after whom, by way of others too. Arrows lead to higher indices.
+/// Per index, all that the arrows lead to, directly or through others. Arrows lead to higher indices.
 fn reachable(arrows: &[(usize, usize)], count: usize) -> Vec<BTreeSet<usize>> {
     let mut after = vec![BTreeSet::new(); count];
     for index in (0..count).rev() {

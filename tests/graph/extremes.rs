@@ -1,4 +1,4 @@
-//! Runs of nothing, of much, and of runs inside runs.
+//! Empty runs, long runs, and runs inside runs.
 
 use std::{
     cell::Cell,
@@ -17,12 +17,12 @@ use drawloom::{
 
 use crate::{
     SCHEDULERS,
-    run::{alone, run},
+    run::{run, single},
 };
 
 #[test]
 fn an_empty_schedule_runs() {
-    let mut schedule = FrameGraph::<Closure<'_, ()>>::new().compile().expect("nothing is wrong");
+    let mut schedule = FrameGraph::<Closure<'_, ()>>::new().compile().expect("the graph is valid");
     for scheduler in SCHEDULERS.iter() {
         run(&mut schedule, scheduler, &());
     }
@@ -30,7 +30,7 @@ fn an_empty_schedule_runs() {
 
 #[test]
 fn a_million_items_are_counted() {
-    let mut schedule = alone(
+    let mut schedule = single(
         Closure::new(|sum: &AtomicUsize, range: Range<usize>, _| {
             sum.fetch_add(range.sum::<usize>(), Ordering::Relaxed);
             Ok(())
@@ -46,7 +46,7 @@ fn a_million_items_are_counted() {
 }
 
 #[test]
-fn the_widest_node_is_cut_without_overflow() {
+fn the_widest_node_is_split_without_overflow() {
     let third = usize::MAX / 3 + 1;
     let whole = std::iter::once(0..usize::MAX).collect();
     for (chunk, expected) in [(usize::MAX, whole), (third, vec![0..third, third..2 * third, 2 * third..usize::MAX])] {
@@ -54,11 +54,11 @@ fn the_widest_node_is_cut_without_overflow() {
             done.lock().map_err(|_| "poisoned")?.push(range);
             Ok(())
         };
-        let mut schedule = alone(Closure::new(body).with_width(|_| usize::MAX).with_chunk(chunk));
+        let mut schedule = single(Closure::new(body).with_width(|_| usize::MAX).with_chunk(chunk));
         for scheduler in SCHEDULERS.iter() {
             let done = Mutex::new(Vec::new());
             run(&mut schedule, scheduler, &done);
-            let mut done = done.into_inner().expect("nobody panics");
+            let mut done = done.into_inner().expect("no thread panics");
             done.sort_unstable_by_key(|range| range.start);
             assert_eq!(done, expected);
         }
@@ -86,7 +86,7 @@ fn chains_of_a_hundred_thousand_nodes_run() {
             graph.write(node, before);
         }
         graph.output(before);
-        let mut schedule = graph.compile().expect("nothing is wrong");
+        let mut schedule = graph.compile().expect("the graph is valid");
         assert_eq!(schedule.len(), LENGTH);
         for scheduler in &SCHEDULERS[..2] {
             let count = AtomicUsize::new(0);
@@ -97,20 +97,20 @@ fn chains_of_a_hundred_thousand_nodes_run() {
 }
 
 #[test]
-fn a_chunk_that_waits_takes_no_other_chunk() {
+fn a_waiting_chunk_runs_no_other_chunk_of_its_node() {
     thread_local! {
         static INSIDE: Cell<bool> = const { Cell::new(false) };
     }
     let scheduler = &SCHEDULERS[2];
     let nested = AtomicUsize::new(0);
-    let mut schedule = alone(
+    let mut schedule = single(
         Closure::new(|(): &(), _, opener: &Worker| {
             if INSIDE.replace(true) {
                 nested.fetch_add(1, Ordering::Relaxed);
             }
             let opener = opener.index();
             let is_taken = AtomicBool::new(false);
-            // The opener gives others time to take its job, and they take their time over it, so that it has to wait.
+            // Gives other workers time to steal the job, which takes a while there, so that this worker has to wait.
             scheduler.scope(|scope| {
                 scope.spawn(|_, worker| {
                     is_taken.store(true, Ordering::Relaxed);
@@ -135,13 +135,13 @@ fn a_chunk_that_waits_takes_no_other_chunk() {
 fn a_schedule_runs_inside_another() {
     let scheduler = &SCHEDULERS[2];
     let count = AtomicUsize::new(0);
-    let mut schedule = alone(
+    let mut schedule = single(
         Closure::new(|(): &(), _, _| {
             let inner = |_: &(), _: Range<usize>, _: &Worker| {
                 count.fetch_add(1, Ordering::Relaxed);
                 Ok(())
             };
-            alone(Closure::new(inner).with_width(|()| 20)).run(scheduler, &())?;
+            single(Closure::new(inner).with_width(|()| 20)).run(scheduler, &())?;
             Ok(())
         })
         .with_width(|()| 20),

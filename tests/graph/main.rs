@@ -1,4 +1,4 @@
-//! The frame graph against a naive oracle of its rules, and its runs against plain bookkeeping.
+//! Compares compiled graphs with a naive oracle of the rules, and runs with simple counters.
 
 mod compile;
 mod dot;
@@ -14,6 +14,6 @@ use std::sync::LazyLock;
 
 use drawloom::task::Scheduler;
 
-/// Schedulers of one, two and four workers, which all tests use.
+/// Schedulers of one, two and four workers, shared by all tests.
 static SCHEDULERS: LazyLock<[Scheduler; 3]> =
     LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));

@@ -1,9 +1,9 @@
-//! What the rules say of a graph, worked out the slow way: matrices of who comes before whom.
+//! The rules of a graph, implemented naively with matrices.
 
 use drawloom::graph::{FrameGraph, NodeId};
 use proptest::{collection::vec, prelude::*};
 
-/// Who comes before whom: `[before][after]`.
+/// A relation of nodes as a matrix: `[before][after]`.
 pub type Relation = Vec<Vec<bool>>;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub enum Role {
 
 /// A graph as plain data. Nodes are named `p0`, `p1`, and so on, resources `r0`, `r1`.
 #[derive(Clone, Debug)]
-pub struct Sketch {
+pub struct GraphModel {
     /// Per node and resource.
     pub roles: Vec<Vec<Option<Role>>>,
     pub orders: Vec<(usize, usize)>,
@@ -24,8 +24,8 @@ pub struct Sketch {
     pub output: Vec<bool>,
 }
 
-/// Anything goes: most of these have something wrong with them.
-pub fn any_sketch() -> impl Strategy<Value = Sketch> {
+/// Any graph. Most of them are invalid.
+pub fn any_graph() -> impl Strategy<Value = GraphModel> {
     let role = prop_oneof![
         6 => Just(None),
         2 => Just(Some(Role::Writes)),
@@ -40,9 +40,9 @@ pub fn any_sketch() -> impl Strategy<Value = Sketch> {
             vec(prop::bool::weighted(0.7), resources),
             vec(prop::bool::weighted(0.5), resources),
         )
-            .prop_map(|(roles, orders, kept, imported, output)| Sketch {
+            .prop_map(|(roles, orders, kept, imported, output)| GraphModel {
                 roles,
-                // Mostly forwards, or there would be little but cycles.
+                // Mostly from low to high, because random orders would nearly always form a cycle.
                 orders: orders
                     .into_iter()
                     .map(|(a, b)| if (a + b) % 7 == 0 { (a, b) } else { (a.min(b), a.max(b)) })
@@ -55,8 +55,8 @@ pub fn any_sketch() -> impl Strategy<Value = Sketch> {
     })
 }
 
-/// Nothing is wrong with these: edges go from low to high, all makers of a resource are ordered, all is imported.
-pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
+/// A valid graph: edges go from low to high, the makers of each resource are ordered, and all resources are imported.
+pub fn valid_graph() -> impl Strategy<Value = GraphModel> {
     (1..24usize, 1..8usize).prop_flat_map(|(nodes, resources)| {
         (
             vec(vec(prop::bool::weighted(0.25), resources), nodes),
@@ -65,7 +65,7 @@ pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
             vec(prop::bool::weighted(0.1), nodes),
             vec(prop::bool::weighted(0.3), resources),
         )
-            .prop_map(|(touches, splits, orders, kept, output)| {
+            .prop_map(|(accesses, splits, orders, kept, output)| {
                 let role = |node: usize, resource: usize| {
                     let (a, b) = splits[resource];
                     if node < a.min(b) {
@@ -76,10 +76,10 @@ pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
                         Role::Reads
                     }
                 };
-                let roles: Vec<Vec<_>> = (0..touches.len())
+                let roles: Vec<Vec<_>> = (0..accesses.len())
                     .map(|node| {
                         (0..output.len())
-                            .map(|resource| touches[node][resource].then(|| role(node, resource)))
+                            .map(|resource| accesses[node][resource].then(|| role(node, resource)))
                             .collect()
                     })
                     .collect();
@@ -91,13 +91,13 @@ pub fn sound_sketch() -> impl Strategy<Value = Sketch> {
                         .collect();
                     orders.extend(makers.windows(2).map(|pair| (pair[0], pair[1])));
                 }
-                Sketch { kept, imported: vec![true; output.len()], output, roles, orders }
+                GraphModel { kept, imported: vec![true; output.len()], output, roles, orders }
             })
     })
 }
 
-impl Sketch {
-    /// The graph of it, with a payload for each node.
+impl GraphModel {
+    /// Builds the graph with a payload for each node.
     pub fn graph<P>(&self, mut payload: impl FnMut(usize) -> P) -> FrameGraph<P> {
         let mut graph = FrameGraph::new();
         let resources: Vec<_> = (0..self.output.len()).map(|index| graph.resource(format!("r{index}"))).collect();
@@ -139,36 +139,36 @@ impl Sketch {
     }
 }
 
-/// All that follows from a sketch.
+/// What the rules say about a graph.
 pub struct Oracle {
-    /// Needs what the other makes of the resource: `[resource][before][after]`.
+    /// Whether a node depends on what another writes to a resource: `[resource][before][after]`.
     pub data: Vec<Relation>,
-    /// Comes before, through any number of others.
+    /// Whether a node comes before another, directly or through others.
     pub before: Relation,
     pub needed: Vec<bool>,
 }
 
 impl Oracle {
-    pub fn new(sketch: &Sketch) -> Self {
-        let count = sketch.roles.len();
+    pub fn new(model: &GraphModel) -> Self {
+        let count = model.roles.len();
         let mut order = vec![vec![false; count]; count];
-        for &(before, after) in &sketch.orders {
+        for &(before, after) in &model.orders {
             order[before][after] = true;
         }
         let ordered = closure(&order);
         let mut all = order;
         let mut data = Vec::new();
-        for resource in 0..sketch.output.len() {
+        for resource in 0..model.output.len() {
             let mut edges = vec![vec![false; count]; count];
-            for writer in sketch.with_role(resource, &[Role::Writes]) {
-                for modifier in sketch.with_role(resource, &[Role::Modifies]) {
+            for writer in model.with_role(resource, &[Role::Writes]) {
+                for modifier in model.with_role(resource, &[Role::Modifies]) {
                     edges[writer][modifier] = !ordered[modifier][writer];
                 }
             }
-            let told = closure(&union(&ordered, &edges));
-            for maker in sketch.makers(resource) {
-                for reader in sketch.with_role(resource, &[Role::Reads]) {
-                    edges[maker][reader] = !told[reader][maker];
+            let before = closure(&union(&ordered, &edges));
+            for maker in model.makers(resource) {
+                for reader in model.with_role(resource, &[Role::Reads]) {
+                    edges[maker][reader] = !before[reader][maker];
                 }
             }
             all = union(&all, &edges);
@@ -176,10 +176,10 @@ impl Oracle {
         }
         let before = closure(&all);
         for (resource, edges) in data.iter_mut().enumerate() {
-            let makers = sketch.makers(resource);
-            for modifier in sketch.with_role(resource, &[Role::Modifies]) {
+            let makers = model.makers(resource);
+            for modifier in model.with_role(resource, &[Role::Modifies]) {
                 for &maker in &makers {
-                    // The last maker before it: none stands between the two.
+                    // The last maker before the modifier: there is no maker between the two.
                     let between = |&other: &usize| {
                         other != maker && other != modifier && before[maker][other] && before[other][modifier]
                     };
@@ -189,9 +189,9 @@ impl Oracle {
                 }
             }
         }
-        let mut needed = sketch.kept.clone();
-        for resource in (0..sketch.output.len()).filter(|&resource| sketch.output[resource]) {
-            sketch.makers(resource).into_iter().for_each(|maker| needed[maker] = true);
+        let mut needed = model.kept.clone();
+        for resource in (0..model.output.len()).filter(|&resource| model.output[resource]) {
+            model.makers(resource).into_iter().for_each(|maker| needed[maker] = true);
         }
         for _ in 0..count {
             for node in 0..count {
@@ -206,14 +206,14 @@ impl Oracle {
         (0..self.needed.len()).any(|node| self.before[node][node])
     }
 
-    /// The needed nodes: always the first of those that nothing left out comes before.
+    /// The needed nodes in execution order: of the nodes that no remaining node comes before, the lowest is next.
     pub fn order(&self) -> Vec<usize> {
-        let mut left: Vec<usize> = (0..self.needed.len()).filter(|&node| self.needed[node]).collect();
+        let mut remaining: Vec<usize> = (0..self.needed.len()).filter(|&node| self.needed[node]).collect();
         let mut order = Vec::new();
-        while !left.is_empty() {
-            let is_next = |&node: &usize| left.iter().all(|&other| !self.before[other][node]);
-            let at = left.iter().position(is_next).expect("there is no cycle");
-            order.push(left.remove(at));
+        while !remaining.is_empty() {
+            let is_next = |&node: &usize| remaining.iter().all(|&other| !self.before[other][node]);
+            let index = remaining.iter().position(is_next).expect("there is no cycle");
+            order.push(remaining.remove(index));
         }
         order
     }
@@ -224,7 +224,7 @@ fn union(one: &Relation, other: &Relation) -> Relation {
     one.iter().zip(other).map(row).collect()
 }
 
-/// Through any number of others (Warshall).
+/// The transitive closure (Warshall).
 pub fn closure(relation: &Relation) -> Relation {
     let mut closed = relation.clone();
     for middle in 0..closed.len() {

@@ -1,4 +1,4 @@
-//! Every problem names what is wrong, and gives the graph back so that it can be put right.
+//! Every problem says what is wrong, and returns the graph so that it can be corrected.
 
 use drawloom::graph::{FrameGraph, GraphProblem, NodeId, ResourceId, Schedule};
 
@@ -12,9 +12,9 @@ fn graph<const N: usize>(names: [&str; N]) -> (FrameGraph<usize>, [NodeId; N]) {
     (graph, nodes)
 }
 
-/// Compiles a graph that is wrong: gives back the graph and what is wrong with it.
+/// Compiles an invalid graph. Returns the graph, the problem, and the problem's text.
 fn problem(graph: FrameGraph<usize>) -> (FrameGraph<usize>, GraphProblem, String) {
-    let error = graph.compile().expect_err("something is wrong with the graph");
+    let error = graph.compile().expect_err("the graph is invalid");
     let text = error.to_string();
     (*error.graph, error.problem, text)
 }
@@ -28,7 +28,7 @@ fn strings(names: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_cycle_is_named_from_its_first_node_on() {
+fn a_cycle_is_reported_from_its_first_node_on() {
     let (mut graph, [behind, a, b, c]) = graph(["behind", "a", "b", "c"]);
     graph.order(c, a);
     graph.order(a, b);
@@ -38,7 +38,7 @@ fn a_cycle_is_named_from_its_first_node_on() {
     assert_eq!(problem, GraphProblem::Cycle { nodes: strings(&["a", "b", "c"]) });
     assert_eq!(text, r#"nodes wait for each other in a cycle: "a" before "b" before "c" before "a""#);
     assert_eq!(graph.remove(b), Some(1));
-    assert_eq!(names(&graph.compile().expect("the circle is broken")), ["c", "behind", "a"]);
+    assert_eq!(names(&graph.compile().expect("the cycle is broken")), ["c", "behind", "a"]);
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn a_node_before_itself_is_a_cycle() {
 }
 
 #[test]
-fn a_cycle_of_dropped_nodes_is_one_too() {
+fn a_cycle_of_dropped_nodes_is_reported() {
     let mut graph = FrameGraph::new();
     let [a, b] = ["a", "b"].map(|name| graph.add(name, 0));
     graph.order(a, b);
@@ -60,7 +60,7 @@ fn a_cycle_of_dropped_nodes_is_one_too() {
 }
 
 #[test]
-fn a_cycle_through_resources_is_put_right_by_an_order() {
+fn an_order_breaks_a_cycle_through_resources() {
     let (mut graph, [history, image]) = graph(["history", "image"]);
     let [old, new] = ["old", "new"].map(|name| graph.resource(name));
     graph.import(new);
@@ -75,7 +75,7 @@ fn a_cycle_through_resources_is_put_right_by_an_order() {
 }
 
 #[test]
-fn a_missing_producer_is_named_with_its_readers() {
+fn a_missing_producer_is_reported_with_its_readers() {
     let (mut graph, [reader, modifier]) = graph(["reader", "modifier"]);
     let [depth, shadow] = ["depth", "shadow"].map(|name| graph.resource(name));
     graph.read(reader, depth);
@@ -95,7 +95,7 @@ fn a_missing_producer_is_named_with_its_readers() {
     assert_eq!(second, missing("shadow", &["modifier"]));
     let clear = graph.add("clear", 0);
     graph.write(clear, shadow);
-    assert_eq!(names(&graph.compile().expect("all is written")), ["clear", "modifier", "reader"]);
+    assert_eq!(names(&graph.compile().expect("all resources are written")), ["clear", "modifier", "reader"]);
 }
 
 #[test]
@@ -109,11 +109,11 @@ fn a_reader_before_every_writer_lacks_a_producer() {
     let readers = strings(&["reader"]);
     assert_eq!(problem, GraphProblem::MissingProducer { resource: "image".to_owned(), output: false, readers });
     graph.import(image);
-    assert_eq!(names(&graph.compile().expect("it is there before")), ["reader", "writer"]);
+    assert_eq!(names(&graph.compile().expect("it is imported")), ["reader", "writer"]);
 }
 
 #[test]
-fn an_output_that_nobody_writes_is_named_as_one() {
+fn an_unwritten_output_is_reported() {
     let (mut graph, [reader]) = graph(["reader"]);
     let [screen, other] = ["screen", "other"].map(|name| graph.resource(name));
     graph.output(screen);
@@ -132,7 +132,7 @@ fn an_output_that_nobody_writes_is_named_as_one() {
 }
 
 #[test]
-fn what_a_dropped_node_lacks_is_no_error() {
+fn a_missing_producer_of_a_dropped_node_is_not_reported() {
     let (mut graph, [kept]) = graph(["kept"]);
     let resource = graph.resource("nowhere");
     let [first, second] = ["first", "second"].map(|name| graph.add(name, 0));
@@ -140,13 +140,13 @@ fn what_a_dropped_node_lacks_is_no_error() {
         graph.read(node, resource);
         graph.write(node, resource);
     }
-    let schedule = graph.compile().expect("the dropped ones do not matter");
+    let schedule = graph.compile().expect("dropped nodes are not checked");
     assert_eq!(schedule.index(kept), Some(0));
     assert_eq!(schedule.dropped(), ["first", "second"]);
 }
 
 #[test]
-fn writers_and_modifiers_without_an_order_are_named() {
+fn unordered_writers_and_modifiers_are_reported() {
     for modify in [false, true] {
         let (mut graph, [one, other]) = graph(["one", "other"]);
         let image = graph.resource("image");
@@ -167,18 +167,18 @@ fn writers_and_modifiers_without_an_order_are_named() {
 }
 
 #[test]
-fn two_nodes_of_one_name_are_refused() {
-    let (graph, [_, _, twin]) = graph(["shadow", "light", "shadow"]);
+fn two_nodes_with_the_same_name_are_reported() {
+    let (graph, [_, _, duplicate]) = graph(["shadow", "light", "shadow"]);
     let (mut graph, problem, text) = problem(graph);
     assert_eq!(problem, GraphProblem::DuplicateNode { name: "shadow".to_owned() });
     assert_eq!(text, r#"two nodes are named "shadow""#);
-    assert_eq!(graph.remove(twin), Some(6));
-    assert_eq!(graph.remove(twin), None);
+    assert_eq!(graph.remove(duplicate), Some(6));
+    assert_eq!(graph.remove(duplicate), None);
     assert_eq!(names(&graph.compile().expect("only one is left")), ["shadow", "light"]);
 }
 
 #[test]
-fn ids_of_another_graph_are_named_by_the_call() {
+fn calls_with_ids_of_another_graph_are_reported() {
     let (mut other, [foreign]) = graph(["foreign"]);
     let foreign_resource: ResourceId = other.resource("foreign resource");
     let (mut graph, [own, gone]) = graph(["own", "gone"]);
@@ -213,7 +213,7 @@ fn ids_of_another_graph_are_named_by_the_call() {
 }
 
 #[test]
-fn removing_a_node_leaves_what_was_said_of_the_others() {
+fn removing_a_node_keeps_the_accesses_and_orders_of_the_others() {
     let (mut graph, [a, b, c, d]) = graph(["a", "b", "c", "d"]);
     let [image, other] = ["image", "other"].map(|name| graph.resource(name));
     graph.write(d, image);
@@ -222,23 +222,23 @@ fn removing_a_node_leaves_what_was_said_of_the_others() {
     graph.order(b, c);
     graph.order(a, d);
     assert_eq!(graph.remove(a), Some(1));
-    let schedule = graph.compile().expect("nothing is wrong");
+    let schedule = graph.compile().expect("the graph is valid");
     assert_eq!(names(&schedule), ["d", "b", "c"]);
     assert_eq!((schedule.dependencies(1), schedule.dependencies(2)), (&[0][..], &[1][..]));
     assert_eq!([a, b, c, d].map(|node| schedule.index(node)), [None, Some(1), Some(2), Some(0)]);
 }
 
 #[test]
-fn errors_can_be_passed_on_and_printed_whatever_the_nodes_carry() {
+fn errors_can_be_returned_and_printed_whatever_the_payload() {
     struct Opaque;
     let compile = || -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let mut graph = FrameGraph::new();
-        graph.add("twin", Opaque);
-        graph.add("twin", Opaque);
+        graph.add("duplicate", Opaque);
+        graph.add("duplicate", Opaque);
         graph.compile()?;
         Ok(())
     };
-    let error = compile().expect_err("two have one name");
-    assert_eq!(error.to_string(), r#"two nodes are named "twin""#);
+    let error = compile().expect_err("two nodes have the same name");
+    assert_eq!(error.to_string(), r#"two nodes are named "duplicate""#);
     assert!(format!("{error:?}").contains("DuplicateNode"), "{error:?}");
 }

@@ -1,4 +1,4 @@
-//! What a run does: every item once, after all it depends on, on whoever is free.
+//! A run processes every item once, after its dependencies, on all workers.
 
 use std::{
     ops::Range,
@@ -17,17 +17,17 @@ use proptest::{collection::vec, prelude::*};
 
 use crate::{
     SCHEDULERS,
-    oracle::{Oracle, sound_sketch},
+    oracle::{Oracle, valid_graph},
 };
 
-/// How often each item of each node was done.
-type Tally = Vec<Vec<AtomicUsize>>;
+/// How often each item of each node was processed.
+type ItemCounts = Vec<Vec<AtomicUsize>>;
 
-fn tally(widths: &[usize]) -> Tally {
+fn item_counts(widths: &[usize]) -> ItemCounts {
     widths.iter().map(|width| (0..*width).map(|_| AtomicUsize::new(0)).collect()).collect()
 }
 
-/// A node that counts its items, and fails if something that comes before it is not done.
+/// A node that counts its items, and fails if a node before it is not complete.
 struct Counting {
     node: usize,
     chunk: usize,
@@ -36,25 +36,25 @@ struct Counting {
 }
 
 impl Counting {
-    fn check(&self, tally: &Tally) -> Result<(), NodeError> {
-        // Relaxed: that the counts are seen at all is what the schedule is to see to.
-        let is_done = |node: &usize| tally[*node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
+    fn check(&self, counts: &ItemCounts) -> Result<(), NodeError> {
+        // Relaxed: the schedule must make the counts visible.
+        let is_done = |node: &usize| counts[*node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
         match self.before.iter().find(|node| !is_done(node)) {
-            Some(node) => Err(format!("p{node} is not done").into()),
+            Some(node) => Err(format!("p{node} is not complete").into()),
             None => Ok(()),
         }
     }
 }
 
-impl Node<Tally> for Counting {
-    fn width(&self, tally: &Tally) -> usize {
-        if let Err(error) = self.check(tally) {
+impl Node<ItemCounts> for Counting {
+    fn width(&self, counts: &ItemCounts) -> usize {
+        if let Err(error) = self.check(counts) {
             panic!("{error}");
         }
-        tally[self.node].len()
+        counts[self.node].len()
     }
 
-    fn chunk(&self, _tally: &Tally) -> usize {
+    fn chunk(&self, _tally: &ItemCounts) -> usize {
         self.chunk
     }
 
@@ -62,18 +62,18 @@ impl Node<Tally> for Counting {
         self.pinned
     }
 
-    fn run(&self, tally: &Tally, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+    fn run(&self, counts: &ItemCounts, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         let chunk = self.chunk.max(1);
         if range.is_empty()
             || !range.start.is_multiple_of(chunk)
-            || range.end != (range.start + chunk).min(tally[self.node].len())
+            || range.end != (range.start + chunk).min(counts[self.node].len())
         {
-            return Err(format!("{range:?} is no chunk").into());
+            return Err(format!("{range:?} is not a chunk").into());
         }
-        for count in &tally[self.node][range] {
+        for count in &counts[self.node][range] {
             count.fetch_add(1, Ordering::Relaxed);
         }
-        self.check(tally)
+        self.check(counts)
     }
 }
 
@@ -81,12 +81,12 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
     #[test]
-    fn every_item_is_done_once_and_after_all_before_it(
-        sketch in sound_sketch(),
+    fn every_item_is_processed_once_after_all_dependencies(
+        model in valid_graph(),
         shapes in vec((prop_oneof![0..4usize, 0..100usize], 0..12usize, prop::bool::weighted(0.1)), 24),
     ) {
-        let oracle = Oracle::new(&sketch);
-        let graph = sketch.graph(|node| Counting {
+        let oracle = Oracle::new(&model);
+        let graph = model.graph(|node| Counting {
             node,
             chunk: shapes[node].1,
             pinned: shapes[node].2,
@@ -97,10 +97,10 @@ proptest! {
             for always_parallel in [true, true, false, false] {
                 schedule.always_parallel(always_parallel);
                 let widths: Vec<usize> = (0..oracle.needed.len()).map(|node| shapes[node].0).collect();
-                let tally = tally(&widths);
-                schedule.run(scheduler, &tally).map_err(|error| TestCaseError::fail(error.to_string()))?;
-                for (node, counts) in tally.into_iter().enumerate() {
-                    for count in counts {
+                let counts = item_counts(&widths);
+                schedule.run(scheduler, &counts).map_err(|error| TestCaseError::fail(error.to_string()))?;
+                for (node, items) in counts.into_iter().enumerate() {
+                    for count in items {
                         prop_assert_eq!(count.into_inner(), usize::from(oracle.needed[node]));
                     }
                 }
@@ -110,23 +110,23 @@ proptest! {
 }
 
 /// A schedule of one kept node.
-pub fn alone<'a, C>(node: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
+pub fn single<'a, C>(node: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
     let mut graph = FrameGraph::new();
-    let node = graph.add("alone", node);
+    let node = graph.add("single", node);
     graph.keep(node);
-    graph.compile().expect("nothing is wrong")
+    graph.compile().expect("the graph is valid")
 }
 
-/// Runs the schedule on all workers of the scheduler, however little work it is.
+/// Runs the schedule in parallel, however little work it is.
 pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Scheduler, context: &C) {
     schedule.always_parallel(true);
-    schedule.run(scheduler, context).expect("nothing fails");
+    schedule.run(scheduler, context).expect("no node fails");
 }
 
 #[test]
 fn all_workers_join_a_wide_node() {
-    // Each item waits for the others, so the run only ends if as many workers work on it at once.
-    let mut schedule = alone(Closure::new(|barrier: &Barrier, _, _| {
+    // Each item waits for the others, so the run only ends if a worker runs each of them.
+    let mut schedule = single(Closure::new(|barrier: &Barrier, _, _| {
         barrier.wait();
         Ok(())
     }));
@@ -145,7 +145,7 @@ fn all_workers_join_a_wide_node() {
 }
 
 #[test]
-fn independent_nodes_run_at_once() {
+fn independent_nodes_run_at_the_same_time() {
     let mut graph = FrameGraph::new();
     let source = graph.add("source", Closure::new(|_: &Barrier, _, _| Ok(())));
     for name in ["a", "b", "c", "d"] {
@@ -160,14 +160,14 @@ fn independent_nodes_run_at_once() {
         graph.keep(node);
     }
     graph.keep(source);
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     for _ in 0..20 {
         run(&mut schedule, &SCHEDULERS[2], &Barrier::new(4));
     }
 }
 
 #[test]
-fn the_width_may_depend_on_what_came_before() {
+fn the_width_may_depend_on_earlier_nodes() {
     let mut graph = FrameGraph::new();
     let list = graph.resource("list");
     let read = graph.add(
@@ -190,7 +190,7 @@ fn the_width_may_depend_on_what_came_before() {
     graph.read(read, list);
     graph.write(write, list);
     graph.keep(read);
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     for scheduler in SCHEDULERS.iter() {
         let counts = [AtomicUsize::new(0), AtomicUsize::new(0)];
         run(&mut schedule, scheduler, &counts);
@@ -199,7 +199,7 @@ fn the_width_may_depend_on_what_came_before() {
 }
 
 #[test]
-fn pinned_nodes_run_in_order_on_the_thread_that_called() {
+fn pinned_nodes_run_in_order_on_the_calling_thread() {
     let log = |log: &Mutex<Vec<(thread::ThreadId, usize)>>, range: Range<usize>, _: &Worker| {
         log.lock().map_err(|_| "poisoned")?.push((thread::current().id(), range.start));
         Ok(())
@@ -211,20 +211,20 @@ fn pinned_nodes_run_in_order_on_the_thread_that_called() {
     graph.order(first, between);
     graph.order(between, last);
     [first, between, last].into_iter().for_each(|node| graph.keep(node));
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     let here = thread::current().id();
     let expected: Vec<_> = (0..50).chain((0..50).step_by(10)).map(|start| (here, start)).collect();
     for scheduler in SCHEDULERS.iter() {
         for _ in 0..20 {
             let log = Mutex::new(Vec::new());
             run(&mut schedule, scheduler, &log);
-            assert_eq!(log.into_inner().expect("nobody panics"), expected);
+            assert_eq!(log.into_inner().expect("no thread panics"), expected);
         }
     }
 }
 
 #[test]
-fn the_context_may_be_of_unknown_size() {
+fn the_context_may_be_unsized() {
     let mut graph = FrameGraph::<Box<dyn Node<[AtomicUsize]>>>::new();
     let node = Closure::new(|items: &[AtomicUsize], range: Range<usize>, _| {
         items[range].iter().for_each(|item| item.store(1, Ordering::Relaxed));
@@ -232,15 +232,15 @@ fn the_context_may_be_of_unknown_size() {
     });
     let node = graph.add("fill", Box::new(node.with_width(<[AtomicUsize]>::len).with_chunk(4)));
     graph.keep(node);
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     let items: Vec<AtomicUsize> = (0..10).map(|_| AtomicUsize::new(0)).collect();
-    schedule.run(&SCHEDULERS[1], items.as_slice()).expect("nothing fails");
+    schedule.run(&SCHEDULERS[1], items.as_slice()).expect("no node fails");
     assert!(items.into_iter().all(|item| item.into_inner() == 1));
 }
 
 #[test]
-fn pinned_roots_run_on_the_thread_that_called() {
-    // The first keeps the caller until another worker has come by, which would take the last if it could.
+fn pinned_roots_run_on_the_calling_thread() {
+    // The first node blocks the caller until another worker takes part, which would run the last node if it could.
     let meeting = |(barrier, _): &(Barrier, thread::ThreadId), _: Range<usize>, _: &Worker| {
         barrier.wait();
         Ok(())
@@ -257,7 +257,7 @@ fn pinned_roots_run_on_the_thread_that_called() {
         let node = graph.add(name, node);
         graph.keep(node);
     }
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     for scheduler in &SCHEDULERS[1..] {
         for _ in 0..50 {
             run(&mut schedule, scheduler, &(Barrier::new(2), thread::current().id()));

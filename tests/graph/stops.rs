@@ -1,4 +1,4 @@
-//! Runs that fail: what is stopped, what is reported, and that the next run is as good as new.
+//! Failing runs: what is cancelled, what is reported, and that the next run is unaffected.
 
 use std::{
     ops::Range,
@@ -16,7 +16,7 @@ use drawloom::{
 use crate::SCHEDULERS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Trouble {
+enum Failure {
     Error,
     PanicInRun,
     PanicInWidth,
@@ -24,40 +24,40 @@ enum Trouble {
     PanicInPinned,
 }
 
-/// Ten items; something goes wrong with the fourth or before the first.
-struct Troubled<'a> {
-    trouble: Trouble,
+/// A node of ten items that fails at the fourth item, or before the first.
+struct Failing<'a> {
+    failure: Failure,
     is_on: &'a AtomicBool,
 }
 
-impl Troubled<'_> {
-    fn has(&self, trouble: Trouble) -> bool {
-        self.trouble == trouble && self.is_on.load(Ordering::Relaxed)
+impl Failing<'_> {
+    fn has(&self, failure: Failure) -> bool {
+        self.failure == failure && self.is_on.load(Ordering::Relaxed)
     }
 }
 
 type Log = Mutex<Vec<String>>;
 
-impl Node<Log> for Troubled<'_> {
+impl Node<Log> for Failing<'_> {
     fn width(&self, _log: &Log) -> usize {
-        assert!(!self.has(Trouble::PanicInWidth), "as planned");
+        assert!(!self.has(Failure::PanicInWidth), "as planned");
         10
     }
 
     fn chunk(&self, _log: &Log) -> usize {
-        assert!(!self.has(Trouble::PanicInChunk), "as planned");
+        assert!(!self.has(Failure::PanicInChunk), "as planned");
         1
     }
 
     fn pinned(&self) -> bool {
-        assert!(!self.has(Trouble::PanicInPinned), "as planned");
+        assert!(!self.has(Failure::PanicInPinned), "as planned");
         false
     }
 
     fn run(&self, _log: &Log, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         if range.contains(&3) {
-            assert!(!self.has(Trouble::PanicInRun), "as planned");
-            if self.has(Trouble::Error) {
+            assert!(!self.has(Failure::PanicInRun), "as planned");
+            if self.has(Failure::Error) {
                 return Err("as planned".into());
             }
         }
@@ -65,9 +65,9 @@ impl Node<Log> for Troubled<'_> {
     }
 }
 
-/// `first`, then `troubled`, then `last`, of which the first and the last write down their names.
-fn chain(trouble: Trouble, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '_>> {
-    let noting = |name: &'static str| {
+/// A chain of `first`, `failing` and `last`. The first and the last log their names.
+fn chain(failure: Failure, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '_>> {
+    let logging = |name: &'static str| {
         Closure::new(move |log: &Log, _, _| {
             log.lock().map_err(|_| "poisoned")?.push(name.to_owned());
             Ok(())
@@ -75,9 +75,9 @@ fn chain(trouble: Trouble, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '
     };
     let mut graph = FrameGraph::<Box<dyn Node<Log> + '_>>::new();
     let nodes = [
-        graph.add("first", Box::new(noting("first"))),
-        graph.add("troubled", Box::new(Troubled { trouble, is_on })),
-        graph.add("last", Box::new(noting("last"))),
+        graph.add("first", Box::new(logging("first"))),
+        graph.add("failing", Box::new(Failing { failure, is_on })),
+        graph.add("last", Box::new(logging("last"))),
     ];
     for pair in nodes.windows(2) {
         graph.order(pair[0], pair[1]);
@@ -85,32 +85,32 @@ fn chain(trouble: Trouble, is_on: &AtomicBool) -> Schedule<Box<dyn Node<Log> + '
     for node in nodes {
         graph.keep(node);
     }
-    graph.compile().expect("nothing is wrong")
+    graph.compile().expect("the graph is valid")
 }
 
 #[test]
-fn a_failure_stops_the_run_and_names_the_node() {
+fn a_failure_stops_the_run_and_the_error_names_the_node() {
     let all =
-        [Trouble::Error, Trouble::PanicInRun, Trouble::PanicInWidth, Trouble::PanicInChunk, Trouble::PanicInPinned];
-    for trouble in all {
+        [Failure::Error, Failure::PanicInRun, Failure::PanicInWidth, Failure::PanicInChunk, Failure::PanicInPinned];
+    for failure in all {
         for scheduler in SCHEDULERS.iter() {
             let is_on = AtomicBool::new(false);
-            let mut schedule = chain(trouble, &is_on);
+            let mut schedule = chain(failure, &is_on);
             for fails in [true, false, true, true, false] {
                 is_on.store(fails, Ordering::Relaxed);
                 let log = Log::default();
                 let result = schedule.run(scheduler, &log);
-                let log = log.into_inner().expect("nobody panics holding the log");
+                let log = log.into_inner().expect("no thread panics while it holds the log");
                 match result {
                     Ok(()) => assert!(!fails && log == ["first", "last"], "{log:?}"),
                     Err(RunError::Failed { node, source }) => {
-                        assert!(fails && trouble == Trouble::Error);
-                        assert_eq!((node.as_str(), source.to_string().as_str()), ("troubled", "as planned"));
+                        assert!(fails && failure == Failure::Error);
+                        assert_eq!((node.as_str(), source.to_string().as_str()), ("failing", "as planned"));
                         assert_eq!(log, ["first"]);
                     }
                     Err(RunError::Panicked { node, message }) => {
-                        assert!(fails && trouble != Trouble::Error);
-                        assert_eq!((node.as_str(), message.as_str()), ("troubled", "as planned"));
+                        assert!(fails && failure != Failure::Error);
+                        assert_eq!((node.as_str(), message.as_str()), ("failing", "as planned"));
                         assert_eq!(log, ["first"]);
                     }
                     Err(other) => panic!("{other}"),
@@ -121,12 +121,12 @@ fn a_failure_stops_the_run_and_names_the_node() {
 }
 
 #[test]
-fn a_root_whose_first_question_panics_is_named() {
+fn a_root_that_panics_in_pinned_is_named() {
     let is_on = AtomicBool::new(true);
     let mut graph = FrameGraph::new();
-    let root = graph.add("root", Troubled { trouble: Trouble::PanicInPinned, is_on: &is_on });
+    let root = graph.add("root", Failing { failure: Failure::PanicInPinned, is_on: &is_on });
     graph.keep(root);
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     let error = schedule.run(&SCHEDULERS[1], &Log::default()).expect_err("it panics");
     assert_eq!(error.to_string(), r#"the node "root" panicked: as planned"#);
     is_on.store(false, Ordering::Relaxed);
@@ -140,11 +140,11 @@ fn no_further_chunk_starts_after_a_failure() {
         let node = Closure::new(|(): &(), range: Range<usize>, _| {
             started.fetch_add(1, Ordering::Relaxed);
             if range.len() < 2 {
-                return Err("so many chunks cannot be counted".into());
+                return Err("a width beyond half of usize must have chunks of at least 2 items".into());
             }
             if range.contains(&5) { Err("enough".into()) } else { Ok(()) }
         });
-        // So wide that the run would not end if the failure did not stop it.
+        // So wide that the run only ends because the failure stops it.
         let node = node.with_width(|()| usize::MAX);
         let mut graph = FrameGraph::new();
         let node = graph.add("endless", if pinned { node.on_calling_thread() } else { node });
@@ -152,7 +152,7 @@ fn no_further_chunk_starts_after_a_failure() {
         graph.order(node, after);
         graph.keep(node);
         graph.keep(after);
-        let mut schedule = graph.compile().expect("nothing is wrong");
+        let mut schedule = graph.compile().expect("the graph is valid");
         for scheduler in SCHEDULERS.iter() {
             started.store(0, Ordering::Relaxed);
             let error = schedule.run(scheduler, &()).expect_err("it fails");
@@ -166,8 +166,8 @@ fn no_further_chunk_starts_after_a_failure() {
 }
 
 #[test]
-fn of_two_failures_the_one_that_stands_first_is_reported() {
-    // Each waits until the other runs too, so both fail in every run.
+fn of_two_failures_the_first_node_in_the_schedule_is_reported() {
+    // Each node waits until the other runs, so both fail in every run.
     let failing = |message: &'static str| {
         Closure::new(move |barrier: &Barrier, _, _| {
             barrier.wait();
@@ -179,7 +179,7 @@ fn of_two_failures_the_one_that_stands_first_is_reported() {
         let node = graph.add(name, failing(name));
         graph.keep(node);
     }
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     schedule.always_parallel(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
@@ -188,7 +188,7 @@ fn of_two_failures_the_one_that_stands_first_is_reported() {
 }
 
 #[test]
-fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
+fn of_two_failing_chunks_the_lowest_is_reported() {
     let failing = Closure::new(|barrier: &Barrier, range: Range<usize>, _| {
         barrier.wait();
         Err(format!("chunk {}", range.start).into())
@@ -196,7 +196,7 @@ fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
     let mut graph = FrameGraph::new();
     let node = graph.add("wide", failing.with_width(|_| 2));
     graph.keep(node);
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     schedule.always_parallel(true);
     for _ in 0..200 {
         let error = schedule.run(&SCHEDULERS[1], &Barrier::new(2)).expect_err("both fail");
@@ -205,7 +205,7 @@ fn of_two_failing_chunks_the_one_that_starts_first_is_reported() {
 }
 
 #[test]
-fn an_error_that_panics_when_dropped_does_not_reach_the_caller() {
+fn a_panic_in_an_errors_drop_does_not_reach_the_caller() {
     #[derive(Debug, thiserror::Error)]
     #[error("bad")]
     struct Bad;
@@ -223,7 +223,7 @@ fn an_error_that_panics_when_dropped_does_not_reach_the_caller() {
         let node = graph.add(name, Closure::new(failing));
         graph.keep(node);
     }
-    let mut schedule = graph.compile().expect("nothing is wrong");
+    let mut schedule = graph.compile().expect("the graph is valid");
     schedule.always_parallel(true);
     for _ in 0..50 {
         match schedule.run(&SCHEDULERS[1], &Barrier::new(2)) {

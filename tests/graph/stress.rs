@@ -1,7 +1,7 @@
-//! Random graphs on few and many workers, against a plain loop over their nodes.
+//! Runs random graphs on different numbers of workers, and compares the results with a serial loop over the nodes.
 //!
-//! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release --test graph stress` goes on with further
-//! seeds for that many seconds.
+//! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release --test graph stress` tests further seeds
+//! for that many seconds.
 
 use std::{
     ops::Range,
@@ -18,7 +18,7 @@ use drawloom::{
     task::{Scheduler, Worker},
 };
 
-/// Numbers by the generator SplitMix64.
+/// The random number generator SplitMix64.
 struct Random(u64);
 
 impl Random {
@@ -30,10 +30,10 @@ impl Random {
     }
 }
 
-/// A node of a random graph. It waits for nodes before it in the list.
+/// A node of a random graph. It depends on nodes with lower indices.
 #[derive(Clone)]
 struct Plan {
-    waits_for: Vec<usize>,
+    dependencies: Vec<usize>,
     width: usize,
     chunk: usize,
     is_pinned: bool,
@@ -41,12 +41,12 @@ struct Plan {
 
 fn plans(seed: u64) -> Vec<Plan> {
     let mut random = Random(seed);
-    // Mostly small, for there to be many.
-    let most = [4, 20, 100, 400, 2_000][[0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 4][random.below(16)]];
-    let reach = 1 + random.below(most);
-    (0..1 + random.below(most))
-        .map(|place| Plan {
-            waits_for: (0..random.below(4).min(place)).map(|_| place - 1 - random.below(reach.min(place))).collect(),
+    // Mostly small graphs, so that many can be tested.
+    let max = [4, 20, 100, 400, 2_000][[0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 4][random.below(16)]];
+    let reach = 1 + random.below(max);
+    (0..1 + random.below(max))
+        .map(|index| Plan {
+            dependencies: (0..random.below(4).min(index)).map(|_| index - 1 - random.below(reach.min(index))).collect(),
             width: [1, 1, 1, random.below(51)][random.below(4)],
             chunk: random.below(8),
             is_pinned: random.below(10) == 0,
@@ -54,39 +54,39 @@ fn plans(seed: u64) -> Vec<Plan> {
         .collect()
 }
 
-/// What a run is lent: how often each item was done, who called, and which node is to fail, if any.
-struct World {
+/// The context of a run: how often each item was processed, the calling thread, and which node fails, if any.
+struct RunContext {
     done: Vec<Vec<AtomicUsize>>,
-    /// Whether something was done too early or in the wrong place.
-    is_wrong: AtomicBool,
+    /// Whether a node ran too early or on the wrong thread.
+    is_misplaced: AtomicBool,
     caller: ThreadId,
     failing: Option<usize>,
 }
 
-impl World {
+impl RunContext {
     fn new(plans: &[Plan], failing: Option<usize>) -> Self {
         let done = plans.iter().map(|plan| (0..plan.width).map(|_| AtomicUsize::new(0)).collect()).collect();
-        Self { done, is_wrong: AtomicBool::new(false), caller: thread::current().id(), failing }
+        Self { done, is_misplaced: AtomicBool::new(false), caller: thread::current().id(), failing }
     }
 
-    /// Per node, how often each of its items was done.
+    /// Per node, how often each of its items was processed.
     fn counts(self) -> Vec<Vec<usize>> {
-        assert!(!self.is_wrong.into_inner(), "something was done too early, or in the wrong place");
+        assert!(!self.is_misplaced.into_inner(), "a node ran too early or on the wrong thread");
         self.done.into_iter().map(|items| items.into_iter().map(AtomicUsize::into_inner).collect()).collect()
     }
 }
 
-struct BusyNode {
-    place: usize,
+struct CountingNode {
+    index: usize,
     plan: Plan,
 }
 
-impl Node<World> for BusyNode {
-    fn width(&self, world: &World) -> usize {
-        world.done[self.place].len()
+impl Node<RunContext> for CountingNode {
+    fn width(&self, context: &RunContext) -> usize {
+        context.done[self.index].len()
     }
 
-    fn chunk(&self, _world: &World) -> usize {
+    fn chunk(&self, _world: &RunContext) -> usize {
         self.plan.chunk
     }
 
@@ -94,47 +94,47 @@ impl Node<World> for BusyNode {
         self.plan.is_pinned
     }
 
-    fn run(&self, world: &World, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
-        // Relaxed: that the counts are seen at all is what the schedule is to see to.
-        let is_done = |&node: &usize| world.done[node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
-        let is_astray = self.plan.is_pinned && thread::current().id() != world.caller;
-        if is_astray || !self.plan.waits_for.iter().all(is_done) {
-            world.is_wrong.store(true, Ordering::Relaxed);
+    fn run(&self, context: &RunContext, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+        // Relaxed: the schedule must make the counts visible.
+        let is_done = |&node: &usize| context.done[node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
+        let is_on_wrong_thread = self.plan.is_pinned && thread::current().id() != context.caller;
+        if is_on_wrong_thread || !self.plan.dependencies.iter().all(is_done) {
+            context.is_misplaced.store(true, Ordering::Relaxed);
         }
-        if world.failing == Some(self.place) {
+        if context.failing == Some(self.index) {
             return Err("as planned".into());
         }
-        world.done[self.place][range].iter().for_each(|count| {
+        context.done[self.index][range].iter().for_each(|count| {
             count.fetch_add(1, Ordering::Relaxed);
         });
         Ok(())
     }
 }
 
-fn compiled(plans: &[Plan]) -> Schedule<BusyNode> {
+fn compiled(plans: &[Plan]) -> Schedule<CountingNode> {
     let mut graph = FrameGraph::new();
     let nodes: Vec<NodeId> = plans
         .iter()
         .enumerate()
-        .map(|(place, plan)| graph.add(format!("p{place}"), BusyNode { place, plan: plan.clone() }))
+        .map(|(index, plan)| graph.add(format!("p{index}"), CountingNode { index, plan: plan.clone() }))
         .collect();
-    for (place, plan) in plans.iter().enumerate() {
-        plan.waits_for.iter().for_each(|&before| graph.order(nodes[before], nodes[place]));
-        graph.keep(nodes[place]);
+    for (index, plan) in plans.iter().enumerate() {
+        plan.dependencies.iter().for_each(|&before| graph.order(nodes[before], nodes[index]));
+        graph.keep(nodes[index]);
     }
-    graph.compile().expect("nothing is wrong")
+    graph.compile().expect("the graph is valid")
 }
 
-/// What a run leaves that a failure does not cut short, by a plain loop.
-fn serially(plans: &[Plan]) -> Vec<Vec<usize>> {
+/// The counts of a run without a failure, by a serial loop.
+fn serial_counts(plans: &[Plan]) -> Vec<Vec<usize>> {
     plans.iter().map(|plan| vec![1; plan.width]).collect()
 }
 
-/// Whether the node waits for the failing one, through any number of others.
+/// Per node, whether it is the failing node or depends on it, directly or through others.
 fn cancelled(plans: &[Plan], failing: usize) -> Vec<bool> {
     let mut cancelled = vec![false; plans.len()];
-    for (place, plan) in plans.iter().enumerate() {
-        cancelled[place] = place == failing || plan.waits_for.iter().any(|&before| cancelled[before]);
+    for (index, plan) in plans.iter().enumerate() {
+        cancelled[index] = index == failing || plan.dependencies.iter().any(|&before| cancelled[before]);
     }
     cancelled
 }
@@ -142,28 +142,28 @@ fn cancelled(plans: &[Plan], failing: usize) -> Vec<bool> {
 fn check(seed: u64, schedulers: &[Scheduler]) {
     let plans = plans(seed);
     let mut random = Random(!seed);
-    let whole = serially(&plans);
+    let expected = serial_counts(&plans);
     for scheduler in schedulers {
-        let at = format!("seed {seed}, {scheduler:?}");
+        let case = format!("seed {seed}, {scheduler:?}");
         let mut schedule = compiled(&plans);
         for always_parallel in [true, false, false, true] {
             schedule.always_parallel(always_parallel);
             let chosen = random.below(plans.len());
             let failing = (random.below(3) == 0 && plans[chosen].width > 0).then_some(chosen);
-            let world = World::new(&plans, failing);
-            let outcome = schedule.run(scheduler, &world);
-            let counts = world.counts();
+            let context = RunContext::new(&plans, failing);
+            let outcome = schedule.run(scheduler, &context);
+            let counts = context.counts();
             let Some(failing) = failing else {
-                outcome.unwrap_or_else(|error| panic!("{at}: {error}"));
-                assert!(counts == whole, "{at}: an item was not done once");
+                outcome.unwrap_or_else(|error| panic!("{case}: {error}"));
+                assert!(counts == expected, "{case}: an item was not processed once");
                 continue;
             };
-            let Err(RunError::Failed { node, .. }) = outcome else { panic!("{at}: no failure") };
-            assert_eq!(node, format!("p{failing}"), "{at}");
-            assert!(counts.iter().flatten().all(|&count| count <= 1), "{at}: an item was done twice");
+            let Err(RunError::Failed { node, .. }) = outcome else { panic!("{case}: no failure") };
+            assert_eq!(node, format!("p{failing}"), "{case}");
+            assert!(counts.iter().flatten().all(|&count| count <= 1), "{case}: an item was processed twice");
             let cancelled = cancelled(&plans, failing);
-            let ran = |place: usize| counts[place].contains(&1);
-            assert!((0..plans.len()).all(|place| !(cancelled[place] && ran(place))), "{at}: a dependent ran");
+            let ran = |index: usize| counts[index].contains(&1);
+            assert!((0..plans.len()).all(|index| !(cancelled[index] && ran(index))), "{case}: a dependent ran");
         }
     }
 }
@@ -177,7 +177,7 @@ fn schedulers() -> Vec<Scheduler> {
 }
 
 #[test]
-fn random_graphs_do_what_a_plain_loop_does() {
+fn random_graphs_give_the_same_results_as_a_serial_loop() {
     let schedulers = schedulers();
     (0..200).for_each(|seed| check(seed, &schedulers));
     let Ok(seconds) = std::env::var("DRAWLOOM_STRESS_SECONDS") else { return };
@@ -191,8 +191,8 @@ fn random_graphs_do_what_a_plain_loop_does() {
 
 /// The order in which one worker runs the chunks of a graph and of a loop.
 fn shuffled_order(seed: u64) -> Vec<(usize, usize)> {
-    struct Noting(usize);
-    impl Node<Mutex<Vec<(usize, usize)>>> for Noting {
+    struct Logging(usize);
+    impl Node<Mutex<Vec<(usize, usize)>>> for Logging {
         fn width(&self, _: &Mutex<Vec<(usize, usize)>>) -> usize {
             6
         }
@@ -204,27 +204,27 @@ fn shuffled_order(seed: u64) -> Vec<(usize, usize)> {
     }
     let scheduler = Scheduler::builder().workers(1).shuffle(seed).build().expect("no thread is needed");
     let mut graph = FrameGraph::new();
-    for place in 0..6 {
-        let node = graph.add(format!("p{place}"), Noting(place));
+    for index in 0..6 {
+        let node = graph.add(format!("p{index}"), Logging(index));
         graph.keep(node);
     }
     let log = Mutex::new(Vec::new());
-    let mut schedule = graph.compile().expect("nothing is wrong");
-    (0..3).for_each(|_frame| schedule.run(&scheduler, &log).expect("nothing fails"));
+    let mut schedule = graph.compile().expect("the graph is valid");
+    (0..3).for_each(|_frame| schedule.run(&scheduler, &log).expect("no node fails"));
     let body = |range: Range<usize>, _: &Worker| log.lock().unwrap().push((usize::MAX, range.start));
     scheduler.parallel_for(20, 1, body).unwrap();
     log.into_inner().unwrap()
 }
 
 #[test]
-fn a_seed_decides_the_order_of_one_worker() {
+fn a_seed_determines_the_order_of_one_worker() {
     let orders: Vec<_> = (0..8).map(shuffled_order).collect();
     for (seed, order) in orders.iter().enumerate() {
         assert_eq!(*order, shuffled_order(seed as u64));
         assert_eq!(order.len(), 3 * 36 + 20);
     }
-    assert!(orders[1..].iter().any(|order| *order != orders[0]), "no seed changes anything");
-    // A result that depends on which of two comes first shows both faces, for nodes, chunks and loops alike.
+    assert!(orders[1..].iter().any(|order| *order != orders[0]), "all seeds give the same order");
+    // Of two nodes, two chunks or two iterations, each comes first with some seed.
     let first = |order: &[(usize, usize)], two: [(usize, usize); 2]| order.iter().find(|&at| two.contains(at)).copied();
     for two in [[(0, 0), (5, 0)], [(0, 0), (0, 5)], [(usize::MAX, 0), (usize::MAX, 19)]] {
         assert!(two.map(|one| orders.iter().any(|order| first(order, two) == Some(one))).iter().all(|&seen| seen));

@@ -1,4 +1,4 @@
-//! What a timeline says of a run: every item of every process once, in an order that keeps every dependency.
+//! The timeline of a run: every item of every node is in one chunk, in an order that respects all dependencies.
 
 use std::{
     hint::black_box,
@@ -20,41 +20,41 @@ use drawloom::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::oracle::sound_sketch;
+use crate::oracle::valid_graph;
 
-/// A process of so many items, each of which takes some time. The chunk is the caller's.
+/// A node whose items take some time. The context has the chunk size.
 #[derive(Clone, Copy, Debug)]
 struct Busy {
     width: usize,
     pinned: bool,
 }
 
-/// What a run is lent.
-struct Call {
+/// The context of a run.
+struct RunContext {
     chunk: usize,
     fails: bool,
 }
 
-impl Node<Call> for Busy {
-    fn width(&self, _call: &Call) -> usize {
+impl Node<RunContext> for Busy {
+    fn width(&self, _call: &RunContext) -> usize {
         self.width
     }
 
-    fn chunk(&self, call: &Call) -> usize {
-        call.chunk
+    fn chunk(&self, context: &RunContext) -> usize {
+        context.chunk
     }
 
     fn pinned(&self) -> bool {
         self.pinned
     }
 
-    fn run(&self, call: &Call, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+    fn run(&self, context: &RunContext, range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
-        if call.fails { Err("it was to fail".into()) } else { Ok(()) }
+        if context.fails { Err("as planned".into()) } else { Ok(()) }
     }
 }
 
-/// What must hold of the record of the only run of the schedule, in chunks of that size.
+/// Checks the log of the schedule's only run.
 fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     let [run] = log.runs.as_slice() else { panic!("{} runs", log.runs.len()) };
     assert!(run.complete && !run.failed);
@@ -74,15 +74,15 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
             next = part.items.end;
             assert!(part.opened <= part.started && part.started <= part.ended);
             assert!(run.began <= part.opened && part.ended <= run.ended);
-            assert_eq!(part.opened, parts[0].opened, "all chunks of a process are opened at once");
+            assert_eq!(part.opened, parts[0].opened, "all chunks of a node have the same opening time");
             assert!(part.worker < workers && !(busy.pinned && part.worker != 0));
             assert!(!(part.stolen && (workers == 1 || busy.pinned)), "{part:?}");
             for &dependency in &process.dependencies {
                 let before = run.chunks_of(dependency).iter();
                 before.for_each(|before| assert!(before.ended <= part.opened, "{before:?} and {part:?}"));
             }
-            let is_alone = run.parallel_from.is_none_or(|from| part.started < from);
-            assert!(!is_alone || part.worker == 0, "{part:?} of a worker that was not let in");
+            let is_serial = run.parallel_from.is_none_or(|from| part.started < from);
+            assert!(!is_serial || part.worker == 0, "{part:?} of another worker while the run is serial");
         }
         assert_eq!(next, busy.width);
         assert_eq!((parts.is_empty(), run.width(index)), (false, busy.width));
@@ -94,16 +94,16 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
         let idle = record.idle.iter().map(|idle| (idle.began, idle.ended));
         let mut spans: Vec<_> = chunks.map(|chunk| (chunk.started, chunk.ended)).chain(idle).collect();
         spans.sort_unstable();
-        assert!(spans.windows(2).all(|pair| pair[0].1 <= pair[1].0), "worker {worker} did two things at once");
+        assert!(spans.windows(2).all(|pair| pair[0].1 <= pair[1].0), "intervals of worker {worker} overlap");
     }
 }
 
-/// What the timeline says of one run.
-fn recorded(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, call: &Call) -> Log {
+/// Runs the schedule, and returns the log of the run.
+fn recorded(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, context: &RunContext) -> Log {
     let timeline = scheduler.timeline();
     timeline.take();
     timeline.start();
-    _ = schedule.run(scheduler, call);
+    _ = schedule.run(scheduler, context);
     timeline.stop();
     timeline.take()
 }
@@ -112,40 +112,40 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
 
     #[test]
-    fn each_item_is_in_one_chunk_and_chunks_keep_all_dependencies(
-        sketch in sound_sketch(),
+    fn each_item_is_in_one_chunk_and_chunks_respect_all_dependencies(
+        model in valid_graph(),
         processes in vec((0..90_usize, prop::bool::weighted(0.2)), 24),
         chunks in vec(1..40_usize, 3),
         always_parallel in any::<bool>(),
     ) {
-        let graph = sketch.graph(|process| Busy { width: processes[process].0, pinned: processes[process].1 });
+        let graph = model.graph(|process| Busy { width: processes[process].0, pinned: processes[process].1 });
         let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         schedule.always_parallel(always_parallel);
         for scheduler in &*RECORDED {
             for &chunk in &chunks {
-                let log = recorded(&mut schedule, scheduler, &Call { chunk, fails: false });
+                let log = recorded(&mut schedule, scheduler, &RunContext { chunk, fails: false });
                 check(&log, &schedule, chunk, scheduler.workers());
-                // One that is not recorded leaves nothing in the next.
-                schedule.run(scheduler, &Call { chunk: 1, fails: false }).unwrap();
+                // A run while the timeline is off leaves nothing in the next log.
+                schedule.run(scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
             }
         }
     }
 }
 
 #[test]
-fn a_run_that_was_begun_alone_says_from_when_on_it_was_shared() {
+fn a_run_that_began_serially_says_when_it_became_parallel() {
     let scheduler = Scheduler::new(2).unwrap();
-    let mut schedule = one_process(Busy { width: 20_000, pinned: false });
-    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
+    let mut schedule = single(Busy { width: 20_000, pinned: false });
+    let log = recorded(&mut schedule, &scheduler, &RunContext { chunk: 16, fails: false });
     check(&log, &schedule, 16, 2);
     assert!(log.runs[0].parallel_from.is_some_and(|from| from > log.runs[0].began), "{:?}", log.runs[0].parallel_from);
     schedule.always_parallel(true);
-    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 16, fails: false });
+    let log = recorded(&mut schedule, &scheduler, &RunContext { chunk: 16, fails: false });
     assert!(log.runs[0].parallel_from <= log.runs[0].chunks.iter().map(|chunk| chunk.opened).min());
 }
 
 #[test]
-fn who_joins_in_a_process_of_another_worker_has_stolen_all_its_chunks() {
+fn a_worker_that_joins_a_node_has_stolen_its_chunks() {
     let scheduler = Scheduler::new(2).unwrap();
     let barrier = Barrier::new(2);
     let mut graph = FrameGraph::new();
@@ -153,7 +153,7 @@ fn who_joins_in_a_process_of_another_worker_has_stolen_all_its_chunks() {
         barrier.wait();
         Ok(())
     });
-    // Two chunks are never taken by one ticket.
+    // No ticket claims both chunks.
     let wide = graph.add("wide", meet.with_width(|_| 2));
     let after = graph.add("after", Closure::new(|_: &(), _range, _worker| Ok(())));
     graph.order(wide, after);
@@ -169,51 +169,51 @@ fn who_joins_in_a_process_of_another_worker_has_stolen_all_its_chunks() {
         let wide = run.chunks_of(0);
         assert!((0..2).all(|worker| wide.iter().any(|chunk| chunk.worker == worker)));
         assert!(wide.iter().all(|chunk| chunk.stolen == (chunk.worker == 1)), "{wide:?}");
-        assert!(!run.chunks_of(1)[0].stolen, "who ends the one before goes on with it");
+        assert!(!run.chunks_of(1)[0].stolen, "the worker that completes the first node runs the next");
     }
 }
 
 #[test]
-fn a_run_that_failed_says_so_and_leaves_nothing_in_the_next() {
+fn a_failed_run_is_marked_and_leaves_nothing_in_the_next() {
     let scheduler = Scheduler::new(2).unwrap();
-    let mut schedule = one_process(Busy { width: 50, pinned: false });
-    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 1, fails: true });
+    let mut schedule = single(Busy { width: 50, pinned: false });
+    let log = recorded(&mut schedule, &scheduler, &RunContext { chunk: 1, fails: true });
     assert!(log.runs[0].failed && log.runs[0].complete);
     assert!((1..50).contains(&log.runs[0].chunks.len()), "{} chunks", log.runs[0].chunks.len());
-    let log = recorded(&mut schedule, &scheduler, &Call { chunk: 7, fails: false });
+    let log = recorded(&mut schedule, &scheduler, &RunContext { chunk: 7, fails: false });
     check(&log, &schedule, 7, 2);
 }
 
 #[test]
-fn what_there_is_no_room_for_is_counted_and_the_run_is_not_complete() {
+fn dropped_chunks_are_counted_and_their_run_is_not_complete() {
     let scheduler = Scheduler::builder().workers(1).timeline_capacity(64).build().unwrap();
-    let mut schedule = one_process(Busy { width: 100, pinned: false });
+    let mut schedule = single(Busy { width: 100, pinned: false });
     assert_eq!(scheduler.timeline().bytes(), 0);
     scheduler.timeline().start();
     assert_eq!(scheduler.timeline().bytes(), 64 * 48);
     for chunk in [4, 1, 4] {
-        schedule.run(&scheduler, &Call { chunk, fails: false }).unwrap();
+        schedule.run(&scheduler, &RunContext { chunk, fails: false }).unwrap();
     }
     let log = scheduler.timeline().take();
     assert_eq!(log.runs.iter().map(|run| run.chunks.len()).collect::<Vec<_>>(), [25, 39, 0]);
     assert_eq!(log.runs.iter().map(|run| run.complete).collect::<Vec<_>>(), [true, false, false]);
     assert_eq!((log.workers[0].dropped, log.all_dropped()), (61 + 25, 61 + 25));
-    // There is room again.
-    schedule.run(&scheduler, &Call { chunk: 4, fails: false }).unwrap();
+    // Taking the log made room.
+    schedule.run(&scheduler, &RunContext { chunk: 4, fails: false }).unwrap();
     check(&scheduler.timeline().take(), &schedule, 4, 1);
 }
 
 #[test]
-fn a_run_that_lost_chunks_is_not_complete_even_if_the_clock_goes_back() {
+fn a_run_that_lost_chunks_is_not_complete_even_if_the_clock_runs_backwards() {
     let clock = {
         let now = AtomicU64::new(1_000_000);
         move || Duration::from_micros(now.fetch_sub(1, Ordering::Relaxed))
     };
     let scheduler = Scheduler::builder().workers(1).timeline_capacity(64).timeline_clock(clock).build().unwrap();
-    let mut schedule = one_process(Busy { width: 100, pinned: false });
+    let mut schedule = single(Busy { width: 100, pinned: false });
     scheduler.timeline().start();
     for chunk in [4, 1, 4] {
-        schedule.run(&scheduler, &Call { chunk, fails: false }).unwrap();
+        schedule.run(&scheduler, &RunContext { chunk, fails: false }).unwrap();
     }
     let log = scheduler.timeline().take();
     assert_eq!(log.runs.iter().map(|run| run.chunks.len()).collect::<Vec<_>>(), [25, 39, 0]);
@@ -221,17 +221,17 @@ fn a_run_that_lost_chunks_is_not_complete_even_if_the_clock_goes_back() {
 }
 
 #[test]
-fn a_run_amid_which_a_log_is_taken_is_not_complete_and_what_is_lost_is_counted() {
+fn a_run_is_not_complete_if_a_log_is_taken_during_it_and_lost_chunks_are_counted() {
     let scheduler = Scheduler::new(1).unwrap();
     let early = Mutex::new(None);
     let mut graph = FrameGraph::new();
-    let look = Closure::new(|_: &(), range: Range<usize>, _worker| {
+    let take = Closure::new(|_: &(), range: Range<usize>, _worker| {
         if range.start == 5 {
             *early.lock().unwrap() = Some(scheduler.timeline().take());
         }
         Ok(())
     });
-    let process = graph.add("look", look.with_width(|_| 9));
+    let process = graph.add("take", take.with_width(|_| 9));
     graph.keep(process);
     let mut schedule = graph.compile().unwrap();
     scheduler.timeline().start();
@@ -245,12 +245,12 @@ fn a_run_amid_which_a_log_is_taken_is_not_complete_and_what_is_lost_is_counted()
 }
 
 #[test]
-fn frames_are_runs_unless_the_engine_marks_its_own() {
+fn each_run_is_a_frame_unless_the_engine_marks_frames() {
     let scheduler = Scheduler::new(1).unwrap();
-    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let mut schedule = single(Busy { width: 5, pinned: false });
     let timeline = scheduler.timeline();
     timeline.start();
-    let mut run = || schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    let mut run = || schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
     run();
     run();
     let log = timeline.take();
@@ -268,31 +268,31 @@ fn frames_are_runs_unless_the_engine_marks_its_own() {
     assert_eq!(log.frames.iter().map(|frame| frame.number).collect::<Vec<_>>(), [2, 3]);
     assert!(log.frames[0].began <= log.runs[0].began && log.frames[0].ended == log.spans[0].ended);
     assert_eq!((log.spans[0].name.as_str(), log.spans[0].frame), ("simulate", 2));
-    assert!(log.threads[log.spans[0].thread].contains("frames_are_runs"));
+    assert!(log.threads[log.spans[0].thread].contains("each_run_is_a_frame"));
     assert_eq!((log.counters[0].name.as_str(), log.counters[0].value), ("objects", 3.0));
 }
 
 #[test]
-fn an_engine_that_marks_frames_has_its_own_whenever_it_is_started() {
+fn frames_that_an_engine_marked_before_the_start_count() {
     let scheduler = Scheduler::new(1).unwrap();
-    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let mut schedule = single(Busy { width: 5, pinned: false });
     let timeline = scheduler.timeline();
     timeline.mark_frame();
     assert_eq!(timeline.take().frames, [], "it is off");
-    // Amid the engine's frame.
+    // In the middle of the engine's frame.
     timeline.start();
     for _run in 0..2 {
-        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+        schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
     }
     timeline.mark_frame();
-    schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+    schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
     let log = timeline.take();
     assert_eq!(log.runs.iter().map(|run| run.frame).collect::<Vec<_>>(), [0, 0, 1]);
     assert_eq!(log.frames.len(), 2);
 }
 
 #[test]
-fn what_runs_in_the_background_is_of_no_frame_that_waits_for_it() {
+fn background_runs_do_not_extend_frames() {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     scheduler.timeline().start();
     let (begun, has_begun) = mpsc::channel();
@@ -313,16 +313,16 @@ fn what_runs_in_the_background_is_of_no_frame_that_waits_for_it() {
         })
     };
     has_begun.recv().unwrap();
-    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let mut schedule = single(Busy { width: 5, pinned: false });
     for _run in 0..2 {
-        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+        schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
     }
     ended.send(()).unwrap();
     streaming.wait().unwrap();
     let log = scheduler.timeline().take();
-    let told: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.nodes[0].name.as_str())).collect();
-    assert_eq!(told, [(false, "busy"), (false, "busy"), (true, "stream")]);
-    assert_ne!(log.runs[0].frame, log.runs[1].frame, "each is a frame of its own");
+    let runs: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.nodes[0].name.as_str())).collect();
+    assert_eq!(runs, [(false, "busy"), (false, "busy"), (true, "stream")]);
+    assert_ne!(log.runs[0].frame, log.runs[1].frame, "each run is a frame of its own");
     for run in &log.runs[..2] {
         let frame = log.frames.iter().find(|frame| frame.number == run.frame).unwrap();
         assert_eq!((frame.began, frame.ended), (run.began, run.ended));
@@ -332,13 +332,13 @@ fn what_runs_in_the_background_is_of_no_frame_that_waits_for_it() {
 }
 
 #[test]
-fn a_span_around_a_run_is_of_the_frame_that_the_run_begins() {
+fn a_span_around_a_run_belongs_to_the_runs_frame() {
     let scheduler = Scheduler::new(1).unwrap();
-    let mut schedule = one_process(Busy { width: 5, pinned: false });
+    let mut schedule = single(Busy { width: 5, pinned: false });
     scheduler.timeline().start();
     for _frame in 0..3 {
         let _span = scheduler.timeline().span("frame");
-        schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap();
+        schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
     }
     let log = scheduler.timeline().take();
     let frames = log.frames.iter().zip(&log.spans).zip(&log.runs);
@@ -350,33 +350,33 @@ fn a_span_around_a_run_is_of_the_frame_that_the_run_begins() {
 }
 
 #[test]
-fn who_slept_before_it_was_started_is_seen_asleep() {
+fn a_worker_that_fell_asleep_before_the_start_is_asleep_in_the_log() {
     let scheduler = Scheduler::new(2).unwrap();
     let asleep = |log: &Log| log.workers[1].idle.iter().any(|idle| idle.kind == IdleKind::Asleep);
-    let is_seen = (0..10_000).any(|_look| {
+    let is_asleep = (0..10_000).any(|_try| {
         thread::sleep(Duration::from_millis(1));
         asleep(&scheduler.timeline().take())
     });
-    assert!(is_seen);
+    assert!(is_asleep);
     scheduler.timeline().start();
     let log = scheduler.timeline().take();
     assert!(asleep(&log) && log.workers[1].idle[0].began < log.workers[1].idle[0].ended);
 }
 
 #[test]
-fn what_a_stolen_job_runs_itself_was_not_stolen() {
+fn runs_that_a_stolen_job_starts_are_not_stolen() {
     let scheduler = Scheduler::new(2).unwrap();
-    let mut schedule = one_process(Busy { width: 1, pinned: false });
+    let mut schedule = single(Busy { width: 1, pinned: false });
     schedule.always_parallel(true);
     let (done, is_done) = mpsc::channel();
     scheduler.timeline().start();
     scheduler
         .scope(|scope| {
             scope.spawn(|_scope, _worker| {
-                (0..2).for_each(|_run| schedule.run(&scheduler, &Call { chunk: 1, fails: false }).unwrap());
+                (0..2).for_each(|_run| schedule.run(&scheduler, &RunContext { chunk: 1, fails: false }).unwrap());
                 done.send(()).unwrap();
             });
-            // So the other worker takes the job.
+            // This thread waits, so the other worker runs the job.
             is_done.recv().unwrap();
         })
         .unwrap();
@@ -386,7 +386,7 @@ fn what_a_stolen_job_runs_itself_was_not_stolen() {
 }
 
 #[test]
-fn what_follows_a_new_start_is_of_no_frame_before_it() {
+fn a_restart_begins_a_new_frame() {
     let scheduler = Scheduler::new(1).unwrap();
     let timeline = scheduler.timeline();
     timeline.start();
@@ -402,7 +402,7 @@ fn what_follows_a_new_start_is_of_no_frame_before_it() {
 }
 
 #[test]
-fn threads_are_forgotten_with_the_log_that_names_them() {
+fn each_log_names_only_its_own_threads() {
     let scheduler = Scheduler::new(1).unwrap();
     let timeline = scheduler.timeline();
     timeline.start();
@@ -412,7 +412,7 @@ fn threads_are_forgotten_with_the_log_that_names_them() {
         let log = timeline.take();
         assert_eq!((log.threads, log.spans[0].thread), (vec![round.to_owned()], 0));
     }
-    // Nor is a thread remembered for whose spans there is no room.
+    // A thread whose spans were all dropped is not named either.
     (0..1 << 16).for_each(|_span| drop(timeline.span("span")));
     thread::scope(|scope| _ = scope.spawn(|| drop(timeline.span("late"))));
     let log = timeline.take();
@@ -420,11 +420,11 @@ fn threads_are_forgotten_with_the_log_that_names_them() {
 }
 
 #[test]
-fn each_idle_time_is_in_one_log() {
+fn each_idle_interval_is_in_one_log() {
     let scheduler = Scheduler::new(2).unwrap();
     scheduler.timeline().start();
     let mut until = Duration::ZERO;
-    for _look in 0..20 {
+    for _log in 0..20 {
         thread::sleep(Duration::from_millis(1));
         for idle in &scheduler.timeline().take().workers[1].idle {
             assert!(until <= idle.began && idle.began <= idle.ended, "{idle:?} after {until:?}");
@@ -435,20 +435,20 @@ fn each_idle_time_is_in_one_log() {
 }
 
 #[test]
-fn room_for_more_than_there_can_be_is_no_reason_to_panic() {
+fn any_capacity_is_accepted() {
     for capacity in [0, usize::MAX] {
         let scheduler = Scheduler::builder().workers(1).timeline_capacity(capacity).build().unwrap();
         assert!(!scheduler.timeline().is_on());
     }
 }
 
-fn one_process(busy: Busy) -> Schedule<Busy> {
+fn single(busy: Busy) -> Schedule<Busy> {
     let mut graph = FrameGraph::new();
     let process = graph.add("busy", busy);
     graph.keep(process);
     graph.compile().unwrap()
 }
 
-/// Those of the other tests are busy with other tests' runs, which would be recorded too.
+/// Not the schedulers of the other tests, whose runs would be recorded, too.
 static RECORDED: LazyLock<[Scheduler; 3]> =
     LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));

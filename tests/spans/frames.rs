@@ -1,4 +1,4 @@
-//! The spans of a frame, as any subscriber gets them.
+//! The spans of a frame.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -16,7 +16,7 @@ use tracing_chrome::ChromeLayerBuilder;
 
 use crate::recorder::{Origin, Recorder, scheduler, subscriber};
 
-/// Draws two frames of the project's own scene, and returns how many objects it has and the names of its jobs.
+/// Draws two frames of the sample scene. Returns its number of objects and the names of the frame's nodes.
 fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<String>) {
     let scheduler = Arc::new(scheduler(Scheduler::builder().workers(workers), dispatch));
     dispatcher::with_default(dispatch, || {
@@ -35,7 +35,7 @@ fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<Stri
 }
 
 #[test]
-fn a_frame_is_recorded_and_submitted_in_spans_with_its_jobs_inside() {
+fn the_spans_record_and_submit_contain_the_nodes_of_a_frame() {
     for workers in [1, 2, 4] {
         let recorder = Recorder::default();
         let (objects, names) = draw_two_frames(workers, &subscriber(recorder.clone(), LevelFilter::DEBUG));
@@ -50,13 +50,13 @@ fn a_frame_is_recorded_and_submitted_in_spans_with_its_jobs_inside() {
         for &frame in &frames {
             assert_eq!(record.spans[frame].fields["objects"], objects.to_string());
             let jobs = record.spans.iter().filter(|span| span.parent == Some(frame));
-            let told: Vec<_> = jobs.map(|job| job.fields["name"].clone()).collect();
-            assert_eq!(told.len(), names.len());
-            assert_eq!(told.into_iter().collect::<BTreeSet<_>>(), names);
+            let found: Vec<_> = jobs.map(|job| job.fields["name"].clone()).collect();
+            assert_eq!(found.len(), names.len());
+            assert_eq!(found.into_iter().collect::<BTreeSet<_>>(), names);
         }
         let stages: BTreeSet<_> = record.spans.iter().filter_map(|span| span.fields.get("stage")).collect();
         for stage in ["visibility", "fill", "sort", "record"] {
-            assert!(stages.iter().any(|told| told.contains(stage)), "{stage} is not among {stages:?}");
+            assert!(stages.iter().any(|found| found.contains(stage)), "{stage} is not among {stages:?}");
         }
         assert!(record.spans.iter().any(|span| span.fields.get("view").is_some_and(|view| view == "main")));
         assert!(record.spans.iter().any(|span| span.fields.contains_key("process")));
@@ -78,22 +78,22 @@ impl io::Write for Memory {
 }
 
 #[test]
-fn tracing_chrome_writes_them_into_a_trace() {
+fn tracing_chrome_writes_the_spans_to_a_trace() {
     let file = Memory::default();
     let (layer, written) = ChromeLayerBuilder::new().writer(file.clone()).include_args(true).build();
     let (_objects, names) = draw_two_frames(2, &subscriber(layer, LevelFilter::TRACE));
     drop(written);
     let trace: Vec<Value> = serde_json::from_slice(&file.0.lock().unwrap()).unwrap();
-    let begun = |name: &str| trace.iter().filter(|event| event["ph"] == "B" && event["name"] == name).count();
-    let ended = |name: &str| trace.iter().filter(|event| event["ph"] == "E" && event["name"] == name).count();
+    let begins = |name: &str| trace.iter().filter(|event| event["ph"] == "B" && event["name"] == name).count();
+    let ends = |name: &str| trace.iter().filter(|event| event["ph"] == "E" && event["name"] == name).count();
     for name in ["record", "submit", "node", "chunk"] {
-        assert!(begun(name) >= 2 && begun(name) == ended(name), "{name}: {} and {}", begun(name), ended(name));
+        assert!(begins(name) >= 2 && begins(name) == ends(name), "{name}: {} and {}", begins(name), ends(name));
     }
-    // It writes strings with the quotes of Rust.
-    let told: BTreeSet<_> = trace.iter().filter_map(|event| event["args"]["name"].as_str()).collect();
+    // It writes strings in quotes.
+    let found: BTreeSet<_> = trace.iter().filter_map(|event| event["args"]["name"].as_str()).collect();
     let missing: Vec<_> = names
         .iter()
-        .filter(|name| !told.contains(format!("{name:?}").as_str()) && !told.contains(name.as_str()))
+        .filter(|name| !found.contains(format!("{name:?}").as_str()) && !found.contains(name.as_str()))
         .collect();
-    assert!(missing.is_empty(), "{missing:?} are not among {told:?}");
+    assert!(missing.is_empty(), "{missing:?} are not among {found:?}");
 }

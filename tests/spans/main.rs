@@ -1,7 +1,7 @@
-//! What subscribers are told of runs and frames. Each test has a subscriber of its own, set on its threads alone.
+//! The tracing spans of runs and frames. Each test sets its own subscriber on its own threads.
 
 mod frames;
 mod recorder;
 mod runs;
-mod troubles;
+mod failures;
 mod work;

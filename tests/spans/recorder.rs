@@ -1,4 +1,4 @@
-//! A layer that writes down all it is told, in the one order in which it is told.
+//! A layer that records all spans and events in order.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -14,17 +14,17 @@ use tracing::{Dispatch, Event, Level, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 use tracing_subscriber::registry::LookupSpan;
 
-/// What a recorder was told.
+/// What a recorder has recorded.
 #[derive(Debug, Default)]
 pub struct Record {
     pub spans: Vec<Span>,
     pub events: Vec<(Origin, Fields)>,
-    pub moves: Vec<Move>,
+    pub changes: Vec<Change>,
 }
 
 pub type Fields = BTreeMap<&'static str, String>;
 
-/// Where a span or an event comes from.
+/// The metadata of a span or an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Origin {
     pub target: &'static str,
@@ -36,20 +36,20 @@ pub struct Origin {
 pub struct Span {
     pub origin: Origin,
     pub fields: Fields,
-    /// Its index among all.
+    /// The parent's index in the record.
     pub parent: Option<usize>,
 }
 
-/// What happened to a span: its index among all, and on which thread.
+/// A change of a span's state, with the span's index in the record.
 #[derive(Clone, Copy, Debug)]
-pub struct Move {
-    pub kind: MoveKind,
+pub struct Change {
+    pub kind: ChangeKind,
     pub span: usize,
     pub thread: ThreadId,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MoveKind {
+pub enum ChangeKind {
     New,
     Enter,
     Exit,
@@ -57,61 +57,61 @@ pub enum MoveKind {
 }
 
 impl Record {
-    /// The indices of all spans of that name, in the order in which they were made.
+    /// The indices of all spans with that name, in the order they were created.
     pub fn named<'a>(&'a self, name: &'a str) -> impl Iterator<Item = usize> + 'a {
         (0..self.spans.len()).filter(move |&span| self.spans[span].origin.name == name)
     }
 
-    /// What happened to a span, and as the how-manieth of all that happened.
-    pub fn moves_of(&self, span: usize) -> impl DoubleEndedIterator<Item = (usize, Move)> + '_ {
-        self.moves.iter().copied().enumerate().filter(move |(_, of)| of.span == span)
+    /// The changes of a span, with their indices among all changes.
+    pub fn changes_of(&self, span: usize) -> impl DoubleEndedIterator<Item = (usize, Change)> + '_ {
+        self.changes.iter().copied().enumerate().filter(move |(_, change)| change.span == span)
     }
 
-    /// Every thread leaves what it entered last, and nothing is entered or open at the end, or was twice at once.
+    /// Checks that each thread exits the span it entered last, never enters a span twice, and that all spans are closed at the end.
     pub fn check_nesting(&self) {
         let mut inside: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         let mut open = vec![false; self.spans.len()];
-        for Move { kind, span, thread } in &self.moves {
+        for Change { kind, span, thread } in &self.changes {
             let inside = inside.entry(format!("{thread:?}")).or_default();
             let parent = self.spans[*span].parent;
             match kind {
-                MoveKind::New => open[*span] = true,
-                MoveKind::Enter => {
+                ChangeKind::New => open[*span] = true,
+                ChangeKind::Enter => {
                     assert!(open[*span] && !inside.contains(span), "{:?}", self.spans[*span]);
                     assert!(parent.is_none_or(|parent| open[parent]), "{:?}", self.spans[*span]);
                     inside.push(*span);
                 }
-                MoveKind::Exit => assert_eq!(inside.pop(), Some(*span), "{:?}", self.spans[*span]),
-                MoveKind::Close => assert!(mem::replace(&mut open[*span], false)),
+                ChangeKind::Exit => assert_eq!(inside.pop(), Some(*span), "{:?}", self.spans[*span]),
+                ChangeKind::Close => assert!(mem::replace(&mut open[*span], false)),
             }
         }
-        assert!(inside.values().all(Vec::is_empty), "{inside:?} are left");
+        assert!(inside.values().all(Vec::is_empty), "{inside:?} are still entered");
         assert!(!open.contains(&true), "{open:?}");
     }
 }
 
-/// Writes into a record.
+/// The layer. It writes to a record.
 #[derive(Clone, Debug, Default)]
 pub struct Recorder(Arc<Mutex<Record>>);
 
 impl Recorder {
-    /// What was told since the last call.
+    /// Takes what was recorded since the last call.
     pub fn take(&self) -> Record {
         mem::take(&mut self.0.lock().unwrap())
     }
 
-    fn note<S>(&self, kind: MoveKind, span: &Id, context: &Context<'_, S>)
+    fn record_change<S>(&self, kind: ChangeKind, span: &Id, context: &Context<'_, S>)
     where
         S: Subscriber + for<'a> LookupSpan<'a>,
     {
         let Some(Number(span)) = context.span(span).and_then(|span| span.extensions().get::<Number>().copied()) else {
             return;
         };
-        self.0.lock().unwrap().moves.push(Move { kind, span, thread: thread::current().id() });
+        self.0.lock().unwrap().changes.push(Change { kind, span, thread: thread::current().id() });
     }
 }
 
-/// A span's index.
+/// A span's index in the record.
 #[derive(Clone, Copy)]
 struct Number(usize);
 
@@ -122,31 +122,31 @@ where
     fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
         let span = context.span(id).unwrap();
         let parent = span.parent().and_then(|parent| parent.extensions().get::<Number>().map(|number| number.0));
-        let mut fields = Text::default();
+        let mut fields = FieldTexts::default();
         attributes.record(&mut fields);
         let mut record = self.0.lock().unwrap();
         span.extensions_mut().insert(Number(record.spans.len()));
         record.spans.push(Span { origin: origin(attributes.metadata()), fields: fields.0, parent });
         drop(record);
-        self.note(MoveKind::New, id, &context);
+        self.record_change(ChangeKind::New, id, &context);
     }
 
     fn on_event(&self, event: &Event<'_>, _context: Context<'_, S>) {
-        let mut fields = Text::default();
+        let mut fields = FieldTexts::default();
         event.record(&mut fields);
         self.0.lock().unwrap().events.push((origin(event.metadata()), fields.0));
     }
 
     fn on_enter(&self, id: &Id, context: Context<'_, S>) {
-        self.note(MoveKind::Enter, id, &context);
+        self.record_change(ChangeKind::Enter, id, &context);
     }
 
     fn on_exit(&self, id: &Id, context: Context<'_, S>) {
-        self.note(MoveKind::Exit, id, &context);
+        self.record_change(ChangeKind::Exit, id, &context);
     }
 
     fn on_close(&self, id: Id, context: Context<'_, S>) {
-        self.note(MoveKind::Close, &id, &context);
+        self.record_change(ChangeKind::Close, &id, &context);
     }
 }
 
@@ -155,9 +155,9 @@ fn origin(metadata: &'static Metadata<'static>) -> Origin {
 }
 
 #[derive(Default)]
-struct Text(Fields);
+struct FieldTexts(Fields);
 
-impl Visit for Text {
+impl Visit for FieldTexts {
     fn record_str(&mut self, field: &Field, value: &str) {
         self.0.insert(field.name(), value.to_owned());
     }
@@ -167,7 +167,7 @@ impl Visit for Text {
     }
 }
 
-/// A subscriber that is told of what is at that level or above.
+/// A subscriber with that layer and maximum level.
 pub fn subscriber<L>(layer: L, level: LevelFilter) -> Dispatch
 where
     L: Layer<tracing_subscriber::layer::Layered<LevelFilter, tracing_subscriber::Registry>> + Send + Sync,
@@ -175,9 +175,9 @@ where
     Dispatch::new(tracing_subscriber::registry().with(level).with(layer))
 }
 
-/// A scheduler whose workers tell that subscriber. The thread that calls it has to see to itself.
+/// A scheduler whose workers have that subscriber. The calling thread must set it for itself.
 pub fn scheduler(builder: SchedulerBuilder, dispatch: &Dispatch) -> Scheduler {
     let dispatch = dispatch.clone();
-    // For as long as the thread lives.
+    // Never dropped, so that the subscriber stays set until the thread ends.
     builder.on_start(move |_worker| mem::forget(tracing::dispatcher::set_default(&dispatch))).build().unwrap()
 }

@@ -1,4 +1,4 @@
-//! Schedules that keep a book of their own on what ran.
+//! Schedules of nodes that log the chunks they run.
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use drawloom::task::{Scheduler, SchedulerBuilder, Worker};
 use drawloom::timeline::Labels;
 use proptest::{collection::vec, prelude::*};
 
-/// A process: its place in the book, how many items it has, and whether it is pinned.
+/// A node with some work: its number, its width, and whether it is pinned.
 #[derive(Clone, Copy, Debug)]
 pub struct Work {
     pub number: usize,
@@ -19,36 +19,36 @@ pub struct Work {
     pub pinned: bool,
 }
 
-/// What a run is lent: its book, and what is to go wrong.
+/// The context of a run: the chunks that ran, and which node fails.
 #[derive(Default)]
-pub struct Call {
-    pub book: Mutex<Vec<Entry>>,
-    pub trouble: Trouble,
+pub struct RunContext {
+    pub ran_chunks: Mutex<Vec<RanChunk>>,
+    pub failure: Failure,
 }
 
 /// A chunk that ran.
 #[derive(Clone, Debug)]
-pub struct Entry {
-    pub process: usize,
+pub struct RanChunk {
+    pub node: usize,
     pub items: Range<usize>,
     pub thread: ThreadId,
 }
 
-/// What goes wrong with the process, at its item 0.
+/// How a node fails, at its item 0, and its number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Trouble {
+pub enum Failure {
     #[default]
     None,
     Error(usize),
     Panic(usize),
 }
 
-impl Node<Call> for Work {
-    fn width(&self, _call: &Call) -> usize {
+impl Node<RunContext> for Work {
+    fn width(&self, _context: &RunContext) -> usize {
         self.width
     }
 
-    fn chunk(&self, _call: &Call) -> usize {
+    fn chunk(&self, _context: &RunContext) -> usize {
         3
     }
 
@@ -56,58 +56,58 @@ impl Node<Call> for Work {
         self.pinned
     }
 
-    fn run(&self, call: &Call, items: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+    fn run(&self, context: &RunContext, items: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
         let is_first = items.start == 0;
         items.clone().for_each(|item| _ = black_box((0..2_000).fold(item, |sum, step| black_box(sum ^ step))));
-        call.book.lock().unwrap().push(Entry { process: self.number, items, thread: thread::current().id() });
-        assert!(!is_first || call.trouble != Trouble::Panic(self.number), "as planned");
-        if is_first && call.trouble == Trouble::Error(self.number) { Err("as planned".into()) } else { Ok(()) }
+        context.ran_chunks.lock().unwrap().push(RanChunk { node: self.number, items, thread: thread::current().id() });
+        assert!(!is_first || context.failure != Failure::Panic(self.number), "as planned");
+        if is_first && context.failure == Failure::Error(self.number) { Err("as planned".into()) } else { Ok(()) }
     }
 }
 
-/// Up to twelve processes, each after some of those before it.
+/// Up to twelve nodes, each of which depends on some of those before it.
 pub fn schedules() -> impl Strategy<Value = Schedule<Work>> {
-    vec((0..40_usize, prop::bool::weighted(0.2), any::<u16>()), 1..12).prop_map(|processes| {
+    vec((0..40_usize, prop::bool::weighted(0.2), any::<u16>()), 1..12).prop_map(|nodes| {
         let mut graph = FrameGraph::new();
         let mut added = Vec::new();
-        for (number, (width, pinned, after)) in processes.into_iter().enumerate() {
-            let process = graph.add(format!("process {number}"), Work { number, width, pinned });
+        for (number, (width, pinned, after)) in nodes.into_iter().enumerate() {
+            let node = graph.add(format!("node {number}"), Work { number, width, pinned });
             if let Some(labels) = labels(number) {
-                graph.label(process, labels);
+                graph.label(node, labels);
             }
-            let before = added.iter().enumerate().filter(|(place, _)| after & after >> 1 & 1 << place != 0);
-            before.for_each(|(_, &before)| graph.order(before, process));
-            graph.keep(process);
-            added.push(process);
+            let before = added.iter().enumerate().filter(|(index, _)| after & after >> 1 & 1 << index != 0);
+            before.for_each(|(_, &before)| graph.order(before, node));
+            graph.keep(node);
+            added.push(node);
         }
-        graph.compile().expect("each is after some of those before it")
+        graph.compile().expect("dependencies come before their dependents")
     })
 }
 
-/// Every other process has some.
+/// The labels of a node; odd ones have none.
 pub fn labels(number: usize) -> Option<Labels> {
     let [process, stage] = [format!("part {number}"), "fill".to_owned()].map(Some);
     number.is_multiple_of(2).then_some(Labels { process, stage, view: (number != 0).then(|| "main".to_owned()) })
 }
 
-/// How a schedule that was never run before is to go.
+/// How a schedule without measurements is executed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Way {
-    Alone,
-    BegunAlone,
-    Shared,
+pub enum Mode {
+    Serial,
+    SerialThenParallel,
+    Parallel,
 }
 
-impl Way {
-    pub const ALL: [Self; 3] = [Self::Alone, Self::BegunAlone, Self::Shared];
+impl Mode {
+    pub const ALL: [Self; 3] = [Self::Serial, Self::SerialThenParallel, Self::Parallel];
 
-    /// A scheduler that goes that way, if the schedule is made to.
+    /// A scheduler with which a schedule is executed in this mode, after [`set`](Self::set).
     pub fn scheduler(self, workers: usize) -> SchedulerBuilder {
-        let price = if self == Self::Alone { Duration::from_secs(1_000) } else { Duration::from_nanos(1) };
-        Scheduler::builder().workers(workers).wake_up_cost(price)
+        let cost = if self == Self::Serial { Duration::from_secs(1_000) } else { Duration::from_nanos(1) };
+        Scheduler::builder().workers(workers).wake_up_cost(cost)
     }
 
     pub fn set(self, schedule: &mut Schedule<Work>) {
-        schedule.always_parallel(self == Self::Shared);
+        schedule.always_parallel(self == Self::Parallel);
     }
 }

@@ -30,14 +30,14 @@ struct Arguments {
     /// Begin at once, whether a viewer is connected or not.
     #[arg(long)]
     no_wait: bool,
-    /// Show every chunk of every process.
+    /// Show every chunk of every node.
     #[arg(long)]
     chunks: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    drawloom_tracy::install(if arguments.chunks { Zones::Chunks } else { Zones::Processes })?;
+    drawloom_tracy::install(if arguments.chunks { Zones::Chunks } else { Zones::Nodes })?;
     drawloom_tracy::name_worker(0);
     let builder = Scheduler::builder().on_start(drawloom_tracy::name_worker);
     let scheduler = match arguments.workers {

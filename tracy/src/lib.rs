@@ -1,15 +1,15 @@
 //! Shows [Drawloom](https://docs.rs/drawloom)'s frames in [Tracy](https://github.com/wolfpld/tracy): what each worker did,
 //! on one timeline.
 //!
-//! An engine that has a subscriber adds [`layer`] to it, and one that has none calls [`install`]. From then on a viewer can
-//! connect, and sees a zone for each process that a worker takes part in, how many processes were ready, and how many jobs
-//! were queued. [`name_worker`] and [`mark_frame`] make that easier to read:
+//! An engine with a `tracing` subscriber adds [`layer`] to it; an engine without one calls [`install`]. Then a viewer can connect.
+//! It shows a zone for each node that a worker runs, the number of ready nodes, and the number of queued jobs.
+//! [`name_worker`] and [`mark_frame`] make the timeline easier to read:
 //!
 //! ```
 //! use drawloom::task::Scheduler;
 //! use drawloom_tracy::Zones;
 //!
-//! drawloom_tracy::install(Zones::Processes)?;
+//! drawloom_tracy::install(Zones::Nodes)?;
 //! let scheduler = Scheduler::builder().on_start(drawloom_tracy::name_worker).build()?;
 //! for _frame in 0..3 {
 //!     scheduler.scope(|_scope| { /* Record and submit. */ });
@@ -18,7 +18,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Nothing is sent, and next to nothing kept, until a viewer on the same machine connects.
+//! Until a viewer on the same machine connects, nothing is sent and hardly anything is stored.
 
 mod plots;
 mod spans;
@@ -30,31 +30,29 @@ use tracing_tracy::{TracyLayer, client::Client};
 
 use crate::{
     plots::Plots,
-    spans::{ByName, Processes, is_chunk, is_process},
+    spans::{NameOnly, NodeZones, is_chunk, is_node},
 };
 
-/// Where Drawloom tells of its runs.
+/// The target of Drawloom's spans and events of runs.
 const RUNS: &str = "drawloom::graph";
 
-/// What gets a zone in Tracy.
+/// Which spans of a run are zones in Tracy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Zones {
-    /// Each process, once a run and worker that takes part in it.
+    /// Nodes: one zone for each worker that runs a part of the node.
     #[default]
-    Processes,
-    /// Each chunk of a process, too: some hundred times as many zones, and as much more that they cost.
+    Nodes,
+    /// Nodes and their chunks. This makes some hundred times as many zones, at as many times the cost.
     Chunks,
 }
 
-/// A layer for an engine's own subscriber, which is to be a [`Registry`] with layers.
+/// A layer for an engine's own subscriber, which must be a [`Registry`] with layers.
 ///
-/// A process of Drawloom is a zone by the name of the process alone. All other spans down to
-/// [`DEBUG`](tracing::Level::DEBUG), Drawloom's or not, are zones by the name of the span, and events are messages. No field
-/// gets into a zone's name, as Tracy has room for some 32,000 different ones. An engine that wants less puts a
-/// [filter](Layer::with_filter) around it.
+/// Each node is a zone with the node's name. All other spans up to [`DEBUG`](tracing::Level::DEBUG), Drawloom's or not, are zones
+/// with the span's name, and events are messages. Fields are not part of a zone's name, because Tracy is limited to about
+/// 32,000 different names. To show fewer zones, add a [filter](Layer::with_filter) to the layer.
 ///
-/// The plots are fed by an event that Drawloom tells at [`TRACE`](tracing::Level::TRACE), so a filter by level for the whole
-/// subscriber leaves them out.
+/// The plots use an event of level [`TRACE`](tracing::Level::TRACE), so a level filter on the whole subscriber removes them.
 pub fn layer<S>(zones: Zones) -> impl Layer<S> + Send + Sync
 where
     S: Subscriber + for<'span> LookupSpan<'span>,
@@ -62,35 +60,36 @@ where
     let client = Client::start();
     let is_wanted = move |metadata: &Metadata<'_>| {
         let is_zone = *metadata.level() <= LevelFilter::DEBUG || (zones == Zones::Chunks && is_chunk(metadata));
-        is_zone && !is_process(metadata)
+        is_zone && !is_node(metadata)
     };
-    let others = TracyLayer::new(ByName::default()).with_filter(FilterFn::new(is_wanted));
-    let processes = Processes::new(client.clone()).with_filter(FilterFn::new(is_process));
-    let plots = Plots::new(client).with_filter(FilterFn::new(plots::is_count));
-    others.and_then(processes).and_then(plots)
+    let others = TracyLayer::new(NameOnly::default()).with_filter(FilterFn::new(is_wanted));
+    let nodes = NodeZones::new(client.clone()).with_filter(FilterFn::new(is_node));
+    let plots = Plots::new(client).with_filter(FilterFn::new(plots::is_counters));
+    others.and_then(nodes).and_then(plots)
 }
 
-/// Makes the [layer] the whole program's subscriber, for a program that has no other.
+/// Makes the [layer] the global subscriber, in a program that has none.
 ///
 /// # Errors
-/// If it has one already: then add the [layer] to that.
+///
+/// Returns [`InstallError`] if the program already has a global subscriber. Add the [layer] to that one instead.
 pub fn install(zones: Zones) -> Result<(), InstallError> {
     set_global_default(Registry::default().with(layer(zones))).map_err(|_| InstallError)
 }
 
-/// There is a subscriber already.
+/// The program already has a global subscriber.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the program has a subscriber of spans already: add drawloom_tracy::layer to that one")]
 pub struct InstallError;
 
-/// Names the calling thread in Tracy after a worker. It is a hook for `SchedulerBuilder::on_start`. Worker 0 is whichever
-/// thread calls the scheduler, which may be named by this too.
+/// Names the calling thread after a worker. Use it as the hook of `SchedulerBuilder::on_start`. Worker 0 is the thread that calls
+/// the scheduler; it can be named by calling this with 0.
 pub fn name_worker(index: usize) {
     let name = if index == 0 { "caller".to_owned() } else { format!("worker {index}") };
     Client::start().set_thread_name(&name);
 }
 
-/// Ends a frame in Tracy, and begins the next. Does nothing before the [layer] is there.
+/// Marks the end of a frame. Does nothing before the [layer] is created.
 pub fn mark_frame() {
     if let Some(client) = Client::running() {
         client.frame_mark();

@@ -1,4 +1,4 @@
-//! Counts that come with events, as plots.
+//! Plots of the counters in Drawloom's events.
 
 use std::{
     cell::Cell,
@@ -17,12 +17,12 @@ use tracing_tracy::client::{Client, PlotName, plot_name};
 
 use crate::RUNS;
 
-/// Whether it is the event with which Drawloom tells its counts.
-pub fn is_count(metadata: &Metadata<'_>) -> bool {
+/// Whether it is Drawloom's event with counters.
+pub fn is_counters(metadata: &Metadata<'_>) -> bool {
     metadata.is_event() && metadata.target() == RUNS && metadata.name() == "taken"
 }
 
-/// Plots how many processes are ready and, for each worker, how many jobs are in its queues.
+/// Plots the number of ready nodes and, for each worker, the number of jobs in its queues.
 pub struct Plots {
     client: Client,
 }
@@ -38,30 +38,30 @@ impl<S: Subscriber> Layer<S> for Plots {
         if !Client::is_connected() {
             return;
         }
-        let Counts { ready, queued } = counts_of(event);
+        let Counters { ready, queued } = counters_of(event);
         if let Some(ready) = ready {
-            self.client.plot(plot_name!("ready processes"), ready as f64);
+            self.client.plot(plot_name!("ready nodes"), ready as f64);
         }
         if let Some(queued) = queued {
-            self.client.plot(name_for_this_thread(), queued as f64);
+            self.client.plot(plot_of_this_thread(), queued as f64);
         }
     }
 }
 
-/// What an event tells.
+/// The counters of an event.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct Counters {
     pub ready: Option<u64>,
     pub queued: Option<u64>,
 }
 
-pub fn counts_of(event: &Event<'_>) -> Counts {
-    let mut counts = Counts::default();
-    event.record(&mut counts);
-    counts
+pub fn counters_of(event: &Event<'_>) -> Counters {
+    let mut counters = Counters::default();
+    event.record(&mut counters);
+    counters
 }
 
-impl Visit for Counts {
+impl Visit for Counters {
     fn record_u64(&mut self, field: &Field, value: u64) {
         match field.name() {
             "ready" => self.ready = Some(value),
@@ -77,17 +77,17 @@ thread_local! {
     static NAME: Cell<Option<PlotName>> = const { Cell::new(None) };
 }
 
-/// The name of the plot of this thread's queues.
-fn name_for_this_thread() -> PlotName {
+/// The plot of this thread's queues.
+fn plot_of_this_thread() -> PlotName {
     NAME.get().unwrap_or_else(|| {
-        let name = name_for(thread::current().name().unwrap_or("a thread"));
+        let name = plot_of(thread::current().name().unwrap_or("a thread"));
         NAME.set(Some(name));
         name
     })
 }
 
-/// A name can never be given back, so threads that come and go under one name share theirs.
-fn name_for(thread: &str) -> PlotName {
+/// The plot of a thread's queues. Threads with the same name share one, because Tracy never frees a name.
+fn plot_of(thread: &str) -> PlotName {
     static NAMES: Mutex<BTreeMap<String, PlotName>> = Mutex::new(BTreeMap::new());
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     *names
@@ -110,43 +110,43 @@ mod tests {
         layer::{Context, Layer, SubscriberExt},
     };
 
-    use super::{Counts, counts_of, is_count, name_for};
+    use super::{Counters, counters_of, is_counters, plot_of};
 
     #[derive(Clone, Default)]
-    struct Collected(Arc<Mutex<Vec<Counts>>>);
+    struct Collected(Arc<Mutex<Vec<Counters>>>);
 
     impl<S: Subscriber> Layer<S> for Collected {
         fn on_event(&self, event: &Event<'_>, _context: Context<'_, S>) {
-            self.0.lock().unwrap().push(counts_of(event));
+            self.0.lock().unwrap().push(counters_of(event));
         }
     }
 
     #[test]
-    fn every_process_of_a_shared_run_comes_with_both_counts() {
+    fn every_node_of_a_parallel_run_has_an_event_with_both_counters() {
         let collected = Collected::default();
-        let layer = collected.clone().with_filter(FilterFn::new(is_count));
+        let layer = collected.clone().with_filter(FilterFn::new(is_counters));
         tracing::subscriber::set_global_default(Registry::default().with(layer)).unwrap();
         let mut graph = FrameGraph::new();
-        for process in 0..10 {
-            let process = graph.add(format!("process {process}"), Closure::new(|(): &(), _, _| Ok(())));
-            graph.keep(process);
+        for index in 0..10 {
+            let node = graph.add(format!("node {index}"), Closure::new(|(): &(), _, _| Ok(())));
+            graph.keep(node);
         }
         let mut schedule = graph.compile().unwrap();
         schedule.always_parallel(true);
         schedule.run(&Scheduler::new(2).unwrap(), &()).unwrap();
         tracing::trace!(target: "drawloom::graph", ready = 77_u64, "another event");
         tracing::trace!(name: "taken", ready = 77_u64);
-        let counts = collected.0.lock().unwrap();
-        assert_eq!(counts.len(), 10);
-        for count in counts.iter() {
-            assert!(count.ready.is_some_and(|ready| ready < 10) && count.queued.is_some_and(|queued| queued < 10));
+        let counters = collected.0.lock().unwrap();
+        assert_eq!(counters.len(), 10);
+        for Counters { ready, queued } in counters.iter() {
+            assert!(ready.is_some_and(|ready| ready < 10) && queued.is_some_and(|queued| queued < 10));
         }
     }
 
     #[test]
-    fn threads_of_one_name_have_one_plot() {
-        assert_eq!(name_for("worker"), name_for("worker"));
-        assert_ne!(name_for("worker"), name_for("another"));
-        assert_ne!(name_for("nul\0"), name_for("nul"));
+    fn threads_with_the_same_name_share_a_plot() {
+        assert_eq!(plot_of("worker"), plot_of("worker"));
+        assert_ne!(plot_of("worker"), plot_of("another"));
+        assert_ne!(plot_of("nul\0"), plot_of("nul"));
     }
 }

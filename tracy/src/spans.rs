@@ -1,4 +1,4 @@
-//! Spans as zones: those of processes by the processes' names, and all others by their own.
+//! Spans as zones: a node's span has the node's name, any other span its own.
 
 use std::{
     cell::RefCell,
@@ -23,8 +23,8 @@ use tracing_tracy::{
 
 use crate::RUNS;
 
-/// Whether it is the span of a process in a run.
-pub fn is_process(metadata: &Metadata<'_>) -> bool {
+/// Whether it is the span of a node.
+pub fn is_node(metadata: &Metadata<'_>) -> bool {
     metadata.is_span() && metadata.target() == RUNS && metadata.name() == "node"
 }
 
@@ -33,15 +33,15 @@ pub fn is_chunk(metadata: &Metadata<'_>) -> bool {
     metadata.is_span() && metadata.target() == RUNS && metadata.name() == "chunk"
 }
 
-/// Says that a zone has its span's name, and no call stack.
+/// Configures zones to have only their span's name: no fields, and no call stack.
 #[derive(Default)]
-pub struct ByName(NoFields);
+pub struct NameOnly(NoFields);
 
-/// Writes nothing: what a field says may be different in every span.
+/// Formats no fields, because their values may differ from span to span.
 #[derive(Default)]
 pub struct NoFields;
 
-impl Config for ByName {
+impl Config for NameOnly {
     type Formatter = NoFields;
 
     fn formatter(&self) -> &NoFields {
@@ -63,26 +63,26 @@ impl FormatFields<'_> for NoFields {
     }
 }
 
-/// Makes the zones of processes. [`TracyLayer`](tracing_tracy::TracyLayer) cannot name them by a field alone.
-pub struct Processes {
+/// Makes the zones of nodes. [`TracyLayer`](tracing_tracy::TracyLayer) cannot name a zone by a single field.
+pub struct NodeZones {
     client: Client,
 }
 
-/// The name of a process, kept with its span if a viewer is there to see it.
+/// The name of a node, stored with its span while a viewer is connected.
 struct Name(String);
 
 thread_local! {
-    /// The zones that the thread is in, and their spans.
+    /// The thread's open zones and the ids of their spans, innermost last.
     static ZONES: RefCell<Vec<(Id, Span)>> = const { RefCell::new(Vec::new()) };
 }
 
-impl Processes {
+impl NodeZones {
     pub fn new(client: Client) -> Self {
         Self { client }
     }
 }
 
-impl<S> Layer<S> for Processes
+impl<S> Layer<S> for NodeZones
 where
     S: Subscriber + for<'span> LookupSpan<'span>,
 {
@@ -95,7 +95,7 @@ where
     }
 
     fn on_enter(&self, id: &Id, context: Context<'_, S>) {
-        // Without a viewer a zone would be made, and thrown away.
+        // Without a viewer, the zone would be discarded.
         if !Client::is_connected() {
             return;
         }
@@ -109,27 +109,27 @@ where
 
     fn on_exit(&self, id: &Id, _context: Context<'_, S>) {
         ZONES.with_borrow_mut(|zones| {
-            // Those inside it have to end with it.
-            if let Some(place) = zones.iter().rposition(|(open, _)| open == id) {
-                zones.drain(place..).rev().for_each(drop);
+            // The zones inside it end with it.
+            if let Some(index) = zones.iter().rposition(|(open, _)| open == id) {
+                zones.drain(index..).rev().for_each(drop);
             }
         });
     }
 }
 
-/// What the zone of a process is called: its name, cut where Tracy could not take it.
+/// The name of a node's zone: the node's name, truncated to what Tracy accepts.
 pub fn name_of(attributes: &Attributes<'_>) -> String {
     let mut name = NameField(String::new());
     attributes.record(&mut name);
     let NameField(mut name) = name;
-    name.truncate(name.floor_char_boundary(MOST_BYTES));
+    name.truncate(name.floor_char_boundary(MAX_NAME_BYTES));
     name
 }
 
-/// Tracy keeps 64 KiB for a zone's name and the path of its source file, and shows some dozen letters.
-const MOST_BYTES: usize = 1024;
+/// Tracy allows 64 KiB for a zone's name and the path of its source file together, and shows a few dozen characters.
+const MAX_NAME_BYTES: usize = 1024;
 
-/// Looks at nothing but the field `name`.
+/// Reads the field `name`.
 struct NameField(String);
 
 impl Visit for NameField {
@@ -166,27 +166,27 @@ mod tests {
     };
     use tracing_tracy::Config;
 
-    use super::{ByName, MOST_BYTES, is_chunk, is_process, name_of};
+    use super::{MAX_NAME_BYTES, NameOnly, is_chunk, is_node, name_of};
 
-    /// Collects what zones are called: a process by its name, all else by the span's and what the formatter adds.
+    /// Collects the names of zones: a node's name, or a span's name and what the formatter adds to it.
     #[derive(Clone, Default)]
     struct Collected(Arc<Mutex<BTreeSet<String>>>);
 
     impl<S: Subscriber> Layer<S> for Collected {
         fn on_new_span(&self, attributes: &Attributes<'_>, _id: &Id, _context: Context<'_, S>) {
             let metadata = attributes.metadata();
-            let name = if is_process(metadata) {
+            let name = if is_node(metadata) {
                 name_of(attributes)
             } else {
-                metadata.name().to_owned() + &added(attributes)
+                metadata.name().to_owned() + &formatted_fields(attributes)
             };
             self.0.lock().unwrap().insert(name);
         }
     }
 
-    fn added(fields: impl RecordFields) -> String {
+    fn formatted_fields(fields: impl RecordFields) -> String {
         let mut text = String::new();
-        ByName::default().formatter().format_fields(Writer::new(&mut text), fields).unwrap();
+        NameOnly::default().formatter().format_fields(Writer::new(&mut text), fields).unwrap();
         text
     }
 
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn zones_have_names_alone_however_many_there_are() {
+    fn zone_names_contain_no_fields() {
         let names = collected(|| {
             for item in 0..100_000 {
                 let name = ["fill", "sort", "record"][item % 3];
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_of_any_sort_is_taken_as_it_is_and_cut_between_letters() {
+    fn any_name_is_used_unchanged_and_truncated_at_a_character() {
         let long = "a".to_owned() + &"ä".repeat(5_000);
         let names = collected(|| {
             for name in ["", "\"{name}\" <b>\0\u{7}", &long] {
@@ -220,21 +220,21 @@ mod tests {
             }
             debug_span!(target: "drawloom::graph", "node", name = ?Some(1));
         });
-        let cut = "a".to_owned() + &"ä".repeat(MOST_BYTES / 2 - 1);
+        let cut = "a".to_owned() + &"ä".repeat(MAX_NAME_BYTES / 2 - 1);
         assert_eq!(names, ["", "\"{name}\" <b>\0\u{7}", "Some(1)", &cut]);
     }
 
     #[test]
-    fn only_drawlooms_own_spans_are_processes_and_chunks() {
-        let told = |span: &tracing::Span| {
+    fn only_drawlooms_own_spans_are_nodes_and_chunks() {
+        let kind = |span: &tracing::Span| {
             let metadata = span.metadata().unwrap();
-            (is_process(metadata), is_chunk(metadata))
+            (is_node(metadata), is_chunk(metadata))
         };
         tracing::subscriber::with_default(Registry::default(), || {
-            assert_eq!(told(&debug_span!(target: "drawloom::graph", "node")), (true, false));
-            assert_eq!(told(&trace_span!(target: "drawloom::graph", "chunk")), (false, true));
-            assert_eq!(told(&debug_span!("node")), (false, false));
-            assert_eq!(told(&debug_span!(target: "drawloom", "record")), (false, false));
+            assert_eq!(kind(&debug_span!(target: "drawloom::graph", "node")), (true, false));
+            assert_eq!(kind(&trace_span!(target: "drawloom::graph", "chunk")), (false, true));
+            assert_eq!(kind(&debug_span!("node")), (false, false));
+            assert_eq!(kind(&debug_span!(target: "drawloom", "record")), (false, false));
         });
     }
 }

@@ -4,7 +4,7 @@ use drawloom_tracy::{InstallError, Zones};
 
 #[test]
 fn a_second_subscriber_is_an_error() {
-    assert_eq!(drawloom_tracy::install(Zones::Processes), Ok(()));
+    assert_eq!(drawloom_tracy::install(Zones::Nodes), Ok(()));
     assert_eq!(drawloom_tracy::install(Zones::Chunks), Err(InstallError));
     assert!(InstallError.to_string().contains("drawloom_tracy::layer"));
 }

@@ -24,7 +24,7 @@ const WELCOME: u8 = 1;
 const PROTOCOL_MISMATCH: u8 = 2;
 
 /// Letters in no order that turns up anywhere else, so that Tracy's compression leaves them as they are.
-const PROCESS: &str = "Wq7x#jvKz9";
+const NODE: &str = "Wq7x#jvKz9";
 const SPAN: &str = "Yb3u@fnGd5";
 const SECRETS: [&str; 4] = ["Ph8c!mtRs2", "Lk6e%ovXa4", "Uz1i&wyJr0", "Dg5o~hqBn3"];
 
@@ -39,7 +39,7 @@ fn a_viewer_of_tracy_0_14_sees_names_and_no_fields() {
     let (mut seen, mut part) = (Vec::new(), [0; 4096]);
     let has = |seen: &[u8], text: &str| seen.windows(text.len()).any(|window| window == text.as_bytes());
     let start = Instant::now();
-    while !(has(&seen, PROCESS) && has(&seen, SPAN)) {
+    while !(has(&seen, NODE) && has(&seen, SPAN)) {
         assert!(start.elapsed() < Duration::from_secs(60), "{} bytes, and no names", seen.len());
         if let Ok(count) = stream.read(&mut part) {
             assert!(count > 0, "the program has hung up after {} bytes", seen.len());
@@ -104,13 +104,13 @@ impl Drop for Program {
 #[test]
 #[ignore = "the other tests start it in a process of its own"]
 fn the_program_that_is_looked_at() {
-    drawloom_tracy::install(Zones::Processes).unwrap();
+    drawloom_tracy::install(Zones::Nodes).unwrap();
     let scheduler = Scheduler::builder().workers(2).on_start(drawloom_tracy::name_worker).build().unwrap();
     let mut graph = FrameGraph::new();
-    let process = graph.add(PROCESS, Closure::new(|(): &(), _, _| Ok(())).with_width(|()| 100));
-    let [of, stage, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.to_owned()));
-    graph.label(process, Labels { process: of, stage, view });
-    graph.keep(process);
+    let node = graph.add(NODE, Closure::new(|(): &(), _, _| Ok(())).with_width(|()| 100));
+    let [process, stage, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.to_owned()));
+    graph.label(node, Labels { process, stage, view });
+    graph.keep(node);
     let mut schedule = graph.compile().unwrap();
     schedule.always_parallel(true);
     let start = Instant::now();
