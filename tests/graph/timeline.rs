@@ -62,10 +62,10 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     assert_eq!(run.graph.nodes.len(), schedule.len());
     assert!(workers > 1 || run.parallel_from.is_none());
     assert!(run.parallel_from.is_none_or(|from| (run.began..=run.ended).contains(&from)));
-    for (index, (process, (name, busy))) in run.graph.nodes.iter().zip(schedule.nodes()).enumerate() {
-        assert_eq!(process.name, name);
-        assert_eq!(process.dependencies, schedule.dependencies(index));
-        assert_eq!(process.pinned, busy.pinned);
+    for (index, (node, (name, busy))) in run.graph.nodes.iter().zip(schedule.nodes()).enumerate() {
+        assert_eq!(node.name, name);
+        assert_eq!(node.dependencies, schedule.dependencies(index));
+        assert_eq!(node.pinned, busy.pinned);
         let mut next = 0;
         let empty = run.empty.iter().filter(|empty| empty.node == index);
         let parts: Vec<&Chunk> = run.chunks_of(index).iter().chain(empty).collect();
@@ -77,7 +77,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
             assert_eq!(part.opened, parts[0].opened, "all chunks of a node have the same opening time");
             assert!(part.worker < workers && !(busy.pinned && part.worker != 0));
             assert!(!(part.stolen && (workers == 1 || busy.pinned)), "{part:?}");
-            for &dependency in &process.dependencies {
+            for &dependency in &node.dependencies {
                 let before = run.chunks_of(dependency).iter();
                 before.for_each(|before| assert!(before.ended <= part.opened, "{before:?} and {part:?}"));
             }
@@ -114,11 +114,11 @@ proptest! {
     #[test]
     fn each_item_is_in_one_chunk_and_chunks_respect_all_dependencies(
         model in valid_graph(),
-        processes in vec((0..90_usize, prop::bool::weighted(0.2)), 24),
+        shapes in vec((0..90_usize, prop::bool::weighted(0.2)), 24),
         chunks in vec(1..40_usize, 3),
         always_parallel in any::<bool>(),
     ) {
-        let graph = model.graph(|process| Busy { width: processes[process].0, pinned: processes[process].1 });
+        let graph = model.graph(|node| Busy { width: shapes[node].0, pinned: shapes[node].1 });
         let mut schedule = graph.compile().map_err(|error| TestCaseError::fail(error.to_string()))?;
         schedule.always_parallel(always_parallel);
         for scheduler in &*RECORDED {
@@ -231,8 +231,8 @@ fn a_run_is_not_complete_if_a_log_is_taken_during_it_and_lost_chunks_are_counted
         }
         Ok(())
     });
-    let process = graph.add("take", take.with_width(|_| 9));
-    graph.keep(process);
+    let node = graph.add("take", take.with_width(|_| 9));
+    graph.keep(node);
     let mut schedule = graph.compile().unwrap();
     scheduler.timeline().start();
     schedule.run(&scheduler, &()).unwrap();
@@ -444,8 +444,8 @@ fn any_capacity_is_accepted() {
 
 fn single(busy: Busy) -> Schedule<Busy> {
     let mut graph = FrameGraph::new();
-    let process = graph.add("busy", busy);
-    graph.keep(process);
+    let node = graph.add("busy", busy);
+    graph.keep(node);
     graph.compile().unwrap()
 }
 
