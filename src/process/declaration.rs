@@ -1,98 +1,98 @@
-//! What a process says of itself before it draws.
+//! What a process declares before it draws.
 
 use super::Format;
 use crate::scene::ViewKind;
 
-/// Collects what a process reads and writes. Targets are named; each view of the process's kind has its own, of its
-/// picture's size.
+/// Collects what a process reads and writes. Targets have names. Each view of the process' kind has targets of its own, of the
+/// size of its picture.
 #[derive(Debug, Default)]
 pub struct Declare {
     declaration: Declaration,
 }
 
 impl Declare {
-    /// The kind of view it draws in; [`ViewKind::Main`] unless said otherwise.
+    /// Sets the kind of view that the process draws in; the default is [`ViewKind::Main`].
     pub fn views(&mut self, kind: ViewKind) {
         self.declaration.views = kind;
     }
 
-    /// Draws into a colour target that is cleared first. Colour targets are the shader's outputs in the order declared.
+    /// Draws into a colour target, cleared first. Colour targets are the shader's outputs in the order declared.
     pub fn clears_color(&mut self, target: &str, format: Format, clear: ClearColor) {
         self.access(target, Access::ClearColor(format, clear));
     }
 
-    /// Draws over what other processes drew into a colour target.
+    /// Draws into a colour target over what other processes drew.
     pub fn draws_over(&mut self, target: &str) {
         self.access(target, Access::DrawOver);
     }
 
-    /// Tests and writes a depth target that is first cleared to 0, infinitely far away (depth is reversed).
+    /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed.
     pub fn clears_depth(&mut self, target: &str, format: Format) {
         self.access(target, Access::ClearDepth(format));
     }
 
-    /// Tests and writes a depth target over what another process drew into it.
+    /// Tests and writes a depth target over what another process drew.
     pub fn draws_depth(&mut self, target: &str) {
         self.access(target, Access::DrawDepth);
     }
 
-    /// Tests and writes a depth target that all views of its kind share: one texture array, of which each view has a layer. It
-    /// is first cleared to 0, infinitely far away. Those views have pictures of one size.
+    /// Tests and writes a depth target that all views of its kind share: a texture array with one layer for each view, first
+    /// cleared to 0, infinitely far away. The pictures of those views have the same size.
     pub fn clears_depth_layer(&mut self, target: &str, format: Format) {
         self.access(target, Access::ClearDepthLayer(format));
     }
 
-    /// Tests against the depth that another process wrote, and leaves it as it is.
+    /// Tests against the depth that another process wrote, without writing it.
     pub fn tests_depth(&mut self, target: &str) {
         self.access(target, Access::TestDepth);
     }
 
-    /// Draws only where its depth is exactly what another process wrote, and leaves it as it is.
+    /// Draws only where its depth equals the depth that another process wrote, without writing it.
     pub fn matches_depth(&mut self, target: &str) {
         self.access(target, Access::MatchDepth);
     }
 
-    /// Reads a target in its shader, at `@group(2)`: the first one sampled is binding 1, the next 2, and so on.
+    /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on.
     pub fn samples(&mut self, target: &str) {
         self.access(target, Access::Sample);
     }
 
-    /// Reads in its shader, at `@group(2)` as [`Declare::samples`], the texture array that all views of another kind share.
+    /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as [`Declare::samples`] does.
     pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
         self.access(target, Access::SampleLayers(views));
     }
 
-    /// A raw pass writes a target by commands of its own; as a storage texture too, where [`Format::can_be_stored`].
+    /// A raw pass overwrites a target with its own commands; as a storage texture too, if [`Format::can_be_stored`].
     pub fn writes(&mut self, target: &str, format: Format) {
         self.access(target, Access::Write(format));
     }
 
-    /// A raw pass changes, by commands of its own, what others wrote into a target.
+    /// A raw pass reads and writes a target with its own commands.
     pub fn changes(&mut self, target: &str) {
         self.access(target, Access::Change);
     }
 
-    /// A raw pass reads a target by commands of its own.
+    /// A raw pass reads a target with its own commands.
     pub fn reads(&mut self, target: &str) {
         self.access(target, Access::Read);
     }
 
-    /// Comes after another process, whatever they read and write.
+    /// Orders the process after another one, whatever they read and write.
     pub fn after(&mut self, process: &str) {
         self.declaration.after.push(process.to_owned());
     }
 
-    /// Comes before another process, whatever they read and write.
+    /// Orders the process before another one, whatever they read and write.
     pub fn before(&mut self, process: &str) {
         self.declaration.before.push(process.to_owned());
     }
 
-    /// Stays in the graph even though no output depends on it: it has effects of its own.
+    /// Keeps the process in the graph although no output depends on it, because it has side effects.
     pub fn keep(&mut self) {
         self.declaration.keep = true;
     }
 
-    /// All that was declared.
+    /// The declaration.
     pub fn finish(self) -> Declaration {
         self.declaration
     }
@@ -105,20 +105,20 @@ impl Declare {
 /// What a process declared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Declaration {
-    /// The kind of view it draws in.
+    /// The kind of view that it draws in.
     pub views: ViewKind,
-    /// Which targets it uses, and how, in the order declared.
+    /// The targets that it uses, and how, in the order declared.
     pub accesses: Vec<(String, Access)>,
-    /// The processes it comes after.
+    /// The processes that it comes after.
     pub after: Vec<String>,
-    /// The processes it comes before.
+    /// The processes that it comes before.
     pub before: Vec<String>,
-    /// Whether it stays although no output depends on it.
+    /// Whether it stays in the graph although no output depends on it.
     pub keep: bool,
 }
 
 impl Declaration {
-    /// The colour targets it draws into, in the order of the shader's outputs; with the clear value where there is one.
+    /// The colour targets in the order of the shader's outputs, each with its clear colour if it is cleared.
     pub fn colors(&self) -> impl Iterator<Item = (&str, Option<ClearColor>)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
             Access::ClearColor(_, clear) => Some((target.as_str(), Some(*clear))),
@@ -127,18 +127,18 @@ impl Declaration {
         })
     }
 
-    /// The targets it leaves changed.
+    /// The targets that it writes.
     pub fn written(&self) -> impl Iterator<Item = &str> {
         self.accesses.iter().filter(|(_, access)| access.writes()).map(|(target, _)| target.as_str())
     }
 
-    /// The depth target it tests, and how it uses it.
+    /// The depth target, and how it is used.
     pub fn depth(&self) -> Option<(&str, Access)> {
         let depth = self.accesses.iter().find(|(_, access)| access.is_depth());
         depth.map(|(target, access)| (target.as_str(), *access))
     }
 
-    /// The targets its shader reads, in the order of their bindings; with the kind of view whose they are.
+    /// The targets that the shader samples in the order of their bindings, each with the kind of view that it belongs to.
     pub fn samples(&self) -> impl Iterator<Item = (ViewKind, &str)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
             Access::Sample => Some((self.views, target.as_str())),
@@ -152,44 +152,44 @@ impl Declaration {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Access {
-    /// Drawn into, cleared first.
+    /// Drawn into; cleared first.
     ClearColor(Format, ClearColor),
-    /// Drawn into, over what is there.
+    /// Drawn into, over its content.
     DrawOver,
-    /// Tested and written, cleared first.
+    /// Tested and written; cleared first.
     ClearDepth(Format),
-    /// Tested and written, cleared first; a layer of a texture array that all views of the kind share.
+    /// Tested and written; cleared first. A layer of a texture array that all views of the kind share.
     ClearDepthLayer(Format),
-    /// Tested and written, over what is there.
+    /// Tested and written, over its content.
     DrawDepth,
     /// Tested.
     TestDepth,
-    /// Tested for being exactly the same.
+    /// Tested for equality.
     MatchDepth,
     /// Read by the shader.
     Sample,
-    /// Read by the shader: the texture array that all views of this kind share.
+    /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
     /// Written by a raw pass.
     Write(Format),
-    /// Changed by a raw pass.
+    /// Read and written by a raw pass.
     Change,
     /// Read by a raw pass.
     Read,
 }
 
 impl Access {
-    /// Whether it needs what is in the target already.
+    /// Whether it depends on the target's earlier content.
     pub fn reads(self) -> bool {
         !matches!(self, Self::ClearColor(..) | Self::ClearDepth(_) | Self::ClearDepthLayer(_) | Self::Write(_))
     }
 
-    /// Whether it leaves the target changed.
+    /// Whether it changes the target.
     pub fn writes(self) -> bool {
         !matches!(self, Self::TestDepth | Self::MatchDepth | Self::Sample | Self::SampleLayers(_) | Self::Read)
     }
 
-    /// The format it gives the target, where it does.
+    /// The target's format, if the access creates the target.
     pub fn format(self) -> Option<Format> {
         match self {
             Self::ClearColor(format, _)
@@ -200,7 +200,7 @@ impl Access {
         }
     }
 
-    /// The kind of view whose target it is, of a process that draws in views of the kind `own`.
+    /// The kind of view that the target belongs to, for a process that draws in views of the kind `own`.
     pub fn views(self, own: ViewKind) -> ViewKind {
         match self {
             Self::SampleLayers(views) => views,
@@ -208,7 +208,7 @@ impl Access {
         }
     }
 
-    /// Whether the target is the one that depth is tested against.
+    /// Whether the target is the depth target.
     pub fn is_depth(self) -> bool {
         matches!(
             self,
@@ -216,13 +216,13 @@ impl Access {
         )
     }
 
-    /// Whether it is by commands of a raw pass.
+    /// Whether a raw pass makes the access.
     pub fn is_raw(self) -> bool {
         matches!(self, Self::Write(_) | Self::Change | Self::Read)
     }
 }
 
-/// What a colour target is cleared to.
+/// The colour that a target is cleared to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ClearColor {
     /// Red, green, blue and alpha, linear.

@@ -12,13 +12,13 @@ use crate::view::LightClass;
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Draws<'a> {
-    /// The objects that the view sees, with one shader.
+    /// The objects that the view sees, all with one shader.
     Commands(CommandDraws<'a>),
-    /// Every pixel once.
+    /// Every pixel, once.
     FullScreen(FullScreen<'a>),
-    /// What the lights of a class reach.
+    /// The pixels that the lights of a class reach.
     Lights(LightDraws<'a>),
-    /// Whatever the process encodes itself: compute, copies, passes of its own.
+    /// Commands that the process encodes itself: compute, copies, render passes.
     #[cfg(feature = "wgpu")]
     Raw(&'a dyn RawPass),
 }
@@ -26,15 +26,15 @@ pub enum Draws<'a> {
 /// The objects that a view sees: culled, sorted, merged into instanced batches and recorded into bundles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommandDraws<'a> {
-    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `vertex`.
+    /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `vertex`.
     pub shader: &'a str,
-    /// The fragment entry point; `None` draws depth alone.
+    /// The fragment entry point; `None` draws only depth.
     pub fragment: Option<&'a str>,
-    /// Which objects.
+    /// Which objects are drawn.
     pub selection: Selection,
-    /// Whether what is drawn hides what comes behind it.
+    /// Whether depth is written.
     pub writes_depth: bool,
-    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
 }
 
@@ -50,35 +50,35 @@ impl Default for CommandDraws<'_> {
     }
 }
 
-/// Every pixel of the view once, by one triangle that is infinitely far away: where the process tests depth, it shows where
-/// nothing else is.
+/// Every pixel of the view, once, by one triangle infinitely far away: if the process tests depth, only pixels where nothing was
+/// drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FullScreen<'a> {
-    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
+    /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
     /// the prelude's `FullScreenPixel`.
     pub shader: &'a str,
-    /// How it mixes with what is in the targets.
+    /// How it blends with the targets' content.
     pub blend: Blend,
-    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
 }
 
-/// The pixels that lights reach: each light is drawn as geometry that surrounds what it lights (L 4.2.1), all of a class in one
-/// instanced draw, and what they add up to is added to the targets. A process that draws lights tests depth, so that pixels
-/// whose surface is behind a light's geometry are left out before they are shaded.
+/// The pixels that lights reach. Each light is drawn as a light volume (L 4.2.1), all lights of a class in one instanced draw,
+/// with additive blending. A process that draws lights tests depth, so that pixels whose surface is behind the light volume are
+/// rejected before they are shaded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightDraws<'a> {
-    /// WGSL that is appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
+    /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
     /// the prelude's `LightPixel`.
     pub shader: &'a str,
-    /// Which lights.
+    /// Which lights are drawn.
     pub class: LightClass,
-    /// The bytes of the uniform at `@group(2) @binding(0)`; none, no binding.
+    /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
 }
 
 impl Draws<'_> {
-    /// Which objects are drawn; `None` where none are.
+    /// Which objects are drawn; `None` if it draws no objects.
     pub fn selection(&self) -> Option<Selection> {
         match self {
             Self::Commands(commands) => Some(commands.selection),
@@ -86,12 +86,12 @@ impl Draws<'_> {
         }
     }
 
-    /// Whether what is drawn hides what comes behind it, where it writes depth.
+    /// Whether it draws objects that write depth, and so hide what is behind them.
     pub fn hides(&self) -> bool {
         matches!(self, Self::Commands(commands) if commands.writes_depth)
     }
 
-    /// The bytes of the uniform at `@group(2) @binding(0)`; empty where there is none.
+    /// The bytes of the uniform at `@group(2) @binding(0)`; empty if there is none.
     pub fn parameters(&self) -> &[u8] {
         match self {
             Self::Commands(commands) => &commands.parameters,

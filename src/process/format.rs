@@ -1,4 +1,4 @@
-//! What a target's pixels are.
+//! The pixel formats of targets.
 
 use crate::quality::{DiffuseFormat, NormalFormat};
 
@@ -10,9 +10,9 @@ pub enum Format {
     Rg8Unorm,
     /// Four bytes, linear, 0 to 1.
     Rgba8Unorm,
-    /// Four bytes, the colours sRGB encoded.
+    /// Four bytes; red, green and blue are sRGB encoded.
     Rgba8Srgb,
-    /// Three numbers of 10 bits and one of 2, linear, 0 to 1.
+    /// Three channels of 10 bits and one of 2, linear, 0 to 1.
     Rgb10a2Unorm,
     /// Four half floats.
     Rgba16Float,
@@ -20,7 +20,7 @@ pub enum Format {
     Rg16Float,
     /// A float.
     R32Float,
-    /// Depth as a float.
+    /// Depth, a float.
     Depth32Float,
 }
 
@@ -35,12 +35,12 @@ impl Format {
         matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float)
     }
 
-    /// Whether it holds numbers below 0.
+    /// Whether it holds negative numbers.
     pub fn is_signed(self) -> bool {
         matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R32Float)
     }
 
-    /// Numbers a pixel.
+    /// Channels per pixel.
     pub fn channels(self) -> usize {
         match self {
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
@@ -49,7 +49,7 @@ impl Format {
         }
     }
 
-    /// Bytes a pixel.
+    /// Bytes per pixel.
     pub fn bytes(self) -> usize {
         match self {
             Self::Rg8Unorm => 2,
@@ -60,7 +60,7 @@ impl Format {
     }
 }
 
-/// What the target `normal` is to be: see [`GeometryFormats`](super::GeometryFormats).
+/// The format of the target `normal`: see [`GeometryFormats`](super::GeometryFormats).
 impl From<NormalFormat> for Format {
     fn from(normals: NormalFormat) -> Self {
         match normals {
@@ -72,7 +72,7 @@ impl From<NormalFormat> for Format {
     }
 }
 
-/// What the target `diffuse` is to be: see [`GeometryFormats`](super::GeometryFormats).
+/// The format of the target `diffuse`: see [`GeometryFormats`](super::GeometryFormats).
 impl From<DiffuseFormat> for Format {
     fn from(diffuse: DiffuseFormat) -> Self {
         match diffuse {

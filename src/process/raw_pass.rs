@@ -4,14 +4,14 @@ use std::error::Error;
 
 use crate::scene::ViewKind;
 
-/// A pass that gets the encoder: compute, copies and viewports do not fit into a bundle.
+/// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
-/// It is called on a worker, once a frame for each view of its process.
+/// It is called on a worker, once per frame and view of its process' kind.
 pub trait RawPass: Send + Sync {
     /// Encodes the pass.
     ///
     /// # Errors
-    /// Whatever the engine finds wrong; the frame fails and names the process.
+    /// Any error of the engine: the frame fails with an error that names the process.
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -19,7 +19,7 @@ pub trait RawPass: Send + Sync {
     ) -> Result<(), Box<dyn Error + Send + Sync>>;
 }
 
-/// What a raw pass can use.
+/// The resources of a raw pass.
 pub struct RawPassResources<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
@@ -32,12 +32,12 @@ pub struct RawPassResources<'a> {
 }
 
 impl RawPassResources<'_> {
-    /// The view's target of this name; `None` where no process declares one.
+    /// The view's target of this name; `None` if no process declares it.
     pub fn target(&self, name: &str) -> Option<&wgpu::Texture> {
         (self.textures)(name)
     }
 
-    /// The texture array that all views of a kind share under this name; `None` where no process declares one.
+    /// The texture array of this name that all views of a kind share; `None` if no process declares it.
     pub fn layered_target(&self, views: ViewKind, name: &str) -> Option<&wgpu::Texture> {
         (self.layered)(views, name)
     }

@@ -1,13 +1,13 @@
-//! What an engine writes to add a step to its frames.
+//! What an engine implements to add a step to its frames.
 
 use std::sync::Arc;
 
 use super::{CpuShader, Declare, Draws};
 
-/// A step of the frame: it owns its trip from the objects a view sees to a recorded pass.
+/// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
-/// A process draws once in each view of its kind. It is shared by all workers while a frame is recorded, so what changes
-/// from frame to frame is behind a lock or an atomic of its own.
+/// A process draws once in each view of its kind. All workers share it while a frame is recorded, so it keeps what changes over
+/// frames behind a lock or in an atomic.
 ///
 /// ```
 /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -40,25 +40,25 @@ use super::{CpuShader, Declare, Draws};
 /// }
 /// ```
 pub trait RenderProcess: Send + Sync {
-    /// What it is called in errors, reports and the graph; no two processes of a graph share a name.
+    /// Its name in errors, reports and the graph, unique among the processes of a frame.
     fn name(&self) -> &str;
 
-    /// Says which views it is for, and what it reads and writes. Asked once for every plan that it becomes part of:
-    /// when the renderer is built, and when a scene requires other processes beside it.
+    /// Declares the views that it draws in, and what it reads and writes. Called once for every plan that it is part of: when
+    /// the renderer is built, and when a scene requires other processes beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// Says what it draws. Asked once a frame, and may change: new parameters cost nothing, another shader or blending
-    /// makes new pipelines.
+    /// What it draws. Called once per frame, and the result may change: new parameters cost nothing, another shader or blending
+    /// needs new pipelines.
     fn draws(&self) -> Draws<'_>;
 
-    /// What the software backend runs in the place of the process's WGSL; without one, frames with this process fail there, and
-    /// say so. Asked once a frame, by that backend alone.
+    /// What the software backend runs in place of the process' WGSL. Without one, frames with this process return an error on
+    /// that backend. Called once per frame, by the software backend only.
     fn cpu_shader(&self) -> Option<CpuShader> {
         None
     }
 }
 
-/// A process that an engine keeps a hold of, to change what it draws from frame to frame.
+/// A process that an engine keeps a handle to, in order to change what it draws.
 impl<P: RenderProcess + ?Sized> RenderProcess for Arc<P> {
     fn name(&self) -> &str {
         (**self).name()

@@ -1,4 +1,4 @@
-//! Textures, sampled as devices do.
+//! Trilinear texture sampling, as on devices.
 
 use std::sync::LazyLock;
 
@@ -6,15 +6,16 @@ use crate::backend::mip_generation::{ARRAY_SIDES, array_for, mip_chain, srgb_to_
 use crate::raster::{Real, Vector, Vector2, Vector4};
 use crate::scene::Texture;
 
-/// All mip levels of a texture, as [`mip_chain`] has them.
+/// All mip levels of a texture.
 pub(super) struct MipChain {
-    /// Of the first level, in pixels: a power of two.
+    /// The width of the first level in pixels: a power of two.
     side: usize,
     levels: Vec<Vec<u8>>,
 }
 
-/// What the bytes of red, green and blue stand for.
-static LIGHT: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f64 / 255.0)));
+/// The linear value of each byte of red, green and blue.
+static LINEAR_OF_BYTES: LazyLock<[f64; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f64 / 255.0)));
 
 impl MipChain {
     pub(super) fn of(texture: &Texture) -> Self {
@@ -22,49 +23,49 @@ impl MipChain {
         Self { side: side as usize, levels: mip_chain(texture, side) }
     }
 
-    /// The level of detail is where a step to the next column, or to the next row if that is longer, is as long as a pixel (Vulkan,
-    /// "Level-of-Detail Operation"). Between two levels, both are blended.
-    pub(super) fn trilinear<R: Real>(&self, uv: Vector2<R>, across: Vector2<R>, down: Vector2<R>) -> Vector4<R> {
-        // What is no number stands for 0, as on devices; it would lead to no pixel at all.
+    /// Samples trilinearly. At the level of detail, the longer of the steps to the next column and to the next row is one pixel long
+    /// (Vulkan, "Level-of-Detail Operation").
+    pub(super) fn trilinear<R: Real>(&self, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
+        // Numbers that are not finite count as 0, as on devices: they would not lead to a pixel.
         let finite = |value: R| if value.is_finite() { value } else { R::zero() };
         let uv = uv.map(finite);
-        let longest = finite(across.dot(across).max(down.dot(down)).sqrt() * R::of(self.side as f64));
+        let longest = finite(dpdx.dot(dpdx).max(dpdy.dot(dpdy)).sqrt() * R::of(self.side as f64));
         let last = self.levels.len() - 1;
         let level = longest.max(R::one()).log2().min(R::of(last as f64));
         let finer = level.floor();
-        let share = level - finer;
+        let fraction = level - finer;
         let finer = finer.as_f64() as usize;
-        let light = &*LIGHT;
-        let one = self.bilinear(light, finer, uv);
-        if share == R::zero() {
+        let linear = &*LINEAR_OF_BYTES;
+        let one = self.bilinear(linear, finer, uv);
+        if fraction == R::zero() {
             return one;
         }
-        one.with(self.bilinear(light, finer + 1, uv), |one, other| one + (other - one) * share)
+        one.with(self.bilinear(linear, finer + 1, uv), |one, other| one + (other - one) * fraction)
     }
 
-    /// Of the four pixels around a place, each by how near its middle is. The picture repeats beyond its border.
-    fn bilinear<R: Real>(&self, light: &[f64; 256], level: usize, uv: Vector2<R>) -> Vector4<R> {
+    /// Blends the four nearest pixels. The texture repeats beyond its border.
+    fn bilinear<R: Real>(&self, linear: &[f64; 256], level: usize, uv: Vector2<R>) -> Vector4<R> {
         let side = self.side >> level;
-        // Taken to between 0 and 1 first, so that far places keep what f32 has of them.
-        let place = uv.map(|value| (value - value.floor()) * R::of(side as f64) - R::of(0.5));
-        let [x, y] = place.map(R::floor).0;
-        let [right, lower] = (place - Vector([x, y])).0;
+        // The fraction is taken before scaling, so that far coordinates lose no more precision.
+        let point = uv.map(|value| (value - value.floor()) * R::of(side as f64) - R::of(0.5));
+        let [x, y] = point.map(R::floor).0;
+        let [right, lower] = (point - Vector([x, y])).0;
         let wrapped = |first: R, step: i64| (first.as_f64() as i64 + step).rem_euclid(side as i64) as usize;
         let columns = [(wrapped(x, 0), R::one() - right), (wrapped(x, 1), right)];
         let rows = [(wrapped(y, 0), R::one() - lower), (wrapped(y, 1), lower)];
         let mut sum = Vector::zero();
         for (row, row_weight) in rows {
             for (column, weight) in columns {
-                sum = sum + self.pixel(light, level, row * side + column) * (weight * row_weight);
+                sum = sum + self.pixel(linear, level, row * side + column) * (weight * row_weight);
             }
         }
         sum
     }
 
-    fn pixel<R: Real>(&self, light: &[f64; 256], level: usize, index: usize) -> Vector4<R> {
+    fn pixel<R: Real>(&self, linear: &[f64; 256], level: usize, index: usize) -> Vector4<R> {
         let bytes = &self.levels[level][index * 4..index * 4 + 4];
-        let of_light = |byte: u8| R::of(light[usize::from(byte)]);
-        Vector([of_light(bytes[0]), of_light(bytes[1]), of_light(bytes[2]), R::of(f64::from(bytes[3]) / 255.0)])
+        let color = |byte: u8| R::of(linear[usize::from(byte)]);
+        Vector([color(bytes[0]), color(bytes[1]), color(bytes[2]), R::of(f64::from(bytes[3]) / 255.0)])
     }
 }
 
@@ -74,7 +75,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// How far f32 rounds, as a share of the value.
+    /// The unit roundoff of f32.
     const UNIT: f64 = 1.0 / 16_777_216.0;
 
     pub(in crate::backend::software) fn noise(side: u32) -> Texture {
@@ -91,15 +92,15 @@ pub(super) mod tests {
         chain.trilinear(uv, across, down).0.map(R::as_f64)
     }
 
-    /// Of every pixel of a level, those by a tent as wide as two pixels around the place, wherever it repeats.
+    /// All pixels of a level, weighted by a tent filter two pixels wide around the point, which repeats.
     fn expected(levels: &[Vec<u8>], level: usize, uv: [f64; 2]) -> [f64; 4] {
         let side = 256_usize >> level;
-        let tent = |index: usize, place: f64| {
-            let distance = (index as f64 + 0.5) / side as f64 - place;
+        let tent = |index: usize, point: f64| {
+            let distance = (index as f64 + 0.5) / side as f64 - point;
             (1.0 - (distance - distance.round()).abs() * side as f64).max(0.0)
         };
         // A level of one pixel is its own neighbour.
-        let weight = |index: usize, place: f64| if side == 1 { 1.0 } else { tent(index, place) };
+        let weight = |index: usize, point: f64| if side == 1 { 1.0 } else { tent(index, point) };
         let mut sum = [0.0; 4];
         for (index, pixel) in levels[level].chunks_exact(4).enumerate() {
             let weight = weight(index % side, uv[0]) * weight(index / side, uv[1]);
@@ -118,8 +119,8 @@ pub(super) mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// In f32, the place in a level's pixels is off by u·(|uv| + 2·side), and so is each weight; a step of one pixel changes what
-        /// is found by 1 at most in each direction. The level is off by 8u and a few u of its logarithm, whose logarithm is 9 at most:
+        /// In f32, the point in a level's pixels is off by u·(|uv| + 2·side), and so is each weight; a step of one pixel changes the
+        /// result by 1 at most in each direction. The level is off by 8u and a few u of its logarithm, whose logarithm is 9 at most:
         /// 20u; sums and products add 10u.
         #[test]
         fn it_is_trilinear(
@@ -153,20 +154,20 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_middle_of_a_pixel_is_that_pixel() {
+    fn the_centre_of_a_pixel_samples_that_pixel() {
         let texture = noise(256);
         let chain = MipChain::of(&texture);
         let pixels: Vec<_> = texture.pixels().chunks_exact(4).collect();
         for [x, y] in [[0, 0], [255, 0], [17, 200], [255, 255]] {
-            let uv = [x, y].map(|place| (place as f64 + 0.5) / 256.0 - 2.0);
+            let uv = [x, y].map(|index| (index as f64 + 0.5) / 256.0 - 2.0);
             let found = texel::<f64>(&chain, uv, [[0.0; 2]; 2]);
             let [red, .., alpha] = pixels[y * 256 + x] else { unreachable!() };
-            assert_eq!([found[0], found[3]], [LIGHT[usize::from(*red)], f64::from(*alpha) / 255.0]);
+            assert_eq!([found[0], found[3]], [LINEAR_OF_BYTES[usize::from(*red)], f64::from(*alpha) / 255.0]);
         }
     }
 
     #[test]
-    fn what_is_no_number_finds_a_colour_all_the_same() {
+    fn coordinates_that_are_not_finite_sample_a_colour() {
         let chain = MipChain::of(&noise(8));
         for strange in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e38, -1e38, -1e-30] {
             for [uv, across] in [[[strange, 0.3], [0.0; 2]], [[0.3, 0.3], [strange, 0.1]]] {

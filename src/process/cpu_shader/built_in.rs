@@ -1,6 +1,6 @@
-//! What WGSL has built in and CPU shaders need, for any number.
+//! WGSL's built-in functions that CPU shaders need, for either precision.
 //!
-//! Where a number is not one, `min` and `max` give the other, as they do on devices; so `clamp` gives its lower end.
+//! If one argument is NaN, `min` and `max` return the other, as on devices; so `clamp` of NaN returns the lower end.
 
 use crate::raster::{Real, Vector, Vector3, Vector4};
 
@@ -9,18 +9,18 @@ pub(in crate::process) fn clamp<R: Real>(value: R, low: R, high: R) -> R {
     value.max(low).min(high)
 }
 
-/// `mix`: from `one` at a share of 0 to `other` at a share of 1.
-pub(in crate::process) fn mix<R: Real>(one: R, other: R, share: R) -> R {
-    one * (R::one() - share) + other * share
+/// `mix`: `one` at a factor of 0, `other` at a factor of 1.
+pub(in crate::process) fn mix<R: Real>(one: R, other: R, factor: R) -> R {
+    one * (R::one() - factor) + other * factor
 }
 
-/// `smoothstep`: from 0 at `low` to 1 at `high`; a step where the two are the same.
+/// `smoothstep`: from 0 at `low` to 1 at `high`; a step if the two are equal.
 pub(in crate::process) fn smoothstep<R: Real>(low: R, high: R, value: R) -> R {
-    let share = clamp((value - low) / (high - low), R::zero(), R::one());
-    share * share * (R::of(3.0) - R::of(2.0) * share)
+    let factor = clamp((value - low) / (high - low), R::zero(), R::one());
+    factor * factor * (R::of(3.0) - R::of(2.0) * factor)
 }
 
-/// `fract`: what is above the next whole number below, for negative numbers too.
+/// `fract`: the distance from the next integer below, for negative numbers too.
 pub(in crate::process) fn fract<R: Real>(value: R) -> R {
     value - value.floor()
 }
@@ -41,7 +41,7 @@ pub(in crate::process) fn inverse_square_root<R: Real>(value: R) -> R {
     R::one() / value.sqrt()
 }
 
-/// `normalize`; 0 where there is no direction.
+/// `normalize`; 0 for a vector of length 0.
 pub(in crate::process) fn normalize<R: Real, const N: usize>(vector: Vector<R, N>) -> Vector<R, N> {
     let length_squared = vector.dot(vector);
     if length_squared > R::zero() { vector * inverse_square_root(length_squared) } else { Vector::zero() }
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_number_ends_here() {
+    fn nan_and_zero_lengths_give_finite_results() {
         assert_eq!(clamp(f32::NAN, 2.0, 3.0), 2.0);
         assert_eq!(smoothstep(0.5_f32, 0.5, 0.5), 0.0);
         assert_eq!(sign(f64::NAN), 0.0);
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn they_are_what_wgsl_says() {
+    fn the_functions_follow_the_wgsl_specification() {
         for value in [-2.5, -1.0, -0.25, 0.0, 0.5, 1.0, 7.75_f64] {
             assert_eq!(clamp(value, 0.0, 1.0), value.clamp(0.0, 1.0));
             assert_eq!(fract(value), value.rem_euclid(1.0));

@@ -1,4 +1,4 @@
-//! The CPU shader of `drawloom.wgsl`: what every CPU shader may use.
+//! The functions of `drawloom.wgsl` in Rust, for all CPU shaders.
 
 use super::built_in::{mix, normalize, rgb, with_alpha};
 use super::{PassInputs, ShaderMaterial, ShaderObject, ShaderView};
@@ -6,27 +6,27 @@ use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::Projection;
 
 impl<R: Real> ShaderObject<R> {
-    /// From object space to a place relative to the camera, along the world's axes, in metres: `relative_position`.
+    /// From object space to a position relative to the camera, along the world's axes, in metres: `relative_position`.
     pub fn relative_position(&self, position: Vector3<R>) -> Vector3<R> {
         self.origin + self.orientation.rotate(self.scale * position) - self.camera
     }
 
-    /// From object space to the world's axes, of unit length; 0 where there is none to be had: `world_normal`. A scale of 0
-    /// along one axis leaves a normal too.
+    /// A normal from object space to the world's axes, of unit length; 0 if there is none: `world_normal`. It works for a scale of 0
+    /// along one axis too.
     pub fn world_normal(&self, normal: Vector3<R>) -> Vector3<R> {
         let largest = self.scale.0.into_iter().fold(R::zero(), |largest, size| largest.max(size.abs()));
-        // Products of the scale as it is could leave the range of f32.
+        // Products of the unnormalized scale could leave the range of f32.
         let scale = if largest > R::zero() { self.scale.map(|size| size / largest) } else { Vector::splat(R::one()) };
         let [x, y, z] = scale.0;
         let mirrored = if x * y * z < R::zero() { -R::one() } else { R::one() };
-        // The cofactors of a scale need no division.
+        // Cofactors need no division, unlike the inverse.
         normalize(self.orientation.rotate(Vector([y * z, z * x, x * y]) * mirrored * normal))
     }
 }
 
 impl<R: Real> ShaderView<R> {
-    /// From a place relative to the camera, along the world's axes, to clip space: `clip_position`. The same to the bit
-    /// wherever it is called, so CPU shaders that call it draw at the same depth.
+    /// From a position relative to the camera, along the world's axes, to clip space: `clip_position`. CPU shaders that call it with
+    /// the same position draw at exactly the same depth.
     pub fn clip_position(&self, relative: Vector3<R>) -> Vector4<R> {
         let [right, up, back, origin] = self.clip_from_relative;
         let [x, y, z] = relative.0;
@@ -40,19 +40,19 @@ impl<R: Real> ShaderView<R> {
         clip
     }
 
-    /// From the camera's axes to clip space, as a mirror shaped like a paraboloid shows it (Brabec et al. 2002).
-    fn paraboloid_position(&self, place: Vector3<R>) -> Vector4<R> {
-        let distance = place.length();
-        let at_least = distance.max(R::of(1e-30));
-        let forward = -place[2] / at_least;
+    /// From the camera's axes to clip space, by a paraboloid mapping (Brabec et al. 2002).
+    fn paraboloid_position(&self, position: Vector3<R>) -> Vector4<R> {
+        let distance = position.length();
+        let nonzero = distance.max(R::of(1e-30));
+        let forward = -position[2] / nonzero;
         let depth = (self.far - distance) / (self.far - self.near);
-        let widened = at_least * (R::one() + forward).max(R::of(0.1));
-        // Straight behind the camera is everywhere at once. What lies there is outside the picture anyway, so it is left out.
+        let divisor = nonzero * (R::one() + forward).max(R::of(0.1));
+        // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and clipped.
         let depth = if forward < R::of(-0.6) { -R::one() } else { depth };
-        Vector([place[0] / widened, place[1] / widened, depth, R::one()])
+        Vector([position[0] / divisor, position[1] / divisor, depth, R::one()])
     }
 
-    /// From a pixel's place in clip space and its depth to its place relative to the camera, along the world's axes, in metres:
+    /// From a pixel's clip coordinates and depth to its position relative to the camera, along the world's axes, in metres:
     /// `position_from_depth`. In perspective, a depth of 0 is infinitely far away.
     pub fn position_from_depth(&self, clip: Vector2<R>, depth: R) -> Vector3<R> {
         let across = self.right * clip[0] + self.up * clip[1];
@@ -62,7 +62,7 @@ impl<R: Real> ShaderView<R> {
         across + self.forward * mix(self.far, self.near, depth)
     }
 
-    /// The way from a place relative to the camera to the eye, of unit length: `direction_to_eye`.
+    /// The direction from a position relative to the camera towards the eye, of unit length: `direction_to_eye`.
     pub fn direction_to_eye(&self, relative: Vector3<R>) -> Vector3<R> {
         if self.is_perspective() { -normalize(relative) } else { -self.forward }
     }
@@ -73,8 +73,7 @@ impl<R: Real> ShaderView<R> {
 }
 
 impl<R: Real> PassInputs<'_, R> {
-    /// The diffuse colour and opacity of the material in a slot at a place of its texture, given how that changes to the next
-    /// column and row: `diffuse_at`.
+    /// The diffuse colour and opacity of the material in a slot at texture coordinates with these derivatives: `diffuse_at`.
     pub fn diffuse_at(
         &self,
         slot: u32,
@@ -95,7 +94,7 @@ pub fn octahedral_from_direction<R: Real>(direction: Vector3<R>) -> Vector2<R> {
     if z >= R::zero() { point } else { fold(point) }
 }
 
-/// The direction, of unit length, that a point of the unfolded octahedron stands for.
+/// The direction, of unit length, of a point of the unfolded octahedron.
 pub fn direction_from_octahedral<R: Real>(point: Vector2<R>) -> Vector3<R> {
     let z = R::one() - point[0].abs() - point[1].abs();
     let Vector([x, y]) = if z >= R::zero() { point } else { fold(point) };
@@ -133,7 +132,7 @@ mod tests {
         DVec3::from(vector.0.map(R::as_f64))
     }
 
-    /// How far two directions are apart, in degrees; the sine tells small angles apart, which the cosine does not.
+    /// The angle between two directions in degrees, by its sine too: the cosine alone is inaccurate for small angles.
     fn angle(one: DVec3, other: DVec3) -> f64 {
         one.cross(other).length().atan2(one.dot(other)).to_degrees()
     }
@@ -141,7 +140,7 @@ mod tests {
     proptest! {
         /// The oracle divides by the scale, as the inverse of the transpose does.
         #[test]
-        fn objects_are_where_a_matrix_puts_them(
+        fn objects_are_transformed_as_by_a_matrix(
             turn in prop::array::uniform3(-3.0..3.0_f64),
             scale in prop::array::uniform3((0.1..9.0_f64, any::<bool>())),
             normal in direction(),
@@ -150,29 +149,29 @@ mod tests {
             let orientation = DQuat::from_scaled_axis(turn.into());
             let scale = DVec3::from(scale.map(|(size, mirrored)| if mirrored { -size } else { size })) * 10_f64.powi(size);
             let object = object::<f64>(orientation, scale);
-            let place = as_double(object.relative_position(Vector3::of(normal)));
+            let position = as_double(object.relative_position(Vector3::of(normal)));
             let matrix = glam::DMat4::from_scale_rotation_translation(scale, orientation, DVec3::new(3.0, -2.0, 1.0));
-            prop_assert!(place.distance(matrix.transform_point3(normal)) < 1e-12 * (1.0 + scale.abs().max_element()));
+            prop_assert!(position.distance(matrix.transform_point3(normal)) < 1e-12 * (1.0 + scale.abs().max_element()));
             let turned = as_double(object.world_normal(Vector3::of(normal)));
             prop_assert!(turned.distance((orientation * (normal / scale)).normalize()) < 1e-12);
         }
 
-        /// Each of the four sums has three additions, on whose way every product is rounded four times at most.
+        /// Each of the four sums has three additions, so every product is rounded four times at most.
         #[test]
-        fn clip_space_in_f32_is_that_of_f64(place in prop::array::uniform3(-1e3..1e3_f32)) {
+        fn clip_space_in_f32_is_that_of_f64(position in prop::array::uniform3(-1e3..1e3_f32)) {
             for view in views() {
-                let [single, double] = [view_values::<f32>(&view).clip_position(Vector3::of_single(place.into())).0.map(f64::from),
-                    view_values::<f64>(&view).clip_position(Vector3::of_single(place.into())).0];
+                let [single, double] = [view_values::<f32>(&view).clip_position(Vector3::of_single(position.into())).0.map(f64::from),
+                    view_values::<f64>(&view).clip_position(Vector3::of_single(position.into())).0];
                 let columns = view.clip_from_relative().to_cols_array_2d().map(|column| column.map(|value| f64::from(value.abs())));
                 for row in 0..4 {
-                    let sizes: f64 = (0..3).map(|axis| columns[axis][row] * f64::from(place[axis].abs())).sum();
+                    let sizes: f64 = (0..3).map(|axis| columns[axis][row] * f64::from(position[axis].abs())).sum();
                     prop_assert!((single[row] - double[row]).abs() <= 4.001 * UNIT * (sizes + columns[3][row]));
                 }
             }
         }
 
         #[test]
-        fn a_pixels_place_is_the_way_back_from_clip_space(pixel in prop::array::uniform2(-1.0..1.0_f64), depth in 0.01..1.0_f64) {
+        fn position_from_depth_inverts_clip_position(pixel in prop::array::uniform2(-1.0..1.0_f64), depth in 0.01..1.0_f64) {
             for view in views() {
                 let view = view_values::<f64>(&view);
                 let relative = view.position_from_depth(Vector(pixel), depth);
@@ -183,15 +182,15 @@ mod tests {
             }
         }
 
-        /// At an angle of θ from the axis the mirror shows a place at tan(θ/2) from its middle.
+        /// A position at an angle of θ from the axis is mapped to tan(θ/2) from the centre.
         #[test]
-        fn a_paraboloid_shows_half_an_angle(angle in 0.0..1.9_f64, around in -3.0..3.0_f64, distance in 0.2..9.0_f64) {
+        fn a_paraboloid_maps_an_angle_to_the_tangent_of_its_half(angle in 0.0..1.9_f64, around in -3.0..3.0_f64, distance in 0.2..9.0_f64) {
             let camera = paraboloid();
             let view = view_values::<f64>(&RenderView::new(&camera));
             let [right, up] = [view.right, view.up].map(as_double);
             let across = right * around.cos() + up * around.sin();
-            let place = (as_double(view.forward) * angle.cos() + across * angle.sin()) * distance;
-            let [x, y, z, w] = view.clip_position(Vector3::of(place)).0;
+            let position = (as_double(view.forward) * angle.cos() + across * angle.sin()) * distance;
+            let [x, y, z, w] = view.clip_position(Vector3::of(position)).0;
             let expected = DVec2::from_angle(around) * (angle / 2.0).tan();
             prop_assert!(DVec2::new(x, y).distance(expected) < 1e-6);
             let depth = (f64::from(camera.far) - distance) / f64::from(camera.far - camera.near);
@@ -200,7 +199,7 @@ mod tests {
 
         /// A half float from 0.5 to 1 is up to 2⁻¹² off; smaller ones are nearer, which is left out here.
         #[test]
-        fn normals_come_back_within_their_formats_bound(normal in direction()) {
+        fn decoded_normals_are_within_their_formats_bound(normal in direction()) {
             let point = octahedral_from_direction(Vector3::<f64>::of(normal));
             let steps = |count: f64| point.map(|value| ((value * 0.5 + 0.5) * count).round() / count * 2.0 - 1.0);
             let half = point.map(|value| (value * 2048.0).round() / 2048.0);
@@ -231,16 +230,16 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_behind_a_paraboloid_is_outside_of_its_picture() {
+    fn positions_behind_a_paraboloid_are_clipped() {
         let view = view_values::<f32>(&RenderView::new(&paraboloid()));
         let behind = view.clip_position(-view.forward * 2.0);
         assert_eq!(behind[2], -1.0);
-        // The light's own place is no place at all.
+        // The light's own position has no direction.
         assert!(view.clip_position(Vector::zero()).0.iter().all(|value| value.is_finite()));
     }
 
     #[test]
-    fn a_directional_map_draws_what_is_before_it() {
+    fn a_directional_shadow_map_clamps_geometry_to_its_near_plane() {
         let mut view = view_values::<f64>(&views()[1]);
         let before = view.forward * -5.0;
         assert!(view.clip_position(before)[2] > 1.0);
@@ -249,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_without_a_direction_are_nothing_and_flat_objects_keep_theirs() {
+    fn a_normal_of_length_zero_stays_zero_and_flat_objects_have_normals() {
         let flat = object::<f32>(DQuat::IDENTITY, DVec3::new(2.0, 0.0, 3.0));
         assert_eq!(flat.world_normal(Vector([0.6, 0.8, 0.0])), Vector([0.0, 1.0, 0.0]));
         let nothing = object::<f32>(DQuat::IDENTITY, DVec3::ZERO);

@@ -1,4 +1,4 @@
-//! Views, lights and targets that the tests of several CPU shaders use.
+//! Views, lights and targets for the tests of several CPU shaders.
 
 use glam::{DVec3, Quat, Vec3};
 use proptest::prelude::*;
@@ -8,17 +8,17 @@ use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, Camera, Light, Projection, ViewKind};
 use crate::view::{GpuLight, RenderView};
 
-/// How far f32 rounds, as a share of the value: 2⁻²⁴.
+/// The unit roundoff of f32: 2⁻²⁴.
 pub(in crate::process) const UNIT: f64 = 1.0 / 16_777_216.0;
 
-/// Any direction, the octahedron's corners and edges among them.
+/// Any direction, including the octahedron's corners and edges.
 pub(in crate::process) fn direction() -> impl Strategy<Value = DVec3> {
     let number = || prop_oneof![4 => -1.0..1.0_f64, 1 => Just(0.0), 1 => -1e-6..1e-6_f64];
     let vector = [number(), number(), number()].prop_map(DVec3::from);
     vector.prop_filter("a direction", |vector| vector.length() > 1e-6).prop_map(DVec3::normalize)
 }
 
-/// One in perspective, looking along its own axis, and one without.
+/// A perspective view that looks along -Z, and an orthographic one.
 pub(in crate::process) fn views() -> [RenderView; 2] {
     let camera = Camera { size: [16, 9], ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
     let plan = Camera {
@@ -59,7 +59,7 @@ pub(in crate::process) fn view_values<R: Real>(view: &RenderView) -> ShaderView<
     }
 }
 
-/// A light as a camera at the world's origin has it.
+/// A light relative to a camera at the world's origin.
 pub(in crate::process) fn light_values<R: Real>(light: &Light, map: Option<&RenderView>) -> ShaderLight<R> {
     let record = GpuLight::new(light, DVec3::ZERO, map);
     let number = |value: f32| R::of(f64::from(value));
@@ -79,29 +79,31 @@ pub(in crate::process) fn light_values<R: Real>(light: &Light, map: Option<&Rend
     }
 }
 
-/// A target that is a function of the place.
-pub(in crate::process) struct Painted<F> {
+/// A target whose pixels are computed by a function.
+pub(in crate::process) struct FunctionTexture<F> {
     pub(in crate::process) size: [usize; 2],
     pub(in crate::process) color: F,
 }
 
-impl<R: Real, F: Fn([usize; 2], usize) -> Vector4<R> + Sync> SampledTexture<R> for Painted<F> {
+impl<R: Real, F: Fn([usize; 2], usize) -> Vector4<R> + Sync> SampledTexture<R> for FunctionTexture<F> {
     fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    fn load(&self, place: [usize; 2], layer: usize) -> Vector4<R> {
-        assert!(place[0] < self.size[0] && place[1] < self.size[1], "{place:?} is outside");
-        (self.color)(place, layer)
+    fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R> {
+        assert!(coordinates[0] < self.size[0] && coordinates[1] < self.size[1], "{coordinates:?} is outside");
+        (self.color)(coordinates, layer)
     }
 }
 
 /// A target of one colour.
-pub(in crate::process) fn plain<R: Real>(color: [f64; 4]) -> Painted<impl Fn([usize; 2], usize) -> Vector4<R> + Sync> {
-    Painted { size: [64; 2], color: move |_, _| Vector(color.map(R::of)) }
+pub(in crate::process) fn plain<R: Real>(
+    color: [f64; 4],
+) -> FunctionTexture<impl Fn([usize; 2], usize) -> Vector4<R> + Sync> {
+    FunctionTexture { size: [64; 2], color: move |_, _| Vector(color.map(R::of)) }
 }
 
-/// One material, whose texture says how `uv` changes.
+/// One material, whose texture returns `uv` and its derivatives.
 pub(in crate::process) struct OneMaterial<R>(pub(in crate::process) ShaderMaterial<R>);
 
 impl<R: Real> Materials<R> for OneMaterial<R> {
@@ -124,7 +126,7 @@ pub(in crate::process) fn material<R: Real>(blend: Blend) -> OneMaterial<R> {
     })
 }
 
-/// What a pass without lights reads.
+/// The inputs of a pass without lights.
 pub(in crate::process) fn pass<'a, R: Real>(
     view: &'a ShaderView<R>,
     materials: &'a dyn Materials<R>,

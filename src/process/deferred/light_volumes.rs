@@ -11,13 +11,13 @@ use crate::process::{CpuShader, Declare, Draws, LightDraws, RenderProcess};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
-/// Adds to the target `radiance` what the surfaces of the geometry buffer reflect of the lights of one class. Surfaces are
+/// Lights the geometry buffer with the lights of one class, and adds the reflected light to the target `radiance`. Surfaces are
 /// Lambertian.
 ///
-/// Lights are drawn as geometry (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or hemispherical light,
-/// the whole picture for a directional one. Their far side is drawn, and where it is behind the surface of a pixel the pixel
-/// is shaded: so a light costs the pixels that it may reach, and it is right when the camera stands inside of it. All lights
-/// of a class are one instanced draw, whose cost is N + L and not N × L (L 2).
+/// A light is drawn as a light volume (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or hemispherical
+/// light, the whole picture for a directional one. The back faces are drawn, and a pixel is shaded if they are behind its surface:
+/// so a light costs only the pixels that it may reach, and the camera may be inside of the volume. All lights of a class are one
+/// instanced draw, whose cost is N + L and not N × L (L 2).
 ///
 /// The steps of L 4.2.1 are: set the viewport; the radiance as target; test depth but do not write it; the rasterizer state;
 /// the geometry buffer as the shader's input; draw each light; finish. Those of L 4.2.2 that concern a light with a shadow map
@@ -31,12 +31,12 @@ pub struct LightVolumes {
 }
 
 impl LightVolumes {
-    /// The lights of a kind that have no shadow map.
+    /// Draws the lights of a kind that have no shadow map.
     pub fn new(kind: LightKind, formats: GeometryFormats) -> Self {
         Self::of_class(kind, formats, None)
     }
 
-    /// The lights of a kind that have one, drawn by [`ShadowCasters`].
+    /// Draws the lights of a kind that have a shadow map, drawn by [`ShadowCasters`].
     pub fn shadowed(kind: LightKind, formats: GeometryFormats, maps: &ShadowMaps) -> Self {
         Self::of_class(kind, formats, Some(maps))
     }
@@ -54,13 +54,13 @@ impl LightVolumes {
         Self { name: Self::name_of(class), shader: shader.concat(), class, cpu_shader }
     }
 
-    /// What the process of a class is called, such as "point lights" or "shadowed spot lights".
+    /// The name of a class' process, such as "point lights" or "shadowed spot lights".
     pub fn name_of(class: LightClass) -> String {
         format!("{}{} lights", if class.shadowed { "shadowed " } else { "" }, class.kind.name())
     }
 }
 
-/// Behind depth, normal and diffuse.
+/// After depth, normal and diffuse.
 const SHADOW_MAPS_BINDING: u32 = 4;
 
 impl RenderProcess for LightVolumes {

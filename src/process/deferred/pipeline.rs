@@ -1,4 +1,4 @@
-//! The deferred pipeline (L 4), put together from what a scene requires.
+//! The deferred pipeline (L 4), assembled from what a scene requires.
 
 use std::sync::Arc;
 
@@ -9,16 +9,16 @@ use crate::quality::Quality;
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 
-/// The deferred pipeline of L 4: its settings, its post-processing, and what an engine replaces or leaves out. What it
-/// adds goes to the renderer's builder beside it.
+/// The deferred pipeline of L 4: its settings, its post-processing, and the processes that an engine replaces or leaves out. An
+/// engine adds further processes to the renderer's builder.
 ///
-/// It models only what a scene requires. Lights of a class that the scene has none of get no process; without a light
-/// that casts shadows there is no shadow map; without a material that mixes with what is behind it there is no
-/// transparency. When a scene changes what it requires, the processes follow.
+/// It has only the processes that a scene requires. A class of lights without lights has no process; without a light that casts
+/// shadows there is no shadow map; without a blended material there is no transparency. When a scene's requirements change, so do
+/// the processes.
 ///
 /// ```text
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
-///  depth pre-pass → geometry buffer → lights, a process a class → transparency → post-processing
+///  depth pre-pass → geometry buffer → lights, a process per class → transparency → post-processing
 /// ```
 ///
 /// ```
@@ -42,7 +42,7 @@ pub struct Deferred {
 }
 
 impl Deferred {
-    /// Without post-processing: the picture is the target `radiance`, which has no upper end.
+    /// Without post-processing: the output is the target `radiance`, which is not limited to 1.
     pub fn new() -> Self {
         Self {
             depth_pre_pass: false,
@@ -55,35 +55,35 @@ impl Deferred {
         }
     }
 
-    /// With tone mapping alone, into the target `picture`.
+    /// With tone mapping only, into the target `picture`.
     pub fn to_picture() -> Self {
         Self::new().post(ToneMapping::default())
     }
 
-    /// Whether depth is drawn before the geometry buffer; it is not unless asked for. See [`DepthPrePass`].
+    /// Sets whether depth is drawn before the geometry buffer; the default is no. See [`DepthPrePass`].
     pub fn depth_pre_pass(self, depth_pre_pass: bool) -> Self {
         Self { depth_pre_pass, ..self }
     }
 
-    /// Into how many processes the geometry buffer is split, by material (L 5): 1 to 64, and what is beyond counts as
-    /// the nearest. They are called "geometry buffer 1 of 2" and so on.
+    /// Sets into how many processes the geometry buffer is split, by material (L 5), clamped to 1 to 64. Their names are "geometry
+    /// buffer 1 of 2" and so on.
     pub fn geometry_shares(self, geometry_shares: u32) -> Self {
         Self { geometry_shares, ..self }
     }
 
-    /// What the geometry buffer's targets are.
+    /// Sets the formats of the geometry buffer's targets.
     pub fn formats(self, formats: GeometryFormats) -> Self {
         Self { formats, ..self }
     }
 
-    /// How shadow maps are drawn and read; with `None`, no light casts shadows.
+    /// Sets how shadow maps are drawn and read; with `None`, no light casts shadows.
     pub fn shadow_maps(self, shadow_maps: Option<ShadowMaps>) -> Self {
         Self { shadow_maps, ..self }
     }
 
-    /// What a [`Quality`] says of the pipeline: the depth pre-pass, normals and diffuse colours in the geometry buffer, the steps of
-    /// post-processing that are there and, if it has any, its shadow maps. The format of `radiance` stays as it is, and so does how
-    /// far the shadow maps of directional lights reach.
+    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the post-processing
+    /// steps added so far and to the shadow maps if there are any. It changes neither the format of `radiance` nor how far the
+    /// shadow maps of directional lights reach.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
@@ -100,14 +100,14 @@ impl Deferred {
         self
     }
 
-    /// Adds a step of post-processing behind those that are there. The first reads `radiance`, the last draws `picture`.
+    /// Appends a step of post-processing. The first step reads `radiance`, the last draws `picture`.
     pub fn post(mut self, step: impl PostStep + 'static) -> Self {
         self.post.push(Arc::new(step));
         self
     }
 
-    /// Puts a process of the engine's own in the place of the one called `name`, whenever that would be there. Of two
-    /// for one place the later counts.
+    /// Replaces the process called `name`, in the frames that have it, with a process of the engine. A later replacement of the
+    /// same process overrides an earlier one.
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
         let name = name.into();
         self.replaced.retain(|(other, _)| *other != name);
@@ -115,24 +115,24 @@ impl Deferred {
         self
     }
 
-    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. Without a step of
-    /// post-processing the chain closes around it; without `"shadow casters"` no light casts shadows.
+    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. If it is a step of post-processing, the
+    /// next step reads what it would have read; without `"shadow casters"`, no light casts shadows.
     pub fn leave_out(mut self, name: impl Into<String>) -> Self {
         self.left_out.push(name.into());
         self
     }
 
-    /// The target that the frame is for.
+    /// The target that the frame outputs.
     pub fn output(&self) -> &'static str {
         if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
 
-    /// The names of all processes there may be, whatever the scene, in their order.
+    /// The names of all processes that a frame may have, whatever the scene, in order.
     pub fn names(&self) -> Vec<String> {
-        self.built(&Requirements::all()).iter().map(|process| process.name().to_owned()).collect()
+        self.build(&Requirements::all()).iter().map(|process| process.name().to_owned()).collect()
     }
 
-    /// How shadow maps are drawn, if at all.
+    /// How shadow maps are drawn, if they are drawn.
     pub(crate) fn maps(&self) -> Option<&ShadowMaps> {
         self.shadow_maps.as_ref().filter(|_| !self.left_out.iter().any(|name| name == ShadowCasters::NAME))
     }
@@ -142,21 +142,21 @@ impl Deferred {
         self.post.iter().filter(|step| !self.left_out.iter().any(|name| name == step.process("", "").name()))
     }
 
-    /// The processes that draw a scene, at the places where they stand.
+    /// The processes that draw a scene, each in its slot.
     pub(crate) fn chain(&self, requirements: &Requirements) -> Vec<ChainSlot> {
-        let mut built = self.built(requirements);
-        let place = |name: String| {
-            let standing =
-                built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
-            let own = self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, own)| Arc::clone(own));
-            let process = standing.map(|standing| own.unwrap_or(standing));
+        let mut built = self.build(requirements);
+        let slot = |name: String| {
+            let shipped = built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
+            let replacement =
+                self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, process)| Arc::clone(process));
+            let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
             ChainSlot { process: process.filter(|_| !self.left_out.contains(&name)), name }
         };
-        self.names().into_iter().map(place).collect()
+        self.names().into_iter().map(slot).collect()
     }
 
     /// # Errors
-    /// If a setting cannot be, or a name of what is replaced or left out is nobody's.
+    /// If a setting is invalid, or the pipeline has no process of a name that is to be replaced or left out.
     pub(crate) fn check(&self) -> Result<(), PlanError> {
         if let Some((target, format)) = self.formats.first_unsuitable() {
             let process = String::from("geometry buffer");
@@ -165,17 +165,17 @@ impl Deferred {
         if let Some(problem) = self.shadow_maps.as_ref().and_then(ShadowMaps::problem) {
             return Err(PlanError::ShadowMaps { problem });
         }
-        let whole = Self { left_out: Vec::new(), ..self.clone() };
-        let names = whole.names();
-        let mut wanted = self.replaced.iter().map(|(name, _)| name).chain(&self.left_out);
-        match wanted.find(|name| !names.contains(name)) {
+        let complete = Self { left_out: Vec::new(), ..self.clone() };
+        let names = complete.names();
+        let mut overridden = self.replaced.iter().map(|(name, _)| name).chain(&self.left_out);
+        match overridden.find(|name| !names.contains(name)) {
             Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
             None => Ok(()),
         }
     }
 
-    /// As they come with the crate.
-    fn built(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+    /// The shipped processes that a scene requires, in order.
+    fn build(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
         let maps = self.maps().filter(|_| requirements.shadows());
         if maps.is_some() {

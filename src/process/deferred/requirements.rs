@@ -1,21 +1,21 @@
-//! What a scene requires of the processes that draw it.
+//! Which processes a scene requires.
 
 use crate::scene::{Blend, LightKind, Material, SceneRef};
 use crate::view::LightClass;
 
-/// What a scene requires. A frame is made of the processes that this asks for and of no others.
+/// What a scene requires of a frame. A frame has the processes that this requires, and no others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Requirements {
-    /// A bit for each class of lights that the scene has, by [`LightClass::index`].
+    /// A bit for each class of lights in the scene, by [`LightClass::index`].
     lights: u8,
-    /// Whether a material mixes with what is behind it.
+    /// Whether a material is blended.
     transparency: bool,
 }
 
 const _: () = assert!(LightClass::COUNT <= 8);
 
 impl Requirements {
-    /// Of a scene whose lights may cast shadows or, where `shadows` is false, are taken to cast none.
+    /// The requirements of a scene. If `shadows` is false, no light casts shadows.
     pub fn of(scene: &SceneRef<'_>, shadows: bool) -> Self {
         let mut requirements = Self::default();
         for light in scene.lights {
@@ -26,7 +26,7 @@ impl Requirements {
         requirements
     }
 
-    /// Everything that a scene can require.
+    /// All that a scene can require.
     pub fn all() -> Self {
         let mut requirements = Self { lights: 0, transparency: true };
         // Point lights cast no shadows.
@@ -41,12 +41,12 @@ impl Requirements {
         self.lights & 1 << class.index() != 0
     }
 
-    /// Whether a light casts shadows.
+    /// Whether a light of the scene casts shadows.
     pub fn shadows(&self) -> bool {
         LightClass::all().any(|class| class.shadowed && self.lights(class))
     }
 
-    /// Whether a material mixes with what is behind it.
+    /// Whether a material is blended.
     pub fn transparency(&self) -> bool {
         self.transparency
     }

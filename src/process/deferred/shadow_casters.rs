@@ -6,21 +6,21 @@ use self::cpu_shader::ShadowCastersCpuShader;
 use crate::process::{CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
 use crate::scene::ViewKind;
 
-/// Draws, for every light that casts shadows, the depth of all opaque objects as the light sees them: the target `shadow map`
-/// of [`ViewKind::Shadow`], of which each light has a layer.
+/// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
+/// [`ViewKind::Shadow`], which has a layer for each light.
 ///
-/// Each map is a view of its own, so its objects are culled, sorted, merged and recorded like any other's, at the same time
+/// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same time
 /// (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the rasterizer
 /// state; clear the depth; draw all objects that cast shadows. The last three are those of
 /// [`LightVolumes`](super::LightVolumes).
 ///
-/// A process of an engine's own may read the maps too, by
-/// [`Declare::samples_layers`](crate::process::Declare::samples_layers): beside a [`Deferred`](super::Deferred) pipeline, where no light
-/// of the scene casts shadows, there is one of a single pixel, with nothing in it.
+/// An engine's process may read the maps too, with
+/// [`Declare::samples_layers`](crate::process::Declare::samples_layers): if a scene's [`Deferred`](super::Deferred) pipeline
+/// has no light that casts shadows, it reads an empty map of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowCasters {
-    /// Whether there are hemispherical lights, whose maps must not show what is behind the light. It costs a look at each
-    /// pixel, which other maps do without.
+    /// Whether there are hemispherical lights, whose maps must not show what is behind the light. They need a fragment shader,
+    /// and other maps do not.
     pub hemispheres: bool,
 }
 

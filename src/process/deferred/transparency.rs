@@ -1,4 +1,4 @@
-//! Transparency: what the geometry buffer cannot hold.
+//! Transparency: blended objects, which the geometry buffer cannot hold.
 
 mod cpu_shader;
 
@@ -10,15 +10,15 @@ use crate::process::{CommandDraws, CpuShader, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
 
-/// Draws objects that mix with what is behind them over `radiance`, back to front by the distance of their centres along the
-/// view's axis: over it by their opacity, added to it, or taken from it (M listing 10.1).
+/// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with alpha,
+/// additive or subtractive blending (M listing 10.1).
 ///
-/// They are lit where they are drawn, by all lights that reach the view and with the same shadows, on the side that is seen;
-/// their emission is added. A subtractive object takes what it would otherwise reflect and give off, and may leave less than
-/// nothing for what is drawn over it; tone mapping shows that as black. They cast no shadows themselves.
+/// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and adds their
+/// emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result may be negative, which
+/// tone mapping shows as black. Blended objects cast no shadows.
 ///
-/// Where lights add up to more than a half float can say, some devices store an infinity, and an infinity times 0 is no number:
-/// there, even what is opaque does not hide it.
+/// If lights add up to more than the greatest half float, some devices store infinity, and infinity times 0 is NaN: on those even
+/// an opaque pixel that is blended over it does not hide it.
 #[derive(Clone, Debug)]
 pub struct Transparency {
     shader: String,
@@ -26,7 +26,7 @@ pub struct Transparency {
 }
 
 impl Transparency {
-    /// With the shadow maps that [`ShadowCasters`] draws, if it does.
+    /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
         let shader = [
             include_str!("shading/surface.wgsl"),

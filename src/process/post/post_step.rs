@@ -5,11 +5,11 @@ use std::sync::Arc;
 use crate::process::RenderProcess;
 use crate::quality::Quality;
 
-/// A step of post-processing that does not know yet where in the chain it stands.
+/// A step of post-processing, which makes a process once its source and target are known.
 ///
-/// The chain begins at the target `radiance`, which is linear, and ends at the target `picture`. Each step samples what
-/// the step before it wrote, and writes a target of its own, in a format of its own choice; before [`ToneMapping`](super::ToneMapping) that is
-/// [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), from there on [`Format::Rgba8Srgb`](crate::process::Format::Rgba8Srgb). A step may sample other targets too, `depth` for one.
+/// The chain begins at the target `radiance`, which is linear, and ends at the target `picture`. Each step samples the target
+/// of the step before it, and writes a target of its own, in a format that it chooses; before [`ToneMapping`](super::ToneMapping) that is
+/// [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), from then on [`Format::Rgba8Srgb`](crate::process::Format::Rgba8Srgb). A step may sample other targets too, such as `depth`.
 ///
 /// A closure from the names of the two targets to a process is a step:
 ///
@@ -52,10 +52,10 @@ use crate::quality::Quality;
 /// assert_eq!(step.process("mapped", "picture").name(), "negative");
 /// ```
 pub trait PostStep: Send + Sync {
-    /// The process that does this step from the target `source` to the target `target`.
+    /// The process of this step, which reads the target `source` and draws the target `target`.
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess>;
 
-    /// The step to take instead in frames of a quality; `None`, unless said otherwise, for this one.
+    /// The step for frames of a quality; `None`, the default, for this step itself.
     fn with_quality(&self, _quality: &Quality) -> Option<Arc<dyn PostStep>> {
         None
     }

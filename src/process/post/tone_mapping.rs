@@ -1,4 +1,4 @@
-//! Tone mapping: the step that every picture needs.
+//! Tone mapping, which every picture needs.
 
 mod cpu_shader;
 
@@ -11,23 +11,22 @@ use super::shipped_step::{BoundStep, ShippedStep, declare_step};
 use crate::process::{CpuShader, Declare, Draws, FullScreen, RenderProcess};
 use crate::quality::{Quality, ToneCurve};
 
-/// Maps radiance, which has no upper end, to a picture, which has: exposure, then a curve, then sRGB. What is below zero, because
-/// something was taken away from it, is black.
+/// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from subtractive
+/// blending, becomes black.
 ///
-/// As a process of its own it leads from the target `radiance` to the target `picture`; as a [`PostStep`], from and to
-/// whatever it is told.
+/// As a process it reads the target `radiance` and draws the target `picture`; as a [`PostStep`], its source and target are
+/// given.
 #[derive(Clone, Debug, Default)]
 pub struct ToneMapping {
     /// Multiplies radiance.
     pub exposure: Exposure,
-    /// What ends at 1. In a [`Deferred`](crate::process::Deferred) pipeline that is told a quality, it is that of the quality.
+    /// Maps radiance to 0 to 1. [`Deferred::quality`](crate::process::Deferred::quality) sets it to the quality's curve.
     pub curve: ToneCurve,
 }
 
-/// What radiance is multiplied by before it is mapped; 1 leaves it. What is not above 0, and what is not a number, makes a
-/// black picture.
+/// What radiance is multiplied by before it is mapped. An exposure that is NaN or not above 0 makes a black picture.
 ///
-/// Clones are one and the same, so an engine keeps one and changes it between frames:
+/// Clones share their value, so an engine keeps a clone and changes the exposure between frames:
 ///
 /// ```
 /// use drawloom::process::{Deferred, Exposure, ToneMapping};
@@ -42,18 +41,18 @@ pub struct ToneMapping {
 pub struct Exposure(Arc<AtomicU32>);
 
 impl Exposure {
-    /// An exposure of its own.
+    /// A new exposure, which shares its value with no other.
     pub fn new(exposure: f32) -> Self {
         Self(Arc::new(AtomicU32::new(exposure.to_bits())))
     }
 
-    /// Changes it, from the next frame on that is recorded.
+    /// Changes it, for frames that are recorded from now on.
     pub fn set(&self, exposure: f32) {
-        // It stands for itself: nothing else is read after it.
+        // Relaxed: nothing else is read because of its value.
         self.0.store(exposure.to_bits(), Ordering::Relaxed);
     }
 
-    /// What it is.
+    /// The current exposure.
     pub fn get(&self) -> f32 {
         f32::from_bits(self.0.load(Ordering::Relaxed))
     }
@@ -72,13 +71,13 @@ impl From<f32> for Exposure {
 }
 
 impl ToneMapping {
-    /// Filmic, with an exposure: a number that stays, or an [`Exposure`] that changes.
+    /// The filmic curve with an exposure: a constant number, or an [`Exposure`] that changes.
     pub fn new(exposure: impl Into<Exposure>) -> Self {
         Self { exposure: exposure.into(), curve: ToneCurve::default() }
     }
 
-    /// The exposure of the moment, finite and 0 or more: infinite, it would make what is black not a number.
-    fn usable_exposure(&self) -> f32 {
+    /// The current exposure, clamped to finite numbers from 0: infinity times a radiance of 0 would be NaN.
+    fn clamped_exposure(&self) -> f32 {
         let exposure = self.exposure.get();
         if exposure > 0.0 { exposure.min(f32::MAX) } else { 0.0 }
     }
@@ -119,12 +118,12 @@ impl ShippedStep for ToneMapping {
         let clips = if self.curve == ToneCurve::Clipped { 1.0 } else { 0.0 };
         FullScreen {
             shader: include_str!("tone_mapping/tone_mapping.wgsl"),
-            parameters: bytemuck::cast_slice(&[self.usable_exposure(), clips, 0.0, 0.0]).to_vec().into(),
+            parameters: bytemuck::cast_slice(&[self.clamped_exposure(), clips, 0.0, 0.0]).to_vec().into(),
             ..FullScreen::default()
         }
     }
 
     fn cpu_shader(&self) -> CpuShader {
-        CpuShader::full_screen(ToneMappingCpuShader { exposure: self.usable_exposure(), curve: self.curve })
+        CpuShader::full_screen(ToneMappingCpuShader { exposure: self.clamped_exposure(), curve: self.curve })
     }
 }

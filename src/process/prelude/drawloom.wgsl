@@ -1,20 +1,20 @@
-// What every shader begins with. A process's own WGSL comes after this and may use all of it.
+// The prelude of every shader. A process' own WGSL follows it and may use all of it.
 //
-//   @group(0)  what the frame and the view are: below
+//   @group(0)  the frame and the view: below
 //   @group(1)  materials and their textures: below
-//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets it samples, in that order
+//   @group(2)  the process' own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order
 //
-// Before it stands `const ABSOLUTE_TRANSFORMS: bool`, as the frame's quality has it.
+// `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 
 struct View {
     // From world axes relative to the camera to clip space; depth is reversed.
     clip_from_relative: mat4x4<f32>,
-    // The camera's position, as an object's.
+    // The camera's position, in fixed point like an object's.
     position_low: vec3<u32>,
     light_count: u32,
     position_high: vec3<i32>,
     near: f32,
-    // Right and up are as long as half the picture is at a distance of 1.
+    // Right and up are as long as half the picture's width and height at a distance of 1.
     right: vec3<f32>,
     width: f32,
     up: vec3<f32>,
@@ -28,11 +28,11 @@ struct View {
 
 const PERSPECTIVE: u32 = 0u;
 const ORTHOGRAPHIC: u32 = 1u;
-// What lies before the near plane is drawn onto it.
+// Geometry in front of the near plane is clamped onto it.
 const ORTHOGRAPHIC_SHADOW: u32 = 2u;
 const PARABOLOID: u32 = 3u;
 
-// A position is 64-bit fixed point in steps of 2^-30 m, as two halves.
+// A position is 64-bit fixed point in steps of 2^-30 m, in two halves.
 struct Object {
     position_low: vec3<u32>,
     material: u32,
@@ -51,20 +51,20 @@ const HEMISPHERICAL: u32 = 3u;
 const NO_SHADOW_MAP: u32 = 0xffffffffu;
 
 struct Light {
-    // Relative to the camera, along the world's axes. Of a directional light: where its shadow map is seen from.
+    // Relative to the camera, along the world's axes. For a directional light: the position of its shadow map's camera.
     position: vec3<f32>,
     kind: u32,
-    // The way it travels.
+    // The direction in which the light travels.
     direction: vec3<f32>,
-    // Of a directional light: where its shadow map ends.
+    // For a directional light: where its shadow map ends.
     range: f32,
-    // At 1 m, or on a surface that faces a directional light.
+    // At 1 m; for a directional light, on a surface that faces it.
     intensity: vec3<f32>,
-    // Spot: from here to `cone_end` the cosine fades.
+    // Spot: the light fades from this cosine to `cone_end`.
     cone_begin: f32,
     cone_end: f32,
     shadow_layer: u32,
-    // Half as wide as its shadow map: at 1 m for a spot light, in metres for a directional one.
+    // Half the width of its shadow map: at 1 m for a spot light, in metres for a directional one.
     shadow_half: f32,
     shadow_near: f32,
     // From the axes of the shadow map's camera to the world's.
@@ -75,10 +75,10 @@ struct Material {
     diffuse: vec3<f32>,
     opacity: f32,
     emission: vec3<f32>,
-    // Which array its texture is in, from 0; 4 for none.
+    // The array that holds its texture, from 0; 4 for none.
     texture_array: u32,
     texture_layer: u32,
-    // 1 where both sides are drawn.
+    // 1 if both sides are drawn.
     double_sided: u32,
     // 0 for none, 1 alpha, 2 additive, 3 subtractive.
     blend: u32,
@@ -89,7 +89,7 @@ const ALPHA: u32 = 1u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
-// In batch order: which object each instance is.
+// The object of each instance, in batch order.
 @group(0) @binding(2) var<storage, read> drawn: array<u32>;
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 
@@ -113,7 +113,7 @@ struct FullScreenPixel {
     @location(0) clip: vec2<f32>,
 }
 
-// A pixel of what a light lights.
+// A pixel that a light may reach.
 struct LightPixel {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) light: u32,
@@ -139,14 +139,14 @@ fn rotate(orientation: vec4<f32>, direction: vec3<f32>) -> vec3<f32> {
 fn relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
     let turned = rotate(object.orientation, object.scale * position);
     if ABSOLUTE_TRANSFORMS {
-        // Far from the world's origin both lose what they have in common too late.
+        // Far from the world's origin both are rounded before they are subtracted.
         let in_world = metres_from_origin(object.position_low, object.position_high) + turned;
         return in_world - metres_from_origin(view.position_low, view.position_high);
     }
     return fixed_difference(object.position_low, object.position_high, view.position_low, view.position_high) + turned;
 }
 
-// A shader that is to draw at just the depth of another calls this, and marks its position `@invariant`.
+// Shaders that must draw at exactly the same depth both call this, and mark their position `@invariant`.
 fn clip_position(relative: vec3<f32>) -> vec4<f32> {
     var clip = view.clip_from_relative * vec4<f32>(relative, 1.0);
     if view.projection == PARABOLOID {
@@ -158,20 +158,20 @@ fn clip_position(relative: vec3<f32>) -> vec4<f32> {
     return clip;
 }
 
-// From the camera's axes to clip space, as a mirror shaped like a paraboloid shows it (Brabec et al. 2002). The half space
-// before the camera becomes a disc as wide as the picture, and depth is the distance.
-fn paraboloid_position(place: vec3<f32>) -> vec4<f32> {
-    let distance = length(place);
-    let forward = -place.z / max(distance, 1e-30);
+// From the camera's axes to clip space, by a paraboloid mapping (Brabec et al. 2002). The half space in front of the camera is
+// mapped to a disc as wide as the picture, and depth is the distance.
+fn paraboloid_position(position: vec3<f32>) -> vec4<f32> {
+    let distance = length(position);
+    let forward = -position.z / max(distance, 1e-30);
     let depth = (view.far - distance) / (view.far - view.near);
-    // Straight behind the camera is everywhere at once. What lies there is outside the picture anyway, so it is left out.
-    return vec4<f32>(place.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
+    // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and clipped.
+    return vec4<f32>(position.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
 }
 
-// From object space to the world's axes, of unit length; 0 where there is none to be had. The cofactors of a scale need no
-// division, so a scale of 0 along one axis leaves a normal too.
+// A normal from object space to the world's axes, of unit length; 0 if there is none. The cofactors of a scale need no division,
+// so it works for a scale of 0 along one axis too.
 fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
-    // Products of the scale as it is could leave the range of f32.
+    // Products of the unnormalized scale could leave the range of f32.
     let sizes = abs(object.scale);
     let largest = max(max(sizes.x, sizes.y), sizes.z);
     let scale = select(vec3<f32>(1.0), object.scale / largest, largest > 0.0);
@@ -182,7 +182,7 @@ fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
     return select(vec3<f32>(0.0), turned * inverseSqrt(length_squared), length_squared > 0.0);
 }
 
-// A pixel's place relative to the camera, along the world's axes.
+// A pixel's position relative to the camera, along the world's axes, from its depth.
 fn position_from_depth(clip: vec2<f32>, depth: f32) -> vec3<f32> {
     let across = clip.x * view.right + clip.y * view.up;
     if view.projection == PERSPECTIVE {
@@ -191,12 +191,12 @@ fn position_from_depth(clip: vec2<f32>, depth: f32) -> vec3<f32> {
     return across + view.forward * mix(view.far, view.near, depth);
 }
 
-// A pixel's place in the picture, from (-1, -1) at its lower left to (1, 1) at its upper right.
+// A pixel's clip coordinates, from (-1, -1) at the picture's lower left to (1, 1) at its upper right.
 fn clip_of_pixel(position: vec4<f32>) -> vec2<f32> {
     return position.xy / vec2<f32>(view.width, view.height) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
 }
 
-// The way from a place to the eye, of unit length.
+// The direction from a position towards the eye, of unit length.
 fn direction_to_eye(relative: vec3<f32>) -> vec3<f32> {
     if view.projection == PERSPECTIVE {
         return -normalize(relative);
@@ -209,7 +209,7 @@ fn fixed_difference(low: vec3<u32>, high: vec3<i32>, from_low: vec3<u32>, from_h
     let borrow = select(vec3<i32>(0), vec3<i32>(1), low < from_low);
     let difference_low = low - from_low;
     let difference_high = high - from_high - borrow;
-    // The magnitude first: the two halves of a small negative number are both large.
+    // The magnitude is converted, because both halves of a small negative number are large.
     let negative = difference_high < vec3<i32>(0);
     let carry = select(vec3<u32>(0u), vec3<u32>(1u), difference_low == vec3<u32>(0u));
     let magnitude_low = select(difference_low, ~difference_low + 1u, negative);
@@ -223,15 +223,15 @@ fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
     return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
 }
 
-// A material's diffuse colour and opacity at a place of its texture. The two gradients are how `uv` changes from pixel to
-// pixel: taken by the caller, because they must be taken where all pixels go the same way.
-fn diffuse_at(material: Material, uv: vec2<f32>, gradient_x: vec2<f32>, gradient_y: vec2<f32>) -> vec4<f32> {
+// A material's diffuse colour and opacity at texture coordinates. The caller takes the derivatives of `uv`, because that needs
+// uniform control flow.
+fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
     var texel = vec4<f32>(1.0);
     switch material.texture_array {
-        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
-        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
-        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
-        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, material.texture_layer, gradient_x, gradient_y); }
+        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
+        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
+        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
+        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
         default: {}
     }
     return vec4<f32>(material.diffuse, material.opacity) * texel;

@@ -1,4 +1,4 @@
-//! Geometry around what a light reaches.
+//! Light volumes: geometry around what a light reaches.
 
 use std::f64::consts::TAU;
 
@@ -6,21 +6,21 @@ use glam::DVec3;
 
 use crate::scene::LightKind;
 
-/// Geometry that holds all that a light can reach, so that lighting touches no other pixels: a sphere for a point
-/// light, a cone for a spot light, and the screen for what reaches everywhere (L 4.2.1).
+/// Geometry that contains all that a light can reach, so that only those pixels are lit: a sphere for a point light, a cone for a
+/// spot light, and the screen for a light that reaches everywhere (L 4.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum LightVolume {
-    /// A ball that contains the unit sphere, to be scaled by the light's range.
+    /// A polyhedron that contains the unit sphere, to be scaled by the light's range.
     Sphere,
-    /// A cone on a blunt end of sixteen sides, whose corners `cone_corner` puts in their places. At 90° it is half a
-    /// cylinder as high as it is wide, which holds what a hemispherical light reaches too.
+    /// A cone of sixteen sides with a cylinder at its wide end, whose corners `cone_corner` positions. At 90° it is a cylinder with
+    /// the range as its radius and height, which contains what a hemispherical light reaches too.
     Cone,
     /// One triangle that covers clip space.
     Screen,
 }
 
 impl LightVolume {
-    /// What lights of a kind are drawn as.
+    /// The light volume of a kind of light.
     pub(crate) fn of(kind: LightKind) -> Self {
         match kind {
             LightKind::Point => Self::Sphere,
@@ -29,9 +29,9 @@ impl LightVolume {
         }
     }
 
-    /// Three corners for each triangle, counter-clockwise seen from outside. No volume has a hole.
+    /// Three corners for each triangle, counter-clockwise seen from outside. The volumes are closed.
     ///
-    /// A sphere's are places; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip
+    /// A sphere's corners are positions; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip
     /// space and 0.
     pub(crate) fn corners(self) -> Vec<[f32; 3]> {
         match self {
@@ -42,7 +42,7 @@ impl LightVolume {
     }
 }
 
-/// As a share of the light's range.
+/// How far a volume exceeds what the light reaches, as a fraction of its range.
 const GROWTH: f32 = 1e-4;
 
 const SIDES: usize = 16;
@@ -52,8 +52,7 @@ const NEAR_RING: f32 = 1.0;
 const FAR_RING: f32 = 2.0;
 const FAR_MIDDLE: f32 = 3.0;
 
-/// An icosahedron whose faces were split into four and blown up to the unit sphere, then scaled until they touch it from
-/// outside.
+/// An icosahedron with each face split into four and the corners moved to the unit sphere, scaled so that it contains the sphere.
 fn sphere() -> Vec<[f32; 3]> {
     let split = |[a, b, c]: [DVec3; 3]| {
         let [ab, bc, ca] = [a + b, b + c, c + a].map(DVec3::normalize);
@@ -66,7 +65,7 @@ fn sphere() -> Vec<[f32; 3]> {
     faces.into_iter().flatten().map(|corner| (corner * scale).as_vec3().to_array()).collect()
 }
 
-/// Its twenty faces, with corners at distance 1.
+/// The twenty faces of an icosahedron, with corners at distance 1.
 fn icosahedron() -> Vec<[DVec3; 3]> {
     let golden = (1.0 + 5_f64.sqrt()) / 2.0;
     let signs = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
@@ -75,7 +74,7 @@ fn icosahedron() -> Vec<[DVec3; 3]> {
         [DVec3::new(0.0, short, long), DVec3::new(short, long, 0.0), DVec3::new(long, 0.0, short)]
     });
     let corners = rectangles.as_flattened();
-    // Neighbours are at a distance of 2, all others at more than 3.
+    // Neighbours are at a distance of 2, other corners at more than 3.
     let are_neighbours = |one: DVec3, other: DVec3| one.distance_squared(other) < 5.0;
     let mut faces = Vec::new();
     for (index, &a) in corners.iter().enumerate() {
@@ -114,19 +113,17 @@ mod tests {
 
     use super::*;
 
-    /// The place of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines
+    /// The position of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines
     /// along +Z.
     ///
-    /// A light of half-angle α reaches, within its range r, no further out than r·sin α, and no further ahead than r.
-    /// So the cone ends where it is r·sin α wide, at r·cos α, and goes on to r as a cylinder.
+    /// A light of half-angle α reaches, within its range r, no farther out than r·sin α, and no farther ahead than r. So
+    /// the cone ends at r·cos α, with a radius of r·sin α, and a cylinder continues to r.
     ///
-    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. All is
-    /// larger by a ten-thousandth of the range, the tip and its cone moved back by as much, since whoever draws it
-    /// rounds too.
+    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. The
+    /// radius and the far end are larger by a ten-thousandth of the range, and the tip and its cone are moved back by as much, to
+    /// cover rounding in the shader.
     ///
-    /// `cosine_of_half_angle` is that of the angle between the axis and where the light ends, from 0 to 1; beyond
-    /// either end it counts as that end. `range` is in metres. It does the same as the function of that name in
-    /// `light_volume.wgsl`.
+    /// `cosine_of_half_angle` is clamped to 0 to 1. `range` is in metres. It is the same function as in `light_volume.wgsl`.
     fn cone_corner(corner: [f32; 3], cosine_of_half_angle: f32, range: f32) -> Vec3 {
         let [x, y, tier] = corner;
         let along = cosine_of_half_angle.clamp(0.0, 1.0);
@@ -140,11 +137,11 @@ mod tests {
         Vec3::new(x * radius, y * radius, height) * range
     }
 
-    /// How much the sine's square may be above what the cosine says. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and
-    /// so is the one that a shader compares it with; at 0° that hides an angle of some 0.03°.
+    /// How much greater the sine's square may be than the cosine implies. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and so is
+    /// the one that a shader compares it with; at 0° that hides an angle of some 0.03°.
     const COSINE_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
-    /// cos(π/16): the middle of each side is that much closer to the axis than its edges.
+    /// cos(π/16): the middle of each side is closer to the axis than its edges by this factor.
     const APOTHEM: f32 = 0.980_785_3;
 
     type Triangle = [DVec3; 3];
@@ -158,21 +155,21 @@ mod tests {
     }
 
     fn placed_cone(cosine: f32, range: f32) -> Vec<Triangle> {
-        let place = |corner: [f32; 3]| cone_corner(corner, cosine, range);
-        triangles(&LightVolume::Cone.corners().into_iter().map(place).collect::<Vec<_>>())
+        let position = |corner: [f32; 3]| cone_corner(corner, cosine, range);
+        triangles(&LightVolume::Cone.corners().into_iter().map(position).collect::<Vec<_>>())
     }
 
     fn volume(triangles: &[Triangle]) -> f64 {
         triangles.iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum()
     }
 
-    /// How far a point is outside the furthest of the planes; below 0 inside.
+    /// A point's greatest distance outside of the planes; negative inside.
     fn distance_outside(triangles: &[Triangle], point: DVec3) -> f64 {
         let outside = |&[a, b, c]: &Triangle| (b - a).cross(c - a).normalize().dot(point - a);
         triangles.iter().map(outside).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Each edge is gone along once, and back once.
+    /// Whether each edge occurs once in each direction.
     fn is_closed(corners: &[[f32; 3]]) -> bool {
         let bits = |corner: [f32; 3]| corner.map(f32::to_bits);
         let (triangles, rest) = corners.as_chunks::<3>();
@@ -183,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn volumes_have_no_holes() {
+    fn volumes_are_closed() {
         assert!(is_closed(&LightVolume::Sphere.corners()));
         assert!(is_closed(&LightVolume::Cone.corners()));
         assert_eq!(LightVolume::Sphere.corners().len(), 80 * 3);
@@ -191,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sphere_is_around_the_unit_sphere_and_little_more() {
+    fn the_sphere_contains_the_unit_sphere_with_little_margin() {
         let sphere = unit_sphere();
         for [a, b, c] in &sphere {
             let across = (b - a).cross(c - a);

@@ -1,4 +1,4 @@
-// What a light reaches, drawn as geometry: the vertex shader of every process that draws lights.
+// The vertex shader of every process that draws lights: places the corners of a light volume.
 @vertex
 fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instance: u32) -> LightPixel {
     let light = lights[instance];
@@ -6,7 +6,7 @@ fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instanc
         // Infinitely far away.
         return LightPixel(vec4<f32>(corner.xy, 0.0, 1.0), instance);
     }
-    // Nothing is farther from a camera than this, and what is larger could leave the range of f32.
+    // No surface is farther from a camera than this, and a larger range could leave the range of f32.
     let range = min(light.range, 0x1p36);
     var local = corner * range;
     if light.kind != POINT {
@@ -14,24 +14,24 @@ fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instanc
     }
     var clip = clip_position(light.position + local);
     if view.projection == ORTHOGRAPHIC && dot(light.position, view.forward) + 2.0 * range > view.far {
-        // The far plane would cut the far side off, and what lies before it would stay dark. All corners of a light take the
-        // same way, since a side with one of its corners moved would be tilted.
+        // The far plane would clip the far side of the volume, and the surfaces in front of it would stay dark. All corners of a
+        // light are moved, because moving only some would tilt a side.
         clip.z = 0.0;
     }
     return LightPixel(clip, instance);
 }
 
-// How large a light volume is beyond the light, as a share of its range: the same as in `light_volume.rs`.
+// How far a light volume exceeds what the light reaches, as a fraction of its range: the same as in `light_volume.rs`.
 const VOLUME_GROWTH: f32 = 1e-4;
 
-// Where the cosine's own rounding could hide an angle, the cone is as wide as if it did.
+// Added to the sine's square: the angle that the rounding of the cosine may hide.
 const COSINE_ROUNDING: f32 = 0x1p-22;
 
-// cos(π/16): the middle of each of the cone's sixteen sides is that much closer to the axis than its edges.
+// cos(π/16): the middle of each of the cone's sixteen sides is closer to the axis than its edges by this factor.
 const APOTHEM: f32 = 0.98078528;
 
-// The place of a corner (x, y, tier) of the cone, for a light at the origin that shines along +Z. `cosine` is that of the
-// angle between the axis and where the light ends, from 0 to 1.
+// The position of a corner (x, y, tier) of the cone, for a light at the origin that shines along +Z. `cosine` is the cosine of the
+// cone's half-angle, from 0 to 1.
 fn cone_corner(corner: vec3<f32>, cosine: f32, range: f32) -> vec3<f32> {
     let along = clamp(cosine, 0.0, 1.0);
     let sine = sqrt(max(1.0 - along * along, 0.0) + COSINE_ROUNDING);
@@ -45,8 +45,7 @@ fn cone_corner(corner: vec3<f32>, cosine: f32, range: f32) -> vec3<f32> {
     return vec3<f32>(corner.xy * radius, height) * range;
 }
 
-// Turns +Z onto an axis of unit length, and whatever else there is with it (Duff et al., "Building an Orthonormal Basis,
-// Revisited", JCGT 2017). The sign keeps the divisor away from 0.
+// Rotates a vector so that +Z becomes an axis of unit length (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017). The sign keeps the divisor away from 0.
 fn around_axis(axis: vec3<f32>, local: vec3<f32>) -> vec3<f32> {
     let sign = select(-1.0, 1.0, axis.z >= 0.0);
     let a = -1.0 / (sign + axis.z);

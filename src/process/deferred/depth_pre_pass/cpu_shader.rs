@@ -1,11 +1,11 @@
-//! The CPU shader of `depth_pre_pass.wgsl`.
+//! `depth_pre_pass.wgsl` on the CPU.
 
 use crate::process::{
     ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
 use crate::raster::{Real, Vector4};
 
-/// Draws depth alone.
+/// Draws only depth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DepthPrePassCpuShader;
 

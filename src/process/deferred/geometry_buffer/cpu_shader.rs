@@ -1,4 +1,4 @@
-//! The CPU shader of `geometry_buffer.wgsl`.
+//! `geometry_buffer.wgsl` on the CPU.
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
 use crate::process::deferred::shading::illumination::MAX_STORED_RADIANCE;
@@ -8,10 +8,10 @@ use crate::process::{
 };
 use crate::raster::{Real, Vector3, Vector4};
 
-/// Fills in normal, diffuse and radiance.
+/// Writes normal, diffuse and radiance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GeometryBufferCpuShader {
-    /// Of its targets.
+    /// The formats of its targets.
     pub(super) formats: GeometryFormats,
 }
 
@@ -25,11 +25,11 @@ impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
         let normal = shading_normal(pass.view, pixel, &material);
         let diffuse = rgb(surface_diffuse(pass, pixel, &material));
         let radiance = material.emission + diffuse * pass.view.ambient;
-        let storable = |color: Vector3<R>| color.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
+        let clamped = |color: Vector3<R>| color.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
         let outputs = [
             self.formats.encode_normal(normal),
-            with_alpha(storable(diffuse), R::one()),
-            with_alpha(storable(radiance), R::one()),
+            with_alpha(clamped(diffuse), R::one()),
+            with_alpha(clamped(radiance), R::one()),
         ];
         for (target, output) in targets.iter_mut().zip(outputs) {
             *target = output;
@@ -48,7 +48,7 @@ mod tests {
     use crate::scene::Blend;
 
     #[test]
-    fn it_stores_what_lighting_needs_in_the_order_declared() {
+    fn it_writes_normal_diffuse_and_radiance_in_the_order_declared() {
         let view = view_values::<f64>(&views()[0]);
         let mut material = material::<f64>(Blend::None);
         material.0.emission = Vector([0.0, 0.5, 1e9]);

@@ -12,7 +12,7 @@ fn fragment(in: Surface) -> Targets {
     let radiance = material.emission + diffuse * view.ambient;
     return Targets(
         encode_normal(normal),
-        // Past this a half float would be infinite, and not a number where no light falls.
+        // Above 65,504 a half float would become infinite, and NaN where it is multiplied by no light.
         vec4<f32>(min(diffuse, vec3<f32>(60000.0)), 1.0),
         vec4<f32>(min(radiance, vec3<f32>(60000.0)), 1.0),
     );

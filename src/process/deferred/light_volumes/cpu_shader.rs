@@ -1,4 +1,4 @@
-//! The CPU shader of `light_volumes.wgsl`.
+//! `light_volumes.wgsl` on the CPU.
 
 use std::f64::consts::PI;
 
@@ -8,12 +8,12 @@ use crate::process::deferred::shading::shadow::ShadowFilter;
 use crate::process::{FullScreenPixel, GeometryFormats, LightCpuShader, PassInputs, ShaderLight};
 use crate::raster::{Real, Vector3, Vector4};
 
-/// Adds what a surface of the geometry buffer reflects of a light.
+/// Adds the light that a surface of the geometry buffer reflects.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightVolumesCpuShader {
-    /// Of the geometry buffer.
+    /// The formats of the geometry buffer.
     pub(super) formats: GeometryFormats,
-    /// Without shadow maps everything is lit.
+    /// `None` if the lights have no shadow maps.
     pub(super) shadows: Option<ShadowFilter>,
 }
 
@@ -26,24 +26,24 @@ impl<R: Real> LightCpuShader<R> for LightVolumesCpuShader {
         targets: &mut [Vector4<R>],
     ) -> bool {
         let stored = |target: usize| pass.sampled[target].load(pixel.coordinates, 0);
-        let place = pass.view.position_from_depth(pixel.clip, stored(DEPTH)[0]);
+        let position = pass.view.position_from_depth(pixel.clip, stored(DEPTH)[0]);
         let normal = self.formats.decode_normal(stored(NORMAL));
 
-        let mut illuminance = illuminance_from(light, place, normal);
+        let mut illuminance = illuminance_from(light, position, normal);
         if illuminance == Vector3::zero() {
             return false;
         }
         if let Some(shadows) = self.shadows {
-            illuminance = illuminance * shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, place, normal);
+            illuminance = illuminance * shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, position, normal);
         }
         let reflected = rgb(stored(DIFFUSE)).map(|value| value / R::of(PI)) * illuminance;
-        // Half floats end at 65,504; past that they would be infinite, and infinities turn to NaN further on.
+        // Above 65,504 a half float would become infinite, and later NaN.
         targets[0] = with_alpha(reflected.map(|value| value.min(R::of(MAX_STORED_RADIANCE))), R::zero());
         true
     }
 }
 
-// The targets sampled, in the order declared.
+// Indices of the sampled targets, in the order declared.
 const DEPTH: usize = 0;
 const NORMAL: usize = 1;
 const DIFFUSE: usize = 2;
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::process::cpu_shader::TypedCpuShader;
     use crate::process::cpu_shader::test_inputs::{
-        Painted, direction, light_values, material, pass, plain, view_values, views,
+        FunctionTexture, direction, light_values, material, pass, plain, view_values, views,
     };
     use crate::process::{
         Format, LightVolumes, ObjectCpuShader, ObjectPixel, RenderProcess, SampledTexture, Transparency, VARYINGS,
@@ -76,12 +76,12 @@ mod tests {
     }
 
     proptest! {
-        /// A surface is lit alike whether it went through the geometry buffer or is drawn over it, in both kinds of number.
+        /// A surface is lit the same whether it is in the geometry buffer or drawn over it.
         #[test]
-        fn it_lights_as_transparency_does(normal in direction(), position in prop::array::uniform3(-5.0..5.0_f64), depth in 0.01..0.5_f64) {
+        fn lighting_equals_that_of_transparency(normal in direction(), position in prop::array::uniform3(-5.0..5.0_f64), depth in 0.01..0.5_f64) {
             let view = view_values::<f64>(&views()[0]);
             let clip = Vector([0.25, -0.5]);
-            let place = view.position_from_depth(clip, depth);
+            let surface = view.position_from_depth(clip, depth);
             let light = light_values(&light(DVec3::from(position)), None);
             let point = octahedral_from_direction(Vector3::of(normal));
             let sampled = [plain([depth, 0.0, 0.0, 0.0]), plain([point[0], point[1], 0.0, 1.0]), plain([0.5, 0.25, 0.75, 1.0])];
@@ -100,7 +100,7 @@ mod tests {
 
             let lights = [light];
             pass.lights = &lights;
-            let [x, y, z] = place.0;
+            let [x, y, z] = surface.0;
             let [dpdx, dpdy] = [[0.0; VARYINGS], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]];
             let varyings = [x, y, z, normal.x, normal.y, normal.z, 0.5, 1.0, 0.0];
             let pixel = ObjectPixel { coordinates: [3, 5], varyings, dpdx, dpdy, material: 0 };
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lambertian_surface_reflects_its_share_over_pi() {
+    fn a_lambertian_surface_reflects_its_diffuse_colour_over_pi() {
         let view = view_values::<f64>(&views()[0]);
         let depth = view.near / 4.0;
         let material = material(Blend::None);
@@ -131,10 +131,10 @@ mod tests {
             let sampled: [&dyn SampledTexture<f64>; 3] = [&depth, &normal, &diffuse];
             let pass = pass(&view, &material, &sampled);
             let pixel = FullScreenPixel { coordinates: [0, 0], clip: Vector([0.0, 0.0]) };
-            // The surface is 4 m before the camera and faces it; the light is 2 m before the surface.
-            let before = light_values(&light(DVec3::NEG_Z * 2.0), None);
+            // The surface is 4 m in front of the camera and faces it; the light is 2 m in front of the surface.
+            let in_front = light_values(&light(DVec3::NEG_Z * 2.0), None);
             let mut targets = [Vector::zero()];
-            assert!(cpu_shader.fragment(&pass, &pixel, &before, &mut targets));
+            assert!(cpu_shader.fragment(&pass, &pixel, &in_front, &mut targets));
             let window = (1.0 - 0.05_f64.powi(4)).powi(2);
             for (channel, expected) in [0.5 * 3.0, 0.25 * 5.0, 7.0].into_iter().enumerate() {
                 let expected = expected / PI / 4.0 * window;
@@ -142,9 +142,9 @@ mod tests {
             }
             let behind = light_values(&light(DVec3::NEG_Z * 6.0), None);
             let mut untouched = [Vector::splat(7.0)];
-            assert!(!cpu_shader.fragment(&pass, &pixel, &behind, &mut untouched), "what gives nothing is discarded");
+            assert!(!cpu_shader.fragment(&pass, &pixel, &behind, &mut untouched), "unlit pixels are discarded");
             assert_eq!(untouched, [Vector::splat(7.0)]);
-            let mut blinding = before;
+            let mut blinding = in_front;
             blinding.intensity = Vector::splat(1e30);
             assert!(cpu_shader.fragment(&pass, &pixel, &blinding, &mut targets));
             assert_eq!(targets[0], Vector([60_000.0, 60_000.0, 60_000.0, 0.0]));
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn shadows_come_from_the_fourth_target() {
+    fn shadow_maps_are_the_fourth_sampled_target() {
         let view = view_values::<f64>(&views()[0]);
         let material = material(Blend::None);
         let maps = ShadowMaps::default();
@@ -172,9 +172,11 @@ mod tests {
         let light = light_values(&spot, Some(&map));
         let targets = [plain([view.near / 4.0, 0.0, 0.0, 0.0]), plain([0.0; 4]), plain([1.0; 4])];
         let [depth, normal, diffuse] = &targets;
-        // The layer of another light shows a wall before it.
-        let walled =
-            Painted { size: [64; 2], color: |_, layer: usize| Vector::splat(if layer == 1 { 0.0 } else { 1.0 }) };
+        // The layers of other lights show a wall right in front of them.
+        let walled = FunctionTexture {
+            size: [64; 2],
+            color: |_, layer: usize| Vector::splat(if layer == 1 { 0.0 } else { 1.0 }),
+        };
         for (maps, is_lit) in [(&walled as &dyn SampledTexture<f64>, true), (&plain([1.0; 4]), false)] {
             let sampled = [depth as &dyn SampledTexture<f64>, normal, diffuse, maps];
             let mut targets = [Vector::zero()];

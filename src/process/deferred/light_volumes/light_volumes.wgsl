@@ -5,16 +5,16 @@
 @fragment
 fn fragment(in: LightPixel) -> @location(0) vec4<f32> {
     let pixel = vec2<i32>(in.position.xy);
-    let place = position_from_depth(clip_of_pixel(in.position), textureLoad(depth_target, pixel, 0));
+    let position = position_from_depth(clip_of_pixel(in.position), textureLoad(depth_target, pixel, 0));
     let normal = decode_normal(textureLoad(normal_target, pixel, 0));
     let light = lights[in.light];
 
-    var illuminance = illuminance_from(light, place, normal);
+    var illuminance = illuminance_from(light, position, normal);
     if all(illuminance == vec3<f32>(0.0)) {
         discard;
     }
-    illuminance *= light_visibility(light, place, normal);
+    illuminance *= light_visibility(light, position, normal);
     let diffuse = textureLoad(diffuse_target, pixel, 0).rgb;
-    // Half floats end at 65,504; past that they would be infinite, and infinities turn to NaN further on.
+    // Above 65,504 a half float would become infinite, and later NaN.
     return vec4<f32>(min(diffuse / PI * illuminance, vec3<f32>(60000.0)), 0.0);
 }

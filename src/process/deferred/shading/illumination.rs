@@ -1,17 +1,17 @@
-//! The CPU shader of `illumination.wgsl`.
+//! `illumination.wgsl` in Rust: the light that reaches a surface.
 
 use crate::process::ShaderLight;
 use crate::process::cpu_shader::built_in::{inverse_square_root, smoothstep};
 use crate::raster::{Real, Vector3};
 use crate::scene::LightKind;
 
-/// What shaders clamp stored radiance to: the half float 65,504 and above would become infinite.
+/// Shaders clamp stored radiance to this: above 65,504 a half float would become infinite.
 pub(in crate::process::deferred) const MAX_STORED_RADIANCE: f64 = 60_000.0;
 
-/// What a light brings to a surface, were nothing in between.
+/// The illuminance of a light on a surface, without shadows.
 pub(in crate::process::deferred) fn illuminance_from<R: Real>(
     light: &ShaderLight<R>,
-    place: Vector3<R>,
+    position: Vector3<R>,
     normal: Vector3<R>,
 ) -> Vector3<R> {
     let brightest = R::of(MAX_ILLUMINANCE);
@@ -19,7 +19,7 @@ pub(in crate::process::deferred) fn illuminance_from<R: Real>(
         let facing = normal.dot(-light.direction).max(R::zero());
         return light.intensity.map(|value| (value * facing).min(brightest));
     }
-    let to_light = light.position - place;
+    let to_light = light.position - position;
     let distance_squared = to_light.dot(to_light);
     if distance_squared == R::zero() || distance_squared >= light.range * light.range {
         return Vector3::zero();
@@ -31,13 +31,13 @@ pub(in crate::process::deferred) fn illuminance_from<R: Real>(
         LightKind::Hemispherical => along_axis.max(R::zero()),
         _ => R::one(),
     };
-    let share = distance_squared / (light.range * light.range);
-    let window = R::one() - share * share;
+    let fraction = distance_squared / (light.range * light.range);
+    let window = R::one() - fraction * fraction;
     let factor = shape * normal.dot(towards).max(R::zero()) * window * window / distance_squared;
     light.intensity.map(|value| (value * factor.min(brightest)).min(brightest))
 }
 
-/// Past the range of f32 light would be infinite, and not a number where nothing of it is left.
+/// Above the range of f32 light would be infinite, and NaN once it is multiplied by 0.
 const MAX_ILLUMINANCE: f64 = 1e30;
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -65,13 +65,11 @@ mod tests {
         ]
     }
 
-    /// By angles, as the documentation of [`Light`] has it.
-    fn expected(light: &Light, place: DVec3, normal: DVec3) -> f64 {
+    /// From angles, as the documentation of [`Light`] defines it.
+    fn expected(light: &Light, position: DVec3, normal: DVec3) -> f64 {
         let axis = Vec3::new(0.48, -0.6, 0.64).as_dvec3();
-        let Some((position, range)) = light.bounding_sphere() else {
-            return (-axis).angle_between(normal).cos().max(0.0);
-        };
-        let way = place - position;
+        let Some((light_position, range)) = light.bounding_sphere() else { return (-axis).angle_between(normal).cos().max(0.0) };
+        let way = position - light_position;
         let (distance, off_axis) = (way.length(), way.angle_between(axis));
         let shape = match light {
             Light::Spot { .. } => {
@@ -95,23 +93,23 @@ mod tests {
         /// 14u·(2 for a hemispherical light, or 1.5/(begin − end) for a spot light) + 14u + 36u, and 10u for products and the
         /// quotient, of I/d².
         #[test]
-        fn light_is_what_its_documentation_says(
+        fn illuminance_follows_the_documentation_of_lights(
             way in prop::array::uniform3(-4.0..4.0_f32),
             normal in direction(),
             range in 0.5..9.0_f32,
         ) {
-            let place = DVec3::new(1.0, 2.0, -3.0).as_vec3() + Vec3::from(way);
-            prop_assume!(place.as_dvec3().distance(DVec3::new(1.0, 2.0, -3.0)) > 1e-3);
+            let position = DVec3::new(1.0, 2.0, -3.0).as_vec3() + Vec3::from(way);
+            prop_assume!(position.as_dvec3().distance(DVec3::new(1.0, 2.0, -3.0)) > 1e-3);
             let normal = normal.as_vec3();
             for light in lights(range) {
-                let at = |normal: Vec3| (Vector3::of_single(place), Vector3::of_single(normal));
+                let at = |normal: Vec3| (Vector3::of_single(position), Vector3::of_single(normal));
                 let (there, facing) = at(normal);
                 let double: Vector3<f64> = illuminance_from(&light_values(&light, None), there, facing);
-                let most = light.bounding_sphere().map_or(1.0, |(position, _)| place.as_dvec3().distance_squared(position).recip());
-                let factor = expected(&light, place.as_dvec3(), normal.as_dvec3());
+                let most = light.bounding_sphere().map_or(1.0, |(light_position, _)| position.as_dvec3().distance_squared(light_position).recip());
+                let factor = expected(&light, position.as_dvec3(), normal.as_dvec3());
                 let single: Vector3<f32> = illuminance_from(
                     &light_values(&light, None),
-                    Vector3::of_single(place),
+                    Vector3::of_single(position),
                     Vector3::of_single(normal),
                 );
                 let [begin, end] = ANGLES.map(|angle| f64::from(angle).cos());
@@ -125,14 +123,14 @@ mod tests {
             }
         }
 
-        /// What the window takes away is I/r²·(2s − s³), where s is (d/r)², and that is largest at s = √(2/3).
+        /// The window subtracts I/r²·(2s − s³), where s is (d/r)², which is largest at s = √(2/3).
         #[test]
-        fn the_window_takes_little_from_what_the_range_is_for(share in 1e-3..1.0_f64, intensity in 0.1..1e3_f32) {
+        fn the_window_subtracts_little_within_the_range_for_an_intensity(share in 1e-3..1.0_f64, intensity in 0.1..1e3_f32) {
             let range = Light::range_for(Vec3::splat(intensity));
             let light = Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range };
             let distance = share * f64::from(range);
-            let place = Vector([0.0, 0.0, distance]);
-            let found = illuminance_from(&light_values(&light, None), place, Vector([0.0, 0.0, -1.0]))[0];
+            let position = Vector([0.0, 0.0, distance]);
+            let found = illuminance_from(&light_values(&light, None), position, Vector([0.0, 0.0, -1.0]))[0];
             let taken = f64::from(intensity) / distance.powi(2) - found;
             let bound = 4.0 / 3.0 * (2.0 / 3.0_f64).sqrt() / 256.0;
             prop_assert!((-1e-6..=bound * (1.0 + 1e-6)).contains(&taken), "{taken} {bound}");
@@ -140,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_dark_and_never_more_than_can_be_counted() {
+    fn degenerate_lights_are_dark_and_bright_ones_are_finite() {
         for light in lights(2.0).iter().skip(1) {
             let light = light_values::<f32>(light, None);
             let up = Vector([0.0, 1.0, 0.0]);

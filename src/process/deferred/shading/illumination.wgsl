@@ -1,14 +1,14 @@
 const PI: f32 = 3.14159265;
 
-// Past the range of f32 light would be infinite, and not a number where nothing of it is left.
+// Above the range of f32 light would be infinite, and NaN once it is multiplied by 0.
 const MAX_ILLUMINANCE: vec3<f32> = vec3<f32>(1e30);
 
-// What a light brings to a surface, were nothing in between.
-fn illuminance_from(light: Light, place: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+// The illuminance of a light on a surface, without shadows.
+fn illuminance_from(light: Light, position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     if light.kind == DIRECTIONAL {
         return min(light.intensity * max(dot(normal, -light.direction), 0.0), MAX_ILLUMINANCE);
     }
-    let to_light = light.position - place;
+    let to_light = light.position - position;
     let distance_squared = dot(to_light, to_light);
     if distance_squared == 0.0 || distance_squared >= light.range * light.range {
         return vec3<f32>(0.0);
@@ -21,8 +21,8 @@ fn illuminance_from(light: Light, place: vec3<f32>, normal: vec3<f32>) -> vec3<f
     } else if light.kind == HEMISPHERICAL {
         shape = max(along_axis, 0.0);
     }
-    let share = distance_squared / (light.range * light.range);
-    let window = 1.0 - share * share;
+    let fraction = distance_squared / (light.range * light.range);
+    let window = 1.0 - fraction * fraction;
     let factor = shape * max(dot(normal, towards), 0.0) * window * window / distance_squared;
     return min(light.intensity * min(factor, 1e30), MAX_ILLUMINANCE);
 }

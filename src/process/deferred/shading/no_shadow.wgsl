@@ -1,3 +1,3 @@
-fn light_visibility(light: Light, place: vec3<f32>, normal: vec3<f32>) -> f32 {
+fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32 {
     return 1.0;
 }

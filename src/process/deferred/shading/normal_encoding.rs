@@ -1,4 +1,4 @@
-//! How normals lie in the target `normal`, in Rust; in WGSL, `normal_encoding.wgsl`.
+//! Encodes and decodes normals in the target `normal`: in Rust, and in WGSL in `normal_encoding.wgsl`.
 
 use crate::process::{Format, GeometryFormats, direction_from_octahedral, octahedral_from_direction};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
@@ -6,16 +6,16 @@ use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 /// A normal is stored as a point of the unfolded octahedron, each coordinate from −1 to 1 (Cigolle et al. 2014).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum NormalEncoding {
-    /// As it is, in the first two channels.
+    /// Unchanged, in the first two channels.
     Signed,
-    /// As a whole number from 0 to twice `steps`, in the first two channels, where 1 stands for `largest`. That is even, so that a
-    /// coordinate of 0 has a number of its own, and floors and walls stay straight.
+    /// As an integer from 0 to twice `steps` in the first two channels, where the value 1 is the integer `largest`. Twice `steps` is
+    /// even, so that a coordinate of 0 is exact, and so are the normals of floors and walls.
     Steps { steps: f64, largest: f64 },
-    /// As a whole number from 0 to 65,534: the high bytes are in the first two channels, the low bytes in the others.
+    /// As an integer from 0 to 65,534: the high bytes in the first two channels, the low bytes in the others.
     TwoBytes,
 }
 
-/// Half of the numbers that two bytes are taken for.
+/// Half of the greatest integer that is stored in two bytes.
 const STEPS_OF_TWO_BYTES: f64 = 32_767.0;
 
 impl NormalEncoding {
@@ -25,26 +25,26 @@ impl NormalEncoding {
             Format::Rgb10a2Unorm => Self::Steps { steps: 511.0, largest: 1023.0 },
             Format::Rgba8Unorm => Self::TwoBytes,
             _ if format.is_signed() => Self::Signed,
-            // Finer than those of the format, whatever they are.
+            // Finer than the steps of any such format.
             _ => Self::Steps { steps: STEPS_OF_TWO_BYTES, largest: 2.0 * STEPS_OF_TWO_BYTES },
         }
     }
 }
 
-/// How normals are stored, which follows from the format of `normal`. All of it comes in WGSL and for CPU shaders on the CPU.
+/// The normal encoding follows from the format of `normal`. It exists in WGSL and in Rust.
 impl GeometryFormats {
     /// WGSL for shaders that write or read the target `normal`: `encode_normal(normal: vec3<f32>) -> vec4<f32>` and
     /// `decode_normal(texel: vec4<f32>) -> vec3<f32>`.
     ///
     /// Both coordinates of a normal's point on the octahedron (Cigolle et al. 2014) are stored:
     ///
-    /// | format | how | off by at most |
+    /// | format | encoding | greatest error |
     /// | --- | --- | --- |
     /// | [`Format::Rg8Unorm`] | −1 to 1 as bytes from 0 to 254 | 0.958° |
     /// | [`Format::Rgb10a2Unorm`] | −1 to 1 as 0 to 1022 | 0.238° |
     /// | [`Format::Rgba8Unorm`] | −1 to 1 as 0 to 65,534: both high bytes, then both low bytes | 0.0039° |
-    /// | [`Format::Rg16Float`], [`Format::Rgba16Float`] | as they are | 0.119° |
-    /// | any other that begins at 0 | −1 to 1 as 0 to 1 | its steps |
+    /// | [`Format::Rg16Float`], [`Format::Rgba16Float`] | unchanged | 0.119° |
+    /// | any other without negative numbers | −1 to 1 as 0 to 1 | its steps |
     ///
     /// In all but the last, normals along an axis of the world are exact. The bounds are those of
     /// [`NormalFormat::bound`](crate::quality::NormalFormat::bound).
@@ -58,7 +58,7 @@ impl GeometryFormats {
         format!("const NORMAL_ENCODING: u32 = {code}u;\n{steps}{}", include_str!("normal_encoding.wgsl"))
     }
 
-    /// What a shader writes to the target `normal` for a normal of any length. What has no direction is stored as +Z.
+    /// The value that a shader writes to the target `normal`, for a normal of any length. A normal without direction is stored as +Z.
     pub fn encode_normal<R: Real>(&self, normal: Vector3<R>) -> Vector4<R> {
         let sum = normal[0].abs() + normal[1].abs() + normal[2].abs();
         let has_direction = sum > R::zero() && sum.is_finite();
@@ -77,7 +77,7 @@ impl GeometryFormats {
         }
     }
 
-    /// The normal that a texel of the target `normal` stands for, in the world, of unit length.
+    /// The world-space normal of a texel of the target `normal`, of unit length.
     pub fn decode_normal<R: Real>(&self, texel: Vector4<R>) -> Vector3<R> {
         let first = Vector([texel[0], texel[1]]);
         let of_whole = |whole: R, steps| (whole - R::of(steps)) / R::of(steps);
@@ -109,7 +109,7 @@ mod tests {
         GeometryFormats { normal, ..GeometryFormats::default() }
     }
 
-    /// What a device makes of a channel: of bytes the nearest, of half floats the worst that it may.
+    /// A channel as a device stores it: the nearest byte, or the worst half float that rounding allows.
     fn rounded(format: Format, channel: f64) -> f64 {
         let steps = match format {
             Format::Rg8Unorm | Format::Rgba8Unorm => 255.0,
@@ -146,7 +146,7 @@ mod tests {
             let third = (steps / 3.0).floor();
             let near =
                 (-20..20).flat_map(move |x| (-20..20).map(move |y| [third + f64::from(x), third + f64::from(y)]));
-            near.map(move |place| place.map(|step| (step + 0.5) / steps))
+            near.map(move |steps_away| steps_away.map(|step| (step + 0.5) / steps))
         });
         let between = between.flat_map(|[x, y]| [[x, y], [0.0, x], [1.0 - x, x]]);
         let faces = between.flat_map(|[x, y]| {
@@ -165,14 +165,14 @@ mod tests {
             };
             for worst in [worst(read_back::<f32>), worst(read_back::<f64>)] {
                 assert!(worst <= normals.max_error_degrees(), "{normals:?}: {worst}");
-                // Or else the bound would not say much.
+                // Otherwise the bound would be too loose.
                 assert!(worst >= normals.max_error_degrees() * 0.4, "{normals:?}: {worst}");
             }
         }
     }
 
     #[test]
-    fn normals_along_an_axis_are_exact_and_stay_so() {
+    fn normals_along_an_axis_are_exact() {
         for axis in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
             for format in ALL.map(Format::from) {
                 assert!(off(read_back::<f64>(format, axis), axis) < 1e-12, "{format:?} {axis}");
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn length_is_nothing_and_what_has_no_direction_is_up() {
+    fn length_does_not_matter_and_a_normal_without_direction_is_up() {
         let across = DVec3::new(1.0, -2.0, -3.0).normalize();
         let broken = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
         let broken = broken.map(|number| DVec3::new(number, 0.5, -0.5)).into_iter().chain([DVec3::ZERO, -DVec3::ZERO]);
@@ -199,9 +199,9 @@ mod tests {
         }
     }
 
-    /// So that who reads only the first two channels of a format of bytes is off by a step.
+    /// A shader that reads only the first two channels of a format of bytes is off by a step.
     #[test]
-    fn two_bytes_begin_with_what_one_byte_would_hold() {
+    fn the_high_bytes_approximate_the_normal() {
         for normal in directions() {
             let two = formats(Format::Rgba8Unorm).encode_normal(Vector3::<f64>::of(normal));
             let one = formats(Format::Rgba8Srgb).encode_normal(Vector3::<f64>::of(normal));
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn shaders_are_told_the_same_numbers() {
+    fn the_wgsl_has_the_same_constants() {
         for (format, constants) in [
             (Format::Rg16Float, ["NORMAL_ENCODING: u32 = 0u;", ""]),
             (

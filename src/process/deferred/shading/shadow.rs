@@ -29,45 +29,46 @@ pub(in crate::process::deferred) struct ShadowFilter {
 }
 
 impl ShadowFilter {
-    /// For maps drawn and read like this.
+    /// With the settings of these maps.
     pub(in crate::process::deferred) fn new(maps: &ShadowMaps) -> Self {
         Self { bias: maps.bias, filter: maps.filter }
     }
 
-    /// The share of a light that is not kept from a place, from 0 to 1.
+    /// The fraction of a light that reaches a position, from 0 to 1.
     pub(in crate::process::deferred) fn light_visibility<R: Real>(
         self,
         maps: &dyn SampledTexture<R>,
         light: &ShaderLight<R>,
-        place: Vector3<R>,
+        position: Vector3<R>,
         normal: Vector3<R>,
     ) -> R {
         let Some(layer) = light.shadow_layer else { return R::one() };
         let towards = match light.kind {
             LightKind::Directional => -light.direction,
-            _ => normalize(light.position - place),
+            _ => normalize(light.position - position),
         };
         let side = maps.size()[0];
-        // Within the pixels that the filter reads, the surface comes nearer to the light by as much as this.
+        // Within the filter's pixels, the surface comes nearer to the light by up to the slope times this.
         let reach = R::of(f64::from(self.filter + 1));
         let offset = R::of(f64::from(self.bias))
-            * shadow_map_point(side, light, place).pixel
+            * shadow_map_point(side, light, position).pixel
             * (R::of(0.1) + reach * shadow_slope(light, normal, towards));
 
-        // Towards the light, so that it stays at its place of the map.
-        let moved = shadow_map_point(side, light, place + towards * offset.min((light.position - place).length()));
+        // An offset towards the light does not change where in the map the position is.
+        let moved =
+            shadow_map_point(side, light, position + towards * offset.min((light.position - position).length()));
         if moved.clip.0.iter().any(|value| value.abs() >= R::one()) || moved.depth <= R::zero() {
             return R::one();
         }
         self.filtered_visibility(maps, layer, &moved)
     }
 
-    /// The mean of what the map's pixels around a place say, each of those on the edge of the square by how much of it is
-    /// inside.
-    fn filtered_visibility<R: Real>(self, maps: &dyn SampledTexture<R>, layer: usize, place: &ShadowMapPoint<R>) -> R {
+    /// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are weighted by
+    /// how much of them is inside.
+    fn filtered_visibility<R: Real>(self, maps: &dyn SampledTexture<R>, layer: usize, point: &ShadowMapPoint<R>) -> R {
         let side = maps.size()[0];
         let half = R::of(0.5);
-        let center = Vector([place.clip[0] * half + half, place.clip[1] * -half + half])
+        let center = Vector([point.clip[0] * half + half, point.clip[1] * -half + half])
             .map(|value| value * R::of(side as f64) - half);
         let first = |value: R| value.floor().as_f64() as i64 - i64::from(self.filter);
         let [left, top] = center.0.map(first);
@@ -83,33 +84,33 @@ impl ShadowFilter {
         for row in 0..=last {
             let weight_of_row = weight_of(row, inside[1]);
             for column in 0..=last {
-                // Reversed: what is nearer to the light has the greater depth.
+                // Depth is reversed: nearer to the light is greater.
                 let [depth, ..] = maps.load([within(left + column), within(top + row)], layer).0;
-                if depth <= place.depth {
+                if depth <= point.depth {
                     lit += weight_of_row * weight_of(column, inside[0]);
                 } else {
                     is_shadowed = true;
                 }
             }
         }
-        // The weights' sum may be off by a rounding, and what nothing stands before is to be just as bright as without a map.
+        // Without an occluder the result is exactly 1, as without a map, although the sum of the weights is rounded.
         if is_shadowed { lit / R::of((last * last) as f64) } else { R::one() }
     }
 }
 
-/// A place as a light's shadow map has it.
+/// A point of a light's shadow map.
 struct ShadowMapPoint<R> {
     /// From (-1, -1) at the map's lower left to (1, 1) at its upper right.
     clip: Vector2<R>,
     depth: R,
-    /// How wide a pixel of the map is there, in metres.
+    /// The width of a pixel of the map there, in metres.
     pixel: R,
 }
 
-fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, place: Vector3<R>) -> ShadowMapPoint<R> {
+fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vector3<R>) -> ShadowMapPoint<R> {
     let side = R::of(side as f64);
     let two = R::of(2.0);
-    let Vector([x, y, z]) = along_map_axes(light, place - light.position);
+    let Vector([x, y, z]) = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
     match light.kind {
         LightKind::Spot => {
@@ -140,15 +141,15 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, place: Vector3
     }
 }
 
-/// How much nearer a surface comes to a light, at most, over a pixel of its map along both of the map's axes: in widths of a
-/// pixel, along the way to the light.
+/// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in pixel
+/// widths.
 fn shadow_slope<R: Real>(light: &ShaderLight<R>, normal: Vector3<R>, towards: Vector3<R>) -> R {
     let cosine = clamp(normal.dot(towards), R::of(1e-3), R::one());
     if light.kind == LightKind::Hemispherical {
-        // A pixel's diagonal, and a little more because pixels differ.
+        // A pixel's diagonal, and a little more because pixels differ in size.
         return R::of(1.5) * (R::one() - cosine * cosine).sqrt() / cosine;
     }
-    // The map is flat: what faces the light, but not along its axis, has a slope in it too.
+    // The map is flat, so a surface that faces the light off the map's axis has a slope too.
     let local = along_map_axes(light, normal);
     (local[0].abs() + local[1].abs()) / cosine
 }
@@ -164,7 +165,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::process::cpu_shader::test_inputs::{Painted, UNIT, direction, light_values, plain, view_values};
+    use crate::process::cpu_shader::test_inputs::{FunctionTexture, UNIT, direction, light_values, plain, view_values};
     use crate::scene::{Camera, Light, Projection};
     use crate::view::RenderView;
 
@@ -192,8 +193,9 @@ mod tests {
         ShadowFilter::new(&ShadowMaps { bias, filter, ..ShadowMaps::default() })
     }
 
-    /// A place that a map sees: from its middle to its border across, and from its camera to its end in distance, each 0 to 1.
-    fn place_before(map: &RenderView, across: [f64; 2], distance: f64) -> DVec3 {
+    /// A position that a map sees, by its offset across from the centre to the border and its distance from the camera to the end,
+    /// each from 0 to 1.
+    fn position_in_map(map: &RenderView, across: [f64; 2], distance: f64) -> DVec3 {
         let [right, up, forward] = map.picture_axes().map(Vec3::as_dvec3);
         let across = right * across[0] + up * across[1];
         let distance = distance * f64::from(map.camera.far);
@@ -206,34 +208,34 @@ mod tests {
     }
 
     proptest! {
-        /// Who draws a map and who reads it agree about where a place is in it. The matrix is of f32.
+        /// Drawing a map and reading it project a position to the same point. The matrix is f32.
         #[test]
-        fn a_place_is_read_where_it_was_drawn(across in prop::array::uniform2(-0.9..0.9_f64), distance in 0.1..0.9_f64) {
+        fn a_position_is_read_where_it_was_drawn(across in prop::array::uniform2(-0.9..0.9_f64), distance in 0.1..0.9_f64) {
             for (light, map) in shadowed() {
-                let place = place_before(&map, across, distance);
+                let position = position_in_map(&map, across, distance);
                 let view = view_values::<f64>(&map);
-                let [x, y, z, w] = view.clip_position(Vector3::of(place - map.camera.position)).0;
-                let found = shadow_map_point(SIDE, &light_values(&light, Some(&map)), Vector3::<f64>::of(place));
+                let [x, y, z, w] = view.clip_position(Vector3::of(position - map.camera.position)).0;
+                let found = shadow_map_point(SIDE, &light_values(&light, Some(&map)), Vector3::<f64>::of(position));
                 let [found_x, found_y] = found.clip.0;
                 prop_assert!((found_x - x / w).abs() + (found_y - y / w).abs() < 1e-4, "{light:?} {:?} {x} {y} {w}", found.clip);
                 prop_assert!((found.depth - z / w).abs() < 1e-4, "{light:?} {} {}", found.depth, z / w);
             }
         }
 
-        /// A step across the map as wide as a pixel leads to the next pixel. On a flat map that is exact; on a paraboloid, whose
+        /// A step of a pixel's width across the map leads to the next pixel. On a flat map that is exact; on a paraboloid, whose
         /// scale changes by its own size from the middle to the rim, it is to the first order in the pixel's angle, 4/side.
         #[test]
-        fn a_pixel_is_as_wide_as_it_is_said_to_be(across in prop::array::uniform2(-0.6..0.6_f64), around in -3.0..3.0_f64) {
+        fn a_step_of_a_pixels_width_leads_to_the_next_pixel(across in prop::array::uniform2(-0.6..0.6_f64), around in -3.0..3.0_f64) {
             for (light, map) in shadowed() {
                 let light = light_values::<f64>(&light, Some(&map));
-                let place = place_before(&map, across, 0.5);
+                let position = position_in_map(&map, across, 0.5);
                 let is_hemisphere = light.kind == LightKind::Hemispherical;
                 let [right, up, forward] = map.picture_axes().map(|axis| axis.as_dvec3().normalize());
-                let axis = if is_hemisphere { (place - map.camera.position).normalize() } else { forward };
+                let axis = if is_hemisphere { (position - map.camera.position).normalize() } else { forward };
                 let step = (right * around.cos() + up * around.sin()).reject_from_normalized(axis).normalize();
                 let side = 1 << 14;
-                let here = shadow_map_point(side, &light, Vector3::of(place));
-                let there = shadow_map_point(side, &light, Vector3::of(place + step * here.pixel));
+                let here = shadow_map_point(side, &light, Vector3::of(position));
+                let there = shadow_map_point(side, &light, Vector3::of(position + step * here.pixel));
                 let pixels = (there.clip - here.clip).length() * side as f64 / 2.0;
                 prop_assert!((pixels - 1.0).abs() < 1e-3, "{:?} {pixels}", light.kind);
             }
@@ -241,7 +243,7 @@ mod tests {
 
         /// Up to 100 weights of at most 1 are added up to 81 at most, so the sum is off by 100u of itself and each weight by 2u.
         #[test]
-        fn a_map_of_one_depth_says_all_or_nothing(
+        fn a_map_of_one_depth_lights_all_or_nothing(
             across in prop::array::uniform2(-0.8..0.8_f64),
             distance in 0.2..0.8_f64,
             normal in direction(),
@@ -249,21 +251,21 @@ mod tests {
         ) {
             for (light, map) in shadowed() {
                 let light = light_values::<f32>(&light, Some(&map));
-                let place = Vector3::of(place_before(&map, across, distance));
-                let share = |depth: f64| shadow_filter(1.0, filter).light_visibility(&plain::<f32>([depth, 0.0, 0.0, 0.0]), &light, place, Vector3::of(normal));
+                let position = Vector3::of(position_in_map(&map, across, distance));
+                let share = |depth: f64| shadow_filter(1.0, filter).light_visibility(&plain::<f32>([depth, 0.0, 0.0, 0.0]), &light, position, Vector3::of(normal));
                 prop_assert!((f64::from(share(0.0)) - 1.0).abs() <= 102.0 * UNIT);
                 let moved = share(1.0);
-                // What is moved to the light itself, or out of the map's sight on the way there, is lit.
+                // A position that the offset moves to the light itself, or out of the map, is lit.
                 prop_assert!(moved == 0.0 || (moved - 1.0).abs() < 1e-5);
                 let mut without = light;
                 without.shadow_layer = None;
-                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, place, Vector3::of(normal)), 1.0);
+                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, position, Vector3::of(normal)), 1.0);
             }
         }
 
-        /// The filter is a box of 2·filter + 1 pixels: across a straight edge the lit share is how much of that lies beyond it.
+        /// The filter is a box of 2·filter + 1 pixels: across a straight edge the visibility is how much of the box lies beyond the edge.
         #[test]
-        fn shadows_fade_over_the_filters_width(
+        fn shadows_fade_over_the_width_of_the_filter(
             across in -0.6..0.6_f64,
             row in -0.6..0.6_f64,
             edge in 20..44_usize,
@@ -271,20 +273,20 @@ mod tests {
         ) {
             let (light, map) = &shadowed()[1];
             let light = light_values::<f64>(light, Some(map));
-            let place = Vector3::of(place_before(map, [across, row], 0.5));
+            let position = Vector3::of(position_in_map(map, [across, row], 0.5));
             let facing = Vector3::<f64>::of_single(-map.picture_axes()[2]);
             let shade = |[column, _]: [usize; 2], layer| {
                 assert_eq!(layer, 2);
                 Vector::splat(if column < edge { 1.0 } else { 0.0 })
             };
-            let share = shadow_filter(0.0, filter).light_visibility(&Painted { size: [SIDE; 2], color: shade }, &light, place, facing);
-            let column = (shadow_map_point(SIDE, &light, place).clip[0] + 1.0) / 2.0 * SIDE as f64;
+            let share = shadow_filter(0.0, filter).light_visibility(&FunctionTexture { size: [SIDE; 2], color: shade }, &light, position, facing);
+            let column = (shadow_map_point(SIDE, &light, position).clip[0] + 1.0) / 2.0 * SIDE as f64;
             let wide = f64::from(2 * filter + 1);
             let beyond = (column + wide / 2.0 - edge as f64).clamp(0.0, wide) / wide;
             prop_assert!((share - beyond).abs() < 1e-9, "{share} {beyond}");
         }
 
-        /// A wall that its light sees all of casts no shadow upon itself, at the documented bias.
+        /// A wall that is fully visible to its light casts no shadow on itself at the documented bias.
         #[test]
         fn a_surface_does_not_shadow_itself(
             across in prop::array::uniform2(-0.5..0.5_f64),
@@ -295,7 +297,7 @@ mod tests {
                 let values = light_values::<f64>(&light, Some(&map));
                 let [right, up, forward] = map.picture_axes().map(|axis| axis.as_dvec3().normalize());
                 let normal = (right * tilt[0] + up * tilt[1] - forward).normalize();
-                let middle = place_before(&map, [0.0; 2], 0.5);
+                let middle = position_in_map(&map, [0.0; 2], 0.5);
                 let from = map.camera.position;
                 // The depth of the wall as the map's pixel sees it, along the pixel's ray.
                 let view = view_values::<f64>(&map);
@@ -315,8 +317,8 @@ mod tests {
                     let [.., z, w] = view.clip_position(Vector3::of(start + way * distance - from)).0;
                     Vector::splat(if distance > 0.0 { z / w } else { 0.0 })
                 };
-                let seen = place_before(&map, across, 0.5);
-                let place = {
+                let seen = position_in_map(&map, across, 0.5);
+                let position = {
                     let (start, way) = match map.camera.projection {
                         Projection::Orthographic { .. } => (seen, forward),
                         _ => (from, seen - from),
@@ -324,21 +326,21 @@ mod tests {
                     start + way * ((middle - start).dot(normal) / way.dot(normal))
                 };
                 let share = shadow_filter(1.0, filter)
-                    .light_visibility(&Painted { size: [SIDE; 2], color: depth_of }, &values, Vector3::of(place), Vector3::of(normal));
+                    .light_visibility(&FunctionTexture { size: [SIDE; 2], color: depth_of }, &values, Vector3::of(position), Vector3::of(normal));
                 prop_assert!(share > 1.0 - 1e-9, "{:?} {share} {tilt:?} {across:?}", values.kind);
             }
         }
     }
 
     #[test]
-    fn what_is_in_the_way_keeps_the_light_off() {
+    fn an_occluder_blocks_the_light() {
         for (light, map) in shadowed() {
             let light = light_values::<f64>(&light, Some(&map));
             let towards = Vector3::of_single(-map.picture_axes()[2]);
             let share = |distance: f64, wall: f64| {
-                let depth = shadow_map_point(SIDE, &light, Vector3::of(place_before(&map, [0.0; 2], wall))).depth;
-                let place = Vector3::of(place_before(&map, [0.0; 2], distance));
-                shadow_filter(1.0, 1).light_visibility(&plain([depth, 0.0, 0.0, 0.0]), &light, place, towards)
+                let depth = shadow_map_point(SIDE, &light, Vector3::of(position_in_map(&map, [0.0; 2], wall))).depth;
+                let position = Vector3::of(position_in_map(&map, [0.0; 2], distance));
+                shadow_filter(1.0, 1).light_visibility(&plain([depth, 0.0, 0.0, 0.0]), &light, position, towards)
             };
             assert!((share(0.4, 0.5) - 1.0).abs() < 1e-12, "before the wall");
             assert_eq!(share(0.6, 0.5), 0.0, "behind it");
@@ -346,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_map_does_not_see_is_lit() {
+    fn positions_outside_of_a_map_are_lit() {
         let shade = plain::<f64>([1.0; 4]);
         for (light, map) in shadowed() {
             let light = light_values::<f64>(&light, Some(&map));
@@ -355,8 +357,8 @@ mod tests {
             let share = |way: DVec3| {
                 let is_sun = light.kind == LightKind::Directional;
                 let facing = if is_sun { -forward } else { -way.normalize() };
-                let place = Vector3::of(map.camera.position + way);
-                shadow_filter(1.0, 1).light_visibility(&shade, &light, place, Vector3::of(facing))
+                let position = Vector3::of(map.camera.position + way);
+                shadow_filter(1.0, 1).light_visibility(&shade, &light, position, Vector3::of(facing))
             };
             assert_eq!(share(forward * far * 1.1), if light.kind == LightKind::Spot { 0.0 } else { 1.0 });
             assert_eq!(share(right.normalize() * far * 1.1 + forward * 0.1), 1.0);

@@ -1,41 +1,40 @@
-// A place as a light's shadow map has it.
+// A point of a light's shadow map.
 struct ShadowMapPoint {
     // From (-1, -1) at the map's lower left to (1, 1) at its upper right.
     clip: vec2<f32>,
     depth: f32,
-    // How wide a pixel of the map is there, in metres.
+    // The width of a pixel of the map there, in metres.
     pixel: f32,
 }
 
-// The share of a light that is not kept from a place, from 0 to 1.
-fn light_visibility(light: Light, place: vec3<f32>, normal: vec3<f32>) -> f32 {
+// The fraction of a light that reaches a position, from 0 to 1.
+fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32 {
     if light.shadow_layer == NO_SHADOW_MAP {
         return 1.0;
     }
     var towards = -light.direction;
     if light.kind != DIRECTIONAL {
-        towards = normalize(light.position - place);
+        towards = normalize(light.position - position);
     }
-    // Within the pixels that the filter reads, the surface comes nearer to the light by as much as this.
-    let offset = SHADOW_BIAS * shadow_map_point(light, place).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
+    // Within the filter's pixels, the surface comes nearer to the light by up to this.
+    let offset = SHADOW_BIAS * shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
 
-    // Towards the light, so that it stays at its place of the map.
-    let moved = shadow_map_point(light, place + towards * min(offset, length(light.position - place)));
+    // An offset towards the light does not change where in the map the position is.
+    let moved = shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
     if any(abs(moved.clip) >= vec2<f32>(1.0)) || moved.depth <= 0.0 {
         return 1.0;
     }
     return filtered_visibility(light.shadow_layer, moved);
 }
 
-// How much nearer a surface comes to a light, at most, over a pixel of its map along both of the map's axes: in widths of a
-// pixel, along the way to the light.
+// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in pixel widths.
 fn shadow_slope(light: Light, normal: vec3<f32>, towards: vec3<f32>) -> f32 {
     let cosine = clamp(dot(normal, towards), 1e-3, 1.0);
     if light.kind == HEMISPHERICAL {
-        // A pixel's diagonal, and a little more because pixels differ.
+        // A pixel's diagonal, and a little more because pixels differ in size.
         return 1.5 * sqrt(1.0 - cosine * cosine) / cosine;
     }
-    // The map is flat: what faces the light, but not along its axis, has a slope in it too.
+    // The map is flat, so a surface that faces the light off the map's axis has a slope too.
     let local = along_map_axes(light, normal);
     return (abs(local.x) + abs(local.y)) / cosine;
 }
@@ -45,9 +44,9 @@ fn along_map_axes(light: Light, direction: vec3<f32>) -> vec3<f32> {
     return rotate(vec4<f32>(-light.shadow_orientation.xyz, light.shadow_orientation.w), direction);
 }
 
-fn shadow_map_point(light: Light, place: vec3<f32>) -> ShadowMapPoint {
+fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     let side = f32(textureDimensions(shadow_maps).x);
-    let local = along_map_axes(light, place - light.position);
+    let local = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
     switch light.kind {
         case SPOT: {
@@ -67,10 +66,11 @@ fn shadow_map_point(light: Light, place: vec3<f32>) -> ShadowMapPoint {
     }
 }
 
-// The mean of what the map's pixels around a place say, each of those on the edge of the square by how much of it is inside.
-fn filtered_visibility(layer: u32, place: ShadowMapPoint) -> f32 {
+// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are weighted by how much
+// of them is inside.
+fn filtered_visibility(layer: u32, point: ShadowMapPoint) -> f32 {
     let side = i32(textureDimensions(shadow_maps).x);
-    let center = (place.clip * vec2<f32>(0.5, -0.5) + 0.5) * f32(side) - 0.5;
+    let center = (point.clip * vec2<f32>(0.5, -0.5) + 0.5) * f32(side) - 0.5;
     let first = vec2<i32>(floor(center)) - SHADOW_FILTER;
     let inside = fract(center);
     let last = 2 * SHADOW_FILTER + 1;
@@ -83,14 +83,14 @@ fn filtered_visibility(layer: u32, place: ShadowMapPoint) -> f32 {
             var weight = weight_of_row;
             if column == 0 { weight *= 1.0 - inside.x; } else if column == last { weight *= inside.x; }
             let pixel = clamp(first + vec2<i32>(column, row), vec2<i32>(0), vec2<i32>(side - 1));
-            // Reversed: what is nearer to the light has the greater depth.
-            if textureLoad(shadow_maps, pixel, layer, 0) <= place.depth {
+            // Depth is reversed: nearer to the light is greater.
+            if textureLoad(shadow_maps, pixel, layer, 0) <= point.depth {
                 lit += weight;
             } else {
                 is_shadowed = true;
             }
         }
     }
-    // The weights' sum may be off by a rounding, and what nothing stands before is to be just as bright as without a map.
+    // Without an occluder the result is exactly 1, as without a map, although the sum of the weights is rounded.
     return select(1.0, lit / f32(last * last), is_shadowed);
 }

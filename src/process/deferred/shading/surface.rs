@@ -1,4 +1,4 @@
-//! The CPU shader of `surface.wgsl`: what CPU shaders that draw objects have in common.
+//! `surface.wgsl` in Rust: what CPU shaders that draw objects share.
 
 use crate::process::cpu_shader::built_in::{inverse_square_root, sign};
 use crate::process::{
@@ -22,40 +22,40 @@ pub(in crate::process::deferred) fn surface_vertex<R: Real>(
     VertexOutput { clip: view.clip_position(relative), varyings }
 }
 
-/// From here on all f32 are whole numbers, and the texture is at its beginning.
+/// From here on all f32 are integers, so the fraction of a texture coordinate is 0.
 const MAX_UV: f64 = 8_388_608.0;
 
-/// A pixel's place relative to the camera, along the world's axes.
+/// A pixel's position relative to the camera, along the world's axes.
 pub(in crate::process::deferred) fn relative_of<R: Real>(pixel: &ObjectPixel<R>) -> Vector3<R> {
     three(&pixel.varyings, RELATIVE)
 }
 
-/// The normal of the side that is seen.
+/// The normal of the visible side.
 pub(in crate::process::deferred) fn shading_normal<R: Real>(
     view: &ShaderView<R>,
     pixel: &ObjectPixel<R>,
     material: &ShaderMaterial<R>,
 ) -> Vector3<R> {
-    // The triangle's own, of either sign.
-    let across = three(&pixel.dpdx, RELATIVE).cross(three(&pixel.dpdy, RELATIVE));
-    // Whichever way the triangle is wound, its visible side is the one that faces the camera.
+    // The triangle's geometric normal, of either sign.
+    let geometric = three(&pixel.dpdx, RELATIVE).cross(three(&pixel.dpdy, RELATIVE));
+    // The visible side faces the camera, whatever the triangle's winding.
     let to_eye = view.direction_to_eye(relative_of(pixel));
-    let facing = unit_or(across * sign(across.dot(to_eye)), to_eye);
-    let normal = unit_or(three(&pixel.varyings, NORMAL), facing);
+    let facing = normalize_or(geometric * sign(geometric.dot(to_eye)), to_eye);
+    let normal = normalize_or(three(&pixel.varyings, NORMAL), facing);
     if material.double_sided && normal.dot(facing) < R::zero() { -normal } else { normal }
 }
 
-/// The diffuse colour and opacity of what is seen.
+/// The surface's diffuse colour and opacity.
 pub(in crate::process::deferred) fn surface_diffuse<R: Real>(
     pass: &PassInputs<'_, R>,
     pixel: &ObjectPixel<R>,
     material: &ShaderMaterial<R>,
 ) -> Vector4<R> {
-    let [uv, across, down] = [&pixel.varyings, &pixel.dpdx, &pixel.dpdy].map(uv_of);
-    pass.diffuse_at(pixel.material, material, uv, across, down)
+    let [uv, dpdx, dpdy] = [&pixel.varyings, &pixel.dpdx, &pixel.dpdy].map(uv_of);
+    pass.diffuse_at(pixel.material, material, uv, dpdx, dpdy)
 }
 
-// Where a corner's varyings begin.
+// The index of each varying.
 const RELATIVE: usize = 0;
 const NORMAL: usize = 3;
 const UV: usize = 6;
@@ -68,8 +68,8 @@ fn uv_of<R: Real>(varyings: &[R; VARYINGS]) -> Vector2<R> {
     Vector([varyings[UV], varyings[UV + 1]])
 }
 
-/// A vector brought to unit length, or another where it has no direction.
-fn unit_or<R: Real>(vector: Vector3<R>, other: Vector3<R>) -> Vector3<R> {
+/// A vector scaled to unit length, or another if it has no direction.
+fn normalize_or<R: Real>(vector: Vector3<R>, other: Vector3<R>) -> Vector3<R> {
     let length_squared = vector.dot(vector);
     let has_direction = length_squared > R::zero() && length_squared < R::of(1e38);
     if has_direction { vector * inverse_square_root(length_squared) } else { other }
@@ -82,7 +82,7 @@ mod tests {
     use crate::raster::Quaternion;
     use crate::scene::Blend;
 
-    /// A pixel of a wall before the camera, whose texture goes once along it in each metre.
+    /// A pixel of a wall in front of the camera, whose texture repeats every metre.
     fn pixel(normal: [f64; 3]) -> ObjectPixel<f64> {
         let [x, y, z] = normal;
         ObjectPixel {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_corner_hands_on_what_its_pixels_read() {
+    fn varyings_carry_position_normal_and_texture_coordinates() {
         let view = view_values::<f32>(&views()[0]);
         let object = ShaderObject {
             camera: Vector3::zero(),
@@ -106,11 +106,11 @@ mod tests {
         };
         let vertex =
             VertexInput { position: Vector([1.0, 1.0, 1.0]), normal: Vector([0.0, 0.0, 1.0]), uv: Vector([0.75, 0.5]) };
-        let corner = surface_vertex(&view, &object, &vertex);
-        assert_eq!(corner.clip, view.clip_position(Vector([2.0, 2.0, -4.0])));
+        let output = surface_vertex(&view, &object, &vertex);
+        assert_eq!(output.clip, view.clip_position(Vector([2.0, 2.0, -4.0])));
         let pixel = ObjectPixel {
             coordinates: [0, 0],
-            varyings: corner.varyings,
+            varyings: output.varyings,
             dpdx: [0.0; VARYINGS],
             dpdy: [0.0; VARYINGS],
             material: 3,
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_face_whom_sees_them_where_both_sides_are_drawn() {
+    fn normals_of_double_sided_materials_face_the_camera() {
         let view = view_values::<f64>(&views()[0]);
         let mut material = material::<f64>(Blend::None).0;
         let slanted = [0.6, 0.0, -0.8];
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_no_normal_gets_the_triangles_own_or_the_way_to_the_eye() {
+    fn a_missing_normal_is_replaced_by_the_geometric_one_or_the_direction_to_the_eye() {
         let view = view_values::<f64>(&views()[0]);
         let material = material(Blend::None).0;
         let mut bare = pixel([0.0; 3]);
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_reach_the_texture() {
+    fn texture_sampling_uses_the_derivatives() {
         let view = view_values::<f64>(&views()[0]);
         let material = material(Blend::None);
         let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel([0.0, 0.0, 1.0]), &material.0);

@@ -1,4 +1,4 @@
-// A pixel of an object, as its vertices say: what shaders that draw objects have in common.
+// The interpolated vertex output of an object: what shaders that draw objects share.
 struct Surface {
     @invariant @builtin(position) clip: vec4<f32>,
     @location(0) relative: vec3<f32>,
@@ -15,28 +15,28 @@ fn vertex(in: VertexInput) -> Surface {
     return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material);
 }
 
-// From here on all f32 are whole numbers, and the texture is at its beginning. At the end of f32, interpolated and filtered, they
-// would be no numbers any more.
+// From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32, interpolation
+// and filtering would lead to NaN.
 const MAX_UV: f32 = 0x1p23;
 
-// The normal of the side that is seen. To be called before the flow parts.
+// The normal of the visible side. Needs uniform control flow.
 fn shading_normal(in: Surface, material: Material) -> vec3<f32> {
-    // The triangle's own, of either sign.
-    let across = cross(dpdx(in.relative), dpdy(in.relative));
-    // Whichever way the triangle is wound, its visible side is the one that faces the camera.
+    // The triangle's geometric normal, of either sign.
+    let geometric = cross(dpdx(in.relative), dpdy(in.relative));
+    // The visible side faces the camera, whatever the triangle's winding.
     let to_eye = direction_to_eye(in.relative);
-    let facing = unit_or(across * sign(dot(across, to_eye)), to_eye);
-    let normal = unit_or(in.normal, facing);
+    let facing = normalize_or(geometric * sign(dot(geometric, to_eye)), to_eye);
+    let normal = normalize_or(in.normal, facing);
     return select(normal, -normal, material.double_sided == 1u && dot(normal, facing) < 0.0);
 }
 
-// The diffuse colour and opacity of what is seen. To be called before the flow parts.
+// The surface's diffuse colour and opacity. Needs uniform control flow.
 fn surface_diffuse(in: Surface, material: Material) -> vec4<f32> {
     return diffuse_at(material, in.uv, dpdx(in.uv), dpdy(in.uv));
 }
 
-// A vector brought to unit length, or another where it has no direction.
-fn unit_or(vector: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
+// A vector scaled to unit length, or another if it has no direction.
+fn normalize_or(vector: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
     let length_squared = dot(vector, vector);
     let has_direction = length_squared > 0.0 && length_squared < 1e38;
     return select(other, vector * inverseSqrt(length_squared), has_direction);

@@ -1,4 +1,4 @@
-//! The CPU shader of `shadow_casters.wgsl`.
+//! `shadow_casters.wgsl` on the CPU.
 
 use crate::process::{
     ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
@@ -6,14 +6,14 @@ use crate::process::{
 use crate::raster::{Real, Vector4};
 use crate::scene::Projection;
 
-/// Draws the depth of what casts shadows.
+/// Draws the depth of shadow casters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShadowCastersCpuShader {
-    /// Whether there are hemispherical lights, whose maps must not show what is behind the light.
+    /// See [`ShadowCasters`](super::ShadowCasters).
     pub(super) hemispheres: bool,
 }
 
-/// Who filters a map at the disc's rim looks a few pixels past it.
+/// A margin beyond the disc's rim: filtering at the rim reads a few pixels past it.
 const RIM_MARGIN: f64 = 0.05;
 
 impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
@@ -31,8 +31,8 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
         self.hemispheres
     }
 
-    /// A triangle behind a paraboloid whose corners lie all around its axis is drawn right across the picture, where it must
-    /// not be.
+    /// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across the
+    /// picture.
     fn fragment(&self, _pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
         let is_behind = pixel.varyings[0] < R::of(-RIM_MARGIN);
         !is_behind
@@ -47,11 +47,11 @@ mod tests {
     use crate::scene::Blend;
     use crate::view::RenderView;
 
-    fn is_drawn(view: &RenderView, place: impl Fn(&ShaderView<f64>) -> Vector3<f64>) -> bool {
+    fn is_drawn(view: &RenderView, position: impl Fn(&ShaderView<f64>) -> Vector3<f64>) -> bool {
         let view = view_values::<f64>(view);
         let object = ShaderObject {
             camera: Vector3::zero(),
-            origin: place(&view),
+            origin: position(&view),
             orientation: Quaternion([0.0, 0.0, 0.0, 1.0]),
             scale: Vector::splat(1.0),
             material: 0,
@@ -65,18 +65,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_a_paraboloid_is_not_drawn() {
+    fn pixels_behind_a_paraboloid_are_discarded() {
         let map = RenderView::new(&paraboloid());
         assert!(is_drawn(&map, |view| view.forward * 2.0));
         assert!(is_drawn(&map, |view| view.right * 2.0 - view.forward * 0.09), "just past the rim");
         assert!(!is_drawn(&map, |view| view.right * 2.0 - view.forward * 0.11));
         assert!(!is_drawn(&map, |view| view.forward * -2.0));
         assert!(is_drawn(&map, |_| Vector::zero()));
-        assert!(is_drawn(&views()[1], |view| view.forward * -2.0), "other maps have nothing to leave out here");
+        assert!(is_drawn(&views()[1], |view| view.forward * -2.0), "other maps discard nothing");
     }
 
     #[test]
-    fn only_hemispheres_cost_a_look_at_each_pixel() {
+    fn only_hemispheres_need_a_fragment_shader() {
         for hemispheres in [false, true] {
             assert_eq!(ObjectCpuShader::<f32>::draws_pixels(&ShadowCastersCpuShader { hemispheres }), hemispheres);
         }

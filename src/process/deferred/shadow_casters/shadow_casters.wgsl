@@ -1,6 +1,6 @@
 struct Caster {
     @builtin(position) clip: vec4<f32>,
-    // The cosine between the way that the camera looks and the way to the place, of a paraboloid; 1 for what needs none.
+    // For a paraboloid, the cosine between the camera's direction and the position's; otherwise 1.
     @location(0) forward: f32,
 }
 
@@ -14,7 +14,7 @@ fn vertex(in: VertexInput) -> Caster {
     return Caster(clip_position(relative), forward);
 }
 
-// A triangle behind a paraboloid whose corners lie all around its axis is drawn right across the picture, where it must not be.
+// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across the picture.
 @fragment
 fn fragment(in: Caster) {
     if in.forward < -RIM_MARGIN {
@@ -22,5 +22,5 @@ fn fragment(in: Caster) {
     }
 }
 
-// Who filters a map at the disc's rim looks a few pixels past it.
+// A margin beyond the disc's rim: filtering at the rim reads a few pixels past it.
 const RIM_MARGIN: f32 = 0.05;

@@ -1,4 +1,4 @@
-//! The CPU shader of `transparency.wgsl`.
+//! `transparency.wgsl` on the CPU.
 
 use std::f64::consts::PI;
 
@@ -10,10 +10,10 @@ use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, Sha
 use crate::raster::{Real, Vector4};
 use crate::scene::Blend;
 
-/// Lights what mixes with what is behind it.
+/// Lights blended objects.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TransparencyCpuShader {
-    /// Without shadow maps everything is lit.
+    /// `None` if no light has a shadow map.
     pub(super) shadows: Option<ShadowFilter>,
 }
 
@@ -26,28 +26,28 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
         let material = pass.materials.get(pixel.material);
         let normal = shading_normal(pass.view, pixel, &material);
         let diffuse = surface_diffuse(pass, pixel, &material);
-        let place = relative_of(pixel);
+        let position = relative_of(pixel);
         let pi = R::of(PI);
         let mut illuminance = pass.view.ambient * pi;
         for light in pass.lights {
-            let unobstructed = illuminance_from(light, place, normal);
+            let unobstructed = illuminance_from(light, position, normal);
             if unobstructed.0.iter().any(|&value| value > R::zero()) {
-                let share = self.shadows.map_or(R::one(), |shadows| {
-                    shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, place, normal)
+                let visibility = self.shadows.map_or(R::one(), |shadows| {
+                    shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, position, normal)
                 });
-                illuminance = illuminance + unobstructed * share;
+                illuminance = illuminance + unobstructed * visibility;
             }
         }
         let radiance = material.emission + rgb(diffuse).map(|value| value / pi) * illuminance;
         let radiance = radiance.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
         let opacity = diffuse[3];
-        // Alpha blending multiplies by the opacity itself.
+        // Alpha blending multiplies by the opacity.
         targets[0] = with_alpha(if material.blend == Blend::Alpha { radiance } else { radiance * opacity }, opacity);
         true
     }
 }
 
-/// The one target sampled.
+/// The index of the only sampled target.
 const SHADOW_MAPS: usize = 0;
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -62,7 +62,7 @@ mod tests {
     use crate::scene::{Camera, Light};
     use crate::view::{RenderView, ShadowMaps};
 
-    /// A pixel 4 m before the camera that faces it, whose texture is (0.5, 1, 0.25) there.
+    /// A pixel of a surface 4 m in front of the camera that faces it, whose texture is (0.5, 1, 0.25) there.
     fn drawn(
         blend: Blend,
         lights: &[ShaderLight<f64>],
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn only_alpha_blending_leaves_the_opacity_to_the_blending() {
+    fn radiance_is_premultiplied_unless_blending_is_alpha() {
         // Diffuse is (0.25, 0.25, 0.25), ambient light (0.1, 0.2, 0.3), emission (0, 0.5, 0.125), and opacity 0.5.
         let radiance = [0.025, 0.55, 0.2];
         let [red, green, blue] = radiance;
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn every_light_adds_what_reaches_it() {
+    fn every_light_adds_its_illumination() {
         let sun = |direction: Vec3| Light::Directional { direction, illuminance: Vec3::splat(4.0), casts_shadow: true };
         let maps = ShadowMaps::default();
         let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);

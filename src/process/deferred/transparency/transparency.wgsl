@@ -12,6 +12,6 @@ fn fragment(in: Surface) -> @location(0) vec4<f32> {
         }
     }
     let radiance = min(material.emission + diffuse.rgb / PI * illuminance, vec3<f32>(60000.0));
-    // Alpha blending multiplies by the opacity itself.
+    // Alpha blending multiplies by the opacity.
     return vec4<f32>(select(radiance * diffuse.a, radiance, material.blend == ALPHA), diffuse.a);
 }

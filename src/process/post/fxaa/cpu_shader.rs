@@ -1,10 +1,10 @@
-//! The CPU shader of `fxaa.wgsl`.
+//! `fxaa.wgsl` on the CPU.
 
 use crate::process::cpu_shader::built_in::{mix, rgb, smoothstep};
 use crate::process::{FullScreenCpuShader, FullScreenPixel, PassInputs, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 
-/// Smooths the steps of edges: see [`Fxaa`](super::Fxaa), whose settings these are, each from 0 to 1.
+/// Smooths aliased edges: see [`Fxaa`](super::Fxaa), whose settings these are, each from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FxaaCpuShader {
     pub(super) contrast_threshold: f32,
@@ -14,13 +14,13 @@ pub(super) struct FxaaCpuShader {
 
 impl<R: Real> FullScreenCpuShader<R> for FxaaCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        targets[0] = self.smoothed(&Source(pass.sampled[0]), pixel.coordinates.map(|place| place as i64));
+        targets[0] = self.smooth(&Source(pass.sampled[0]), pixel.coordinates.map(|coordinate| coordinate as i64));
         true
     }
 }
 
 impl FxaaCpuShader {
-    fn smoothed<R: Real>(&self, source: &Source<'_, R>, pixel: Place) -> Vector4<R> {
+    fn smooth<R: Real>(&self, source: &Source<'_, R>, pixel: Coordinates) -> Vector4<R> {
         let setting = |value: f32| R::of(f64::from(value));
         let two = R::of(2.0);
         let at = |x: i64, y: i64| source.brightness_at(sum(pixel, [x, y]));
@@ -36,7 +36,7 @@ impl FxaaCpuShader {
 
         let [above_left, above_right, below_left, below_right] = [at(-1, -1), at(1, -1), at(-1, 1), at(1, 1)];
 
-        // An edge lies across the way in which brightness bends most.
+        // An edge lies across the direction in which brightness has the greatest second difference.
         let bend = |one: R, between: R, other: R| (one - two * between + other).abs();
         let bend_down = bend(above_left, left, below_left)
             + two * bend(above, middle, below)
@@ -47,51 +47,57 @@ impl FxaaCpuShader {
         let lies_along_row = bend_down >= bend_right;
         let (along, before, after) = if lies_along_row { ([1, 0], above, below) } else { ([0, 1], left, right) };
 
-        // Of the pixel's two sides, the edge is on the steeper one.
+        // The edge is on the side of the pixel with the greater contrast.
         let is_before = (before - middle).abs() >= (after - middle).abs();
-        let [x, y]: Place = along;
+        let [x, y]: Coordinates = along;
         let (other_side, other) = if is_before { ([-y, -x], before) } else { ([y, x], after) };
 
-        let covered = source.covered_share(pixel, along, other_side, middle, other);
+        let covered = source.covered_fraction(pixel, along, other_side, middle, other);
         let neighbours = two * (above + below + left + right) + above_left + above_right + below_left + below_right;
-        // How much to mix in for what is smaller than a pixel, by how far the pixel is from the mean of its neighbours as a
-        // share of the contrast. Beside a straight edge that is 1/3, which is not to change.
+        // The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours as a fraction
+        // of the contrast. Beside a straight edge that is 1/3, which must not change.
         let deviation = (neighbours / R::of(12.0) - middle).abs() / contrast;
         let small = setting(self.sub_pixel) * smoothstep(R::of(1.0 / 3.0), R::one(), deviation);
-        let share = covered.max(small);
-        color.with(source.color_at(sum(pixel, other_side)), |own, other| mix(own, other, share))
+        let factor = covered.max(small);
+        color.with(source.color_at(sum(pixel, other_side)), |own, other| mix(own, other, factor))
     }
 }
 
-/// How many pixels the search for the end of a step goes each way.
+/// How many pixels the search for the end of a step goes in each direction.
 const REACH: i64 = 16;
 
 /// Column and row.
-type Place = [i64; 2];
+type Coordinates = [i64; 2];
 
-fn sum([x, y]: Place, [right, down]: Place) -> Place {
+fn sum([x, y]: Coordinates, [right, down]: Coordinates) -> Coordinates {
     [x + right, y + down]
 }
 
-/// As perceived: near enough the square root of luminance.
+/// Perceived brightness: approximately the square root of luminance.
 fn brightness<R: Real>(color: Vector4<R>) -> R {
     rgb(color).dot(Vector([0.2126, 0.7152, 0.0722].map(R::of))).sqrt()
 }
 
-/// The picture to be smoothed.
+/// The picture that is smoothed.
 struct Source<'a, R>(&'a dyn SampledTexture<R>);
 
 struct StepEnd<R> {
-    /// From the pixel's middle, in pixels.
+    /// From the pixel's centre, in pixels.
     distance: R,
-    /// How much brighter the two sides are there, in the mean, than between them at the pixel.
+    /// The mean brightness of the two sides there, less that at the pixel.
     change: R,
 }
 
 impl<R: Real> Source<'_, R> {
-    /// How much of the pixel lies on the other side of a straight edge through the middles of the step's two ends; at most one
-    /// half.
-    fn covered_share(&self, pixel: Place, along: Place, other_side: Place, middle: R, other: R) -> R {
+    /// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at most one half.
+    fn covered_fraction(
+        &self,
+        pixel: Coordinates,
+        along: Coordinates,
+        other_side: Coordinates,
+        middle: R,
+        other: R,
+    ) -> R {
         let between = (middle + other) / R::of(2.0);
         let tolerance = (other - middle).abs() / R::of(4.0);
         let backward = self.step_end(pixel, along.map(|step| -step), other_side, between, tolerance);
@@ -105,18 +111,25 @@ impl<R: Real> Source<'_, R> {
             return if leads_across { R::of(0.125) / length } else { R::zero() };
         }
 
-        // Behind the end, both sides look like one of the two. Where they look like the pixel's own, the edge turns away from
+        // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns away from
         // it, and the pixels opposite are the ones that are partly covered.
         let nearest = if backward.distance < forward.distance { backward } else { forward };
         let turns_away = (nearest.change < R::zero()) == (middle < between);
         if turns_away { R::zero() } else { R::of(0.5) - nearest.distance / length }
     }
 
-    /// Where, on the way along an edge, the mean of its two sides is not what it was any more.
-    fn step_end(&self, pixel: Place, along: Place, other_side: Place, between: R, tolerance: R) -> StepEnd<R> {
+    /// Where along an edge the mean of its two sides changes.
+    fn step_end(
+        &self,
+        pixel: Coordinates,
+        along: Coordinates,
+        other_side: Coordinates,
+        between: R,
+        tolerance: R,
+    ) -> StepEnd<R> {
         for distance in 1..=REACH {
-            let place = sum(pixel, along.map(|step| step * distance));
-            let mean = (self.brightness_at(place) + self.brightness_at(sum(place, other_side))) / R::of(2.0);
+            let along_edge = sum(pixel, along.map(|step| step * distance));
+            let mean = (self.brightness_at(along_edge) + self.brightness_at(sum(along_edge, other_side))) / R::of(2.0);
             let change = mean - between;
             if change.abs() >= tolerance {
                 // The end is where the first pixel that differs begins.
@@ -126,15 +139,15 @@ impl<R: Real> Source<'_, R> {
         StepEnd { distance: R::of(REACH as f64), change: R::zero() }
     }
 
-    fn brightness_at(&self, pixel: Place) -> R {
+    fn brightness_at(&self, pixel: Coordinates) -> R {
         brightness(self.color_at(pixel))
     }
 
-    /// Beyond its border, the picture goes on as it is there.
-    fn color_at(&self, [x, y]: Place) -> Vector4<R> {
+    /// Coordinates are clamped to the picture.
+    fn color_at(&self, [x, y]: Coordinates) -> Vector4<R> {
         let [width, height] = self.0.size();
-        let within = |place: i64, size: usize| place.clamp(0, size as i64 - 1) as usize;
-        self.0.load([within(x, width), within(y, height)], 0)
+        let clamped = |coordinate: i64, size: usize| coordinate.clamp(0, size as i64 - 1) as usize;
+        self.0.load([clamped(x, width), clamped(y, height)], 0)
     }
 }
 
@@ -145,7 +158,7 @@ mod tests {
     use super::*;
     use crate::process::RenderProcess;
     use crate::process::cpu_shader::TypedCpuShader;
-    use crate::process::cpu_shader::test_inputs::{Painted, material, pass, view_values, views};
+    use crate::process::cpu_shader::test_inputs::{FunctionTexture, material, pass, view_values, views};
     use crate::process::post::{Fxaa, PostStep};
     use crate::scene::Blend;
 
@@ -160,7 +173,7 @@ mod tests {
         let color = |[x, y]: [usize; 2], _| {
             Vector([1.0, 1.0, 1.0, 0.0]) * shade(x as i64, y as i64) + Vector([0.0, 0.0, 0.0, 1.0])
         };
-        let source = Painted { size: SIZE, color };
+        let source = FunctionTexture { size: SIZE, color };
         let (view, material) = (view_values(&views()[0]), material(Blend::None));
         let sampled: [&dyn SampledTexture<f64>; 1] = [&source];
         let pass = pass(&view, &material, &sampled);
@@ -193,9 +206,9 @@ mod tests {
             }
         }
 
-        /// Whatever it does, a pixel stays between itself and its neighbours.
+        /// A result lies between the pixel and its neighbours.
         #[test]
-        fn nothing_new_comes_up(bits in prop::collection::vec(0.0..1.0_f64, SIZE[0] * SIZE[1]), sub_pixel in 0.0..1.0_f32) {
+        fn results_lie_between_a_pixel_and_its_neighbours(bits in prop::collection::vec(0.0..1.0_f64, SIZE[0] * SIZE[1]), sub_pixel in 0.0..1.0_f32) {
             let at = |x: i64, y: i64| bits[(y.clamp(0, 39) * 40 + x.clamp(0, 39)) as usize];
             let settings = Fxaa { sub_pixel, ..Fxaa::default() };
             for (index, found) in (0..).zip(smoothed(settings, at)) {
@@ -208,12 +221,12 @@ mod tests {
         }
     }
 
-    /// An edge that climbs a pixel in every so many columns covers of each pixel just what is mixed in, either way up and across.
+    /// Along an edge that rises one pixel in `length` columns, the blend factor equals the covered area, in both orientations.
     #[test]
-    fn steps_become_what_the_straight_edge_covers() {
+    fn aliased_steps_become_the_coverage_of_the_straight_edge() {
         let settings = Fxaa { sub_pixel: 0.0, ..Fxaa::default() };
         for length in 1..=12_i64 {
-            // A pixel is lit where its middle is below the edge, and no middle lies just on it.
+            // A pixel is lit if its centre is below the edge, and no centre lies exactly on it.
             let start = if length % 2 == 0 { 20.0 } else { 20.5 };
             let height = |x: f64| 20.0 + (x - start) / length as f64;
             let aliased = |x: i64, y: i64| f64::from(u8::from(y as f64 + 0.5 > height(x as f64 + 0.5)));
@@ -236,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn weak_edges_stay_and_single_pixels_fade_by_their_setting() {
+    fn weak_edges_stay_and_single_pixels_fade_by_the_setting() {
         let weak = |x: i64, y: i64| if x + y < 20 { 0.5 } else { 0.55 };
         let settings = Fxaa { dark_threshold: 0.2, ..Fxaa::default() };
         let kept: Vec<_> = smoothed(settings, weak).into_iter().map(|[red, ..]| red).collect();

@@ -9,7 +9,7 @@ struct Parameters {
 @group(2) @binding(0) var<uniform> parameters: Parameters;
 @group(2) @binding(1) var source: texture_2d<f32>;
 
-// How many pixels the search for the end of a step goes each way.
+// How many pixels the search for the end of a step goes in each direction.
 const REACH: i32 = 16;
 
 @fragment
@@ -33,7 +33,7 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let below_left = brightness_at(pixel + vec2<i32>(-1, 1));
     let below_right = brightness_at(pixel + vec2<i32>(1, 1));
 
-    // An edge lies across the way in which brightness bends most.
+    // An edge lies across the direction in which brightness has the greatest second difference.
     let bend_down = abs(above_left - 2.0 * left + below_left) + 2.0 * abs(above - 2.0 * middle + below)
         + abs(above_right - 2.0 * right + below_right);
     let bend_right = abs(above_left - 2.0 * above + above_right) + 2.0 * abs(left - 2.0 * middle + right)
@@ -43,20 +43,19 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let before = select(left, above, lies_along_row);
     let after = select(right, below, lies_along_row);
 
-    // Of the pixel's two sides, the edge is on the steeper one.
+    // The edge is on the side of the pixel with the greater contrast.
     let is_before = abs(before - middle) >= abs(after - middle);
     let other_side = select(along.yx, -along.yx, is_before);
     let other = select(after, before, is_before);
 
-    let covered = covered_share(pixel, along, other_side, middle, other);
+    let covered = covered_fraction(pixel, along, other_side, middle, other);
     let neighbours = 2.0 * (above + below + left + right) + above_left + above_right + below_left + below_right;
-    let share = max(covered, sub_pixel_share(abs(neighbours / 12.0 - middle) / contrast));
-    return mix(color, color_at(pixel + other_side), share);
+    let factor = max(covered, sub_pixel_factor(abs(neighbours / 12.0 - middle) / contrast));
+    return mix(color, color_at(pixel + other_side), factor);
 }
 
-// How much of the pixel lies on the other side of a straight edge through the middles of the step's two ends; at most one
-// half.
-fn covered_share(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, middle: f32, other: f32) -> f32 {
+// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at most one half.
+fn covered_fraction(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, middle: f32, other: f32) -> f32 {
     let between = (middle + other) / 2.0;
     let tolerance = abs(other - middle) / 4.0;
     let backward = step_end(pixel, -along, other_side, between, tolerance);
@@ -69,7 +68,7 @@ fn covered_share(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, midd
         return select(0.0, 0.125 / length, backward.change * forward.change < 0.0);
     }
 
-    // Behind the end, both sides look like one of the two. Where they look like the pixel's own, the edge turns away from
+    // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns away from
     // it, and the pixels opposite are the ones that are partly covered.
     var nearest = forward;
     if backward.distance < forward.distance {
@@ -80,17 +79,17 @@ fn covered_share(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, midd
 }
 
 struct StepEnd {
-    // From the pixel's middle, in pixels.
+    // From the pixel's centre, in pixels.
     distance: f32,
-    // How much brighter the two sides are there, in the mean, than between them at the pixel.
+    // The mean brightness of the two sides there, less that at the pixel.
     change: f32,
 }
 
-// Where, on the way along an edge, the mean of its two sides is not what it was any more.
+// Where along an edge the mean of its two sides changes.
 fn step_end(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, between: f32, tolerance: f32) -> StepEnd {
     for (var distance = 1; distance <= REACH; distance++) {
-        let place = pixel + distance * along;
-        let change = (brightness_at(place) + brightness_at(place + other_side)) / 2.0 - between;
+        let along_edge = pixel + distance * along;
+        let change = (brightness_at(along_edge) + brightness_at(along_edge + other_side)) / 2.0 - between;
         if abs(change) >= tolerance {
             // The end is where the first pixel that differs begins.
             return StepEnd(f32(distance) - 0.5, change);
@@ -99,9 +98,9 @@ fn step_end(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, between: 
     return StepEnd(f32(REACH), 0.0);
 }
 
-// How much to mix in for what is smaller than a pixel, by how far the pixel is from the mean of its neighbours as a share of
-// the contrast. Beside a straight edge that is 1/3, which is not to change.
-fn sub_pixel_share(deviation: f32) -> f32 {
+// The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours as a fraction of
+// the contrast. Beside a straight edge that is 1/3, which must not change.
+fn sub_pixel_factor(deviation: f32) -> f32 {
     return parameters.sub_pixel * smoothstep(1.0 / 3.0, 1.0, deviation);
 }
 
@@ -109,12 +108,12 @@ fn brightness_at(pixel: vec2<i32>) -> f32 {
     return brightness(color_at(pixel));
 }
 
-// As perceived: near enough the square root of luminance.
+// Perceived brightness: approximately the square root of luminance.
 fn brightness(color: vec4<f32>) -> f32 {
     return sqrt(dot(color.rgb, vec3<f32>(0.2126, 0.7152, 0.0722)));
 }
 
-// Beyond its border, the picture goes on as it is there.
+// Coordinates are clamped to the picture.
 fn color_at(pixel: vec2<i32>) -> vec4<f32> {
     let last = vec2<i32>(textureDimensions(source)) - 1;
     return textureLoad(source, clamp(pixel, vec2<i32>(0), last), 0);

@@ -1,4 +1,4 @@
-//! The CPU shader of `tone_mapping.wgsl`.
+//! `tone_mapping.wgsl` on the CPU.
 
 use crate::process::cpu_shader::built_in::{clamp, rgb, with_alpha};
 use crate::process::{FullScreenCpuShader, FullScreenPixel, PassInputs};
@@ -17,8 +17,7 @@ impl<R: Real> FullScreenCpuShader<R> for ToneMappingCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let largest = R::of(MAX_HALF_FLOAT);
         let exposure = R::of(f64::from(self.exposure));
-        // What several processes added up may be past the end of half floats, and then it is infinite; what they took away may
-        // be more than there was.
+        // A sum of several processes may exceed the half floats and be infinite; a difference may be negative.
         let finite = rgb(pass.sampled[0].load(pixel.coordinates, 0)).map(|value| clamp(value, R::zero(), largest));
         let radiance = finite.map(|value| (value * exposure).min(largest));
         let mapped = match self.curve {
@@ -53,7 +52,7 @@ mod tests {
     use crate::raster::Vector;
     use crate::scene::Blend;
 
-    /// What a step makes of a radiance, in f32 and in f64.
+    /// A radiance mapped by a step, in f32 and in f64.
     fn mapped(step: &dyn RenderProcess, radiance: [f64; 3]) -> [[f64; 4]; 2] {
         let [red, green, blue] = radiance;
         let cpu_shader = step.cpu_shader().unwrap();
@@ -94,13 +93,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_clipped_ends_at_one() {
+    fn the_clipped_curve_ends_at_one() {
         let step = ToneMapping { curve: ToneCurve::Clipped, ..ToneMapping::new(0.5) };
         assert_eq!(mapped(&step, [0.25, 2.0, 1e9])[0], [0.125, 1.0, 1.0, 1.0]);
     }
 
     #[test]
-    fn nothing_but_numbers_from_zero_to_one_comes_out() {
+    fn results_are_numbers_from_zero_to_one() {
         let step = ToneMapping::default();
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, -0.0, 1e-40, 1e38] {
             for found in mapped(&step, [value; 3]) {
@@ -115,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_maps_as_the_process_does_at_the_exposure_of_the_moment() {
+    fn a_step_maps_like_the_process_at_the_current_exposure() {
         let mapping = ToneMapping::new(0.5);
         let step = mapping.process("radiance", "mapped");
         assert_eq!(mapped(&*step, [0.1, 0.5, 2.0]), mapped(&mapping, [0.1, 0.5, 2.0]));

@@ -1,6 +1,6 @@
 struct Parameters {
     exposure: f32,
-    // 1 where what is brighter than 1 is cut off, and 0 where it is bent towards 1.
+    // 1 clips radiance at 1, 0 applies the filmic curve.
     clips: f32,
 }
 
@@ -9,8 +9,7 @@ struct Parameters {
 
 @fragment
 fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
-    // What several processes added up may be past the end of half floats, and then it is infinite; what they took away may
-    // be more than there was.
+    // A sum of several processes may exceed the half floats and be infinite; a difference may be negative.
     let sum = textureLoad(radiance_target, vec2<i32>(in.position.xy), 0).rgb;
     let finite = clamp(sum, vec3<f32>(0.0), vec3<f32>(65504.0));
     let radiance = min(finite * parameters.exposure, vec3<f32>(65504.0));
