@@ -68,7 +68,9 @@ mod tests {
     /// From angles, as the documentation of [`Light`] defines it.
     fn expected(light: &Light, position: DVec3, normal: DVec3) -> f64 {
         let axis = Vec3::new(0.48, -0.6, 0.64).as_dvec3();
-        let Some((light_position, range)) = light.bounding_sphere() else { return (-axis).angle_between(normal).cos().max(0.0) };
+        let Some((light_position, range)) = light.bounding_sphere() else {
+            return (-axis).angle_between(normal).cos().max(0.0);
+        };
         let way = position - light_position;
         let (distance, off_axis) = (way.length(), way.angle_between(axis));
         let shape = match light {
