@@ -14,9 +14,9 @@ pub const CASES: &[Case] = &[
     ("a_resized_view_draws_what_a_new_one_draws", resized),
     ("objects_come_and_go", objects_come_and_go),
     ("assets_are_added_changed_and_removed", assets_change),
-    ("a_frame_on_its_way_is_not_touched_by_the_next", frames_on_their_way),
+    ("a_frame_in_flight_is_not_affected_by_the_next", frames_in_flight),
     ("a_frame_that_is_dropped_leaves_no_trace", dropped),
-    ("another_scene_takes_the_place_of_the_first", another_scene),
+    ("another_scene_replaces_the_first", another_scene),
     ("views_come_and_go", views_come_and_go),
     ("a_removed_texture_is_counted_in_every_frame", removed_texture),
 ];
@@ -86,7 +86,7 @@ fn assets_change() -> Result<(), Failed> {
     if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("after the move it differs".into()) }
 }
 
-fn frames_on_their_way() -> Result<(), Failed> {
+fn frames_in_flight() -> Result<(), Failed> {
     let mut scene = field(300);
     let before = draw(&scene)?;
     let mut studio = Studio::new()?;

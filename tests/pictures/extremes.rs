@@ -1,4 +1,4 @@
-//! Lights and shadows at the ends of what numbers can say.
+//! Lights and shadows at the limits of the number formats.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, Topology};
@@ -13,7 +13,7 @@ use crate::studio::{Studio, draw, pixel};
 pub const CASES: &[Case] = &[
     ("a_black_surface_stays_black_in_any_light", black),
     ("a_shade_close_to_a_bright_lamp_casts_its_shadow", shade),
-    ("edges_too_long_for_a_paraboloid_are_counted_once_an_object", coarse),
+    ("edges_too_long_for_a_paraboloid_are_counted_once_per_object", coarse),
 ];
 
 /// A wall of 2 m at the origin that faces +Z, seen from 5 m.
@@ -51,7 +51,7 @@ fn shade() -> Result<(), Failed> {
         scene.lights = vec![lamp(1.0, intensity, true)];
         let (mesh, material) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
         let object = RenderObject::new(mesh, material, DVec3::Z * 0.92);
-        // From 8 cm its 10 cm hide more than a metre around the wall's middle; the camera sees past it.
+        // At 8 cm from the lamp, its 10 cm hide more than a metre around the wall's centre; the camera sees past it.
         scene.add_object(RenderObject { scale: Vec3::splat(0.05), ..object })?;
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(2.0, 0.0, 3.0), DVec3::ZERO), [31, 31])];
         assert_color(pixel(&draw(&scene)?, 15, 15), [0; 3])

@@ -1,4 +1,4 @@
-//! The geometry buffer: however it is drawn and whatever it is stored in, it shows the same.
+//! The geometry buffer gives the same picture however it is drawn and stored.
 
 use drawloom::backend::Picture;
 use drawloom::process::{Deferred, Format, GeometryFormats};
@@ -16,11 +16,11 @@ pub const CASES: &[Case] = &[
     ("a_depth_pre_pass_changes_no_byte", depth_pre_pass),
     ("shares_of_the_materials_change_no_byte", shares),
     ("shares_are_recorded_as_processes_of_their_own", shares_are_processes),
-    ("normals_diffuse_and_radiance_can_be_stored_otherwise", formats),
+    ("normals_diffuse_and_radiance_can_have_other_formats", formats),
     ("formats_that_lack_channels_are_refused_by_name", misfits),
 ];
 
-/// Scenes with mirrored and strip objects, in perspective and without, and one with every object at one place with another.
+/// Scenes with mirrored objects and strips, perspective and orthographic, and one with pairs of objects at one position.
 fn scenes() -> Result<Vec<(&'static str, Scene)>, Failed> {
     let mut boxes = field(400);
     for camera in &mut boxes.cameras {
@@ -47,7 +47,7 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Without shadow maps, which neither read the geometry buffer nor write it.
+/// Without shadow maps, which do not use the geometry buffer.
 fn deferred() -> Deferred {
     Deferred::to_picture().shadow_maps(None)
 }
@@ -61,7 +61,7 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<Vec<Picture>, Failed> {
     views.flat_map(|view| targets.map(|target| Ok(submission.read(view, target)?))).collect()
 }
 
-/// Fails where one of these pipelines draws another picture than the usual one, of any scene.
+/// Fails if one of these pipelines draws another picture of any scene than the default one.
 fn expect_same(others: &[Deferred]) -> Result<(), Failed> {
     for (name, scene) in scenes()? {
         let expected = drawn(deferred(), &scene)?;
@@ -118,7 +118,7 @@ fn shares_are_processes() -> Result<(), Failed> {
     Ok(())
 }
 
-/// How far from the default's a picture may be: the root of the mean square, and the same where it is largest.
+/// How far from the default's a picture may be: the root mean square error, and the greatest error.
 type Bound = (GeometryFormats, f64, f64);
 
 fn formats() -> Result<(), Failed> {
@@ -129,7 +129,7 @@ fn formats() -> Result<(), Failed> {
         (GeometryFormats { normal: Format::Rgba8Srgb, ..usual }, 0.004, 0.015),
         (GeometryFormats { diffuse: Format::Rgba8Unorm, ..usual }, 0.003, 0.005),
         (GeometryFormats { diffuse: Format::Rgba16Float, ..usual }, 0.003, 0.005),
-        // Every light that is added rounds to a byte once more.
+        // Every added light rounds to a byte once more.
         (GeometryFormats { radiance: Format::Rgba8Unorm, ..usual }, 0.012, 0.02),
         (GeometryFormats { radiance: Format::Rgba8Srgb, ..usual }, 0.012, 0.02),
     ];

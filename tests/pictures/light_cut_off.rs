@@ -1,4 +1,4 @@
-//! Lights that end where little is left of them.
+//! Lights that end at a range beyond which they are negligible.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -25,7 +25,7 @@ fn radiance_of(studio: &mut Studio, scene: &Scene) -> Result<Vec<[f64; 3]>, Fail
     radiance(&studio.submit(recorded)?, 0)
 }
 
-/// The field in lights of each kind that falls off, which reach far beyond it.
+/// The field in lights of each kind with falloff, which reach far beyond it.
 fn scene() -> Scene {
     let mut scene = field(300);
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
@@ -41,7 +41,7 @@ fn scene() -> Scene {
     scene
 }
 
-/// A white floor below a light, at all heights around the one where the most is taken away: (2/3)^¼ of where it ends.
+/// A white floor below a light, at heights around the one where the window subtracts the most: (2/3)^¼ of the range.
 fn bound() -> Result<(), Failed> {
     let (cut_off, end) = (0.125_f32, 3.0_f64);
     let (mut whole, mut ending) = (with_cut_off(0.0)?, with_cut_off(cut_off)?);
@@ -72,7 +72,7 @@ fn bound() -> Result<(), Failed> {
                 worst = worst.max(expected - found);
             }
         }
-        // So nothing less than the bound holds.
+        // So no lower bound holds.
         if worst < 0.95 * bound {
             return Err(format!("{worst} of {bound} in light {kind}").into());
         }
@@ -92,7 +92,7 @@ fn reach() -> Result<(), Failed> {
     for (cut_off, lights) in [(0.0, 3), (1e-4, 3), (0.5, 0)] {
         let recorded = with_cut_off(cut_off)?.record(&scene)?;
         let (found, views) = (recorded.statistics().views[0].lights, recorded.statistics().views.len());
-        // Who reaches no view needs no map either.
+        // A light that reaches no view needs no map.
         if (found, views) != (lights, if lights == 0 { 2 } else { 4 }) {
             return Err(format!("{found} lights in one of {views} views, cut off at {cut_off}").into());
         }

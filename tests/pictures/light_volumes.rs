@@ -1,4 +1,4 @@
-//! The geometry that lights are drawn as cuts off nothing that they reach.
+//! Light volumes clip nothing that the lights reach.
 
 use drawloom::glam::{DQuat, DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -15,12 +15,12 @@ pub const CASES: &[Case] = &[
     ("cones_of_every_width_light_all_they_reach", cones),
     ("hemispheres_light_all_they_reach", hemispheres),
     ("spheres_light_all_they_reach", spheres),
-    ("lights_are_right_from_within", from_within),
-    ("the_near_plane_may_cut_what_a_light_reaches", near_plane),
+    ("lights_are_drawn_from_within", from_within),
+    ("the_near_plane_may_clip_a_light_volume", near_plane),
     ("a_hundred_lights_add_up", hundred),
-    ("lights_are_hidden_and_hide_nothing", depth_is_left_alone),
-    ("parallel_rays_see_the_same_light", orthographic),
-    ("light_far_from_the_origin_is_as_near_it", far_away),
+    ("lights_test_depth_and_do_not_write_it", depth_is_left_alone),
+    ("an_orthographic_camera_sees_the_same_light", orthographic),
+    ("light_far_from_the_origin_equals_light_near_it", far_away),
 ];
 
 const RANGE: f64 = 4.0;
@@ -29,7 +29,7 @@ fn point(position: DVec3) -> Light {
     Light::Point { position, intensity: Vec3::new(50.0, 40.0, 30.0), range: RANGE as f32 }
 }
 
-/// It is bright right up to its edge, so that an edge that is cut off shows.
+/// It is bright up to its edge, so that a clipped edge shows.
 fn spot(position: DVec3, direction: DVec3, degrees: f32) -> Light {
     let outer_angle = degrees.to_radians();
     Light::Spot {
@@ -59,7 +59,7 @@ fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
     sized(Camera { projection: Projection::Perspective { field_of_view }, ..camera }, [64, 64])
 }
 
-/// The six axes, and four ways between them.
+/// The six axes, and four directions between them.
 fn directions() -> impl Iterator<Item = DVec3> {
     let between = [[1.0, 0.3, 0.3], [-0.3, 0.9, 0.2], [0.4, -0.1, -0.9], [1e-4, 1e-4, -1.0]].map(DVec3::from);
     DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).chain(between).map(DVec3::normalize)
@@ -85,7 +85,7 @@ fn end_of_range() -> Result<(), Failed> {
             }
         }
     }
-    // One without a place lights what is as far as can be.
+    // A directional light lights what is as far away as possible.
     for distance in [1.0, 1e3, 1e6] {
         let sun = Light::Directional {
             direction: Vec3::new(0.48, -0.6, -0.64),
@@ -99,7 +99,7 @@ fn end_of_range() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Fails unless about this share of the pixels that are sure is lit.
+/// Fails unless about this fraction of the pixels with a known result is lit.
 fn expect_lit(counts: Counts, least: f64) -> Result<(), Failed> {
     let Counts { lit, dark, fading, edges } = counts;
     let all = (lit + dark + fading + edges) as f64;
@@ -107,7 +107,7 @@ fn expect_lit(counts: Counts, least: f64) -> Result<(), Failed> {
     if sure && lit as f64 >= least * all { Ok(()) } else { Err(format!("too little to judge: {counts:?}").into()) }
 }
 
-/// A room around a light: it reaches the middles of the walls, but not the corners.
+/// A room around a light, which reaches the centres of the walls but not the corners.
 fn room(light: Light) -> Stage {
     Stage::new(Panel::room(DVec3::ZERO, 0.8 * RANGE), vec![light])
 }
@@ -116,7 +116,7 @@ fn cones() -> Result<(), Failed> {
     let mut studio = Studio::new()?;
     for degrees in [1.0_f32, 10.0, 45.0, 80.0, 90.0] {
         for direction in directions() {
-            // Askew, so that the axis meets no corner.
+            // Tilted, so that the axis meets no corner.
             let place = DVec3::new(0.11, -0.23, 0.17);
             let stage = room(spot(place, direction, degrees));
             let aside = direction.any_orthonormal_vector();
@@ -156,7 +156,7 @@ fn hemispheres() -> Result<(), Failed> {
 
 fn spheres() -> Result<(), Failed> {
     let mut studio = Studio::new()?;
-    // Walls that cut a ball in half, seen from all sides: its outline is that of what it reaches.
+    // Walls through the centre of a sphere, seen from all sides: the lit discs have the sphere's outline.
     for direction in directions() {
         let place = DVec3::new(0.3, 0.1, -0.2);
         let wall = Panel::facing(place - direction * 0.05, direction, 3.0 * RANGE);
@@ -177,7 +177,7 @@ fn from_within() -> Result<(), Failed> {
     let place = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.6, 0.0, -0.8);
     let half_angle = 30.0_f32;
-    // On the cone's edge at half of its height.
+    // On the cone's surface at half of its height.
     let turn = DQuat::from_rotation_y(f64::from(half_angle).to_radians());
     let edge = turn * direction * (0.5 * RANGE);
     for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
@@ -204,7 +204,7 @@ fn from_within() -> Result<(), Failed> {
             stage.expect(&mut studio, &views).map_err(|failed| told(failed, half_angle, eye))?;
         }
     }
-    // The room above is beyond the range of much; in this one walls are lit all around.
+    // In the room above, much of the walls is out of range; in this one all walls are lit.
     for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
         for eye in [DVec3::ZERO, direction * 1.5, -direction, edge] {
             let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
@@ -235,7 +235,7 @@ fn near_plane() -> Result<(), Failed> {
 
 fn stage_of_near_plane(light: Light) -> Stage {
     let mut stage = room(light);
-    // Something within the light, some of it before the near plane.
+    // An object within the light, partly in front of the near plane.
     stage.panels.extend(Panel::closed_box(DVec3::new(0.3, 0.9, -1.6), DVec3::new(0.5, 0.1, 0.4)));
     stage
 }
@@ -273,7 +273,7 @@ fn depth_is_left_alone() -> Result<(), Failed> {
     let mut studio = Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).output("depth"))?;
     let view = camera(DVec3::new(1.0, 0.5, 4.0), DVec3::ZERO, 60.0);
     let mut depths = Vec::new();
-    // Behind the wall; at both of its sides; before it.
+    // Behind the wall; on both of its sides; in front of it.
     let before = lights.map(|light| shifted(light, DVec3::Z * 2.0));
     for lights in [vec![], lights.to_vec(), lights.into_iter().chain(before).collect(), before.to_vec()] {
         let stage = Stage::new(vec![wall, Panel::facing(DVec3::NEG_Z * 2.5, DVec3::Z, 1.0)], lights);
@@ -309,7 +309,7 @@ fn orthographic() -> Result<(), Failed> {
     for light in [point(place), spot(place, direction, 35.0), hemisphere(place, direction), sun] {
         for (from, near, far) in [
             (DVec3::new(1.0, 2.0, 2.5), 0.1, 50.0),
-            // The light reaches beyond where the camera ends, and before where it begins.
+            // The light reaches beyond the far plane and in front of the near plane.
             (DVec3::new(0.5, 1.0, 2.5), 0.1, 7.0),
             (DVec3::new(0.0, 0.0, 2.0), 2.5, 5.3),
             (DVec3::new(0.0, 0.0, 2.0), 0.5, 5.3),
@@ -339,7 +339,7 @@ fn far_away() -> Result<(), Failed> {
         let view = camera(eye, eye + direction, 100.0);
         expect_lit(stage.expect(&mut studio, std::slice::from_ref(&view))?, 0.04)?;
 
-        // To all bits that half floats have, it is the picture that is drawn near the origin.
+        // To the precision of half floats, it equals the picture that is drawn near the origin.
         let near = Camera { position: view.position - shift, ..view.clone() };
         let pictures = [(room(light), near), (stage, view)].map(|(stage, view)| {
             let recorded = studio.record(&stage.scene(&[view])?)?;

@@ -1,4 +1,4 @@
-//! Light has the brightness that its definition gives it.
+//! Lights have the brightness that their documentation defines.
 
 use std::f64::consts::PI;
 
@@ -17,13 +17,13 @@ pub const CASES: &[Case] = &[
     ("a_spot_light_ends_at_its_cone", spot),
     ("a_hemispherical_light_falls_off_with_the_cosine", hemispherical),
     ("ambient_light_and_emission_add_up", ambient_and_emission),
-    ("the_background_is_where_nothing_is", background),
-    ("a_light_that_cannot_be_lights_nothing", invalid_light),
+    ("the_background_fills_the_rest_of_the_picture", background),
+    ("an_invalid_light_lights_nothing", invalid_light),
 ];
 
 const DIFFUSE: f64 = 0.5;
 
-/// A wall of 2 m at the origin that faces +Z, seen from 5 m, in one light; and what its middle looks like.
+/// A wall of 2 m at the origin that faces +Z, seen from 5 m, in one light; and the colour of its centre.
 fn middle_of_wall(light: Option<Light>, change: impl FnOnce(&mut Scene)) -> Result<[u8; 3], Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [91, 91])];
@@ -74,7 +74,7 @@ fn point() -> Result<(), Failed> {
 fn spot() -> Result<(), Failed> {
     let share = windowed(2.0, 20.0);
     for (aside, lit) in [(0.0, 1.0), (0.2, 1.0), (0.35, 0.5), (0.45, 0.0), (3.0, 0.0)] {
-        // The axis is turned away from the wall's middle by this angle.
+        // The axis is turned away from the wall's centre by this angle.
         let (inner, outer) = (0.3_f32, 0.4_f32);
         let light = Light::Spot {
             position: DVec3::Z * 2.0,

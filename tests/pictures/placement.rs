@@ -1,4 +1,4 @@
-//! Things are where they should be, the right way up, and the nearer one in front.
+//! Objects are drawn at their positions, upright, and nearer ones in front.
 
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Quat, Vec3};
@@ -12,19 +12,19 @@ use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[
     ("up_is_up_and_right_is_right", up_is_up),
-    ("a_texture_lies_as_it_should", a_texture_lies_as_it_should),
+    ("a_texture_has_the_right_orientation", a_texture_has_the_right_orientation),
     ("textures_of_every_size_class_keep_their_colour", every_size_class),
     ("a_strip_draws_what_a_list_draws", a_strip_is_a_list),
-    ("the_nearer_object_hides_the_farther_whatever_comes_first", nearer_hides),
+    ("the_nearer_object_hides_the_farther_in_any_order", nearer_hides),
     ("a_mirrored_object_shows_its_outside", mirrored),
-    ("what_faces_away_is_culled_unless_double_sided", culled),
-    ("no_scale_leaves_a_pixel_that_is_not_a_number", extreme_scales),
-    ("a_normal_of_zero_stands_for_the_triangles_own", zero_normals),
-    ("far_from_the_origin_is_as_near_it", far_away),
+    ("back_faces_are_culled_unless_double_sided", culled),
+    ("no_scale_leads_to_nan", extreme_scales),
+    ("a_normal_of_zero_is_replaced_by_the_triangles", zero_normals),
+    ("pictures_far_from_the_origin_equal_those_near_it", far_away),
     ("each_view_has_its_own_picture", two_views),
 ];
 
-/// A scene of unlit surfaces that glow in their own colour, with a camera 5 m before the origin.
+/// A scene of unlit surfaces that emit their own colour, with a camera 5 m in front of the origin.
 struct Signs {
     scene: Scene,
     mesh: drawloom::handle::Handle<Mesh>,
@@ -98,8 +98,8 @@ fn textured(texture: Texture) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-fn a_texture_lies_as_it_should() -> Result<(), Failed> {
-    // Four quarters, wide enough that filtering keeps to their edges.
+fn a_texture_has_the_right_orientation() -> Result<(), Failed> {
+    // Four quarters, wide enough that filtering affects only their edges.
     let mut pixels = Vec::new();
     for y in 0..64 {
         for x in 0..64 {
@@ -200,7 +200,7 @@ fn extreme_scales() -> Result<(), Failed> {
         let mut studio = Studio::new()?;
         let recorded = studio.record(&scene)?;
         let radiance = studio.submit(recorded)?.read(0, "radiance")?;
-        // A half float is infinite or not a number where its exponent is all ones.
+        // A half float is infinite or NaN if its exponent is all ones.
         let broken = radiance.bytes.chunks_exact(2).any(|half| half[1] & 0x7c == 0x7c);
         if broken {
             return Err(format!("a pixel is not a number at scale {scale}").into());

@@ -1,4 +1,4 @@
-//! Post-processing: tone mapping, anti-aliasing, and an engine's own step between them.
+//! Post-processing: tone mapping, anti-aliasing, and an engine's step between them.
 
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec3};
@@ -16,19 +16,19 @@ use crate::judge::{Distance, as_image, assert_color, tone_mapped};
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[
-    ("a_slanted_edge_comes_nearer_to_the_truth", slanted_edge),
+    ("a_slanted_edge_comes_nearer_to_its_coverage", slanted_edge),
     ("edges_along_rows_and_columns_stay_sharp", straight_edges),
-    ("what_has_no_contrast_stays_byte_for_byte", no_contrast),
-    ("the_dark_threshold_holds_where_nearly_nothing_is_bright", dark),
-    ("sub_pixel_detail_is_mixed_as_far_as_asked", sub_pixel),
-    ("beyond_its_border_a_picture_goes_on_as_it_is_there", borders),
-    ("settings_out_of_range_are_brought_into_it", settings),
-    ("an_engines_own_step_stands_in_the_chain", own_step),
-    ("radiance_below_zero_and_beyond_the_end_is_black_and_white", extreme_radiance),
+    ("pictures_without_contrast_stay_byte_for_byte", no_contrast),
+    ("the_dark_threshold_applies_to_dark_areas", dark),
+    ("sub_pixel_detail_is_blended_by_the_setting", sub_pixel),
+    ("a_picture_is_clamped_at_its_border", borders),
+    ("settings_out_of_range_are_clamped", settings),
+    ("an_engines_step_is_part_of_the_chain", own_step),
+    ("negative_radiance_is_black_and_infinite_radiance_white", extreme_radiance),
 ];
 
-/// An engine's own full-screen process. Its WGSL is the body of a function from `pixel`, which is the pixel's middle, and
-/// from `source`, the colour there before, to a colour.
+/// An engine's full-screen process. Its WGSL is the body of a function from `pixel`, the pixel's centre, and `source`, the
+/// colour there before, to a colour.
 struct Step {
     name: &'static str,
     source: Option<String>,
@@ -109,10 +109,10 @@ fn smoothed(size: [u32; 2], fxaa: Fxaa, body: &str, numbers: [f32; 4]) -> Result
     Ok((submission.read(0, "pattern")?, submission.read(0, "picture")?))
 }
 
-/// White where the third number and a multiple of each coordinate add up to more than 0.
+/// White where the third number plus a multiple of each coordinate is greater than 0.
 const HALF_PLANE: &str = "return vec4(vec3(select(0.0, 1.0, dot(vec3(pixel, 1.0), numbers.xyz) > 0.0)), 1.0);";
 
-/// What a half plane would look like with 16 × 16 samples a pixel.
+/// A half plane drawn with 16 × 16 samples per pixel.
 fn half_plane_truth(size: [u32; 2], [across, down, offset, _]: [f32; 4]) -> RgbImage {
     const SIDE: u32 = 16;
     RgbImage::from_fn(size[0], size[1], |x, y| {
@@ -133,7 +133,7 @@ fn encoded(linear: f64) -> u8 {
 
 fn slanted_edge() -> Result<(), Failed> {
     const SIZE: [u32; 2] = [64, 64];
-    // How fast white grows across and down; each edge runs near the picture's middle.
+    // The gradient across and down; each edge runs near the picture's centre.
     for [across, down] in [[0.25, 1.0], [-0.25, 1.0], [1.0, 0.25], [-1.0, 0.25], [0.1, -1.0], [1.0, 1.0], [0.4, 1.0]] {
         let numbers = [across, down, -(across + down) * 32.27, 0.0];
         let (before, after) = smoothed(SIZE, Fxaa::default(), HALF_PLANE, numbers)?;
@@ -178,7 +178,7 @@ fn straight_edges() -> Result<(), Failed> {
 }
 
 fn no_contrast() -> Result<(), Failed> {
-    // Without thresholds nothing is left out beforehand.
+    // Without thresholds every pixel is processed.
     let unrestrained = Fxaa { contrast_threshold: 0.0, dark_threshold: 0.0, sub_pixel: 1.0 };
     for value in 0..=255 {
         let decoded = f64::from(value) / 255.0;
@@ -219,7 +219,7 @@ fn dark() -> Result<(), Failed> {
 fn sub_pixel() -> Result<(), Failed> {
     let dot = "return vec4(vec3(select(0.0, 1.0, all(vec2<i32>(pixel) == vec2(4, 4)))), 1.0);";
     let line = "return vec4(vec3(select(0.0, 1.0, i32(pixel.x) == 4)), 1.0);";
-    // A single pixel differs from all its neighbours; one of a line, from two thirds of them by weight.
+    // A single pixel differs from all its neighbours; a pixel of a line differs from two thirds of them by weight.
     for (body, share_of_most) in [(dot, 1.0), (line, 0.5)] {
         for sub_pixel in [0.0, 0.25, 1.0] {
             let (_, after) = smoothed([9, 9], Fxaa { sub_pixel, ..Fxaa::default() }, body, [0.0; 4])?;
@@ -231,7 +231,7 @@ fn sub_pixel() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Half planes and stripes in colour, on a picture of `numbers.zw` that begins at `numbers.xy` and is continued beyond its
+/// Half planes and stripes in colour, on a picture of size `numbers.zw` that begins at `numbers.xy` and continues beyond its
 /// border.
 const BUSY: &str = "
     let place = clamp(floor(pixel - numbers.xy), vec2(0.0), numbers.zw - 1.0);
@@ -242,7 +242,7 @@ const BUSY: &str = "
 ";
 
 fn borders() -> Result<(), Failed> {
-    // Wider than the step looks.
+    // Wider than the search of the step.
     const MARGIN: u32 = 20;
     for [width, height] in [[1, 1], [2, 1], [1, 2], [3, 2], [1, 40], [17, 13], [40, 40]] {
         let size = [width as f32, height as f32];
@@ -257,7 +257,7 @@ fn borders() -> Result<(), Failed> {
             }
         }
     }
-    // Side by side, black and white have nothing that could be smoothed.
+    // Black and white side by side have nothing to smooth.
     unchanged("two pixels", smoothed([2, 1], Fxaa::default(), HALF_PLANE, [1.0, 0.0, -1.0, 0.0])?)
 }
 
@@ -280,7 +280,7 @@ fn settings() -> Result<(), Failed> {
     unchanged("nothing has so much contrast", draw(0.0, f32::INFINITY, 1.0)?)
 }
 
-/// What the steps, one after the other, make of a scene's background.
+/// A scene's background after the steps, in order.
 fn after_steps(background: Vec3, steps: &[&dyn PostStep]) -> Result<[u8; 3], Failed> {
     let mut scene = empty_scene([8, 8]);
     scene.background = background;
@@ -319,7 +319,7 @@ fn own_step() -> Result<(), Failed> {
     assert_color(after_steps(seen, &[&tone_mapping, &fxaa, &negative])?, negated.map(encoded))?;
     let both: [&dyn PostStep; 4] = [&tone_mapping, &negative, &redden, &fxaa];
     assert_color(after_steps(seen, &both)?, [red, green / 2.0, blue / 2.0].map(encoded))?;
-    // The other way round is another picture: green and blue are halved before the negative.
+    // The reverse order gives another picture: green and blue are halved before the negative.
     let swapped: [&dyn PostStep; 4] = [&tone_mapping, &redden, &negative, &fxaa];
     let [_, green, blue] = mapped;
     assert_color(after_steps(seen, &swapped)?, [red, 1.0 - green / 2.0, 1.0 - blue / 2.0].map(encoded))
@@ -343,7 +343,7 @@ fn extreme_radiance() -> Result<(), Failed> {
         (-1.0, -1.0, 0),
     ]);
     for (radiance, exposure, expected) in expected {
-        // Beside something ordinary, which is to stay so.
+        // Next to an ordinary colour, which must not change.
         let numbers = [radiance, 0.25, radiance, 1.0];
         let pattern = Step::pattern("radiance", Format::Rgba16Float, "return numbers;", numbers);
         let tone_mapping = ToneMapping::new(exposure);

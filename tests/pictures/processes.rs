@@ -1,4 +1,4 @@
-//! An engine's own processes: its shaders, its passes, and its mistakes.
+//! Processes of an engine: shaders, raw passes and errors.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -21,12 +21,12 @@ use crate::judge::{assert_color, tone_mapped};
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[
-    ("a_pipeline_of_the_engines_own", own_pipeline),
-    ("blended_objects_go_back_to_front", back_to_front),
+    ("an_engine_can_have_its_own_pipeline", own_pipeline),
+    ("blended_objects_are_drawn_back_to_front", back_to_front),
     ("parameters_change_from_frame_to_frame", parameters),
     ("a_raw_pass_writes_a_target", raw_pass),
-    ("what_a_process_draws_may_change_from_frame_to_frame", other_draws),
-    ("a_full_screen_pass_that_tests_depth_shows_where_nothing_is", behind_everything),
+    ("the_draws_of_a_process_may_change_from_frame_to_frame", other_draws),
+    ("a_full_screen_pass_that_tests_depth_fills_the_background", behind_everything),
     ("blended_objects_hide_nothing_behind_them", blended_leaves_depth),
     ("exposure_brightens", exposure),
     ("a_shader_that_does_not_compile_is_named", broken_shader),
@@ -36,7 +36,7 @@ pub const CASES: &[Case] = &[
     ("a_raw_pass_that_fails_or_panics_is_named", failing_raw_pass),
 ];
 
-/// A process made of closures' worth of data.
+/// A process whose declaration and draws are data.
 struct Made {
     name: &'static str,
     declare: fn(&mut Declare),
@@ -116,7 +116,7 @@ fn back_to_front() -> Result<(), Failed> {
         (1.0, Vec3::new(0.0, 0.0, 0.5), Blend::Additive),
         (2.0, Vec3::new(0.0, 0.25, 0.0), Blend::Subtractive),
     ];
-    // Over blue: red half over it, green half over that, then half a blue added, then a quarter of green taken.
+    // Over blue: half red over it, half green over that, then half a blue added, then a quarter of green subtracted.
     let expected = [64, 128 - 64, 64 + 128];
     for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
         let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain"))?;
@@ -174,7 +174,7 @@ fn parameters() -> Result<(), Failed> {
     Ok(())
 }
 
-/// What a raw pass does when it is asked to encode.
+/// What a raw pass does in `encode`.
 #[derive(Clone, Copy)]
 enum Deed {
     ClearYellow,
@@ -240,7 +240,7 @@ fn raw_pass() -> Result<(), Failed> {
     assert_color(pixel(&picture, 5, 5), [255, 255, 0])
 }
 
-/// Draws one thing, then another.
+/// Draws first one thing, then another.
 struct Changing {
     step: Arc<AtomicU32>,
 }

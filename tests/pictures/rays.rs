@@ -1,4 +1,4 @@
-//! What a picture of flat panels should be, found by rays in f64: an answer that shares nothing with the renderer.
+//! The expected picture of flat panels, computed by ray casting in f64: it shares no code with the renderer.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,21 +9,21 @@ use libtest_mimic::Failed;
 
 use crate::studio::{Studio, radiance};
 
-/// A flat parallelogram of white that reflects all light, and is seen from the side that right × up points to.
+/// A flat white parallelogram that reflects all light, visible from the side that right × up points to.
 #[derive(Clone, Copy, Debug)]
 pub struct Panel {
     /// In the world, in metres.
     pub center: DVec3,
-    /// From the centre to the middle of an edge.
+    /// From the centre to the midpoint of an edge.
     pub right: DVec3,
-    /// From the centre to the middle of the next edge.
+    /// From the centre to the midpoint of the next edge.
     pub up: DVec3,
-    /// Whether it is seen from both sides, and keeps light from either side.
+    /// Whether it is visible from both sides, and blocks light from both.
     pub double_sided: bool,
 }
 
 impl Panel {
-    /// One that is seen from the side it faces alone.
+    /// A panel that is visible only from the side that it faces.
     pub fn new(center: DVec3, right: DVec3, up: DVec3) -> Self {
         Self { center, right, up, double_sided: false }
     }
@@ -34,7 +34,7 @@ impl Panel {
         Self::new(center, right * half, normal.cross(right) * half)
     }
 
-    /// The same, seen from both sides.
+    /// The same, visible from both sides.
     pub fn double_sided(self) -> Self {
         Self { double_sided: true, ..self }
     }
@@ -43,7 +43,7 @@ impl Panel {
         self.right.cross(self.up).normalize()
     }
 
-    /// Six that face inwards: a room.
+    /// Six panels that face inwards: a room.
     pub fn room(center: DVec3, half: f64) -> Vec<Self> {
         DVec3::AXES
             .into_iter()
@@ -52,7 +52,7 @@ impl Panel {
             .collect()
     }
 
-    /// Six that face outwards: a box.
+    /// Six panels that face outwards: a box.
     pub fn closed_box(center: DVec3, half: DVec3) -> Vec<Self> {
         let side = |axis: DVec3, right: DVec3| {
             let up = axis.cross(right);
@@ -74,11 +74,11 @@ impl Panel {
     }
 }
 
-/// A panel as rays meet it.
+/// A panel for ray intersection.
 struct Face {
     center: DVec3,
     normal: DVec3,
-    /// What a place's distance from the centre is multiplied by for 1 at the end of `right`, and of `up`.
+    /// Vectors whose dot products with a point relative to the centre are 1 at the end of `right` and of `up`.
     right: DVec3,
     up: DVec3,
     double_sided: bool,
@@ -93,7 +93,7 @@ impl Face {
         Self { center, normal, right, up, double_sided: panel.double_sided }
     }
 
-    /// Where its plane is met, as a multiple of `along`; infinite where it is parallel.
+    /// Where a ray meets its plane, as a multiple of `along`; infinite if it is parallel.
     fn plane_share(&self, from: DVec3, along: DVec3) -> f64 {
         (self.center - from).dot(self.normal) / along.dot(self.normal)
     }
@@ -121,7 +121,7 @@ pub struct Stage {
     pub maps: ShadowMaps,
 }
 
-/// Between what a radiance must be, one channel a component.
+/// Bounds of a radiance, channel by channel.
 struct Bounds {
     low: DVec3,
     high: DVec3,
@@ -148,7 +148,7 @@ impl Stage {
     }
 }
 
-/// How many pixels of a picture must be what.
+/// How many pixels of a picture have which expectation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     pub lit: usize,
@@ -160,12 +160,12 @@ pub struct Counts {
 }
 
 impl Stage {
-    /// Draws the stage, and fails where a pixel of any camera is not what rays say.
+    /// Draws the panels, and fails if a pixel of any camera differs from the ray cast result.
     pub fn expect(&self, studio: &mut Studio, cameras: &[Camera]) -> Result<Counts, Failed> {
         self.expect_of(studio, &self.scene(cameras)?)
     }
 
-    /// Draws a scene, and fails where a pixel of any camera is not what rays say of the stage.
+    /// Draws a scene, and fails if a pixel of any camera differs from the ray cast result.
     pub fn expect_of(&self, studio: &mut Studio, scene: &Scene) -> Result<Counts, Failed> {
         let recorded = studio.record(scene)?;
         let submission = studio.submit(recorded)?;
@@ -234,7 +234,7 @@ impl Stage {
     }
 }
 
-/// What rays of one camera find.
+/// Casts the rays of one camera.
 struct Rays<'a> {
     eye: Eye,
     camera: &'a Camera,
@@ -260,7 +260,7 @@ impl Rays<'_> {
         nearest.1
     }
 
-    /// What a pixel must be; `None` where it lies so close to an edge that rounding decides.
+    /// The bounds of a pixel; `None` if it is so close to an edge that rounding decides.
     fn radiance(&self, x: u32, y: u32) -> Option<Bounds> {
         let ray = |right: f64, down: f64| self.eye.ray(f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down);
         let met = |right: f64, down: f64| {
@@ -284,7 +284,7 @@ impl Rays<'_> {
         let (from, along) = ray(0.0, 0.0);
         let normal = if along.dot(face.normal) > 0.0 { -face.normal } else { face.normal };
         let center = place(0.0, 0.0);
-        // A rasterizer puts corners onto a grid of 1/256 of a pixel, and the surface moves as much.
+        // A rasterizer snaps corners to a grid of 1/256 of a pixel, and the surface moves as much.
         let footprint = center.distance(place(1.0, 0.0)).max(center.distance(place(0.0, 1.0)));
         let error = footprint / 256.0 + from.distance(center) * 1e-5;
         let mut sum = Bounds { low: DVec3::ZERO, high: DVec3::ZERO };
@@ -301,8 +301,8 @@ impl Rays<'_> {
         Some(Bounds { low: sum.low * (1.0 - rounding) - smallest, high: sum.high * (1.0 + rounding) + smallest })
     }
 
-    /// The least and the most that a light's shadows may leave: all or nothing, but anything in between where the filter
-    /// meets an edge, and so close behind what casts the shadow that the bias may reach past it.
+    /// The least and the greatest fraction of a light after shadowing: 0 or 1, but anything in between where the filter meets an
+    /// edge, and so close behind the shadow caster that the bias may reach past it.
     fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
         if !light.casts_shadow() {
             return [1.0; 2];
@@ -330,7 +330,7 @@ impl Rays<'_> {
         [least, most]
     }
 
-    /// How far before a place a face keeps a light from it, if one does; the face at `index` is that which the place lies on.
+    /// The distance from a point to the face that blocks a light from it, if one does; the point lies on the face at `index`.
     fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
         let (from, along) = match *light {
             Light::Directional { direction, .. } => {
@@ -348,13 +348,13 @@ impl Rays<'_> {
     }
 }
 
-/// How wide a pixel of a light's map is: in metres for a directional light, and at a distance of 1 m for others, as the
-/// documentation of [`ShadowMaps`] says.
+/// The width of a pixel of a light's map: in metres for a directional light, and at a distance of 1 m for others, as the
+/// documentation of [`ShadowMaps`] defines it.
 fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     let side = f64::from(maps.side);
     match *light {
         Light::Spot { outer_angle, .. } => 2.0 * f64::from(outer_angle.min(1.4835)).tan() / side,
-        // Edges of 5° that are drawn straight are off by half a pixel of 1024.
+        // Straight edges of 5° are off by half a pixel of 1024.
         Light::Hemispherical { .. } => 4.0 / side + 1.0 / 1024.0,
         // The pixel of a map for several cameras depends on all of them.
         Light::Directional { .. } => {
@@ -367,9 +367,9 @@ fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     }
 }
 
-/// How far from where geometry puts it a shadow may begin to fade, in metres on the surface: half of the filter's width and
-/// half a pixel of the map, along a diagonal of the map's pixels; across a surface that the light meets at a slope, as much
-/// more. A pixel is what [`map_pixel`] says.
+/// How far from its geometric edge a shadow may fade, in metres on the surface: half of the filter's width and half a pixel of
+/// the map, along a diagonal of the map's pixels, and more on a surface that is inclined to the light. A pixel is that of
+/// [`map_pixel`].
 fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
@@ -392,10 +392,10 @@ fn color(light: &Light) -> DVec3 {
     }
 }
 
-/// The least and the most that a light of intensity 1 brings to a place that is known to within `error` metres.
+/// The least and the greatest illuminance of a light of intensity 1 at a point that is known to within `error` metres.
 fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
-    // An octahedral normal of half floats is up to 0.12° off where a device cuts them short. Those along an axis are exact,
-    // and f32 leaves a little.
+    // An octahedral normal of half floats is up to 0.12° off if a device truncates them. Those along an axis are exact, except
+    // for the rounding of f32.
     let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
     let (position, range) = match *light {
         Light::Directional { direction, .. } => {
@@ -424,7 +424,7 @@ fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 
     [ends[0] * shape[0], ends[1] * shape[1]]
 }
 
-/// How much of a light goes along a direction, were the cosine from its axis this much more.
+/// How much of a light goes along a direction whose cosine from its axis is greater by this.
 fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
     match *light {
         Light::Spot { direction, inner_angle, outer_angle, .. } => {
@@ -438,12 +438,12 @@ fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
     }
 }
 
-/// Where the pixels of a camera's picture look.
+/// The rays of the pixels of a camera's picture.
 struct Eye {
     position: DVec3,
     axes: [DVec3; 3],
     size: [f64; 2],
-    /// Half as high as the picture: in perspective at 1 m.
+    /// Half of the picture's height: in perspective at 1 m.
     half: f64,
     perspective: bool,
 }
@@ -465,7 +465,7 @@ impl Eye {
         }
     }
 
-    /// Where a ray begins, and how far it goes for 1 m forward; `x` and `y` in pixels from the upper left.
+    /// A ray's origin, and its direction for 1 m forward; `x` and `y` in pixels from the upper left.
     fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let [right, up, forward] = self.axes;
         let [width, height] = self.size;

@@ -1,4 +1,4 @@
-//! The deferred pipeline models what a scene requires: all of it, and nothing else.
+//! The deferred pipeline has the processes that a scene requires, and no others.
 
 use drawloom::backend::{Picture, WgpuResources};
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
@@ -11,22 +11,22 @@ use crate::Case;
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
-    ("lights_of_a_class_that_is_not_there_cost_nothing", || no_light_of_a_class(false)),
-    ("shadowed_lights_of_a_class_that_is_not_there_cost_nothing", || no_light_of_a_class(true)),
+    ("a_class_without_lights_costs_nothing", || no_light_of_a_class(false)),
+    ("a_class_without_shadowed_lights_costs_nothing", || no_light_of_a_class(true)),
     ("lights_that_are_switched_off_cost_nothing", dark_lights),
     ("without_a_light_that_casts_shadows_there_is_no_shadow_map", no_casters),
     ("without_glass_there_is_no_transparency", no_glass),
     ("without_a_light_nothing_is_lit", no_light),
-    ("an_empty_scene_is_cleared_and_mapped", nothing_at_all),
+    ("an_empty_scene_is_cleared_and_tone_mapped", nothing_at_all),
     ("without_a_step_of_post_processing_there_is_none", no_post),
     ("without_a_depth_pre_pass_there_is_none", no_depth_pre_pass),
     ("every_process_is_needed_by_another_or_changes_the_picture", every_process_counts),
-    ("processes_follow_what_a_scene_requires_and_are_kept", processes_follow),
+    ("processes_change_with_the_requirements_and_are_cached", processes_follow),
 ];
 
 const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1 };
 const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
-/// A list, a mirrored list, and a double-sided strip, which subdivision turns into a list.
+/// A list, a mirrored list, and a double-sided strip, which subdivision converts to a list.
 const OPAQUE_STATES: i64 = 3;
 const OPAQUE_STATES_IN_MAPS: i64 = 4;
 const GLASS_STATES: i64 = 3;
@@ -35,7 +35,7 @@ fn deferred() -> Deferred {
     Deferred::to_picture().shadow_maps(Some(MAPS))
 }
 
-/// What one frame of a new renderer is made of.
+/// The processes of one frame of a new renderer, and their costs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Cost {
     passes: i64,
@@ -59,7 +59,7 @@ impl Cost {
     }
 }
 
-/// What a new renderer draws of a scene, and what that costs.
+/// A new renderer's picture of a scene, and its costs.
 fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     let output = deferred.output();
     let mut studio = Studio::with(2, |builder| builder.deferred(deferred))?;
@@ -77,8 +77,8 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     Ok((cost, picture))
 }
 
-/// Fails unless a scene without something costs as much, and looks the same to the last byte, as with a pipeline that never
-/// had a process for it; and costs less than the scene of everything by what is saved.
+/// Fails unless a scene without a feature costs as much, and has the same picture byte for byte, as with a pipeline that has no
+/// process for it; and costs less than the scene with everything by the expected savings.
 fn expect_saved(
     full: &(Cost, Picture),
     what: &str,
@@ -100,7 +100,7 @@ fn expect_saved(
     expect_changed(what, &full.1, &picture)
 }
 
-/// Fails where two pictures differ by no more than rounding.
+/// Fails if two pictures differ by no more than rounding.
 fn expect_changed(what: &str, one: &Picture, other: &Picture) -> Result<(), Failed> {
     let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
     let differ = |one: &[u8], other: &[u8]| one.iter().zip(other).any(|(one, other)| one.abs_diff(*other) > 8);
@@ -115,7 +115,7 @@ fn expect_same(what: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Re
     if one.1 == other.1 { Ok(()) } else { Err(format!("{what}: the picture is another").into()) }
 }
 
-/// Every class that there can be lights of.
+/// Every class of lights.
 fn classes() -> impl Iterator<Item = LightClass> {
     LightClass::all().filter(|class| class.kind != LightKind::Point || !class.shadowed)
 }
@@ -173,7 +173,7 @@ fn no_casters() -> Result<(), Failed> {
     };
     let never_had = || Deferred::to_picture().shadow_maps(None);
     expect_saved(&full()?, "shadows", &scene, never_had(), saved)?;
-    // With `None`, lights are taken to cast none; also where no others are there.
+    // With `None` no light casts shadows.
     expect_same("no shadow maps", &drawn(never_had(), &everything())?, &drawn(deferred(), &scene)?)?;
     let mut casting = everything();
     casting.lights.retain(Light::casts_shadow);
@@ -278,16 +278,15 @@ fn every_process_counts() -> Result<(), Failed> {
     {
         return Err(format!("{needed_by_others:?} should be {expected:?}").into());
     }
-    // A process a class of lights, shadow casters, transparency, and the two steps of post-processing.
+    // A process per class of lights, shadow casters, transparency, and the two steps of post-processing.
     if (changed, count) == (11, 13) { Ok(()) } else { Err(format!("{changed} of {count} change the picture").into()) }
 }
 
-/// A change of the scene; for how many requirements plans are kept when it is drawn for the first time, and how many
-/// pipelines are new then.
+/// A change of the scene; the number of cached plans after it is first drawn, and the number of new pipelines then.
 type Step = (&'static str, usize, usize, fn(&mut Scene) -> Result<(), Failed>);
 
 const STEPS: &[Step] = &[
-    // The plan of an empty scene is always there.
+    // The plan of an empty scene always exists.
     ("everything", 2, EVERY_PIPELINE, |_| Ok(())),
     ("the last spot light with a shadow goes", 3, 0, |scene| {
         scene.lights.retain(|light| light.kind() != LightKind::Spot || !light.casts_shadow());
@@ -297,7 +296,7 @@ const STEPS: &[Step] = &[
         scene.lights = everything().lights;
         Ok(())
     }),
-    // Glass is lit by a shader that reads no maps.
+    // The shader of glass reads no maps then.
     ("all shadows go", 4, GLASS_STATES as usize, |scene| {
         scene.lights = everything().lights.into_iter().map(without_shadow).collect();
         Ok(())
@@ -312,7 +311,7 @@ const STEPS: &[Step] = &[
         scene.lights.retain(|light| matches!(light, Light::Directional { casts_shadow: false, .. }));
         Ok(())
     }),
-    // What is left requires no more than an empty scene.
+    // The rest requires no more than an empty scene.
     ("all lights go", 6, 0, |scene| {
         scene.lights.clear();
         Ok(())
@@ -323,10 +322,10 @@ const STEPS: &[Step] = &[
     }),
 ];
 
-/// Of objects in maps, of opaque objects and of glass; of seven classes of lights, and of tone mapping.
+/// Those of objects in maps, of opaque objects and of glass; of seven classes of lights, and of tone mapping.
 const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 7 + 1;
 
-/// Lets so many of the glasses hide what is behind them, and the others be as they were.
+/// Makes this many of the glass materials opaque.
 fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
     let handles = scene.assets().iter::<Material>().map(|(handle, _)| handle);
     let originals = everything();

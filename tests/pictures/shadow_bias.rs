@@ -1,4 +1,4 @@
-//! Lit surfaces keep no light from themselves, and shadows begin where what casts them ends.
+//! Lit surfaces do not shadow themselves, and shadows begin where their casters end.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,11 +21,11 @@ pub const CASES: &[Case] = &[
     ("lit_surfaces_do_not_shadow_themselves_in_a_hemisphere", || surfaces(hemisphere, &[0.0, 45.0, 80.0])),
     ("without_bias_lit_surfaces_shadow_themselves", without_bias),
     ("a_ball_does_not_shadow_its_lit_side", ball),
-    ("a_shadow_begins_at_the_foot_of_what_casts_it", box_on_a_floor),
+    ("a_shadow_begins_at_the_foot_of_its_caster", box_on_a_floor),
     ("a_shadow_begins_as_near_as_the_filter_reads", close_to_a_wall),
 ];
 
-/// How much less light a surface gets at most, by what it keeps from itself: a share of what it should get.
+/// The greatest loss of light of a surface by self-shadowing, as a fraction of its light.
 fn most_kept(studio: &mut Studio, lit: &Scene, shadowed: &Scene) -> Result<f64, Failed> {
     let mut shots = Vec::new();
     for scene in [lit, shadowed] {
@@ -34,11 +34,11 @@ fn most_kept(studio: &mut Studio, lit: &Scene, shadowed: &Scene) -> Result<f64, 
     }
     let pixels = shots[0].iter().zip(&shots[1]).map(|(lit, shadowed)| (lit[0], shadowed[0]));
     let kept = pixels.filter(|(lit, _)| *lit > 0.0).map(|(lit, shadowed)| (lit - shadowed) / lit);
-    // A pixel that is not a number would be lost in a maximum.
+    // A maximum would ignore NaN.
     Ok(kept.fold(0.0, |most, kept| if kept <= most { most } else { kept }))
 }
 
-/// A panel that a light meets at an angle, so many degrees from the light's axis; a camera before it; and the light.
+/// A panel that a light meets at an angle, this many degrees from the light's axis; a camera in front of it; and the light.
 fn slope(
     light: impl Fn(DVec3, DVec3) -> Light,
     distance: f64,
@@ -84,7 +84,7 @@ fn surfaces(light: impl Fn(DVec3, DVec3) -> Light, leavings: &[f64]) -> Result<(
 
 const SLOPES: [f64; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 
-/// Else the cases before this one could not fail.
+/// Otherwise the cases before this one could not fail.
 fn without_bias() -> Result<(), Failed> {
     for bias in [0.0, 0.5] {
         let mut studio = studio_with(ShadowMaps { bias, ..MAPS })?;
@@ -102,7 +102,7 @@ fn without_bias() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A ball of radius 1 with smooth normals, of this many strips from pole to pole.
+/// A sphere of radius 1 with smooth normals, of this many strips from pole to pole.
 fn ball_mesh(strips: u32) -> Result<Mesh, Failed> {
     let around = strips * 2;
     let vertex = |strip: u32, side: u32| {
@@ -123,7 +123,7 @@ fn ball_mesh(strips: u32) -> Result<Mesh, Failed> {
 }
 
 fn ball() -> Result<(), Failed> {
-    // Where a pixel of the map is much smaller than a facet, the facet's own slope shows: it is not that of its normals.
+    // If a pixel of the map is much smaller than a facet, the facet's geometric slope shows, which differs from its normals'.
     for (side, strips, most) in [(256, 16, 0.01), (512, 32, 0.01), (2048, 64, 0.01), (2048, 16, 0.2)] {
         let mut studio = studio_with(ShadowMaps { side, ..MAPS })?;
         let axis = DVec3::new(0.3, -0.9, -0.3).normalize();
@@ -149,7 +149,7 @@ fn ball() -> Result<(), Failed> {
     Ok(())
 }
 
-/// What is nearer to the foot than the bias may be lit; all else that the box hides is dark.
+/// Points nearer to the foot than the bias may be lit; all others that the box hides are dark.
 fn box_on_a_floor() -> Result<(), Failed> {
     for (side, filter) in [(512, 1), (2048, 4)] {
         let maps = ShadowMaps { side, filter, ..MAPS };
@@ -162,7 +162,7 @@ fn box_on_a_floor() -> Result<(), Failed> {
                 let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
                 let mut stage = Stage { panels: vec![floor], lights: vec![light], maps };
                 let mut scene = stage.scene(&[camera(DVec3::new(3.0, 4.0, 3.0), DVec3::new(0.5, 0.3, 0.4), 50.0)])?;
-                // One mesh, because there are cracks between objects that meet in an edge.
+                // One mesh, because objects that meet in an edge have cracks between them.
                 let mesh = scene.add(cube())?;
                 let material = scene.add(Material { diffuse: Vec3::ONE, ..Material::default() })?;
                 let half = Vec3::new(0.5, 1.0, 0.7);
@@ -180,8 +180,8 @@ fn box_on_a_floor() -> Result<(), Failed> {
     Ok(())
 }
 
-/// The floor behind a wall is dark from there on where the filter reads nothing of what is before the wall, and half a pixel:
-/// what the bias takes is hidden in that.
+/// The floor behind a wall is dark from where the filter reads nothing of what is in front of the wall, and half a pixel, which
+/// covers the bias.
 fn close_to_a_wall() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };

@@ -1,4 +1,4 @@
-//! What casts shadows, what does not, and what a shadow map holds.
+//! Which objects cast shadows, and the content of shadow maps.
 
 use drawloom::glam::{DVec2, DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
@@ -13,10 +13,10 @@ use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told};
 pub const CASES: &[Case] = &[
     ("boxes_cast_their_shadow_mirrored_or_not", boxes),
     ("squares_cast_their_shadow_as_lists_and_as_strips", squares),
-    ("what_is_blended_casts_no_shadow", blended_casts_none),
-    ("what_is_blended_is_darker_in_shadow", blended_receives),
+    ("blended_objects_cast_no_shadow", blended_casts_none),
+    ("blended_objects_are_darker_in_shadow", blended_receives),
     ("no_scale_spoils_a_shadow_map", extreme_scales),
-    ("a_shadow_map_holds_the_depth_of_what_is_nearest", depths),
+    ("a_shadow_map_holds_the_nearest_depth", depths),
 ];
 
 fn lights() -> [Light; 3] {
@@ -29,7 +29,7 @@ fn floor() -> Panel {
     Panel::facing(DVec3::ZERO, DVec3::Y, 6.0)
 }
 
-/// A floor in one light, seen from above, and from just over it; and what makes it up.
+/// A floor in one light, seen from above, and from just over it; and the panels of the scene.
 struct Set {
     floor: Stage,
     scene: Scene,
@@ -59,7 +59,7 @@ impl Set {
         Ok(())
     }
 
-    /// What it should look like with these panels on top.
+    /// The expected result with these panels on top.
     fn with(&self, panels: Vec<Panel>) -> Stage {
         let mut stage = self.floor.clone();
         stage.panels.extend(panels);
@@ -95,7 +95,7 @@ fn squares() -> Result<(), Failed> {
         for (topology, mirrored) in
             [(Topology::TriangleList, 1.0), (Topology::TriangleStrip, 1.0), (Topology::TriangleStrip, -1.0)]
         {
-            // Seen from both sides; from the light's side alone; from the other alone, and then it casts no shadow.
+            // Visible from both sides; from the light's side only; from the other side only, and then it casts no shadow.
             for (double_sided, turn) in [(true, -90.0_f32), (true, 90.0), (false, -90.0), (false, 90.0)] {
                 let mut set = Set::new(light)?;
                 let mesh = set.scene.add(square(topology))?;
@@ -122,7 +122,7 @@ fn blended_casts_none() -> Result<(), Failed> {
     for light in lights() {
         for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
             let mut set = Set::new(light)?;
-            // From below the glass it is not in sight.
+            // From below, the glass is not visible.
             set.scene.cameras.remove(0);
             let mesh = set.scene.add(cube())?;
             set.add(mesh, Material { blend, opacity: 0.9, ..white() }, |object| {
@@ -137,7 +137,7 @@ fn blended_casts_none() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A floor of glass that reflects half of the light, before nothing.
+/// A floor of glass that reflects half of the light, with nothing behind it.
 fn blended_receives() -> Result<(), Failed> {
     let mut studio = studio_with(MAPS)?;
     for light in lights() {
@@ -181,13 +181,13 @@ fn extreme_scales() -> Result<(), Failed> {
         for scale in [
             Vec3::ZERO,
             Vec3::splat(1e-20),
-            // The camera and the light are inside of these, and what faces away from a light casts no shadow.
+            // The camera and the light are inside of these, and faces that face away from a light cast no shadow.
             Vec3::new(-1e6, 1e3, 1e5),
             Vec3::splat(1e20),
         ] {
             let mut set = Set::new(light)?;
             let [mesh, flat] = [set.scene.add(cube())?, set.scene.add(square(Topology::TriangleStrip))?];
-            // Where a lamp is, and about the middle of the scene.
+            // At a lamp, and near the centre of the scene.
             set.add(mesh, white(), |object| (object.scale, object.position) = (scale, DVec3::new(-0.4, 3.0, 0.9)))?;
             set.add(flat, Material { double_sided: true, ..white() }, |object| {
                 object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
@@ -227,7 +227,7 @@ fn depths() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Where a pixel of a map looks from and which way, `along` being as long as depth counts; `None` outside a disc.
+/// The ray of a map's pixel, with `along` in the unit of depth; `None` outside of the disc.
 fn look(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
     let side = f64::from(map.size[0]);
     let clip = DVec2::new(x / side * 2.0 - 1.0, 1.0 - y / side * 2.0);
@@ -237,7 +237,7 @@ fn look(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
             (DVec3::ZERO, (clip * (f64::from(field_of_view) / 2.0).tan()).extend(-1.0))
         }
         Projection::Orthographic { height } => ((clip * (f64::from(height) / 2.0)).extend(0.0), DVec3::NEG_Z),
-        // The half space as a disc: a way that leaves the axis by φ is at tan(φ/2).
+        // The half space as a disc: a direction at an angle of φ from the axis is at tan(φ/2).
         _ => {
             let angle = 2.0 * clip.length().atan();
             let aside = clip.normalize_or(DVec2::X) * angle.sin();
@@ -266,8 +266,8 @@ fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) 
             Projection::Perspective { .. } => near / depth(x, y),
             _ => far - depth(x, y) * (far - near),
         };
-        // Edges of 5° that are drawn straight are off by half a pixel of 1024, which is a quarter here; and in between,
-        // distances are longer by a thousandth.
+        // Straight edges of 5° are off by half a pixel of 1024, which is a quarter here; and in between, distances are longer by a
+        // thousandth.
         let slope = hits.iter().map(|hit| (hit.0 - hits[0].0).abs()).fold(0.0, f64::max);
         if (found - hits[0].0).abs() > 0.3 * slope + 1e-3 * hits[0].0 {
             return Err(format!("at ({x}, {y}) it is {found} m away, and should be {}", hits[0].0));

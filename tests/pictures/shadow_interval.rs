@@ -1,4 +1,4 @@
-//! Shadow maps that are drawn in every so many-th frame.
+//! Shadow maps that are drawn once every few frames.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -13,11 +13,11 @@ use crate::shadows::{hemisphere, spot, sun};
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
-    ("where_nothing_moves_kept_shadow_maps_are_as_good_as_new", nothing_moves),
-    ("the_shadow_of_what_moves_lags_and_catches_up", moved_casters),
+    ("cached_shadow_maps_equal_new_ones_while_nothing_moves", nothing_moves),
+    ("the_shadow_of_a_moved_object_lags_and_catches_up", moved_casters),
     ("a_moved_light_lags_together_with_its_shadow", moved_light),
     ("shadows_stay_in_the_world_when_the_camera_moves", moved_camera),
-    ("a_frame_that_is_dropped_takes_no_shadow_with_it", dropped),
+    ("a_dropped_frame_loses_no_shadow_map", dropped),
     ("another_number_of_lights_or_views_leaves_no_old_shadow", other_lists),
 ];
 
@@ -115,7 +115,7 @@ fn moved_camera() -> Result<(), Failed> {
     for camera in &mut scene.cameras {
         camera.position += DVec3::new(2.0, 0.5, -3.0);
     }
-    // The sun's map is another, whose pixels lie elsewhere.
+    // The sun's new map has its pixels at other positions.
     assert_alike(&studio.draw(&scene)?, &every(1)?.draw(&scene)?)
 }
 

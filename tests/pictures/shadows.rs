@@ -1,4 +1,4 @@
-//! Shadows lie where geometry puts them, to within the filter and a pixel of the map.
+//! Shadows lie where ray casting finds them, to within the filter and a pixel of the map.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -12,24 +12,24 @@ use crate::rays::{Counts, Panel, Stage};
 use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] = &[
-    ("a_square_casts_the_shadow_that_geometry_says", square_occluder),
+    ("a_square_casts_the_shadow_of_its_geometry", square_occluder),
     ("shadows_are_right_in_the_middle_of_a_hemisphere_and_at_its_rim", around_a_hemisphere),
     ("a_long_beam_casts_a_straight_shadow", long_beam),
-    ("what_passes_a_hemispheres_plane_casts_no_shadow_before_it", across_the_rim),
-    ("a_wall_close_behind_a_hemisphere_casts_no_shadow_before_it", close_behind),
-    ("a_directional_light_is_kept_away_from_however_far", far_towards_the_sun),
-    ("a_tower_keeps_the_sun_from_what_is_close_behind_it", tower),
-    ("beyond_the_reach_of_a_map_all_is_lit", beyond_the_reach),
+    ("an_object_across_a_hemispheres_plane_casts_no_shadow_in_front_of_it", across_the_rim),
+    ("a_wall_close_behind_a_hemisphere_casts_no_shadow_in_front_of_it", close_behind),
+    ("a_distant_object_blocks_a_directional_light", far_towards_the_sun),
+    ("a_tower_shadows_what_is_close_behind_it", tower),
+    ("beyond_the_distance_of_a_map_all_is_lit", beyond_the_reach),
     ("each_light_has_its_own_shadow", several_lights),
-    ("maps_of_one_and_two_pixels_do_no_harm", smallest_maps),
-    ("a_spot_light_of_half_a_turn_casts_shadows", widest_spot),
-    ("parallel_rays_see_the_same_shadows", orthographic),
-    ("shadows_far_from_the_origin_are_as_near_it", far_away),
+    ("maps_of_one_and_two_pixels_are_harmless", smallest_maps),
+    ("a_spot_light_of_180_degrees_casts_shadows", widest_spot),
+    ("an_orthographic_camera_sees_the_same_shadows", orthographic),
+    ("shadows_far_from_the_origin_equal_those_near_it", far_away),
 ];
 
 pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1 };
 
-/// The shipped processes, with shadow maps like these.
+/// The shipped processes with these shadow maps.
 pub fn studio_with(maps: ShadowMaps) -> Result<Studio, Failed> {
     Studio::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
 }
@@ -66,7 +66,7 @@ pub fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
     sized(Camera { projection, ..Camera::looking_at("main", position, target) }, [64, 64])
 }
 
-/// The same light, which nothing keeps away.
+/// The same light without shadows.
 pub fn without_shadow(light: Light) -> Light {
     let mut light = light;
     if let Light::Directional { casts_shadow, .. }
@@ -82,7 +82,7 @@ fn stage(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> Stage {
     Stage { panels, lights, maps }
 }
 
-/// Fails unless at least these shares of the pixels are surely lit and surely dark, and no more than a fifth is not sure.
+/// Fails unless at least these fractions of the pixels are surely lit and surely dark, and at most a fifth is uncertain.
 fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
     let all = (counts.lit + counts.dark + counts.fading + counts.edges) as f64;
     let enough = counts.lit as f64 >= lit * all && counts.dark as f64 >= dark * all;
@@ -94,7 +94,7 @@ pub fn told(failed: Failed, what: impl std::fmt::Display) -> Failed {
     format!("{what}: {}", failed.message().unwrap_or("")).into()
 }
 
-/// The six axes, and two ways between them.
+/// The six axes, and two directions between them.
 fn directions() -> impl Iterator<Item = DVec3> {
     let between = [[1.0, 0.3, 0.3], [-0.3, -0.9, 0.2]].map(DVec3::from);
     DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).chain(between).map(DVec3::normalize)
@@ -104,7 +104,7 @@ fn square_occluder() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };
         let mut studio = studio_with(maps)?;
-        // The filter is the same whatever the way.
+        // The filter does not depend on the direction.
         for up in directions().skip(if filter == 1 { 0 } else { 7 }) {
             let aside = up.any_orthonormal_vector();
             let across = up.cross(aside);
@@ -128,7 +128,7 @@ fn square_occluder() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A way that leaves an axis at an angle.
+/// A direction at an angle from an axis.
 fn leaving(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
     let right = axis.any_orthonormal_vector();
     let aside = right * around.cos() + axis.cross(right) * around.sin();
@@ -159,12 +159,12 @@ fn long_beam() -> Result<(), Failed> {
     let mut studio = studio_with(maps)?;
     let floor = Panel::facing(DVec3::Y * -4.0, DVec3::Y, 12.0);
     let wall = Panel::facing(DVec3::Z * -6.0, DVec3::Z, 12.0);
-    // Below the light; aside; near the plane that it shines from. All are some 2.2 m away, and reach 10 m to either side.
+    // Below the light; to its side; near its plane. All are about 2.2 m away, and extend 10 m to either side.
     for (y, z) in [(-2.2, 0.1), (-1.5, -1.6), (-0.3, -2.2)] {
         let normal = DVec3::new(0.0, y, z).normalize();
         let beam = Panel::new(DVec3::new(0.0, y, z), DVec3::X * 10.0, normal.cross(DVec3::X) * 0.1).double_sided();
         for light in [hemisphere(DVec3::ZERO, DVec3::NEG_Y), sun(normal), spot(DVec3::ZERO, normal, 80.0)] {
-            // A map that sees as much as this would be too coarse for the beam.
+            // A map of this extent would be too coarse for the beam.
             let maps = if matches!(light, Light::Directional { .. }) {
                 ShadowMaps { max_distance: 20.0, ..maps }
             } else {
@@ -189,7 +189,7 @@ fn long_beam() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A square before the light, and the wall that its shadow falls on.
+/// A square in front of the light, and the wall that its shadow falls on.
 fn before(place: DVec3, axis: DVec3) -> [Panel; 2] {
     let wall = Panel::facing(place + axis * 3.0, -axis, 3.5);
     [wall, Panel::facing(place + leaving(axis, 20.0, 0.7) * 1.2, -axis, 0.3).double_sided()]
@@ -200,7 +200,7 @@ fn across_the_rim() -> Result<(), Failed> {
     let place = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions().skip(4) {
         for (turn, distance) in [(40.0, 1.0), (80.0, 0.5), (100.0, 1.0), (150.0, 0.6)] {
-            // From before the light to behind it, 12 m either way.
+            // From in front of the light to behind it, 12 m in either direction.
             let away = leaving(axis, turn, turn);
             let slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
             let mut panels = before(place, axis).to_vec();
@@ -228,7 +228,7 @@ fn close_behind() -> Result<(), Failed> {
             for distance in [0.1, 0.02] {
                 let away = leaving(axis, turn, turn);
                 let mut slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
-                // A corner of one of the triangles that it is split into had better not be straight behind.
+                // No corner of the triangles that it is split into may be straight behind the light.
                 slab.center += slab.right.normalize() * 0.05 + slab.up.normalize() * 0.12;
                 let mut panels = before(place, axis).to_vec();
                 panels.push(slab);
@@ -259,7 +259,7 @@ fn far_towards_the_sun() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Each of its triangles reaches from the ground to far above all that the camera sees.
+/// Each of its triangles extends from the ground to far above everything that the camera sees.
 fn tower() -> Result<(), Failed> {
     let mut studio = studio_with(MAPS)?;
     for (height, lean) in [(20.0, 0.0), (100.0, 0.3), (200.0, 0.0)] {
@@ -279,7 +279,7 @@ fn beyond_the_reach() -> Result<(), Failed> {
     let maps = ShadowMaps { max_distance: 5.0, ..MAPS };
     let mut studio = studio_with(maps)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
-    // What it would have cast its shadow on is seen from too far away, and so all of that is lit.
+    // The surface that its shadow would fall on is too far away, so all of it is lit.
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
     let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
     let view = camera(DVec3::new(20.0, 30.0, 40.0), DVec3::ZERO, 8.0);
@@ -293,7 +293,7 @@ fn beyond_the_reach() -> Result<(), Failed> {
     if shadowed? != lit? {
         return Err("there are shadows beyond the reach".into());
     }
-    // As near as this they are there.
+    // At this distance there are shadows.
     let near = camera(DVec3::new(1.0, 2.0, 2.0), DVec3::ZERO, 50.0);
     expect(stage(vec![floor, square], vec![sun(down)], maps).expect(&mut studio, &[near])?, 0.3, 0.02)
 }
@@ -339,7 +339,7 @@ fn several_lights() -> Result<(), Failed> {
     for lights in orders {
         let views = [
             camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0),
-            // Not every light reaches what this one sees.
+            // Not every light reaches what this camera sees.
             camera(DVec3::new(-4.0, 1.0, 1.0), DVec3::new(-1.0, 0.0, 0.0), 50.0),
         ];
         stage(vec![floor, square], lights, MAPS).expect(&mut studio, &views)?;
@@ -356,7 +356,7 @@ fn smallest_maps() -> Result<(), Failed> {
         let place = DVec3::Y * 3.0;
         for light in [sun(DVec3::NEG_Y), spot(place, DVec3::NEG_Y, 50.0), hemisphere(place, DVec3::NEG_Y)] {
             let view = camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0);
-            // Nobody can say where shadows are, but there is no light that should not be there, and no shadow of nothing.
+            // The positions of shadows are undefined, but nothing is brighter than its light, and nothing is shadowed without a caster.
             let mut shots = Vec::new();
             for (panels, light) in [
                 (vec![floor, square], without_shadow(light)),

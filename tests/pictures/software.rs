@@ -1,4 +1,4 @@
-//! wgpu's pictures, and those of the software backend, against what they should be.
+//! wgpu's pictures against those of the software backend, in f32 and in f64.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::references::shared;
 use crate::studio::draw;
 
 pub const CASES: &[Case] = &[
-    ("software_draws_the_projects_own_scene_as_wgpu_does", || judge(demo::colonnade()?)),
+    ("software_draws_the_demo_scene_as_wgpu_does", || judge(demo::colonnade()?)),
     ("software_draws_everything_as_wgpu_does", || judge(everything())),
     ("software_draws_a_field_of_boxes_as_wgpu_does", || judge(field(400))),
 ];
@@ -30,7 +30,7 @@ pub const CASES_OF_SHARED_SCENES: &[Case] = &[
 /// wgpu against the reference, and against the software backend in f32.
 fn judge(mut scene: Scene) -> Result<(), Failed> {
     for camera in &mut scene.cameras {
-        // Without optimisation the processor takes some thirty times as long.
+        // Without optimisation the software backend takes about thirty times as long.
         camera.size = if cfg!(debug_assertions) { [240, 135] } else { [960, 540] };
     }
     let by_wgpu = draw(&scene)?;
@@ -51,12 +51,12 @@ fn draw_on(backend: SoftwareBackend, scheduler: Arc<Scheduler>, scene: &Scene) -
     Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
 }
 
-/// How far two pictures are apart.
+/// The difference between two pictures.
 #[derive(Debug)]
 struct Difference {
-    /// Root of the mean square over all pixels and colours, 0 to 255.
+    /// The root mean square over all pixels and colours, 0 to 255.
     root_mean_square: f64,
-    /// The share of pixels of which no colour is off by more than 3 of 255.
+    /// The fraction of pixels whose colours all differ by at most 3 of 255.
     near: f64,
 }
 
@@ -73,8 +73,8 @@ impl Difference {
         Self { root_mean_square: (squares / count).sqrt(), near: near / count }
     }
 
-    /// What is asked of every scene. Where rounding decides which of two surfaces a pixel on an edge shows, the pixel is off as a
-    /// whole, and so are edges of shadows.
+    /// Whether the difference is acceptable. Where rounding decides which surface a pixel on an edge shows, or whether a pixel on a
+    /// shadow's edge is lit, the whole pixel differs.
     fn is_within_bound(&self) -> bool {
         self.root_mean_square <= 2.0 && self.near >= 0.99
     }

@@ -1,4 +1,4 @@
-//! What it does to a picture when an object's place is worked out in another way.
+//! How the precision of transforms affects a picture.
 
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
@@ -12,7 +12,7 @@ use crate::judge::{assert_alike, assert_different};
 use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
-    ("absolute_transforms_are_as_good_near_the_origin_and_worse_far_from_it", absolute),
+    ("absolute_transforms_are_accurate_only_near_the_origin", absolute),
     ("the_precision_of_transforms_can_change_between_frames", changes),
 ];
 
@@ -20,7 +20,7 @@ fn quality(transforms: TransformPrecision) -> Quality {
     Quality { transforms, ..Quality::balanced() }
 }
 
-/// The field, with all that is in it so far from the world's origin.
+/// The field, moved this far from the world's origin.
 fn field_at(shift: DVec3) -> Result<Scene, SceneError> {
     let mut scene = field(300);
     scene.cameras.iter_mut().for_each(|camera| camera.position += shift);

@@ -1,4 +1,4 @@
-//! Glass: sorted, lit and mixed as it should be.
+//! Blended objects: sorting, lighting and blending.
 
 use std::f64::consts::PI;
 
@@ -16,13 +16,13 @@ use crate::judge::{assert_color, tone_mapped};
 use crate::studio::{Studio, pixel};
 
 pub const CASES: &[Case] = &[
-    ("panes_look_the_same_in_every_order_of_submission", every_order),
-    ("glass_is_hidden_by_what_is_before_it", behind_a_wall),
-    ("glass_that_hides_everything_looks_opaque_in_every_light", lit_like_opaque),
-    ("what_is_added_or_taken_scales_with_opacity", scales_with_opacity),
+    ("the_order_of_submission_does_not_change_the_picture", every_order),
+    ("opaque_objects_hide_glass_behind_them", behind_a_wall),
+    ("glass_of_opacity_one_looks_opaque_in_every_light", lit_like_opaque),
+    ("additive_and_subtractive_blending_scale_with_opacity", scales_with_opacity),
     ("panes_at_one_depth_keep_the_order_of_objects", equal_depths),
-    ("what_is_taken_away_leaves_black_at_worst", black_at_worst),
-    ("a_double_sided_pane_is_lit_on_the_side_that_is_seen", lit_on_the_seen_side),
+    ("subtractive_blending_leaves_black_at_least", black_at_worst),
+    ("a_double_sided_pane_is_lit_on_the_visible_side", lit_on_the_seen_side),
     ("more_panes_than_a_bundle_holds_stay_in_order", many_batches),
 ];
 
@@ -48,7 +48,7 @@ fn glass(blend: Blend, diffuse: Vec3, opacity: f32) -> Material {
     Material { blend, diffuse, opacity, ..Material::default() }
 }
 
-/// What a pane leaves of what is behind it, by its definition, where no light but the ambient one reaches it.
+/// The radiance of a pane over what is behind it, by its definition, in ambient light only.
 fn behind(radiance: [f64; 3], pane: &Material) -> [f64; 3] {
     let opacity = f64::from(pane.opacity);
     let own = (pane.emission.as_dvec3() + pane.diffuse.as_dvec3() * AMBIENT.as_dvec3()).to_array();
@@ -60,14 +60,14 @@ fn behind(radiance: [f64; 3], pane: &Material) -> [f64; 3] {
     })
 }
 
-/// The radiance and the picture that a scene gives.
+/// A scene's radiance and picture.
 fn drawn(studio: &mut Studio, scene: &Scene) -> Result<(Picture, Picture), Failed> {
     let recorded = studio.record(scene)?;
     let submission = studio.submit(recorded)?;
     Ok((submission.read(0, "radiance")?, submission.read(0, "picture")?))
 }
 
-/// Red, green and blue of the middle pixel of a target of half floats.
+/// Red, green and blue of the centre pixel of a target of half floats.
 fn middle(radiance: &Picture) -> [f64; 3] {
     let pixel = (radiance.height / 2 * radiance.width + radiance.width / 2) as usize;
     let channel = |index: usize| {
@@ -77,13 +77,13 @@ fn middle(radiance: &Picture) -> [f64; 3] {
     [channel(0), channel(1), channel(2)]
 }
 
-/// Fails where the middle of the picture is not what a radiance, worked out in f64, makes of it.
+/// Fails if the picture's centre is not the tone-mapped radiance, computed in f64.
 fn expect(what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
     // A half float is off by 2⁻¹⁰ of itself at most, and the last of a few count.
     expect_within(2e-3, what, drawn, expected)
 }
 
-/// The same with how far off radiance may be, as a share of what it should be or of one quarter.
+/// The same with the greatest error of the radiance, as a fraction of the radiance or of one quarter.
 fn expect_within(share: f64, what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
     let found = middle(&drawn.0);
     let close = |(found, expected): (&f64, f64)| (found - expected).abs() <= share * expected.abs().max(0.25);
@@ -123,7 +123,7 @@ fn every_order() -> Result<(), Failed> {
     }
     colors.sort_unstable();
     colors.dedup();
-    // What is added and what is taken commutes, so only the place of the pane that covers counts.
+    // Additive and subtractive blending commute, so only the position of the alpha-blended pane matters.
     if colors.len() >= 3 { Ok(()) } else { Err("the order of the panes should be seen".into()) }
 }
 
@@ -144,7 +144,7 @@ fn behind_a_wall() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A light of every class before the pane, from a little above.
+/// A light of every class in front of the pane, from slightly above.
 fn lights() -> Vec<Light> {
     let (position, intensity, range) = (DVec3::new(0.5, 1.5, 4.0), Vec3::new(9.0, 7.0, 5.0), 12.0);
     let direction = -position.as_vec3().normalize();
@@ -233,7 +233,7 @@ fn black_at_worst() -> Result<(), Failed> {
         }
         assert_color(pixel(&found.1, SIDE / 2, SIDE / 2), [0; 3])?;
     }
-    // What is less than nothing lacks in what is drawn over it.
+    // Negative radiance is missing from what is drawn over it.
     let taken = glass(Blend::Subtractive, Vec3::ONE, 1.0);
     let added = Material { emission: Vec3::ONE, ..glass(Blend::Additive, Vec3::ZERO, 1.0) };
     let expected = behind(behind(BACKGROUND.as_dvec3().to_array(), &taken), &added);
@@ -265,7 +265,7 @@ fn lit_on_the_seen_side() -> Result<(), Failed> {
 }
 
 fn many_batches() -> Result<(), Failed> {
-    // Bundles end at 256, 512 and 699: each after another colour, so that the last one drawn shows.
+    // Bundles end at 256, 512 and 699, each after another colour, so that the last drawn one shows.
     const COUNT: usize = 699;
     let mut studio = Studio::new()?;
     let colors = [Vec3::X, Vec3::Y, Vec3::Z].map(|diffuse| glass(Blend::Alpha, diffuse, 0.1));
@@ -292,7 +292,7 @@ fn many_batches() -> Result<(), Failed> {
     }
     let expected =
         (0..COUNT).fold(BACKGROUND.as_dvec3().to_array(), |radiance, pane| behind(radiance, &colors[pane % 3]));
-    // Each pane takes a tenth of what rounding has left behind, so ten times 2⁻¹⁰ is the most.
+    // Each pane removes a tenth of the accumulated rounding error, so the error is at most ten times 2⁻¹⁰.
     expect_within(0.01, "two meshes", &pictures[1], expected)?;
     if pictures[0] == pictures[1] { Ok(()) } else { Err("one mesh gives another picture than two".into()) }
 }

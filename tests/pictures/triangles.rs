@@ -1,4 +1,4 @@
-//! Leaving out triangles that nobody sees changes no byte, whichever way frames are recorded.
+//! Triangle culling changes no byte, with any recording strategy.
 
 use std::cell::Cell;
 
@@ -18,14 +18,14 @@ use crate::techniques::{
 };
 
 pub const CASES: &[Case] = &[
-    ("culled_triangles_change_no_byte_by_any_technique", any_technique),
-    ("culled_triangles_change_no_byte_while_ways_are_measured", measured),
-    ("culled_triangles_change_no_byte_whatever_else_changes", whatever_else_changes),
+    ("triangle_culling_changes_no_byte_with_any_technique", any_technique),
+    ("triangle_culling_changes_no_byte_while_strategies_are_measured", measured),
+    ("triangle_culling_changes_no_byte_whatever_else_changes", whatever_else_changes),
 ];
 
 type Make = fn() -> Result<Scene, Failed>;
 
-/// Scenes, and which of their meshes ask: every so many-th.
+/// Scenes, and the step between their cullable meshes.
 const SCENES: [(Make, usize); 4] =
     [(|| Ok(everything()), 1), (|| Ok(field(300)), 1), (small_colonnade, 1), (|| Ok(many_batches()), 2)];
 
@@ -35,8 +35,8 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// The scene with the triangles of every so many-th mesh culled, and of lists only: what a strip's triangles are rounded to is not
-/// what a list's are.
+/// The scene with the triangles of every n-th mesh culled, and of lists only: a strip's triangles are rounded differently than
+/// a list's.
 fn asking(scene: Scene, every: usize) -> Scene {
     let number = Cell::new(0_usize);
     with_meshes(scene, |mesh| {
@@ -45,7 +45,7 @@ fn asking(scene: Scene, every: usize) -> Scene {
     })
 }
 
-/// Moves what looks and something that is looked at: the draws stay the same, the triangles left of them do not.
+/// Moves the camera and an object: the draws stay the same, but their remaining triangles change.
 fn change(scene: &mut Scene) -> Result<(), Failed> {
     for camera in &mut scene.cameras {
         camera.position += DVec3::new(0.7, 0.3, -0.4);
@@ -86,8 +86,8 @@ fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
     recorded.statistics().views.iter().map(|view| view.culled_triangles.culled()).sum()
 }
 
-/// With all that decides anew what is drawn where: depth drawn first, several frames on their way, another quality and back, and meshes
-/// that cease to ask.
+/// With other causes of change: a depth pre-pass, several frames in flight, another quality and back, and meshes that stop being
+/// cullable.
 fn whatever_else_changes() -> Result<(), Failed> {
     let expected = |scene: &Scene| drawn_anew(scene);
     let mut whole = with_meshes(everything(), as_list);
@@ -107,7 +107,7 @@ fn whatever_else_changes() -> Result<(), Failed> {
         let drawn = [pictures(&studio, on_its_way, &scene)?, pictures(&studio, later, &scene)?];
         expect(is_culled && drawn == [first.clone(), second.clone()], || "a frame on its way differs".to_owned())?;
 
-        // Absolute places are culled nowhere.
+        // Absolute transforms disable culling.
         studio.renderer.set_quality(Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() })?;
         let recorded = studio.record(&scene)?;
         expect(culled_in(&recorded) == 0, || "absolute places were culled".to_owned())?;

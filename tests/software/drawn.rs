@@ -1,4 +1,4 @@
-//! What is drawn.
+//! Pictures of the software backend.
 
 use std::collections::HashSet;
 
@@ -12,7 +12,7 @@ use drawloom_testing::scenes::{cube, field, sized, square};
 
 use crate::{Studio, deferred, pixel};
 
-/// A square of 2 m, 5 m before the camera, that gives off this radiance and reflects nothing.
+/// A square of 2 m, 5 m in front of the camera, that emits this radiance and reflects nothing.
 fn lit_square(radiance: Vec3) -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add(square(Topology::TriangleStrip)).unwrap();
@@ -27,7 +27,7 @@ fn lit_square(radiance: Vec3) -> Scene {
 }
 
 #[test]
-fn a_square_is_where_it_is_and_the_background_is_around_it() {
+fn a_square_covers_its_pixels_and_the_background_the_others() {
     let scene = lit_square(Vec3::new(1.0, 0.5, 0.25));
     for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
         let submission = studio.draw(&scene);
@@ -46,7 +46,7 @@ fn a_square_is_where_it_is_and_the_background_is_around_it() {
 }
 
 #[test]
-fn what_is_nearer_hides_what_is_farther_in_either_order() {
+fn nearer_objects_hide_farther_ones_in_either_order() {
     for turned in [false, true] {
         let mut scene = lit_square(Vec3::X);
         let near = scene.add(Material { diffuse: Vec3::ZERO, emission: Vec3::Y, ..Material::default() }).unwrap();
@@ -69,7 +69,7 @@ fn an_empty_scene_is_its_background() {
 }
 
 #[test]
-fn each_of_many_views_is_what_it_is_alone() {
+fn each_of_many_views_draws_what_it_draws_alone() {
     let mut scene = field(150);
     let sizes = [[64, 64], [65, 30], [1, 1], [200, 3], [96, 54]];
     let base = scene.cameras[0].clone();
@@ -94,16 +94,15 @@ fn a_depth_pre_pass_changes_nothing() {
 }
 
 #[test]
-fn shares_of_the_geometry_buffer_change_nothing() {
+fn splitting_the_geometry_buffer_changes_nothing() {
     let scene = everything();
     let mut shared = Studio::new(2, |builder| builder.deferred(deferred().geometry_shares(3)));
     assert!(shared.picture(&scene) == Studio::cut(2, Granularity::Adaptive).picture(&scene));
 }
 
-/// What light a fraction of a texel's width more or less brings is no more than what a pixel of the map is worth, so a few
-/// pixels on a shadow's edge differ.
+/// Rounding may move a lookup across a shadow map's texel, so a few pixels on a shadow's edge differ.
 #[test]
-fn the_reference_is_the_same_picture() {
+fn the_reference_draws_the_same_picture() {
     for scene in [everything(), field(120)] {
         let single = Studio::cut(2, Granularity::Adaptive).picture(&scene);
         let double = Studio::reference().picture(&scene);
@@ -130,9 +129,9 @@ fn share_within(one: &Picture, other: &Picture, bound: u8) -> f64 {
     pixels.filter(is_near).count() as f64 / (one.bytes.len() / 4) as f64
 }
 
-/// The light's ball touches every square of the picture in one of the places.
+/// The light's sphere touches every tile of the picture from one of the positions.
 #[test]
-fn a_light_reaches_no_less_for_being_looked_for_only_where_it_may() {
+fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     let mut scene = Scene::new();
     let mesh = scene.add(cube()).unwrap();
     let material = scene.add(Material::default()).unwrap();
@@ -152,7 +151,7 @@ fn a_light_reaches_no_less_for_being_looked_for_only_where_it_may() {
             let (x, y) = ((index % 150) as f64 + 0.5, (index / 150) as f64 + 0.5);
             let ray = DVec3::new((x / 75.0 - 1.0) * tangent * 1.5, (1.0 - y / 50.0) * tangent, -1.0);
             let surface = camera.position + camera.orientation.as_dquat() * ray * (0.05 / depth[0]);
-            // Well inside of the ball, above the floor, light arrives; outside none does.
+            // Well inside of the sphere, above the floor, pixels are lit; outside none is.
             let distance = surface.distance(DVec3::from(place));
             if depth[0] > 0.0 && distance < 2.7 && surface.y > -0.95 {
                 assert!(radiance[0] > 1e-4, "{place:?}: {surface} at {distance} is dark");

@@ -20,7 +20,7 @@ struct Studio {
 }
 
 impl Studio {
-    /// In f32, with as many workers.
+    /// In f32, with this number of workers.
     fn new(
         workers: usize,
         build: impl FnOnce(RendererBuilder<SoftwareBackend>) -> RendererBuilder<SoftwareBackend>,
@@ -54,7 +54,7 @@ impl Studio {
     }
 }
 
-/// Every process there is, with small shadow maps.
+/// All shipped processes, with small shadow maps.
 fn deferred() -> Deferred {
     let maps = ShadowMaps { side: 100, ..ShadowMaps::default() };
     Deferred::new().shadow_maps(Some(maps)).post(ToneMapping::default()).post(Fxaa::default())

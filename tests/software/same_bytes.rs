@@ -1,4 +1,4 @@
-//! However a frame is shared out, it has the same bytes.
+//! A frame has the same bytes however it is distributed over workers.
 
 use drawloom::backend::SoftwareBackend;
 use drawloom::quality::{CullingVolume, Quality};
@@ -9,7 +9,7 @@ use drawloom_testing::scenes::{as_list, culled, field, with_meshes};
 
 use crate::{Studio, deferred};
 
-/// A field in pictures of odd sizes, with edges inside of the squares that are drawn by one job.
+/// A field in pictures whose sizes are no multiples of a tile.
 fn odd_field() -> Scene {
     let mut scene = field(300);
     scene.cameras[0].size = [131, 77];
@@ -49,7 +49,7 @@ fn a_frame_does_not_depend_on_those_before_it() {
 }
 
 #[test]
-fn a_frame_that_was_recorded_draws_what_the_scene_was_then() {
+fn a_recorded_frame_draws_the_scene_as_it_was() {
     let scene = everything();
     let expected = Studio::cut(2, Granularity::Adaptive).picture(&scene);
     let mut studio = Studio::cut(2, Granularity::Adaptive);
@@ -64,7 +64,7 @@ fn a_frame_that_was_recorded_draws_what_the_scene_was_then() {
 }
 
 #[test]
-fn what_is_hidden_does_not_show() {
+fn occlusion_culling_changes_nothing() {
     for scene in [odd_field(), everything()] {
         let quality = Quality { culling: CullingVolume::OrientedBox, ..Quality::balanced() };
         let draw = |occlusion| {
@@ -80,7 +80,7 @@ fn what_is_hidden_does_not_show() {
 }
 
 #[test]
-fn triangles_that_are_culled_change_nothing() {
+fn triangle_culling_changes_nothing() {
     for scene in [odd_field, everything] {
         let list = with_meshes(scene(), as_list);
         let asking = with_meshes(scene(), culled);
