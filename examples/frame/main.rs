@@ -63,7 +63,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         },
     };
     report.print();
-    timeline::tell(arguments, &log)?;
+    timeline::write_outputs(arguments, &log)?;
     match &arguments.report {
         Some(path) => report.write(path),
         None => Ok(()),
@@ -183,12 +183,12 @@ fn draw<B: Backend>(
     let mut measured: Vec<(Duration, FrameStatistics)> = Vec::new();
     let mut last = None;
     for number in 0..frames {
-        let begins_at = timeline::begins_at(arguments);
+        let first_recorded_frame = timeline::first_recorded_frame(arguments);
         // Who records for the first time describes the graph and touches memory: that is no frame to look at, if there are more.
-        if begins_at.is_some_and(|first| first.saturating_sub(1) == number) {
+        if first_recorded_frame.is_some_and(|first| first.saturating_sub(1) == number) {
             timeline.start();
         }
-        if begins_at == Some(number) {
+        if first_recorded_frame == Some(number) {
             drop(timeline.take());
             device.start(renderer.backend(), &timeline)?;
         }

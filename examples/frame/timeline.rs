@@ -1,4 +1,4 @@
-//! What the frames' timeline is asked for: words, a page, a trace.
+//! What is made of the frames' timeline: a report as text, a page, a trace.
 
 use std::error::Error;
 use std::fs::File;
@@ -10,23 +10,23 @@ use drawloom::timeline::{Frame, Log};
 
 use crate::arguments::Arguments;
 
-/// How many of the last frames are recorded: the first ones make pipelines, and try ways to record.
-const FRAMES: u32 = 60;
+/// How many of the last frames are recorded. The first ones create pipelines and try recording strategies.
+const RECORDED_FRAMES: u32 = 60;
 
-/// For how many jobs there is room, a worker.
+/// The capacity of the timeline, in events of each worker.
 pub const CAPACITY: usize = 1 << 18;
 
-/// The first frame that is to be recorded, if any is.
-pub fn begins_at(arguments: &Arguments) -> Option<u32> {
-    let is_asked = arguments.explain || arguments.timeline.is_some() || arguments.html.is_some();
-    is_asked.then_some(arguments.frames.saturating_sub(FRAMES))
+/// The first frame to record, if any output of the timeline is requested.
+pub fn first_recorded_frame(arguments: &Arguments) -> Option<u32> {
+    let is_requested = arguments.explain || arguments.timeline.is_some() || arguments.html.is_some();
+    is_requested.then_some(arguments.frames.saturating_sub(RECORDED_FRAMES))
 }
 
-/// Writes and prints what was asked for.
+/// Writes and prints the requested outputs.
 ///
 /// # Errors
-/// If a file cannot be written, or if not all of the frame that is to be explained was recorded.
-pub fn tell(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
+/// If a file cannot be written, or if the frame to explain was not recorded completely.
+pub fn write_outputs(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
     if let Some(path) = &arguments.timeline {
         write(path, |file| write_chrome_trace(log, file))?;
     }
@@ -37,14 +37,14 @@ pub fn tell(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
     if let Some(path) = &arguments.html {
         write(path, |file| write_page(log, &costs, file))?;
     }
-    if let Some(frame) = middle(log).filter(|_| arguments.explain) {
+    if let Some(frame) = median_frame(log).filter(|_| arguments.explain) {
         println!("\n{}", FrameReport::new(log, frame, &costs)?);
     }
     Ok(())
 }
 
-/// The frame that as many others are shorter than as are longer.
-fn middle(log: &Log) -> Option<u64> {
+/// The frame of median duration.
+fn median_frame(log: &Log) -> Option<u64> {
     let mut frames = log.frames.clone();
     frames.sort_by_key(|frame: &Frame| frame.ended - frame.began);
     Some(frames.get(frames.len() / 2)?.number)

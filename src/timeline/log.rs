@@ -2,8 +2,8 @@
 
 use std::{ops::Range, sync::Arc, time::Duration};
 
-/// Everything recorded since the timeline was started, or since the last log was taken. All times are measured from the
-/// moment in which the scheduler was built.
+/// Everything recorded since the timeline was started, or since the last log was taken. All times are measured from
+/// the construction of the scheduler.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
     /// One for each worker. Worker 0 is whichever thread called the scheduler.

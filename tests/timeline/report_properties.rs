@@ -212,10 +212,10 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
     }
     prop_assert_eq!(report.shares.iter().map(|share| share.duration()).sum::<Duration>(), took);
     let mut slack = report.slack.as_slice();
-    for (place, run) in log.runs.iter().enumerate() {
-        let steps = path.iter().filter(|step| step.node.is_some_and(|(run, _)| run == place));
+    for (index, run) in log.runs.iter().enumerate() {
+        let steps = path.iter().filter(|step| step.node.is_some_and(|(run, _)| run == index));
         let (of_run, rest) = slack.split_at(run.graph.nodes.len());
-        prop_assert!(of_run.iter().enumerate().all(|(index, slack)| slack.node == (place, index)));
+        prop_assert!(of_run.iter().enumerate().all(|(node, slack)| slack.node == (index, node)));
         check_run(run, &steps.collect::<Vec<_>>(), of_run)?;
         slack = rest;
     }

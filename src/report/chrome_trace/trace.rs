@@ -168,9 +168,9 @@ impl<W: io::Write> TraceWriter<'_, W> {
         slice.end()
     }
 
-    /// Writes the ends of arrows at a slice. They follow the slice directly, because of several slices that begin at the same
-    /// time Perfetto binds an arrow to the last one it read. And they lie a nanosecond inside the slice if it is long enough,
-    /// because where one slice ends as the next one begins `chrome://tracing` binds an arrow to the one that ends.
+    /// Writes the ends of the arrows at a slice. They directly follow the slice, because Perfetto binds an arrow to the last
+    /// slice it has read of those that begin at the same time. They lie a nanosecond inside the slice if it is long enough,
+    /// because `chrome://tracing` binds an arrow at the border of two slices to the one that ends.
     fn write_arrows(&mut self, slice: usize, chunk: &Chunk, span: &NodeSpan) -> io::Result<()> {
         let track = track_of(chunk.worker);
         let nanosecond = Duration::from_nanos(1);

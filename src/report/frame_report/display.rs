@@ -30,7 +30,7 @@ const MAX_NAME_LENGTH: usize = 60;
 const MAX_WORKER_NAME_LENGTH: usize = 40;
 const MAX_SHORT_NAME_LENGTH: usize = 17;
 
-/// Savings and slack of less than one part in so many of the frame are left out.
+/// Savings and slack shorter than the frame divided by this number are left out.
 const MIN_SAVED_PART: u32 = 200;
 
 /// What is to blame first, then each list, cut to a length that a person reads.

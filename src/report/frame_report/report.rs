@@ -59,7 +59,7 @@ pub struct FrameReport {
 const WORKER_COUNTS: [usize; 5] = [1, 2, 4, 8, 16];
 
 impl FrameReport {
-    /// Reports on the frame of that number. `costs` are those of this machine, for the [replay](Replay).
+    /// Reports on the frame with that number. `costs` are those of this machine, for the [replay](Replay).
     ///
     /// ```
     /// use drawloom::{

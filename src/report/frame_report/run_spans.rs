@@ -21,7 +21,7 @@ impl<'log> RunSpans<'log> {
         Self { index, run, node_spans, worker_spans }
     }
 
-    /// The worker span that ended last, before it the one that held it up, and so on: from the first to the last.
+    /// The chain of worker spans that each held up the next, from the first to the one that ended last.
     pub(super) fn critical_path(&self) -> Vec<&WorkerSpan> {
         let holder = |span: &&WorkerSpan| span.holder.map(|holder| &self.worker_spans[holder]);
         let mut path: Vec<_> = std::iter::successors(self.worker_spans.last(), holder).collect();

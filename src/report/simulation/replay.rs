@@ -285,21 +285,21 @@ mod tests {
         let test_run =
             TestRun::new().add(&[], &[10]).add(&[0], &[100]).add(&[0], &[60]).add(&[1], &[50]).add(&[1], &[50]);
         // The other worker has nothing to do from 100 µs on, and at 120 two nodes become ready.
-        let costs = SchedulerCosts { quiet_search: micros(5), ..costly_wake_ups() };
+        let costs = SchedulerCosts { uncounted_search: micros(5), ..costly_wake_ups() };
         assert_eq!(times(&replay(&test_run, costs), [2, 3]), [micros(170); 2]);
-        // A worker in its quiet search does not count as searching, so a third one is woken in vain.
-        let costs = SchedulerCosts { quiet_search: micros(25), ..costs };
+        // A worker in its uncounted search does not count as searching, so a third one is woken in vain.
+        let costs = SchedulerCosts { uncounted_search: micros(25), ..costs };
         assert_eq!(times(&replay(&test_run, costs), [2, 3]), [170, 180].map(micros));
     }
 
     #[test]
-    fn after_its_quiet_search_a_worker_searches_as_long_as_a_wake_up_takes() {
+    fn after_its_uncounted_search_a_worker_searches_as_long_as_a_wake_up_takes() {
         let test_run =
             TestRun::new().add(&[], &[10]).add(&[0], &[100]).add(&[0], &[40]).add(&[1], &[50]).add(&[1], &[50]);
         // The other worker has nothing to do from 80 µs on, and at 120 two nodes become ready.
-        let costs = SchedulerCosts { quiet_search: micros(20), ..costly_wake_ups() };
+        let costs = SchedulerCosts { uncounted_search: micros(20), ..costly_wake_ups() };
         assert_eq!(replay(&test_run, costs).frame_time(2), micros(170));
-        let costs = SchedulerCosts { quiet_search: micros(5), ..costly_wake_ups() };
+        let costs = SchedulerCosts { uncounted_search: micros(5), ..costly_wake_ups() };
         assert_eq!(replay(&test_run, costs).frame_time(2), micros(200));
     }
 
@@ -342,7 +342,7 @@ mod tests {
             wake: infinite,
             waker: infinite,
             steal: infinite,
-            quiet_search: infinite,
+            uncounted_search: infinite,
             ticket: infinite,
             node: infinite,
             ..SchedulerCosts::ZERO
@@ -396,8 +396,8 @@ mod tests {
             workers in 2..12_usize,
             costs in [any_cost(), any_cost(), any_cost(), any_cost(), any_cost(), any_cost()],
         ) {
-            let [wake, waker, steal, quiet_search, ticket, node] = costs;
-            let costs = SchedulerCosts { wake, waker, steal, quiet_search, ticket, node, ..SchedulerCosts::ZERO };
+            let [wake, waker, steal, uncounted_search, ticket, node] = costs;
+            let costs = SchedulerCosts { wake, waker, steal, uncounted_search, ticket, node, ..SchedulerCosts::ZERO };
             let work = micros(test_run.nodes.iter().map(|node| sum(&node.chunks)).sum());
             let mut run = test_run.run(&costs);
             let replay = Replay::new(&run, costs).unwrap();

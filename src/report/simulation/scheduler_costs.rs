@@ -18,8 +18,8 @@ pub struct SchedulerCosts {
     pub waker: Duration,
     /// From pushing a job until a worker begins with it that was already searching for one.
     pub steal: Duration,
-    /// How long a worker without work looks for some before it counts as searching, so that others need not wake anyone.
-    pub quiet_search: Duration,
+    /// How long an idle worker looks for work before it counts as searching. While one counts, no other worker is woken.
+    pub uncounted_search: Duration,
     /// To take chunks of a node by ticket, where another worker has taken some.
     pub ticket: Duration,
     /// To run a chunk, without its own work.
@@ -48,8 +48,8 @@ const FALL_ASLEEP: Duration = Duration::from_micros(200);
 /// How long to wait for a worker that does not come.
 const TIMEOUT: Duration = Duration::from_millis(1);
 
-/// How many spin-loop hints a worker executes before it counts as searching.
-const QUIET_SPINS: usize = 119;
+/// How many pause instructions a worker executes before it counts as searching.
+const UNCOUNTED_PAUSES: usize = 119;
 
 impl SchedulerCosts {
     /// A scheduler that costs nothing, as on paper.
@@ -57,7 +57,7 @@ impl SchedulerCosts {
         wake: Duration::ZERO,
         waker: Duration::ZERO,
         steal: Duration::ZERO,
-        quiet_search: Duration::ZERO,
+        uncounted_search: Duration::ZERO,
         ticket: Duration::ZERO,
         chunk: Duration::ZERO,
         node: Duration::ZERO,
@@ -84,7 +84,9 @@ impl SchedulerCosts {
             wake: scheduler.wake_up_cost(),
             waker: first_quartile((0..SAMPLES).filter_map(|_| waker_time(&scheduler))).min(scheduler.wake_up_cost()),
             steal,
-            quiet_search: first_quartile((0..SAMPLES).map(|_| time(|| (0..QUIET_SPINS).for_each(|_| spin_loop())))),
+            uncounted_search: first_quartile(
+                (0..SAMPLES).map(|_| time(|| (0..UNCOUNTED_PAUSES).for_each(|_| spin_loop()))),
+            ),
             // The ticket counter comes from another core's cache: half of a steal, which is a round trip.
             ticket: ticket_time() + steal / 2,
             chunk,
@@ -222,7 +224,7 @@ mod tests {
         assert!(is_within(costs.wake, 500, 200_000), "{costs:?}");
         assert!(costs.waker <= costs.wake, "{costs:?}");
         assert!(costs.steal <= Duration::from_millis(1), "{costs:?}");
-        assert!(is_within(costs.quiet_search, 119, 100_000), "{costs:?}");
+        assert!(is_within(costs.uncounted_search, 119, 100_000), "{costs:?}");
         assert!(is_within(costs.chunk, 1, 20_000), "{costs:?}");
         for cost in [costs.node, costs.node_serial, costs.recording] {
             assert!(cost <= Duration::from_micros(20), "{costs:?}");

@@ -51,9 +51,9 @@ impl TestRun {
                 ..NodeInfo::default()
             });
             let opened = now;
-            for (index_of_chunk, &cost) in node.chunks.iter().enumerate() {
+            for (chunk, &cost) in node.chunks.iter().enumerate() {
                 let ended = now + Duration::from_micros(cost) + costs.recording;
-                let items = index_of_chunk * 3..index_of_chunk * 3 + 3;
+                let items = chunk * 3..chunk * 3 + 3;
                 chunks.push(Chunk { node: index, items, opened, started: now, ended, ..Chunk::default() });
                 now = ended;
             }

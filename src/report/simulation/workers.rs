@@ -1,8 +1,8 @@
 //! The simulated workers: their queues, which of them search for work or sleep, and who wakes whom. This follows
-//! `task/worker.rs`, `task/idle.rs` and `task/sleep.rs`.
+//! `task/worker.rs`, `task/queues.rs`, `task/idle.rs` and `task/sleep.rs`.
 //!
 //! It is a discrete-event simulation: the clock jumps from one event to the next. A worker that searches does so all the
-//! time, so it reacts at the moment in which a token is pushed. All tokens lie in queues, as in a run that a thread outside
+//! time, so it reacts as soon as a token is pushed. All tokens lie in queues, as in a run that a thread outside
 //! of the scheduler calls for. Mailboxes, through which workers of a run inside a job pass on tokens, are not simulated.
 
 use std::{
@@ -14,8 +14,8 @@ use crate::task::Priority;
 
 use super::{measured_run::nanoseconds, scheduler_costs::SchedulerCosts};
 
-/// The longest that a worker searches once it counts as searching, in nanoseconds, whatever a wake-up costs.
-const MAX_SEARCH: u64 = 100_000;
+/// How long a worker looks for work at most once it counts as searching, in nanoseconds, whatever a wake-up costs.
+const MAX_SPIN: u64 = 100_000;
 
 /// The workers, and the clock. Times are in nanoseconds since the run began. `T` is what lies in the queues, `A` what a
 /// worker does.
@@ -31,7 +31,7 @@ pub(super) struct SimulatedWorkers<T, A> {
     events_scheduled: u64,
     wake: u64,
     waker: u64,
-    quiet_search: u64,
+    uncounted_search: u64,
 }
 
 struct SimulatedWorker<T, A> {
@@ -92,7 +92,7 @@ impl<T, A> SimulatedWorkers<T, A> {
             events_scheduled: 0,
             wake: nanoseconds(costs.wake),
             waker: nanoseconds(costs.waker),
-            quiet_search: nanoseconds(costs.quiet_search),
+            uncounted_search: nanoseconds(costs.uncounted_search),
         };
         workers.schedule(0, State::Busy(first), 0);
         workers
@@ -188,7 +188,7 @@ impl<T, A> SimulatedWorkers<T, A> {
     fn look_for_work(&mut self, worker: usize) -> Event<T, A> {
         let Some((token, is_stolen)) = self.find(worker) else {
             let since = *self.workers[worker].idle_since.get_or_insert(self.now);
-            self.schedule(worker, State::Searching, since + self.quiet_search + self.wake.min(MAX_SEARCH));
+            self.schedule(worker, State::Searching, since + self.uncounted_search + self.wake.min(MAX_SPIN));
             return Event::Idle;
         };
         let was_searching = self.is_searching(&self.workers[worker]);
@@ -239,7 +239,7 @@ impl<T, A> SimulatedWorkers<T, A> {
     }
 
     fn is_searching(&self, worker: &SimulatedWorker<T, A>) -> bool {
-        worker.is_called || worker.idle_since.is_some_and(|since| self.now - since >= self.quiet_search)
+        worker.is_called || worker.idle_since.is_some_and(|since| self.now - since >= self.uncounted_search)
     }
 }
 
