@@ -6,6 +6,7 @@
 //! re-export of an item that the file does not use itself. So a `mod.rs` that only declares modules and re-exports their
 //! items is no part of a circle.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use proc_macro2::TokenTree;
@@ -99,8 +100,8 @@ impl<'a> Imports<'a> {
                     circle.reverse();
                     return Some(circle);
                 }
-                if !importer.contains_key(&used) {
-                    importer.insert(used, user);
+                if let Entry::Vacant(entry) = importer.entry(used) {
+                    entry.insert(user);
                     queue.push_back(used);
                 }
             }
