@@ -183,7 +183,7 @@ impl Backend for NullBackend {
             objects: end,
             triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
             lights: match &request.draws[pass.process] {
-                Draws::Lights(lights) => request.lights[pass.view].range(lights.class).len(),
+                Draws::Lights(lights) => request.light_tables[pass.view].range(lights.class).len(),
                 _ => 0,
             },
         })

@@ -3,7 +3,7 @@
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
-use crate::scene::SceneRef;
+use crate::scene::{Light, SceneRef};
 use crate::view::{LightTable, Rejections, RenderView};
 
 /// Everything that a backend needs to know of a frame.
@@ -15,8 +15,10 @@ pub struct FrameRequest<'a> {
     pub draws: &'a [Draws<'a>],
     /// The views. The targets of a cached view still hold what an earlier frame drew: see [`RenderView::is_cached`].
     pub views: &'a [RenderView],
+    /// The valid lights of the scene, in its order.
+    pub lights: &'a [Light],
     /// The lights that reach each view.
-    pub lights: &'a [LightTable],
+    pub light_tables: &'a [LightTable],
     /// Each render process in each of its views, in submission order.
     pub passes: &'a [Pass],
     /// The scene.

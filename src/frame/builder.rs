@@ -1,8 +1,8 @@
-//! How a renderer is put together.
+//! Builds a renderer.
 
 use std::sync::Arc;
 
-use super::plans::Plans;
+use super::plan_cache::PlanCache;
 use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
 use crate::backend::Backend;
@@ -11,7 +11,7 @@ use crate::quality::Quality;
 use crate::task::Scheduler;
 use crate::view::ShadowMaps;
 
-/// Puts a renderer together from processes.
+/// Builds a [`Renderer`] from render processes and settings.
 pub struct RendererBuilder<B> {
     backend: B,
     deferred: Option<Deferred>,
@@ -23,8 +23,15 @@ pub struct RendererBuilder<B> {
     quality: Option<Quality>,
 }
 
+impl<B: Backend> Renderer<B> {
+    /// Starts to build a renderer.
+    pub fn builder(backend: B) -> RendererBuilder<B> {
+        RendererBuilder::new(backend)
+    }
+}
+
 impl<B: Backend> RendererBuilder<B> {
-    pub(super) fn new(backend: B) -> Self {
+    fn new(backend: B) -> Self {
         Self {
             backend,
             deferred: None,
@@ -37,57 +44,57 @@ impl<B: Backend> RendererBuilder<B> {
         }
     }
 
-    /// Adds a process. The order of these calls only matters where reads and writes leave it open.
+    /// Adds a render process. The order of these calls matters only where reads and writes leave it open.
     pub fn process(mut self, process: impl RenderProcess + 'static) -> Self {
         self.processes.push(Arc::new(process));
         self
     }
 
-    /// Adds the processes of a deferred pipeline, which follow from frame to frame what the scene requires, and its output.
+    /// Adds a deferred pipeline: its output, and in each frame the processes that the scene requires.
     pub fn deferred(mut self, deferred: Deferred) -> Self {
         self.deferred = Some(deferred);
         self
     }
 
-    /// Names a target that the frame is for. Processes that lead to none are dropped.
+    /// Names an output of the frame. Processes that lead to no output are dropped.
     pub fn output(mut self, target: impl Into<String>) -> Self {
         self.outputs.push(target.into());
         self
     }
 
-    /// How lights that cast shadows are seen, for processes of the engine's own that draw in views of
-    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). If a [`Deferred`] pipeline draws shadow maps, it says how instead.
+    /// Sets the shadow maps for an engine's own processes that draw in views of
+    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). The settings of a [`Deferred`] pipeline that draws shadow maps override these.
     pub fn shadow_maps(mut self, maps: ShadowMaps) -> Self {
         self.shadow_maps = maps;
         self
     }
 
-    /// How finely a frame is cut into jobs.
+    /// Sets how finely a frame is divided into jobs.
     pub fn granularity(mut self, granularity: Granularity) -> Self {
         self.granularity = granularity;
         self
     }
 
-    /// Whether equal commands become one instanced draw, which they do unless said otherwise. Without it each object is a draw
-    /// of its own, as in engines that do not merge: the same picture, at a higher price.
+    /// Sets whether equal commands become one instanced draw, which is the default. Otherwise each object is a draw of its own: the
+    /// same picture at a higher cost.
     pub fn instancing(mut self, instancing: bool) -> Self {
         self.instancing = instancing;
         self
     }
 
-    /// How accurate frames are, and so what they cost. It says so of the [`Deferred`] pipeline as well, whatever that was told:
-    /// see [`Deferred::quality`]. Without it the pipeline stays as it is, and all else is [`Quality::balanced`].
+    /// Sets the quality, of the frame and of the [`Deferred`] pipeline: see [`Deferred::quality`]. Without this call the pipeline keeps
+    /// its own settings, and everything else is [`Quality::balanced`].
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = Some(quality);
         self
     }
 
-    /// The renderer, which records on the scheduler's workers, and the submitter. The thread that calls this is the device
-    /// thread: the submitter cannot leave it.
+    /// Builds the renderer, which records on the scheduler's workers, and the submitter, which cannot leave this thread: the thread that
+    /// calls this is the device thread.
     ///
     /// # Errors
-    /// If the processes do not make a frame, if shadow maps or the quality cannot be as they are set, or if the granularity is a
-    /// chunk of 0.
+    /// If the processes make no frame, if the settings of shadow maps or the quality are invalid, or if the granularity is a chunk
+    /// of 0.
     pub fn build(self, scheduler: Arc<Scheduler>) -> Result<(Renderer<B>, Submitter<B>), BuildError> {
         if self.granularity == Granularity::Chunk(0) {
             return Err(BuildError::EmptyChunk);
@@ -97,7 +104,7 @@ impl<B: Backend> RendererBuilder<B> {
             (Some(deferred), Some(quality)) => Some(deferred.quality(quality)),
             (deferred, _) => deferred,
         };
-        let plans = Plans::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
+        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = Arc::new(self.backend);
         let submitter = Submitter::new(Arc::clone(&backend), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))

@@ -1,4 +1,4 @@
-//! What can go wrong with a frame.
+//! Errors of building a renderer, recording a frame and submitting it.
 
 use crate::backend::BackendError;
 use crate::graph::{GraphProblem, NodeError, RunError};
@@ -7,14 +7,14 @@ use crate::quality::QualityError;
 use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
 
-/// Why there is no renderer.
+/// Why a renderer cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
-    /// The processes do not make a frame.
+    /// The processes make no frame.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The quality cannot be.
+    /// The quality is invalid.
     #[error(transparent)]
     Quality(#[from] QualityError),
     /// [`Granularity::Chunk`](super::Granularity::Chunk) of 0.
@@ -55,7 +55,7 @@ pub enum FrameError {
         /// Two views.
         views: [String; 2],
     },
-    /// The processes do not make a frame of what the scene requires.
+    /// The processes that the scene requires make no frame.
     #[error(transparent)]
     Plan(#[from] PlanError),
     /// The scene cannot be drawn as it is.
@@ -70,30 +70,30 @@ pub enum FrameError {
     /// The device could not start the frame.
     #[error("the frame could not be started")]
     Backend(#[from] BackendError),
-    /// A process failed in one of its phases.
-    #[error("{phase} failed: {source}")]
+    /// A stage failed.
+    #[error("{stage} failed: {source}")]
     Failed {
-        /// The process, the view and the phase.
-        phase: String,
+        /// The process, the view and the stage.
+        stage: String,
         /// Why.
         source: NodeError,
     },
-    /// A process, or a job of the frame's own, panicked. Where the program is built with `panic = "abort"` the process ends
+    /// A stage panicked, in the code of a process or in Drawloom's own. Where the program is built with `panic = "abort"` the process ends
     /// instead, as no panic can be caught.
-    #[error("{phase} panicked: {message}")]
+    #[error("{stage} panicked: {message}")]
     Panicked {
-        /// The process, the view and the phase.
-        phase: String,
+        /// The process, the view and the stage.
+        stage: String,
         /// What the panic said.
         message: String,
     },
-    /// A process cannot say what it draws, or says it wrong.
+    /// What a process declares or draws is invalid.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// A job outside of every process panicked.
+    /// A callback of the scheduler panicked.
     #[error(transparent)]
     Job(#[from] JobPanic),
-    /// The frame's own jobs have no order: an error of Drawloom's own.
+    /// The job graph has no order: a bug in Drawloom.
     #[error("the frame's jobs have no order: {0}")]
     Jobs(GraphProblem),
 }
@@ -101,8 +101,8 @@ pub enum FrameError {
 impl From<RunError> for FrameError {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Failed { node, source } => Self::Failed { phase: node, source },
-            RunError::Panicked { node, message } => Self::Panicked { phase: node, message },
+            RunError::Failed { node, source } => Self::Failed { stage: node, source },
+            RunError::Panicked { node, message } => Self::Panicked { stage: node, message },
             RunError::Scheduler(panic) => Self::Job(panic),
         }
     }

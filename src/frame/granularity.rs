@@ -1,30 +1,31 @@
-//! How finely a frame is cut into jobs.
+//! How finely a frame is divided into jobs.
 
-/// The job size of everything in a frame that can be cut: of what is done for all views together, and of each view's
-/// visibility, fill, sort, instance, triangles and record (M 10.5, "Better Load Balancing"). It decides who does what when, never what
-/// is drawn: bundles are cut at fixed places whatever it is, so every granularity gives the same picture to the byte.
+/// The job size of every stage that can be divided: of the objects' stages, and of each view's and pass' visibility, fill, sort,
+/// instance, triangles and record (M 10.5, "Better Load Balancing"). It decides which worker does what, never the picture: bundles
+/// end at fixed batches, so every granularity draws the same bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Granularity {
-    /// As it pays: every frame is measured, and each stage of each process is cut into as many jobs as its work is worth,
-    /// or not at all. It has learnt a scene, or a change of it, within 30 frames.
+    /// By measured cost: each stage of each process is divided into as many jobs as its work is worth. It adapts to a scene, or
+    /// to a change of it, within 30 frames.
     #[default]
     Adaptive,
-    /// Nothing is cut: a job a view, M's first design.
+    /// One job a stage and view: M's first design.
     PerCamera,
-    /// A job a draw: M's "more advanced solution". Of what has larger smallest parts, such as bundles, a job for each of them.
+    /// One job a draw: M's "more advanced solution". Where the smallest item holds several draws, as a bundle does, one job an
+    /// item.
     PerDraw,
-    /// A job for this many objects or draws; of what has larger smallest parts, for as many of them as hold these. Not 0.
+    /// One job for this many objects or draws, rounded up to whole items. Not 0.
     Chunk(usize),
 }
 
 impl Granularity {
-    /// How many parts of so many items each make a job; `None` where that is to be learnt.
-    pub(super) fn parts(self, items_per_part: usize) -> Option<usize> {
+    /// The number of items in a job, where an item has `units_per_item` objects or draws; `None` where the cost model decides.
+    pub(super) fn items_per_job(self, units_per_item: usize) -> Option<usize> {
         match self {
             Self::Adaptive => None,
             Self::PerCamera => Some(usize::MAX),
             Self::PerDraw => Some(1),
-            Self::Chunk(items) => Some(items.div_ceil(items_per_part)),
+            Self::Chunk(units) => Some(units.div_ceil(units_per_item)),
         }
     }
 }

@@ -1,19 +1,32 @@
-//! The façade: a scene goes in, recorded queues come out, and the device thread submits them.
+//! The frame: a scene goes in, recorded queues come out, and the device thread submits them.
+//!
+//! [`Renderer::record`] is the way of a frame, `stages.rs` the list of what its jobs do.
 
 mod builder;
+mod context;
 mod cost_model;
 mod error;
 mod granularity;
-mod jobs;
-mod kept_maps;
-mod occlusion;
-mod phase;
-mod plans;
+mod occluders;
+mod occlusion_control;
+mod occlusion_tuner;
+mod pass_recording;
+mod plan_cache;
 mod recorded;
 mod renderer;
+mod scene_check;
+mod shadow_cache;
+mod stage;
+mod stage_clock;
+mod stage_graph;
+mod stages;
 mod statistics;
-mod triangles;
+mod tables;
+mod triangle_culling;
+mod valid_lights;
+mod view_occlusion;
 mod views;
+mod warnings;
 
 pub use builder::RendererBuilder;
 pub use error::{BuildError, FrameError, SubmitError};

@@ -1,10 +1,10 @@
-//! Submission: from queues to the device, on the device thread alone.
+//! Recorded frames, and their submission on the device thread.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::kept_maps::OnItsWay;
+use super::shadow_cache::InFlight;
 use super::{FrameStatistics, SubmitError};
 use crate::backend::Backend;
 use crate::process::Pass;
@@ -18,29 +18,29 @@ pub struct Recorded<B: Backend> {
     pub(super) frame: B::Frame,
     pub(super) statistics: FrameStatistics,
     pub(super) backend: Arc<B>,
-    /// Which frame of the timeline it is, if that was on.
+    /// The number of its frame in the timeline, if that was on.
     pub(super) frame_number: Option<u64>,
-    pub(super) on_its_way: OnItsWay,
+    pub(super) in_flight: InFlight,
 }
 
 impl<B: Backend> Recorded<B> {
-    /// What the frame is, in numbers.
+    /// The frame's statistics.
     pub fn statistics(&self) -> &FrameStatistics {
         &self.statistics
     }
 
-    /// The number of its frame in the [timeline](crate::timeline), if that was on when it was recorded.
+    /// The number of its frame in the [timeline](crate::timeline), if that was on while it was recorded.
     pub fn frame_number(&self) -> Option<u64> {
         self.frame_number
     }
 
-    /// One queue for each view.
+    /// The queue of each view.
     pub fn queues(&self) -> &[ViewQueue<B::Commands>] {
         &self.queues
     }
 }
 
-/// One view's queue: its finished passes in order.
+/// The queue of one view: its finished passes in order.
 #[derive(Debug)]
 pub struct ViewQueue<T> {
     /// The view's index.
@@ -49,8 +49,7 @@ pub struct ViewQueue<T> {
     pub passes: Vec<(Pass, T)>,
 }
 
-/// Submits frames. It cannot leave the thread that built it, which is the device thread (M 10.3's assert, moved into the
-/// type):
+/// Submits frames. It cannot leave the thread that built it, the device thread: the assert of M 10.3 as a type.
 ///
 /// ```compile_fail
 /// fn leave<B: drawloom::backend::Backend>(submitter: drawloom::Submitter<B>) {
@@ -60,16 +59,16 @@ pub struct ViewQueue<T> {
 pub struct Submitter<B> {
     backend: Arc<B>,
     timeline: Arc<Timeline>,
-    stays_on_its_thread: PhantomData<*const ()>,
+    not_send: PhantomData<*const ()>,
 }
 
 impl<B: Backend> Submitter<B> {
     pub(super) fn new(backend: Arc<B>, timeline: Arc<Timeline>) -> Self {
-        Self { backend, timeline, stays_on_its_thread: PhantomData }
+        Self { backend, timeline, not_send: PhantomData }
     }
 
-    /// Submits a frame: the views' queues, merged into the order of the graph. Frames are to be submitted in the order they
-    /// were recorded.
+    /// Submits a frame: the views' queues, merged into the order of the plan. Frames are submitted in the order in which they were
+    /// recorded.
     ///
     /// # Errors
     /// If the frame is another renderer's, or the device refuses it.
@@ -79,20 +78,20 @@ impl<B: Backend> Submitter<B> {
         if !Arc::ptr_eq(&self.backend, &recorded.backend) {
             return Err(SubmitError::ForeignFrame);
         }
-        let _span_of_timeline = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
+        let _timeline_span = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
-        let Recorded { queues, frame, mut statistics, on_its_way, .. } = recorded;
+        let Recorded { queues, frame, mut statistics, in_flight, .. } = recorded;
         let mut passes = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
         passes.extend(queues.into_iter().flat_map(|queue| queue.passes));
         // Passes are ordered by process first, and processes are in an order that keeps every dependency.
         passes.sort_unstable_by_key(|(pass, _)| *pass);
         let submission = self.backend.submit(frame, passes)?;
-        on_its_way.arrive();
+        in_flight.submitted();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })
     }
 
-    /// What draws.
+    /// The backend.
     pub fn backend(&self) -> &B {
         &self.backend
     }
@@ -100,8 +99,8 @@ impl<B: Backend> Submitter<B> {
 
 /// A frame that was submitted.
 pub struct Submitted<B: Backend> {
-    /// What the backend knows of it.
+    /// The backend's view of the submission.
     pub submission: B::Submission,
-    /// What it was, in numbers.
+    /// The frame's statistics.
     pub statistics: FrameStatistics,
 }

@@ -1,25 +1,29 @@
-//! Recording: from a scene to queues that are ready to submit.
+//! The renderer: from a scene to recorded queues.
 
 use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
-use super::jobs::JobsCache;
-use super::kept_maps::KeptMaps;
-use super::phase::{FrameContext, FrameTables, Recording};
-use super::plans::Plans;
+use super::context::FrameContext;
+use super::occlusion_control::update_occlusion_tuners;
+use super::pass_recording::PassRecording;
+use super::plan_cache::PlanCache;
 use super::recorded::{Recorded, ViewQueue};
-use super::statistics::{Stage, StageClock};
-use super::views::{ValidLights, views_of};
-use super::{BuildError, FrameError, FrameStatistics, Granularity, RendererBuilder, ViewStatistics};
+use super::scene_check::check_scene;
+use super::shadow_cache::ShadowCache;
+use super::stage_clock::{StageClock, StageGroup};
+use super::stage_graph::{StageGraphCache, StageOptions};
+use super::tables::FrameTables;
+use super::valid_lights::ValidLights;
+use super::views::FrameViews;
+use super::warnings::Warnings;
+use super::{BuildError, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Deferred, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
-use crate::raster::CulledTriangles;
-use crate::scene::{SceneError, SceneRef};
+use crate::scene::SceneRef;
 use crate::task::Scheduler;
-use crate::view::{Rejection, RejectionReason, RenderView};
 
 /// Produces frames: records a scene on all workers, and gives it back when that is done.
 ///
@@ -52,52 +56,43 @@ use crate::view::{Rejection, RejectionReason, RenderView};
 /// ```
 pub struct Renderer<B: Backend> {
     backend: Arc<B>,
-    plans: Plans,
+    plans: PlanCache,
     granularity: Granularity,
-    merges: bool,
+    instancing: bool,
     quality: Quality,
-    /// Whether the pipeline was told that quality.
-    pipeline_knows_quality: bool,
+    /// Whether the deferred pipeline has that quality; otherwise it has settings of its own.
+    pipeline_has_quality: bool,
     scheduler: Arc<Scheduler>,
-    jobs: JobsCache,
+    graphs: StageGraphCache<B>,
     tables: FrameTables,
-    kept_maps: KeptMaps,
+    shadow_cache: ShadowCache,
     /// One for each pass of the latest frame.
-    recordings: Vec<Recording<B>>,
-    /// What the last warnings were about.
-    told: Vec<Rejection>,
+    recordings: Vec<PassRecording<B>>,
+    warnings: Warnings,
 }
 
 impl<B: Backend> Renderer<B> {
-    /// Starts to put a renderer together.
-    pub fn builder(backend: B) -> RendererBuilder<B> {
-        RendererBuilder::new(backend)
-    }
-
     pub(super) fn new(
         backend: Arc<B>,
-        plans: Plans,
+        plans: PlanCache,
         granularity: Granularity,
-        merges: bool,
+        instancing: bool,
         quality: Option<Quality>,
         scheduler: Arc<Scheduler>,
     ) -> Self {
-        let (jobs, tables) = (JobsCache::default(), FrameTables::default());
-        let (quality, pipeline_knows_quality) = (quality.unwrap_or_default(), quality.is_some());
-        let (kept_maps, recordings, told) = (KeptMaps::default(), Vec::new(), Vec::new());
         Self {
             backend,
             plans,
             granularity,
-            merges,
-            quality,
-            pipeline_knows_quality,
+            instancing,
+            quality: quality.unwrap_or_default(),
+            pipeline_has_quality: quality.is_some(),
             scheduler,
-            jobs,
-            tables,
-            kept_maps,
-            recordings,
-            told,
+            graphs: StageGraphCache::default(),
+            tables: FrameTables::default(),
+            shadow_cache: ShadowCache::default(),
+            recordings: Vec::new(),
+            warnings: Warnings::default(),
         }
     }
 
@@ -107,244 +102,169 @@ impl<B: Backend> Renderer<B> {
     /// `tracing` when their number changes.
     ///
     /// # Errors
-    /// If the scene has no camera, a camera that cannot be, or slices of different lengths; if the device refuses
-    /// something; if a process fails or panics. The next frame is not affected.
+    /// If the scene has no camera, an invalid camera, or slices of different lengths; if the device refuses something; if a
+    /// process fails or panics. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
-        let _span_of_timeline = self.scheduler.timeline().span_of(frame_number, "record");
+        let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
-        check(&scene)?;
+        check_scene(&scene)?;
+
+        // Scene → views: one for each camera, and one for each shadow map.
         self.tables.objects.configure(self.quality.culling);
         self.tables.objects.reset(scene.object_count());
-        let mut lights = ValidLights::new(&scene, self.tables.objects.rejections(), self.quality.light_cut_off);
-        let plan = self.plans.follow(&SceneRef { lights: &lights.lights, ..scene })?;
-        let mut views = views_of(&scene, &lights, self.plans.shadow_maps(), &plan)?;
-        let interval = self.quality.shadows.interval;
-        let maps = self.kept_maps.follow(interval, &plan, &mut views, &mut lights.lights);
-        let scene = SceneRef { lights: &lights.lights, ..scene };
+        let valid_lights = ValidLights::new(&scene, self.tables.objects.rejections(), self.quality.light_cut_off);
+        let plan = self.plans.select(&valid_lights.lights, scene.assets)?;
+        let requested = FrameViews::new(&scene, valid_lights, self.plans.shadow_maps(), &plan)?;
+        let (frame_views, shadow_maps) = self.shadow_cache.resolve(self.quality.shadows.interval, &plan, requested);
+        let FrameViews { views, lights } = frame_views;
+
+        // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
-        self.tables.asking.follow(scene.assets);
-        // What is told of places relative to the camera is not so of absolute ones.
-        let culls_triangles = self.tables.asking.any() && self.quality.transforms == TransformPrecision::CameraRelative;
-        let jobs = self.jobs.find(&plan, &draws, &views, self.quality.occlusion, culls_triangles)?;
-        jobs.reset(&mut self.tables.passes, scene.object_count());
-        self.tables.reset(views.len(), self.scheduler.workers());
-        self.tables.reset_occlusion(&scene, &views, jobs, self.quality.occlusion);
+        self.tables.cullable_meshes.update(scene.assets);
+        // The bounds of triangle culling hold only for camera-relative transforms.
+        let culls_triangles =
+            !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;
+        let options = StageOptions { occlusion_tile: self.quality.occlusion, culls_triangles };
+        let graph = self.graphs.get(&plan, &draws, &views, options)?;
+        graph.reset_tables(&mut self.tables, &scene, &views, self.scheduler.workers());
         let clock = StageClock::default();
-        clock.measure(Stage::Visibility, || {
-            let shadows = self.plans.tells_shadowed_apart();
-            for (view, lights) in views.iter().zip(&mut self.tables.lights) {
-                lights.fill(view, scene.lights, &views, shadows);
-            }
-        });
+        let shadowed_apart = self.plans.shades_shadowed_lights_apart();
+        clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, shadowed_apart));
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
             views: &views,
-            lights: &self.tables.lights,
-            passes: &jobs.passes,
+            lights: &lights,
+            light_tables: &self.tables.lights,
+            passes: &graph.passes,
             scene: &scene,
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
-
         let uploaded_before = self.backend.uploaded_bytes();
-        let frame = clock.measure(Stage::Record, || self.backend.begin(&request)).0?;
-        self.recordings.resize_with(request.passes.len(), Recording::default);
-        self.recordings.iter_mut().for_each(|recording| drop(recording.take()));
+        let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0?;
+        reset_recordings(&mut self.recordings, request.passes.len());
+
+        // Visibility → fill → sort → instance → record, on all workers: `stages.rs` lists them.
         let context = FrameContext {
             request: &request,
             tables: &self.tables,
             granularity: self.granularity,
-            merges: self.merges,
+            instancing: self.instancing,
             backend: &*self.backend,
             frame: &frame,
             recordings: &self.recordings,
             clock: &clock,
-            costs: &jobs.costs,
-            occluders: &jobs.occluders,
+            costs: &graph.costs,
+            occlusion: &graph.occlusion,
             culls_triangles,
             workers: self.scheduler.workers(),
         };
-        let outcome = jobs.schedule.run(&self.scheduler, &context);
-        match outcome {
-            Ok(()) => {
-                jobs.costs.learn();
-                self.tables.learn_payoffs(&jobs.occluders, &mut jobs.payoffs);
-            }
-            Err(_) => jobs.costs.forget_frame(),
+        if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
+            graph.costs.discard_frame();
+            return Err(error.into());
         }
-        outcome?;
+        graph.costs.update();
+        update_occlusion_tuners(&mut graph.occlusion, &self.tables);
 
-        let queues = queues_of(&request, &mut self.recordings)?;
+        // Record → per-camera queues, for the submitter.
+        let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
-        let statistics = statistics_of(&request, &self.tables, uploaded, &clock);
-        let keeps_maps = views.iter().any(|view| view.is_cached);
-        warn_of_changes(&statistics.rejections, keeps_maps, &mut self.told);
-        let on_its_way = self.kept_maps.keep(maps);
-        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number, on_its_way })
+        let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times());
+        self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
+        let in_flight = self.shadow_cache.store(shadow_maps);
+        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number, in_flight })
     }
 
-    /// Draws with another deferred pipeline from the next frame on: with other settings, or other steps. Pipelines that both
-    /// have in common are kept.
+    /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.
     ///
     /// # Errors
-    /// If the processes do not make a frame; then nothing changes.
+    /// If the processes make no frame; then nothing changes.
     pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
         self.plans = self.plans.with_deferred(deferred)?;
-        self.pipeline_knows_quality = false;
-        self.kept_maps.forget();
+        self.pipeline_has_quality = false;
+        self.shadow_cache.invalidate();
         Ok(())
     }
 
-    /// Draws with another quality from the next frame on; that of the deferred pipeline is another as well.
+    /// Sets the quality from the next frame on, of the deferred pipeline too.
     ///
     /// # Errors
-    /// If there can be no frames of that quality; then nothing changes.
+    /// If the quality is invalid; then nothing changes.
     pub fn set_quality(&mut self, quality: Quality) -> Result<(), BuildError> {
         quality.check()?;
-        if quality == self.quality && self.pipeline_knows_quality {
+        if quality == self.quality && self.pipeline_has_quality {
             return Ok(());
         }
         if let Some(deferred) = self.plans.deferred() {
             self.plans = self.plans.with_deferred(deferred.clone().quality(&quality))?;
         }
-        (self.quality, self.pipeline_knows_quality) = (quality, true);
-        self.kept_maps.forget();
+        (self.quality, self.pipeline_has_quality) = (quality, true);
+        self.shadow_cache.invalidate();
         Ok(())
     }
 
-    /// How accurate frames are. Where nobody has said, a deferred pipeline may differ from it in what it was told itself.
+    /// The quality of frames. Before it is set, a deferred pipeline may have settings of its own that differ.
     pub fn quality(&self) -> &Quality {
         &self.quality
     }
 
-    /// What the last frame drew in one view by one process, which may be nothing if it failed; `None` where that process draws
-    /// no commands there, or did not because the view was kept.
+    /// What one process drew in one view, by index, in the latest frame; empty if that frame failed. `None` where the process draws no
+    /// commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
-        let jobs = self.jobs.latest()?;
-        let name = |pass: &Pass| jobs.plan.processes()[pass.process].process.name();
+        let graph = self.graphs.latest()?;
+        let name = |pass: &Pass| graph.plan.processes()[pass.process].process.name();
         let is_wanted = |pass: &Pass| pass.view == view && name(pass) == process;
-        let table = self.tables.passes.get(jobs.passes.iter().position(is_wanted)?)?;
+        let table = self.tables.passes.get(graph.passes.iter().position(is_wanted)?)?;
         table.selection.map(|_| table.list.read())
     }
 
-    /// The processes of the last frame and their targets; before the first one, those of an empty scene.
+    /// The plan of the latest frame; before the first one, that of an empty scene.
     pub fn plan(&self) -> &FramePlan {
         self.plans.current()
     }
 
-    /// For how many different requirements of scenes plans are kept.
+    /// The number of plans in the plan cache: one for each set of requirements that scenes have had.
     pub fn plan_count(&self) -> usize {
         self.plans.count()
     }
 
-    /// The last frame's jobs as a graph in the DOT language; `None` before the first frame.
+    /// The job graph of the latest frame in the DOT language; `None` before the first frame.
     pub fn jobs_to_dot(&self) -> Option<String> {
-        self.jobs.latest().map(|jobs| jobs.schedule.to_dot())
+        self.graphs.latest().map(|graph| graph.schedule.to_dot())
     }
 
-    /// The scheduler whose workers record, and whose [timeline](Scheduler::timeline) records them.
+    /// The scheduler whose workers record, and whose [timeline](Scheduler::timeline) shows them.
     pub fn scheduler(&self) -> &Arc<Scheduler> {
         &self.scheduler
     }
 
-    /// What draws.
+    /// The backend.
     pub fn backend(&self) -> &B {
         &self.backend
     }
 }
 
+/// Makes `recordings` one for each pass, empty.
+fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
+    recordings.resize_with(passes, PassRecording::default);
+    recordings.iter_mut().for_each(|recording| drop(recording.take()));
+}
+
 /// One queue for each view, its passes in the order of the plan.
-fn queues_of<B: Backend>(
+fn view_queues<B: Backend>(
     request: &FrameRequest<'_>,
-    recordings: &mut [Recording<B>],
+    recordings: &mut [PassRecording<B>],
 ) -> Result<Vec<ViewQueue<B::Commands>>, FrameError> {
-    // A process is in a view once at most.
-    let queue = |view| ViewQueue { view, passes: Vec::with_capacity(request.plan.processes().len()) };
-    let mut queues: Vec<_> = (0..request.views.len()).map(queue).collect();
+    // A process has at most one pass in a view.
+    let empty = |view| ViewQueue { view, passes: Vec::with_capacity(request.plan.processes().len()) };
+    let mut queues: Vec<_> = (0..request.views.len()).map(empty).collect();
     for (&pass, recording) in request.passes.iter().zip(recordings) {
-        let lost = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
-        queues[pass.view].passes.push((pass, recording.take().ok_or_else(lost)?));
+        let missing = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
+        queues[pass.view].passes.push((pass, recording.take().ok_or_else(missing)?));
     }
     Ok(queues)
-}
-
-fn statistics_of(
-    request: &FrameRequest<'_>,
-    tables: &FrameTables,
-    uploaded: u64,
-    clock: &StageClock,
-) -> FrameStatistics {
-    let of_view = |(index, view): (usize, &RenderView)| {
-        let mut statistics = ViewStatistics {
-            name: view.name().to_owned(),
-            kind: view.kind(),
-            visible: tables.visible[index].count(),
-            occluded: tables.occlusion[index].hidden(),
-            lights: request.lights[index].gpu_lights().len(),
-            commands: 0,
-            batches: 0,
-            bundles: 0,
-            culled_triangles: CulledTriangles::default(),
-        };
-        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
-            let list = table.list.read();
-            statistics.commands += list.objects.len();
-            statistics.batches += list.batches.len();
-            statistics.bundles += list.bundle_count();
-            statistics.culled_triangles += table.triangles.read().culled();
-        }
-        statistics
-    };
-    FrameStatistics {
-        objects: request.scene.object_count(),
-        lights: request.scene.lights.len(),
-        views: request.views.iter().enumerate().map(of_view).collect(),
-        uploaded,
-        stages: clock.times(),
-        rejections: request.rejections.list(),
-    }
-}
-
-/// Warns of what is left out or cannot be drawn as asked, once and not in every frame. What only shadow maps find out is not
-/// forgotten by a frame that keeps those there are.
-fn warn_of_changes(rejections: &[Rejection], keeps_maps: bool, told: &mut Vec<Rejection>) {
-    // A light that is switched off is nothing to warn of.
-    let is_news = |rejection: &&Rejection| rejection.reason != RejectionReason::DarkLight && !told.contains(rejection);
-    for rejection in rejections.iter().filter(is_news) {
-        let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-        tracing::warn!(target: "drawloom", count, first, "not drawn as asked: {reason}");
-    }
-    told.retain(|old| keeps_maps && old.reason == RejectionReason::CoarseEdges);
-    told.extend(
-        rejections.iter().filter(|rejection| !(keeps_maps && rejection.reason == RejectionReason::CoarseEdges)),
-    );
-}
-
-/// What must hold of a scene as a whole. Single objects and lights are left out instead.
-fn check(scene: &SceneRef<'_>) -> Result<(), FrameError> {
-    scene.check_lengths()?;
-    let objects = scene.object_count();
-    if u32::try_from(objects).is_err() {
-        return Err(FrameError::TooManyObjects { objects });
-    }
-    if scene.cameras.is_empty() {
-        return Err(FrameError::NoView);
-    }
-    for camera in scene.cameras {
-        let [width, height] = camera.size;
-        if width == 0 || height == 0 {
-            return Err(FrameError::EmptyTarget { view: camera.name.clone(), width, height });
-        }
-        camera.check()?;
-    }
-    for (name, color) in [("ambient", scene.ambient), ("background", scene.background)] {
-        if !color.is_finite() || color.min_element() < 0.0 {
-            return Err(SceneError::InvalidColor { name }.into());
-        }
-    }
-    Ok(())
 }

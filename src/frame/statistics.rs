@@ -1,39 +1,40 @@
-//! What a frame was, in numbers.
+//! Statistics of a frame.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use super::tables::FrameTables;
+use crate::backend::FrameRequest;
 use crate::raster::CulledTriangles;
 use crate::scene::ViewKind;
-use crate::view::Rejection;
+use crate::view::{Rejection, RenderView};
 
-/// What a frame was, in numbers.
+/// Statistics of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameStatistics {
     /// Objects in the scene.
     pub objects: usize,
-    /// Lights in the scene that can be; the others are among the rejections.
+    /// Valid lights in the scene; the others are among the rejections.
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
-    /// Where the time went.
+    /// The thread time of each group of stages.
     pub stages: StageTimes,
-    /// What was left out, and why.
+    /// What was left out or cannot be drawn as asked, and why.
     pub rejections: Vec<Rejection>,
 }
 
-/// What a view drew.
+/// Statistics of a view.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewStatistics {
     /// The camera's name.
     pub name: String,
-    /// What its picture is for.
+    /// The kind of view.
     pub kind: ViewKind,
     /// Objects it sees.
     pub visible: usize,
-    /// Objects it would see, did others not hide them: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
+    /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
     pub occluded: usize,
     /// Lights that reach it.
     pub lights: usize,
@@ -41,66 +42,66 @@ pub struct ViewStatistics {
     pub commands: usize,
     /// Instanced draws, over all its processes.
     pub batches: usize,
-    /// Bundles that those fill, whether they are recorded as bundles or not.
+    /// Bundles that the batches fill, whether they are recorded as bundles or not.
     pub bundles: usize,
-    /// Triangles that were looked at before they were drawn, and how many of them were left out, over all its processes: see
+    /// Triangles that were tested and culled on the CPU, over all its processes: see
     /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
     pub culled_triangles: CulledTriangles,
 }
 
-/// Thread time of each stage, summed over workers.
+/// The thread time of each group of stages, summed over workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageTimes {
-    /// Checking objects, and finding those that each view sees, and the lights that reach it.
+    /// Checking objects, and finding the objects and lights that each view sees.
     pub visibility: Duration,
-    /// Making commands.
+    /// Filling commands.
     pub fill: Duration,
-    /// Sorting them.
+    /// Sorting commands.
     pub sort: Duration,
-    /// Merging them into batches, and looking at the triangles of meshes that ask for it.
+    /// Merging commands into batches, joining these to draw lists, and culling triangles.
     pub instance: Duration,
-    /// Uploading, recording bundles, finishing passes.
+    /// Uploading, recording and finishing passes.
     pub record: Duration,
-    /// Submitting. 0 until the frame was.
+    /// Submitting; 0 until the frame is submitted.
     pub submit: Duration,
 }
 
-/// A stage of [`StageTimes`] that jobs take part in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stage {
-    Visibility,
-    Fill,
-    Sort,
-    Instance,
-    Record,
-}
-
-/// Adds up thread time a stage while jobs run.
-#[derive(Debug, Default)]
-pub(super) struct StageClock {
-    nanoseconds: [AtomicU64; 5],
-}
-
-impl StageClock {
-    /// Runs `work`, adds the time it takes to `stage`, and says how long that was.
-    pub(super) fn measure<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> (R, Duration) {
-        let start = Instant::now();
-        let result = work();
-        let took = start.elapsed();
-        // Read when all jobs have ended, which orders everything.
-        self.nanoseconds[stage as usize].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
-        (result, took)
-    }
-
-    pub(super) fn times(&self) -> StageTimes {
-        let of = |stage: Stage| Duration::from_nanos(self.nanoseconds[stage as usize].load(Ordering::Relaxed));
-        StageTimes {
-            visibility: of(Stage::Visibility),
-            fill: of(Stage::Fill),
-            sort: of(Stage::Sort),
-            instance: of(Stage::Instance),
-            record: of(Stage::Record),
-            submit: Duration::ZERO,
+impl FrameStatistics {
+    /// The statistics of a frame whose stages have run.
+    pub(super) fn new(request: &FrameRequest<'_>, tables: &FrameTables, uploaded: u64, stages: StageTimes) -> Self {
+        let views =
+            request.views.iter().enumerate().map(|(index, view)| ViewStatistics::new(index, view, request, tables));
+        Self {
+            objects: request.scene.object_count(),
+            lights: request.lights.len(),
+            views: views.collect(),
+            uploaded,
+            stages,
+            rejections: request.rejections.list(),
         }
+    }
+}
+
+impl ViewStatistics {
+    fn new(index: usize, view: &RenderView, request: &FrameRequest<'_>, tables: &FrameTables) -> Self {
+        let mut statistics = Self {
+            name: view.name().to_owned(),
+            kind: view.kind(),
+            visible: tables.visible[index].count(),
+            occluded: tables.occlusion[index].hidden(),
+            lights: tables.lights[index].gpu_lights().len(),
+            commands: 0,
+            batches: 0,
+            bundles: 0,
+            culled_triangles: CulledTriangles::default(),
+        };
+        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
+            let list = table.list.read();
+            statistics.commands += list.objects.len();
+            statistics.batches += list.batches.len();
+            statistics.bundles += list.bundle_count();
+            statistics.culled_triangles += table.triangles.read().culled();
+        }
+        statistics
     }
 }

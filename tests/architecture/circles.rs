@@ -19,7 +19,6 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 #[rustfmt::skip] // One a line, so that two changes do not conflict.
 const KNOWN_CIRCLES: &[&str] = &[
     "backend",
-    "frame",
 ];
 
 /// How many re-exports are followed to the definition of one item.

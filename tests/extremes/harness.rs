@@ -211,7 +211,7 @@ impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
     fn draw(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed> {
         let recorded = match self.renderer.record(*scene) {
             Ok(recorded) => recorded,
-            Err(FrameError::Panicked { phase, message }) => return Err(format!("{phase} panicked: {message}").into()),
+            Err(FrameError::Panicked { stage, message }) => return Err(format!("{stage} panicked: {message}").into()),
             Err(FrameError::Job(panic)) => return Err(format!("a job panicked: {panic}").into()),
             Err(error) => return Ok(Outcome::Refused(error)),
         };

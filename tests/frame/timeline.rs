@@ -60,7 +60,7 @@ fn a_log_accounts_for_whole_frames() {
 }
 
 #[test]
-fn every_job_says_which_process_phase_and_view_it_is_of() {
+fn every_job_says_which_process_stage_and_view_it_belongs_to() {
     let scene = field(300);
     let (mut renderer, _submitter) = renderer(1, Granularity::default());
     renderer.scheduler().timeline().start();
@@ -78,6 +78,7 @@ fn every_job_says_which_process_phase_and_view_it_is_of() {
         "fill",
         "finish",
         "instance",
+        "join",
         "objects",
         "prepare",
         "record",

@@ -209,7 +209,7 @@ fn lost_while(record: RecordingStrategy, encode: EncodingStrategy) -> Result<(),
         }
     }
     match renderer.record(scene.as_scene_ref()) {
-        Err(FrameError::Panicked { phase, message }) => Err(format!("{phase} panicked: {message}").into()),
+        Err(FrameError::Panicked { stage, message }) => Err(format!("{stage} panicked: {message}").into()),
         Err(_) => Ok(()),
         Ok(_) => Err("a frame was recorded on a lost device".into()),
     }

@@ -98,7 +98,7 @@ pub(super) fn cpu_shaders_of(request: &FrameRequest<'_>) -> Result<Vec<CpuShader
 /// # Errors
 /// If the camera is out of reach.
 fn view_state<R: Precision>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
-    let (view, lights, scene) = (&request.views[index], &request.lights[index], request.scene);
+    let (view, lights, scene) = (&request.views[index], &request.light_tables[index], request.scene);
     let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
     let gpu_view = GpuView::new(view, scene, lights.gpu_lights().len()).ok_or_else(out_of_reach)?;
     let camera = CameraPosition {
@@ -107,7 +107,7 @@ fn view_state<R: Precision>(request: &FrameRequest<'_>, index: usize) -> Result<
         transforms: request.quality.transforms,
     };
     let light = |(gpu_light, (light, map)): (_, (usize, Option<usize>))| {
-        R::light(gpu_light, &scene.lights[light], &camera, map.map(|map| &request.views[map]))
+        R::light(gpu_light, &request.lights[light], &camera, map.map(|map| &request.views[map]))
     };
     let shader_view = R::view(view, &gpu_view, scene);
     Ok(ViewState { shader_view, lights: lights.gpu_lights().iter().zip(lights.sources()).map(light).collect(), camera })
@@ -131,7 +131,7 @@ fn software_pass<R: Precision>(
             SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
         }
         (Draws::Lights(draws), TypedCpuShader::Lights(shader)) => {
-            let lights = request.lights[pass.view].range(draws.class);
+            let lights = request.light_tables[pass.view].range(draws.class);
             SoftwareDraws::Lights { shader: Arc::clone(shader), lights: lights.start as usize..lights.end as usize }
         }
         _ => {

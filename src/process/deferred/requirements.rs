@@ -1,6 +1,6 @@
 //! Which processes a scene requires.
 
-use crate::scene::{Blend, LightKind, Material, SceneRef};
+use crate::scene::{Assets, Blend, Light, LightKind, Material};
 use crate::view::LightClass;
 
 /// What a scene requires of a frame. A frame has the processes that this requires, and no others.
@@ -15,13 +15,13 @@ pub struct Requirements {
 const _: () = assert!(LightClass::COUNT <= 8);
 
 impl Requirements {
-    /// The requirements of a scene. If `shadows` is false, no light casts shadows.
-    pub fn of(scene: &SceneRef<'_>, shadows: bool) -> Self {
+    /// What a scene with these valid lights and assets requires. Without `shadows`, lights count as casting none.
+    pub fn of(lights: &[Light], assets: &Assets, shadows: bool) -> Self {
         let mut requirements = Self::default();
-        for light in scene.lights {
+        for light in lights {
             requirements.lights |= 1 << LightClass::of(light, shadows).index();
         }
-        let mut materials = scene.assets.iter::<Material>();
+        let mut materials = assets.iter::<Material>();
         requirements.transparency = materials.any(|(_, material)| material.blend != Blend::None);
         requirements
     }

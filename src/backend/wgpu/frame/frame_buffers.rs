@@ -103,7 +103,7 @@ impl FrameBuffers {
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
         let object_bytes = objects * size_of::<GpuObject>();
-        let light_bytes = request.lights.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
+        let light_bytes = request.light_tables.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
         for bytes in [object_bytes, objects * 4, light_bytes] {
             check_storage_binding_size(device, bytes)?;
         }
@@ -283,7 +283,7 @@ impl Buffers {
         let bytes = self.lights.rewrite();
         let ranges = &mut self.next_key.light_ranges;
         ranges.clear();
-        for (view, lights) in request.lights.iter().enumerate() {
+        for (view, lights) in request.light_tables.iter().enumerate() {
             let before = self.key.light_ranges.get(view).map_or(0, |(_, length)| *length);
             // The layout requires a binding even if no light reaches the view.
             let size = size_with_headroom(before, size_of_val(lights.gpu_lights()), max);
@@ -328,7 +328,7 @@ impl Buffers {
 /// # Errors
 /// If a camera is out of reach.
 fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
-    for (view, lights) in request.views.iter().zip(request.lights) {
+    for (view, lights) in request.views.iter().zip(request.light_tables) {
         let record = GpuView::new(view, request.scene, lights.gpu_lights().len())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
         append_aligned(bytes, bytemuck::bytes_of(&record));

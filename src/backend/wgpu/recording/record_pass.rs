@@ -95,7 +95,7 @@ pub(crate) fn record_without_commands(
         Draws::Lights(draws) => {
             let meshes = frame.light_meshes.as_ref();
             let meshes = meshes.ok_or_else(|| broken_rule("light volumes are uploaded before they are drawn"))?;
-            let lights = request.lights[view].range(draws.class);
+            let lights = request.light_tables[view].range(draws.class);
             if !lights.is_empty() {
                 render_pass.set_vertex_buffer(0, meshes.vertices.slice(..));
                 render_pass.draw(meshes.range(draws.class.kind), lights);

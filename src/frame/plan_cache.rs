@@ -1,14 +1,14 @@
-//! Which processes a frame is made of, as the scene requires.
+//! The plan cache: one compiled plan for each set of requirements.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
-use crate::scene::{SceneRef, ViewKind};
+use crate::scene::{Assets, Light, ViewKind};
 use crate::view::ShadowMaps;
 
-/// A renderer's processes, and a plan for everything that scenes have required of them so far.
-pub(super) struct Plans {
+/// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
+pub(super) struct PlanCache {
     deferred: Option<Deferred>,
     processes: Vec<Arc<dyn RenderProcess>>,
     outputs: Vec<String>,
@@ -17,9 +17,11 @@ pub(super) struct Plans {
     current: Arc<FramePlan>,
 }
 
-impl Plans {
+impl PlanCache {
+    /// A cache with the plan of an empty scene.
+    ///
     /// # Errors
-    /// If the processes do not make a frame, of an empty scene or of one that has everything.
+    /// If the processes make no frame, either for an empty scene or for one that requires everything.
     pub(super) fn new(
         deferred: Option<Deferred>,
         processes: Vec<Arc<dyn RenderProcess>>,
@@ -40,10 +42,10 @@ impl Plans {
         Ok(Self { deferred, processes, outputs, shadow_maps, compiled, current })
     }
 
-    /// The same with another deferred pipeline.
+    /// A cache with another deferred pipeline.
     ///
     /// # Errors
-    /// As [`Plans::new`].
+    /// As [`PlanCache::new`].
     pub(super) fn with_deferred(&self, deferred: Deferred) -> Result<Self, PlanError> {
         Self::new(Some(deferred), self.processes.clone(), self.outputs.clone(), self.shadow_maps)
     }
@@ -53,18 +55,18 @@ impl Plans {
         self.deferred.as_ref()
     }
 
-    /// The plan of the last frame; before the first one, of an empty scene.
+    /// The plan of the latest frame; before the first one, that of an empty scene.
     pub(super) fn current(&self) -> &Arc<FramePlan> {
         &self.current
     }
 
-    /// The plan that draws `scene`: the one there is, if scenes have required the same before.
+    /// The plan for a scene with these valid lights and assets, compiled if the cache does not have it. It becomes the current plan.
     ///
     /// # Errors
-    /// If the processes do not make a frame.
-    pub(super) fn follow(&mut self, scene: &SceneRef<'_>) -> Result<Arc<FramePlan>, PlanError> {
+    /// If the processes make no frame.
+    pub(super) fn select(&mut self, lights: &[Light], assets: &Assets) -> Result<Arc<FramePlan>, PlanError> {
         if let Some(deferred) = &self.deferred {
-            let requirements = Requirements::of(scene, self.tells_shadowed_apart());
+            let requirements = Requirements::of(lights, assets, self.shades_shadowed_lights_apart());
             self.current = match self.compiled.get(&requirements) {
                 Some(plan) => Arc::clone(plan),
                 None => {
@@ -77,21 +79,21 @@ impl Plans {
         Ok(Arc::clone(&self.current))
     }
 
-    /// How shadow maps are seen; `None` where the current plan draws none.
+    /// The settings of shadow maps; `None` where the current plan draws none.
     pub(super) fn shadow_maps(&self) -> Option<&ShadowMaps> {
         let maps = self.deferred.as_ref().and_then(Deferred::maps).unwrap_or(&self.shadow_maps);
         self.current.draws_views(ViewKind::Shadow).then_some(maps)
     }
 
-    /// Whether lights that cast shadows are drawn by processes of their own, with maps or without.
-    pub(super) fn tells_shadowed_apart(&self) -> bool {
+    /// Whether processes of their own draw the lights that cast shadows.
+    pub(super) fn shades_shadowed_lights_apart(&self) -> bool {
         match &self.deferred {
             Some(deferred) => deferred.maps().is_some(),
             None => self.current.draws_views(ViewKind::Shadow),
         }
     }
 
-    /// How many plans are kept.
+    /// The number of plans in the cache.
     pub(super) fn count(&self) -> usize {
         self.compiled.len()
     }

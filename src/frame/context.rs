@@ -1,0 +1,68 @@
+//! What the jobs of a frame share.
+
+use super::cost_model::{CostModel, NodeCosts};
+use super::granularity::Granularity;
+use super::occlusion_control::OcclusionControl;
+use super::pass_recording::PassRecording;
+use super::stage_clock::StageClock;
+use super::tables::FrameTables;
+use crate::backend::{Backend, FrameRequest, PassRequest};
+use crate::command::DrawList;
+
+/// What the jobs of a frame share.
+pub(super) struct FrameContext<'a, B: Backend> {
+    pub(super) request: &'a FrameRequest<'a>,
+    pub(super) tables: &'a FrameTables,
+    pub(super) granularity: Granularity,
+    /// Whether equal commands become one instanced draw.
+    pub(super) instancing: bool,
+    pub(super) backend: &'a B,
+    pub(super) frame: &'a B::Frame,
+    /// One for each pass.
+    pub(super) recordings: &'a [PassRecording<B>],
+    pub(super) clock: &'a StageClock,
+    pub(super) costs: &'a CostModel,
+    /// One for each view.
+    pub(super) occlusion: &'a [OcclusionControl],
+    /// Whether the triangles of meshes that ask for it are culled.
+    pub(super) culls_triangles: bool,
+    pub(super) workers: usize,
+}
+
+impl<B: Backend> FrameContext<'_, B> {
+    /// The index of a pass' view.
+    pub(super) fn view_of(&self, pass: usize) -> usize {
+        self.request.passes[pass].view
+    }
+
+    /// The number of objects that a pass' view sees.
+    pub(super) fn visible_count(&self, pass: usize) -> usize {
+        self.tables.visible[self.view_of(pass)].count()
+    }
+
+    /// What the backend records of a pass.
+    pub(super) fn pass_request<'b>(&'b self, pass: usize, list: &'b DrawList) -> PassRequest<'b> {
+        PassRequest { frame: self.request, pass: self.request.passes[pass], list }
+    }
+
+    /// The number of parts that the backend records a pass in.
+    pub(super) fn part_count(&self, pass: usize) -> usize {
+        self.backend.part_count(self.frame, &self.pass_request(pass, &self.tables.passes[pass].list.read()))
+    }
+
+    /// Whether a pass culls triangles of meshes that ask for it.
+    pub(super) fn culls_triangles_of(&self, pass: usize) -> bool {
+        self.culls_triangles && self.request.views[self.view_of(pass)].can_cull_triangles()
+    }
+
+    /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.
+    pub(super) fn can_merge(&self, pass: usize, mesh: u32) -> bool {
+        self.instancing && !(self.culls_triangles_of(pass) && self.tables.cullable_meshes.contains(mesh))
+    }
+
+    /// The number of a node's `width` items that make a job.
+    pub(super) fn items_per_job(&self, costs: NodeCosts, width: usize, units_per_item: usize) -> usize {
+        let by_cost = || self.costs.items_per_job(costs, width, self.workers);
+        self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
+    }
+}

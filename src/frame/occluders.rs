@@ -1,0 +1,49 @@
+//! Which objects of a view may occlude others.
+
+use crate::command::{Blending, Selection};
+use crate::process::{Draws, FramePlan, Pass};
+use crate::scene::ViewKind;
+use crate::view::RenderView;
+
+/// The objects that may occlude others in a view, as the selections of the passes that draw them. `None` where no object may be
+/// removed because it could be seen through what is in front of it: where objects do not test the view's single depth target, test
+/// it before all occluders are drawn or after it is cleared again, or are drawn into other targets than the occluders. Shadow maps
+/// test nothing: they show objects that are hidden from elsewhere.
+pub(super) fn occluders(
+    plan: &FramePlan,
+    draws: &[Draws<'_>],
+    passes: &[Pass],
+    (index, view): (usize, &RenderView),
+) -> Option<Vec<Selection>> {
+    if view.kind() == ViewKind::Shadow {
+        return None;
+    }
+    // Passes are in draw order.
+    let of_view = || passes.iter().filter(|pass| pass.view == index);
+    let depth_of = |pass: &Pass| plan.processes()[pass.process].declaration.depth();
+    let colors_of = |pass: &Pass| -> Vec<&str> {
+        plan.processes()[pass.process].declaration.colors().map(|(target, _)| target).collect()
+    };
+    let (mut depth, mut colors, mut tests_only, mut occluders) = (None, Vec::new(), false, Vec::new());
+    for pass in of_view() {
+        let Some(selection) = draws[pass.process].selection() else { continue };
+        let (target, access) = depth_of(pass)?;
+        if *depth.get_or_insert(target) != target {
+            return None;
+        }
+        if access.writes() && draws[pass.process].hides() && selection.blending != Blending::Blended {
+            let own = colors_of(pass);
+            if tests_only || !(colors.is_empty() || own.is_empty() || own == colors) {
+                return None;
+            }
+            if !own.is_empty() {
+                colors = own;
+            }
+            occluders.push(selection);
+        } else {
+            tests_only = true;
+        }
+    }
+    let clears = |pass: &&Pass| depth_of(pass).is_some_and(|(target, access)| depth == Some(target) && !access.reads());
+    (of_view().filter(clears).count() <= 1 && !occluders.is_empty()).then_some(occluders)
+}

@@ -1,0 +1,129 @@
+//! What a stage is: one step of the frame's pipeline, and a node of the frame's job graph.
+
+use std::ops::Range;
+
+use super::context::FrameContext;
+use super::cost_model::NodeCosts;
+use super::granularity::Granularity;
+use super::stage_clock::StageGroup;
+use crate::backend::{Backend, BackendError};
+use crate::graph::{Node, NodeError};
+use crate::task::Worker;
+
+/// One step of the frame's pipeline: of the whole frame, of one view, or of one pass. [`stages`](super::stages) lists all of them.
+pub(super) trait Stage<B: Backend>: Send + Sync {
+    /// What does not depend on the frame.
+    fn info(&self) -> &'static StageInfo;
+
+    /// Whether a frame with these needs has the stage.
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands
+    }
+
+    /// The number of items. It is asked when the stage that this one waits for is complete.
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        let _ = frame;
+        1
+    }
+
+    /// The number of items that the time of a job over `items` is divided by to estimate the cost of an item; `None` where the
+    /// cost model has no use for it.
+    fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
+        let _ = frame;
+        matches!(self.info().chunking, Chunking::ByCost { .. }).then(|| items.len())
+    }
+
+    /// Does the work of one job.
+    ///
+    /// # Errors
+    /// If the backend fails.
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError>;
+}
+
+/// What is fixed about a stage.
+#[derive(Debug)]
+pub(super) struct StageInfo {
+    /// The name in timelines.
+    pub(super) name: &'static str,
+    /// The stage that this one waits for, by name: the first of these that the pass, its view or the frame has.
+    pub(super) after: &'static [&'static str],
+    /// Which of the [`StageTimes`](super::StageTimes) its time is part of.
+    pub(super) group: StageGroup,
+    /// How its items are divided into jobs.
+    pub(super) chunking: Chunking,
+    /// Stages of one process with equal cost kinds share an estimate of what an item costs.
+    pub(super) cost_kind: &'static str,
+    /// Whether it takes longer or shorter where the view tests for occlusion.
+    pub(super) depends_on_occlusion: bool,
+}
+
+/// How a stage's items are divided into jobs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Chunking {
+    /// One item a job.
+    PerItem,
+    /// As many items a job as the [`Granularity`] says, or as are worth a job.
+    ByCost {
+        /// The objects or batches in one item.
+        units_per_item: usize,
+    },
+}
+
+/// What decides which stages a frame has.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StageNeeds {
+    /// Whether the pass draws commands, or any pass of the view.
+    pub(super) draws_commands: bool,
+    /// Whether the view may test for occlusion.
+    pub(super) tests_occlusion: bool,
+    /// Whether the scene has meshes whose triangles are culled.
+    pub(super) culls_triangles: bool,
+}
+
+/// A job of a stage.
+#[derive(Debug)]
+pub(super) struct StageJob<'a> {
+    /// The items to work on.
+    pub(super) items: Range<usize>,
+    /// The worker that runs the job.
+    pub(super) worker: &'a Worker,
+    /// The index of the node's costs.
+    pub(super) costs: NodeCosts,
+}
+
+/// A stage as a node of the frame's job graph.
+pub(super) struct StageNode<B> {
+    pub(super) stage: Box<dyn Stage<B>>,
+    pub(super) costs: NodeCosts,
+    /// The view whose occlusion tuner counts the node's time, by index.
+    pub(super) tuned_view: Option<usize>,
+}
+
+impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        self.stage.width(frame)
+    }
+
+    fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
+        match self.stage.info().chunking {
+            Chunking::PerItem => 1,
+            Chunking::ByCost { units_per_item } => {
+                frame.items_per_job(self.costs, self.stage.width(frame), units_per_item)
+            }
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
+        let job = StageJob { items: items.clone(), worker, costs: self.costs };
+        let (result, took) = frame.clock.measure(self.stage.info().group, || self.stage.run(frame, job));
+        if let Some(view) = self.tuned_view {
+            frame.tables.occlusion[view].add_time(took);
+        }
+        if frame.granularity == Granularity::Adaptive
+            && let Some(measured) = self.stage.measured_items(frame, items)
+        {
+            frame.costs.add_sample(self.costs, measured, took);
+        }
+        Ok(result?)
+    }
+}

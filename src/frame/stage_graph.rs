@@ -1,0 +1,296 @@
+//! The frame's job graph: which stages a frame has, and which waits for which.
+
+use std::sync::Arc;
+
+use super::FrameError;
+use super::cost_model::{CostModel, NodeCosts};
+use super::occlusion_control::OcclusionControl;
+use super::stage::{Stage, StageNeeds, StageNode};
+use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
+use super::tables::{FrameTables, PassTable};
+use crate::backend::Backend;
+use crate::command::Selection;
+use crate::graph::{FrameGraph, NodeId, Schedule};
+use crate::process::{Draws, FramePlan, Pass};
+use crate::scene::{SceneRef, ViewKind};
+use crate::timeline::Labels;
+use crate::view::RenderView;
+
+/// The stages of a frame for one plan and one list of views, compiled to a schedule, with what is measured about them.
+pub(super) struct StageGraph<B: Backend> {
+    pub(super) schedule: Schedule<StageNode<B>>,
+    pub(super) costs: CostModel,
+    /// In submission order: by process, then by view.
+    pub(super) passes: Vec<Pass>,
+    pub(super) plan: Arc<FramePlan>,
+    /// What else the graph was built for.
+    key: GraphKey,
+    /// One for each view.
+    pub(super) occlusion: Vec<OcclusionControl>,
+}
+
+/// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
+#[derive(Debug)]
+struct GraphKey {
+    /// The name and kind of each view, and whether its picture is cached.
+    views: Vec<(String, ViewKind, bool)>,
+    /// For each process, the objects that it draws, and whether these hide what is behind them.
+    draws: Vec<(Option<Selection>, bool)>,
+    options: StageOptions,
+}
+
+/// The optional parts of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StageOptions {
+    /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
+    pub(super) occlusion_tile: Option<u32>,
+    /// Whether triangles of meshes that ask for it are culled.
+    pub(super) culls_triangles: bool,
+}
+
+impl GraphKey {
+    fn new(draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> Self {
+        Self {
+            views: views.iter().map(|view| (view.name().to_owned(), view.kind(), view.is_cached)).collect(),
+            draws: draws.iter().map(|draws| (draws.selection(), draws.hides())).collect(),
+            options,
+        }
+    }
+
+    /// Whether it is that of a frame. Allocates nothing.
+    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> bool {
+        let views_of_key = self.views.iter().map(|(name, kind, is_cached)| (name.as_str(), *kind, *is_cached));
+        self.options == options
+            && views_of_key.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_cached)))
+            && self.draws.iter().copied().eq(draws.iter().map(|draws| (draws.selection(), draws.hides())))
+    }
+}
+
+impl<B: Backend> StageGraph<B> {
+    /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass run one
+    /// after the other. Nothing else waits: the order of passes binds submission, not recording.
+    ///
+    /// # Errors
+    /// If no process draws in a view.
+    fn new(
+        plan: &Arc<FramePlan>,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        key: GraphKey,
+    ) -> Result<Self, FrameError> {
+        let passes = passes_of(plan, views);
+        for (index, view) in views.iter().enumerate() {
+            if !view.is_cached && !passes.iter().any(|pass| pass.view == index) {
+                return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
+            }
+        }
+        let tests_occlusion = key.options.occlusion_tile.is_some();
+        let control_of = |view| OcclusionControl::new(tests_occlusion, plan, draws, &passes, view);
+        let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();
+        let mut builder = GraphBuilder::default();
+        let every_frame = StageNeeds { draws_commands: true, tests_occlusion: false, culls_triangles: false };
+        let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
+        let mut view_scopes = vec![None; views.len()];
+        for (index, pass) in passes.iter().enumerate() {
+            let (view, process) = (&views[pass.view], plan.processes()[pass.process].process.name());
+            let needs = StageNeeds {
+                draws_commands: draws[pass.process].selection().is_some(),
+                tests_occlusion: occlusion[pass.view].is_possible(),
+                culls_triangles: key.options.culls_triangles,
+            };
+            // The stages of a view stand right before those of its first pass: a serial run has what they write in its caches.
+            let pass_scope = if needs.draws_commands {
+                let view_scope = view_scopes[pass.view].get_or_insert_with(|| {
+                    builder.add(frame.of_view(pass.view, view, needs.tests_occlusion), stages_of_view(pass.view), needs)
+                });
+                view_scope.of_process(pass.process, process)
+            } else {
+                frame.of_view(pass.view, view, needs.tests_occlusion).of_process(pass.process, process)
+            };
+            builder.add(pass_scope, stages_of_pass(index), needs);
+        }
+        let GraphBuilder { graph, cost_kinds, node_count } = builder;
+        Ok(Self {
+            schedule: graph.compile().map_err(|error| FrameError::Jobs(error.problem))?,
+            costs: CostModel::new(cost_kinds.len(), node_count),
+            passes,
+            plan: Arc::clone(plan),
+            key,
+            occlusion,
+        })
+    }
+
+    /// Empties the tables for a frame of these views.
+    pub(super) fn reset_tables(
+        &self,
+        tables: &mut FrameTables,
+        scene: &SceneRef<'_>,
+        views: &[RenderView],
+        workers: usize,
+    ) {
+        tables.passes.resize_with(self.passes.len(), PassTable::default);
+        for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
+            let (selection, _) = self.key.draws[pass.process];
+            table.reset(selection, scene.object_count(), self.key.options.culls_triangles);
+        }
+        tables.reset(views.len(), workers);
+        let tile = self.key.options.occlusion_tile;
+        if tile.is_some() {
+            tables.occluder_meshes.sync(scene.assets);
+        }
+        for (index, view) in views.iter().enumerate() {
+            tables.occlusion[index].reset(view, tile.filter(|_| self.occlusion[index].is_on()));
+        }
+    }
+}
+
+/// The graph under construction.
+struct GraphBuilder<B: Backend> {
+    graph: FrameGraph<StageNode<B>>,
+    /// A stage of one process has the same cost kind in all views, whatever its nodes. The index is [`NodeCosts::kind`].
+    cost_kinds: Vec<(&'static str, Option<usize>)>,
+    node_count: usize,
+}
+
+/// What a node belongs to: the frame, a view or a pass.
+#[derive(Clone, Debug, Default)]
+struct Scope {
+    view: Option<String>,
+    process: Option<usize>,
+    labels: Labels,
+    tuned_view: Option<usize>,
+    /// The stages of the scope and of those around it, by name: what later stages can wait for.
+    stages: Vec<(&'static str, NodeId)>,
+}
+
+impl Scope {
+    fn of_view(&self, index: usize, view: &RenderView, tests_occlusion: bool) -> Self {
+        let mut scope = self.clone();
+        scope.view = Some(format!("view {index} {:?}", view.name()));
+        scope.labels.view = Some(view.name().to_owned());
+        scope.tuned_view = tests_occlusion.then_some(index);
+        scope
+    }
+
+    fn of_process(&self, index: usize, name: &str) -> Self {
+        let mut scope = self.clone();
+        scope.process = Some(index);
+        scope.labels.process = Some(name.to_owned());
+        scope
+    }
+
+    /// The name of a stage's node.
+    fn name_of(&self, stage: &str) -> String {
+        match (&self.labels.process, &self.view) {
+            (Some(process), Some(view)) => format!("{process}, {view}, {stage}"),
+            (None, Some(view)) => format!("{stage}, {view}"),
+            _ => stage.to_owned(),
+        }
+    }
+}
+
+impl<B: Backend> Default for GraphBuilder<B> {
+    fn default() -> Self {
+        Self { graph: FrameGraph::new(), cost_kinds: Vec::new(), node_count: 0 }
+    }
+}
+
+impl<B: Backend> GraphBuilder<B> {
+    /// Adds the needed ones of some stages, each after the stage that it names, and returns the scope with them.
+    fn add(&mut self, mut scope: Scope, stages: Vec<Box<dyn Stage<B>>>, needs: StageNeeds) -> Scope {
+        for stage in stages.into_iter().filter(|stage| stage.is_needed(&needs)) {
+            let info = stage.info();
+            let cost_kind = (info.cost_kind, scope.process);
+            let kind = self.cost_kinds.iter().position(|known| *known == cost_kind).unwrap_or_else(|| {
+                self.cost_kinds.push(cost_kind);
+                self.cost_kinds.len() - 1
+            });
+            let costs = NodeCosts { kind, node: self.node_count };
+            self.node_count += 1;
+            let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
+            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, costs, tuned_view });
+            self.graph.label(id, Labels { stage: Some(info.name.to_owned()), ..scope.labels.clone() });
+            self.graph.keep(id);
+            let find = |name: &&str| scope.stages.iter().rev().find(|(known, _)| known == name);
+            if let Some((_, before)) = info.after.iter().find_map(find) {
+                self.graph.order(*before, id);
+            }
+            scope.stages.push((info.name, id));
+        }
+        scope
+    }
+}
+
+/// The graphs of recent frames, the latest first. A scene changes what it requires and changes back, and finds its graph again.
+pub(super) struct StageGraphCache<B: Backend> {
+    latest_first: Vec<StageGraph<B>>,
+}
+
+impl<B: Backend> Default for StageGraphCache<B> {
+    fn default() -> Self {
+        Self { latest_first: Vec::new() }
+    }
+}
+
+impl<B: Backend> StageGraphCache<B> {
+    const CAPACITY: usize = 16;
+
+    /// The graph of a frame, built if the cache does not have it.
+    ///
+    /// # Errors
+    /// If no process draws in a view.
+    pub(super) fn get(
+        &mut self,
+        plan: &Arc<FramePlan>,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+    ) -> Result<&mut StageGraph<B>, FrameError> {
+        let found = self
+            .latest_first
+            .iter()
+            .position(|graph| graph.plan.identity() == plan.identity() && graph.key.fits(draws, views, options));
+        let graph = match found {
+            Some(index) => self.latest_first.remove(index),
+            None => StageGraph::new(plan, draws, views, GraphKey::new(draws, views, options))?,
+        };
+        self.latest_first.truncate(Self::CAPACITY - 1);
+        self.latest_first.insert(0, graph);
+        Ok(&mut self.latest_first[0])
+    }
+
+    /// The graph of the latest frame; `None` before the first one.
+    pub(super) fn latest(&self) -> Option<&StageGraph<B>> {
+        self.latest_first.first()
+    }
+}
+
+fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
+    let mut passes = Vec::new();
+    for (process, planned) in plan.processes().iter().enumerate() {
+        let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_cached;
+        for (view, _) in views.iter().enumerate().filter(|(_, view)| is_drawn(view)) {
+            passes.push(Pass { process, view });
+        }
+    }
+    passes
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::super::stage::StageInfo;
+    use super::*;
+    use crate::backend::NullBackend;
+
+    #[test]
+    fn a_stage_waits_only_for_stages_that_stand_before_it() {
+        let mut known = Vec::new();
+        let stages = [stages_of_frame::<NullBackend>(), stages_of_view(0), stages_of_pass(0)];
+        for stage in stages.iter().flatten() {
+            let StageInfo { name, after, .. } = stage.info();
+            assert!(after.iter().all(|before| known.contains(before)), "{name} waits for {after:?}, after {known:?}");
+            assert!(!known.contains(name), "{name} is listed twice");
+            known.push(name);
+        }
+    }
+}

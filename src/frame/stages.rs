@@ -1,0 +1,46 @@
+//! The stages of a frame, in order.
+//!
+//! A stage is a type that holds its name, its dependency, its width, its chunking, its cost kind and its work: see [`Stage`].
+//! To add one, implement the trait and add a line to one of these lists.
+
+mod of_frame;
+mod of_pass;
+mod of_view;
+
+use of_frame::{Objects, Upload};
+use of_pass::{Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
+use of_view::{CoarseDepth, Compact, Occluders, Occlusion, Visibility};
+
+use super::stage::Stage;
+use crate::backend::Backend;
+
+/// The stages that a frame has once.
+pub(super) fn stages_of_frame<B: Backend>() -> Vec<Box<dyn Stage<B>>> {
+    vec![Box::new(Objects), Box::new(Upload)]
+}
+
+/// The stages of one view, by index.
+pub(super) fn stages_of_view<B: Backend>(view: usize) -> Vec<Box<dyn Stage<B>>> {
+    vec![
+        Box::new(Visibility { view }),
+        Box::new(Occluders { view }),
+        Box::new(CoarseDepth { view }),
+        Box::new(Occlusion { view }),
+        Box::new(Compact { view }),
+    ]
+}
+
+/// The stages of one pass, by index in the frame.
+pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> {
+    vec![
+        Box::new(Fill { pass }),
+        Box::new(Split { pass }),
+        Box::new(Sort { pass }),
+        Box::new(Instance { pass }),
+        Box::new(Join { pass }),
+        Box::new(Triangles { pass }),
+        Box::new(Prepare { pass }),
+        Box::new(Record { pass }),
+        Box::new(Finish { pass }),
+    ]
+}

@@ -1,0 +1,291 @@
+//! The stages of a pass: from visible objects to finished commands.
+
+use std::ops::Range;
+
+use super::super::context::FrameContext;
+use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
+use super::super::stage_clock::StageGroup;
+use crate::backend::{Backend, BackendError};
+use crate::command::{DrawList, instance, sort};
+use crate::view;
+
+/// Makes a command for each visible object (M 10.3).
+pub(super) struct Fill {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Fill {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "fill",
+            after: &["compact"],
+            group: StageGroup::Fill,
+            chunking: Chunking::ByCost { units_per_item: 1 },
+            cost_kind: "fill",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.visible_count(self.pass)
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let (table, view_index) = (&frame.tables.passes[self.pass], frame.view_of(self.pass));
+        let fill = view::Fill {
+            table: &frame.tables.objects,
+            view: &frame.request.views[view_index],
+            visible: &frame.tables.visible[view_index],
+            selection: table.selection.unwrap_or_default(),
+            scene: frame.request.scene,
+            quality: frame.request.quality,
+        };
+        fill.run(job.items, &table.commands);
+        Ok(())
+    }
+}
+
+/// Chooses the splitters that divide the pass' commands into buckets.
+pub(super) struct Split {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Split {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "split",
+            after: &["fill"],
+            group: StageGroup::Sort,
+            chunking: Chunking::PerItem,
+            // Splitting decides how large the jobs are that sort.
+            cost_kind: "sort",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        let count = frame.visible_count(self.pass);
+        // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
+        let buckets = count.div_ceil(frame.items_per_job(job.costs, count, 1)).min(frame.workers);
+        table.splitters.write().choose(&table.commands, count, buckets);
+        Ok(())
+    }
+}
+
+/// Sorts the commands of each bucket (M 10.5). An item is a bucket.
+pub(super) struct Sort {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Sort {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "sort",
+            after: &["split"],
+            group: StageGroup::Sort,
+            chunking: Chunking::PerItem,
+            cost_kind: "sort",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.tables.passes[self.pass].splitters.read().bucket_count()
+    }
+
+    /// The bucket's share of the visible objects, drawn or not: the split knows only their number.
+    fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
+        let buckets = frame.tables.passes[self.pass].splitters.read().bucket_count();
+        Some(frame.visible_count(self.pass) * items.len() / buckets)
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        let (count, splitters) = (frame.visible_count(self.pass), table.splitters.read());
+        let mut scratch = frame.tables.sort_scratch[job.worker.index()].lock();
+        for bucket in job.items {
+            let sorted = &mut table.buckets[bucket].write().commands;
+            sort(&table.commands, count, splitters.key_range(bucket), &mut scratch, sorted);
+        }
+        Ok(())
+    }
+}
+
+/// Merges equal commands of each bucket into instanced draws (M 10.5). An item is a bucket.
+pub(super) struct Instance {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Instance {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "instance",
+            after: &["sort"],
+            group: StageGroup::Instance,
+            chunking: Chunking::PerItem,
+            cost_kind: "instance",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.tables.passes[self.pass].splitters.read().bucket_count()
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        for bucket in job.items {
+            let mut bucket = frame.tables.passes[self.pass].buckets[bucket].write();
+            instance(&mut bucket, |mesh| frame.can_merge(self.pass, mesh));
+        }
+        Ok(())
+    }
+}
+
+/// Joins the buckets to the pass' draw list.
+pub(super) struct Join {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Join {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "join",
+            after: &["instance"],
+            group: StageGroup::Instance,
+            chunking: Chunking::PerItem,
+            cost_kind: "join",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        let mut list = table.list.write();
+        list.clear();
+        for bucket in &table.buckets[..table.splitters.read().bucket_count()] {
+            list.append(&mut bucket.write(), |mesh| frame.can_merge(self.pass, mesh));
+        }
+        if frame.culls_triangles_of(self.pass) {
+            table.triangles.write().find(&list, &frame.tables.cullable_meshes, frame.request.scene.assets);
+        }
+        Ok(())
+    }
+}
+
+/// Culls the triangles of meshes that ask for it (S 9.6).
+pub(super) struct Triangles {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Triangles {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "triangles",
+            after: &["join"],
+            group: StageGroup::Instance,
+            chunking: Chunking::ByCost { units_per_item: 1 },
+            cost_kind: "triangles",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.culls_triangles
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.tables.passes[self.pass].triangles.read().len()
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        let view = &frame.request.views[frame.view_of(self.pass)];
+        table.triangles.read().cull(job.items, view, frame.request.scene, &table.list.read());
+        Ok(())
+    }
+}
+
+/// Uploads which objects the pass draws, and makes its pipelines.
+pub(super) struct Prepare {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Prepare {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "prepare",
+            after: &["triangles", "join"],
+            group: StageGroup::Record,
+            chunking: Chunking::PerItem,
+            cost_kind: "prepare",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        table.triangles.read().apply(&mut table.list.write());
+        frame.recordings[self.pass].reserve(frame.part_count(self.pass));
+        let list = table.list.read();
+        frame.backend.prepare(job.worker, frame.frame, &frame.pass_request(self.pass, &list))
+    }
+}
+
+/// Records the pass in parts, such as bundles. An item is a part.
+pub(super) struct Record {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Record {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "record",
+            after: &["prepare"],
+            group: StageGroup::Record,
+            chunking: Chunking::ByCost { units_per_item: DrawList::BATCHES_PER_BUNDLE },
+            cost_kind: "record",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.part_count(self.pass)
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let list = frame.tables.passes[self.pass].list.read();
+        let request = frame.pass_request(self.pass, &list);
+        let mut put_part = frame.recordings[self.pass].put_parts_from(job.items.start);
+        frame.backend.record(job.worker, frame.frame, &request, job.items, &mut put_part)
+    }
+}
+
+/// Finishes the pass: its commands are ready to submit.
+pub(super) struct Finish {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Finish {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "finish",
+            after: &["record"],
+            group: StageGroup::Record,
+            chunking: Chunking::PerItem,
+            cost_kind: "finish",
+            depends_on_occlusion: true,
+        }
+    }
+
+    /// Every pass is finished, with commands or without.
+    fn is_needed(&self, _: &StageNeeds) -> bool {
+        true
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let list = frame.tables.passes[self.pass].list.read();
+        let request = frame.pass_request(self.pass, &list);
+        frame.recordings[self.pass].finish(|parts| frame.backend.finish(job.worker, frame.frame, &request, parts))
+    }
+}

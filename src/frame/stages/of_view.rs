@@ -1,0 +1,172 @@
+//! The stages of a view: from all objects to the visible ones.
+
+use super::super::context::FrameContext;
+use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
+use super::super::stage_clock::StageGroup;
+use crate::backend::{Backend, BackendError};
+use crate::scene::Blend;
+use crate::view::ObjectTable;
+
+/// Tests the objects against the view's frustum.
+pub(super) struct Visibility {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for Visibility {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "visibility",
+            after: &["objects"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::ByCost { units_per_item: 1 },
+            cost_kind: "visibility",
+            depends_on_occlusion: false,
+        }
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.tables.objects.len()
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let frustum = &frame.request.views[self.view].frustum;
+        frame.tables.visible[self.view].test(job.items, |objects| {
+            let block = frame.tables.objects.block(objects.start / ObjectTable::BLOCK_SIZE);
+            let first = objects.start % ObjectTable::BLOCK_SIZE;
+            block.visible(frustum, frame.request.quality.culling, first..first + objects.len())
+        });
+        Ok(())
+    }
+}
+
+/// Chooses the visible objects that may occlude others.
+pub(super) struct Occluders {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for Occluders {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "occluders",
+            after: &["visibility"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::PerItem,
+            cost_kind: "occluders",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.tests_occlusion
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        usize::from(frame.tables.occlusion[self.view].is_on())
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        let (tables, scene) = (frame.tables, frame.request.scene);
+        let selections = frame.occlusion[self.view].occluders.as_deref().unwrap_or_default();
+        let occlusion = &tables.occlusion[self.view].occlusion;
+        occlusion.select_occluders(
+            scene,
+            &tables.objects,
+            &tables.visible[self.view],
+            &tables.occluder_meshes,
+            |draw| {
+                let blend = draw.state.blend();
+                blend == Blend::None && selections.iter().any(|selection| selection.contains(blend, draw.material))
+            },
+        );
+        Ok(())
+    }
+}
+
+/// Draws the occluders into the view's coarse depth buffer. An item is a strip of tiles.
+pub(super) struct CoarseDepth {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for CoarseDepth {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "coarse depth",
+            after: &["occluders"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::ByCost { units_per_item: 1 },
+            cost_kind: "coarse depth",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.tests_occlusion
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        let occlusion = &frame.tables.occlusion[self.view];
+        if occlusion.is_on() { occlusion.occlusion.strip_count() } else { 0 }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        job.items.for_each(|strip| frame.tables.occlusion[self.view].occlusion.draw_occluders(strip));
+        Ok(())
+    }
+}
+
+/// Tests the visible objects against the coarse depth buffer, and removes the hidden ones.
+pub(super) struct Occlusion {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for Occlusion {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "occlusion",
+            after: &["coarse depth"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::ByCost { units_per_item: 1 },
+            cost_kind: "occlusion",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.tests_occlusion
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        if frame.tables.occlusion[self.view].is_on() { frame.tables.objects.len() } else { 0 }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let occlusion = &frame.tables.occlusion[self.view];
+        let hidden_of =
+            |first, visible| occlusion.occlusion.hidden(frame.request.scene, &frame.tables.objects, first, visible);
+        occlusion.add_hidden(frame.tables.visible[self.view].remove_hidden(job.items, hidden_of));
+        Ok(())
+    }
+}
+
+/// Counts the visible objects, which gives each its rank.
+pub(super) struct Compact {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for Compact {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "compact",
+            after: &["occlusion", "visibility"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::PerItem,
+            cost_kind: "compact",
+            depends_on_occlusion: false,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        frame.tables.visible[self.view].compact();
+        Ok(())
+    }
+}

@@ -1,0 +1,134 @@
+//! Triangle culling on the CPU, for meshes that ask for it (S 9.6).
+
+use std::ops::Range;
+
+use parking_lot::Mutex;
+
+use crate::command::DrawList;
+use crate::raster::CulledTriangles;
+use crate::scene::{Assets, SceneRef};
+use crate::view::RenderView;
+
+/// The meshes that ask for triangle culling.
+#[derive(Debug, Default)]
+pub(super) struct CullableMeshes {
+    /// The identity and revision of the mesh collection that this was built from.
+    version: Option<(u64, u64)>,
+    /// For each slot, up to the last cullable one.
+    is_cullable: Vec<bool>,
+}
+
+impl CullableMeshes {
+    /// Rebuilds the set if the meshes have changed.
+    pub(super) fn update(&mut self, assets: &Assets) {
+        let version = (assets.meshes.identity(), assets.meshes.revision());
+        if self.version == Some(version) {
+            return;
+        }
+        self.version = Some(version);
+        self.is_cullable.clear();
+        for (handle, ..) in assets.meshes.iter_with_revision().filter(|(.., mesh)| mesh.culls_triangles()) {
+            self.is_cullable.resize(handle.index() as usize, false);
+            self.is_cullable.push(true);
+        }
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.is_cullable.is_empty()
+    }
+
+    /// Whether the mesh in a slot is one of them.
+    pub(super) fn contains(&self, slot: u32) -> bool {
+        self.is_cullable.get(slot as usize).is_some_and(|is_cullable| *is_cullable)
+    }
+}
+
+/// The triangles of a pass that are tested.
+#[derive(Debug, Default)]
+pub(super) struct PassTriangles {
+    items: Vec<Item>,
+    /// The indices of the triangles that remain of each item; longer than `items`, to keep memory.
+    remaining: Vec<Mutex<Vec<u32>>>,
+    culled: Mutex<CulledTriangles>,
+}
+
+/// Some triangles of a batch of one object. A large mesh makes several items, so that several workers cull it.
+#[derive(Debug)]
+struct Item {
+    /// The batch's index in the draw list.
+    batch: u32,
+    triangles: Range<usize>,
+}
+
+/// The most triangles in an item.
+const MAX_ITEM_TRIANGLES: usize = 256;
+
+/// The most triangles that a pass tests. Their indices take 128 MiB, half of what every device allows in a buffer.
+const MAX_PASS_TRIANGLES: usize = (1 << 25) / 3;
+
+impl PassTriangles {
+    /// Lists the triangles of cullable meshes in a draw list, in its order, up to [`MAX_PASS_TRIANGLES`].
+    pub(super) fn find(&mut self, list: &DrawList, cullable: &CullableMeshes, assets: &Assets) {
+        self.clear();
+        let mut room = MAX_PASS_TRIANGLES;
+        let cullable_batches = (0..).zip(&list.batches).filter(|(_, batch)| cullable.contains(batch.mesh));
+        for (batch, drawn) in cullable_batches {
+            let count = assets.meshes.get_with_revision(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
+            let Some(left) = room.checked_sub(count) else { continue };
+            room = left;
+            let starts = (0..count).step_by(MAX_ITEM_TRIANGLES);
+            self.items
+                .extend(starts.map(|start| Item { batch, triangles: start..count.min(start + MAX_ITEM_TRIANGLES) }));
+        }
+        // Keeps the memory of up to twice as many items for the next frame.
+        self.remaining.truncate(self.items.len() * 2);
+        if self.remaining.len() < self.items.len() {
+            self.remaining.resize_with(self.items.len(), Mutex::default);
+        }
+    }
+
+    /// Removes all items. The memory stays until the next [`PassTriangles::find`].
+    pub(super) fn clear(&mut self) {
+        self.items.clear();
+        *self.culled.get_mut() = CulledTriangles::default();
+    }
+
+    /// The number of items.
+    pub(super) fn len(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Culls the triangles of some items.
+    pub(super) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
+        let mut culled = CulledTriangles::default();
+        for (item, remaining) in self.items[items.clone()].iter().zip(&self.remaining[items]) {
+            let object = list.objects[list.batches[item.batch as usize].first as usize] as usize;
+            let mut remaining = remaining.lock();
+            remaining.clear();
+            culled += view.cull_triangle_range(scene, object, item.triangles.clone(), &mut remaining);
+        }
+        *self.culled.lock() += culled;
+    }
+
+    /// Makes the draw list draw what remains. A batch that lost no triangle stays whole.
+    pub(super) fn apply(&self, list: &mut DrawList) {
+        let mut first = 0;
+        for items in self.items.chunk_by(|one, next| one.batch == next.batch) {
+            let remaining = &self.remaining[first..first + items.len()];
+            first += items.len();
+            let all: usize = items.iter().map(|item| item.triangles.len() * 3).sum();
+            let count: usize = remaining.iter().map(|remaining| remaining.lock().len()).sum();
+            if count < all {
+                list.make_partial(items[0].batch, |indices| {
+                    remaining.iter().for_each(|remaining| indices.extend_from_slice(&remaining.lock()));
+                });
+            }
+        }
+    }
+
+    /// How many triangles were tested and culled.
+    pub(super) fn culled(&self) -> CulledTriangles {
+        *self.culled.lock()
+    }
+}
