@@ -32,7 +32,7 @@ fn check(what: &str, tallies: &Tallies) {
 #[test]
 fn no_visible_sphere_is_culled() {
     let tallies = spheres::try_batches(0..2_000);
-    check("sphere", &tallies.ours);
+    check("sphere", &tallies.drawloom);
     // The cases are hard: the common method fails one in ten.
     assert!(tallies.naive.tangent.false_culls > tallies.naive.tangent.cases / 20, "{:?}", tallies.naive);
 }

@@ -15,19 +15,19 @@ use drawloom::scene::Camera;
 #[derive(Parser)]
 #[command(name = "frame")]
 pub struct Arguments {
-    /// An OBJ file; without it, the scene that comes with the project.
+    /// An OBJ file. Default: the scene that comes with the project.
     pub scene: Option<PathBuf>,
 
-    /// Where the camera is and what it looks at, in metres.
+    /// The camera's position and target, in metres.
     #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
     pub camera: Option<PlacedCamera>,
 
-    /// What draws: `wgpu` an adapter, `software` the processor, `reference` the same in f64 on one thread, `noop` wgpu without an
-    /// adapter, `null` nothing, with every rule checked. If not given, an adapter, and the processor where there is none.
+    /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
+    /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter.
     #[arg(long, value_enum)]
     pub backend: Option<BackendName>,
 
-    /// Threads that run jobs, this one included; as many as the machine has cores if not given.
+    /// Threads that run jobs, the calling thread included. Default: the number of cores.
     #[arg(long, value_name = "N")]
     pub workers: Option<NonZeroUsize>,
 
@@ -35,15 +35,15 @@ pub struct Arguments {
     #[arg(long, value_name = "SIZE", default_value = "adaptive")]
     pub granularity: JobSize,
 
-    /// How draws become commands of the device; for each pass whatever is measured to be cheapest, if not given.
+    /// The recording strategy. Default: for each pass the one that is measured to be cheapest.
     #[arg(long, value_enum, value_name = "WAY")]
     pub record: Option<RecordName>,
 
-    /// The scene's objects N times over, at the same place.
+    /// Repeats the scene's objects N times, at the same positions.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub copies: u32,
 
-    /// How many frames to draw.
+    /// Number of frames.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub frames: u32,
 
@@ -51,15 +51,15 @@ pub struct Arguments {
     #[arg(long, value_name = "WxH", default_value = "960x540")]
     pub size: PictureSize,
 
-    /// Where the last picture goes; frame.png if not given.
+    /// The file of the last picture. Default: frame.png.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 
-    /// Draws depth before the geometry buffer.
+    /// Adds a depth pre-pass before the geometry buffer.
     #[arg(long)]
     pub depth_pre_pass: bool,
 
-    /// Has the CPU leave out triangles that a view cannot show: those that face away, say, or cover no pixel.
+    /// Culls triangles on the CPU: back faces, for example, and those that cover no pixel.
     #[arg(long)]
     pub cull_triangles: bool,
 
@@ -67,11 +67,11 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     pub graph: Option<PathBuf>,
 
-    /// Says in words why a frame took as long as it did: the one in the middle of the last 60.
+    /// Explains in words why a frame took as long as it did: the median of the last 60.
     #[arg(long)]
     pub explain: bool,
 
-    /// Writes the timeline of the last 60 frames as a page to look at in a browser.
+    /// Writes the timeline of the last 60 frames as an HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
 
@@ -85,7 +85,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// The command line's arguments, or clap's error.
+    /// Parses the command line, or exits with an error.
     pub fn checked() -> Self {
         let arguments = Self::parse();
         if arguments.out.is_some() && matches!(arguments.backend, Some(BackendName::Noop | BackendName::Null)) {
@@ -102,21 +102,21 @@ fn conflict(message: &str) -> ! {
     <Arguments as clap::CommandFactory>::command().error(ErrorKind::ArgumentConflict, message).exit()
 }
 
-/// How draws become commands of the device.
+/// A recording strategy.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RecordName {
-    /// Straight into each pass.
+    /// Directly into each pass.
     Direct,
     /// Into bundles, on all workers.
     Bundles,
     /// Into bundles that are kept from frame to frame.
     Kept,
-    /// By indirect draws; not every adapter has them.
+    /// Indirect draws, which not every adapter has.
     Indirect,
 }
 
 impl RecordName {
-    /// As it is written on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -137,23 +137,23 @@ impl RecordName {
     }
 }
 
-/// What draws.
+/// A backend.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BackendName {
     /// wgpu on the machine's adapter.
     Wgpu,
-    /// The processor, in f32 on all workers.
+    /// The CPU, in f32 on all workers.
     Software,
-    /// The processor, in f64 on one thread: what the others should draw.
+    /// The CPU, in f64 on one thread: the reference for the others.
     Reference,
-    /// wgpu's own backend that does nothing: the price of recording alone.
+    /// wgpu's no-op backend, which leaves the cost of recording.
     Noop,
-    /// Drawloom's backend that counts and checks.
+    /// Drawloom's null backend, which counts and checks.
     Null,
 }
 
 impl BackendName {
-    /// As it is written on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Wgpu => "wgpu",
@@ -177,7 +177,7 @@ pub struct PlacedCamera {
 }
 
 impl PlacedCamera {
-    /// Puts a camera there.
+    /// Moves a camera there.
     pub fn apply(&self, camera: &mut Camera) {
         let placed = Camera::looking_at(camera.name.clone(), self.position, self.target);
         camera.position = placed.position;
@@ -193,14 +193,14 @@ impl FromStr for PlacedCamera {
             text.split(',').map(|part| part.trim().parse::<f64>().map_err(|error| format!("{part:?}: {error}")));
         let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
         let &[x, y, z, target_x, target_y, target_z] = numbers.as_slice() else {
-            return Err(format!("six numbers are wanted, not {}", numbers.len()));
+            return Err(format!("expected six numbers, found {}", numbers.len()));
         };
         let (position, target) = (DVec3::new(x, y, z), DVec3::new(target_x, target_y, target_z));
         if !position.is_finite() || !target.is_finite() {
             return Err("the numbers must be finite".to_owned());
         }
         if position == target {
-            return Err("a camera cannot look at where it is".to_owned());
+            return Err("the camera's position and target must differ".to_owned());
         }
         Ok(Self { position, target })
     }
@@ -211,7 +211,7 @@ impl FromStr for PlacedCamera {
 pub struct JobSize(pub Granularity);
 
 impl JobSize {
-    /// As it is written on the command line.
+    /// Its name on the command line.
     pub fn name(&self) -> String {
         match self.0 {
             Granularity::Adaptive => "adaptive".to_owned(),
@@ -234,7 +234,7 @@ impl FromStr for JobSize {
                 let size = size.parse::<NonZeroUsize>().map_err(|error| format!("chunk size {size:?}: {error}"))?;
                 Ok(Self(Granularity::Chunk(size.get())))
             }
-            _ => Err("it is adaptive, per-camera, per-draw or chunk:N".to_owned()),
+            _ => Err("expected adaptive, per-camera, per-draw or chunk:N".to_owned()),
         }
     }
 }
@@ -247,9 +247,9 @@ impl FromStr for PictureSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (width, height) = text.split_once('x').ok_or("it is WIDTHxHEIGHT, as in 960x540")?;
+        let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, as in 960x540")?;
         let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text:?}: {error}"));
         let size = [side(width)?, side(height)?];
-        if size.contains(&0) { Err("a picture without pixels".to_owned()) } else { Ok(Self(size)) }
+        if size.contains(&0) { Err("a picture needs at least one pixel".to_owned()) } else { Ok(Self(size)) }
     }
 }

@@ -1,32 +1,32 @@
-//! What is asked of the device as frames are drawn: to be done with each, and when it drew which pass.
+//! Waits for the device after each frame, and reads its pass times.
 
 use std::error::Error;
 
 use drawloom::backend::{Backend, DeviceClock, DevicePassTimes, WgpuBackend, WgpuSubmission};
 use drawloom::timeline::{DeviceLog, Timeline};
 
-/// A backend's device, as frames are drawn.
+/// A backend's device.
 pub trait Device<B: Backend> {
-    /// The first frame that is recorded is about to be drawn.
+    /// Called before the first frame on the timeline.
     ///
     /// # Errors
-    /// If the device refuses.
+    /// Returns an error if the device fails.
     fn start(&mut self, backend: &B, timeline: &Timeline) -> Result<(), Box<dyn Error>>;
 
-    /// A frame was submitted, and has that number on the timeline if it is recorded: waits until it is drawn.
+    /// Waits until a submitted frame is drawn. `number` is its number on the timeline, if it is recorded.
     ///
     /// # Errors
-    /// If the device fails.
+    /// Returns an error if the device fails.
     fn wait(&mut self, submission: &B::Submission, number: Option<u64>) -> Result<(), Box<dyn Error>>;
 
-    /// All frames were drawn. Says when the device drew them, if it knows.
+    /// Called after the last frame. Returns the device's log, if it has one.
     ///
     /// # Errors
-    /// If the device refuses.
+    /// Returns an error if the device fails.
     fn end(self, backend: &B, timeline: &Timeline) -> Result<Option<DeviceLog>, Box<dyn Error>>;
 }
 
-/// There is none, or none that works on by itself.
+/// No device, or one that is idle after each submission.
 pub struct NoDevice;
 
 impl<B: Backend> Device<B> for NoDevice {
@@ -43,17 +43,16 @@ impl<B: Backend> Device<B> for NoDevice {
     }
 }
 
-/// wgpu's.
+/// wgpu's device.
 #[derive(Default)]
 pub struct WgpuDevice {
-    /// Whether it is to say when it drew which pass.
+    /// Whether pass times are read.
     pub is_timed: bool,
     clock: Option<DeviceClock>,
     times: Vec<(u64, DevicePassTimes)>,
 }
 
 impl WgpuDevice {
-    /// One that says when it drew which pass, or does not.
     pub fn timed(is_timed: bool) -> Self {
         Self { is_timed, ..Self::default() }
     }

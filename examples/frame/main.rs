@@ -1,4 +1,4 @@
-//! Renders a scene through the whole frame, and says what that took. Without a graphics adapter the processor draws it.
+//! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend draws it.
 //!
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
@@ -57,7 +57,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
         None => match adapter_backend(arguments) {
             Ok(backend) => draw_on_adapter(arguments, &scene, backend)?,
-            // Whoever says how wgpu is to record wants wgpu.
+            // `--record` implies wgpu.
             Err(error) if arguments.record.is_some() => return Err(error),
             Err(error) => draw_in_software(arguments, BackendName::Software, &scene, Some(&*error))?,
         },
@@ -87,7 +87,7 @@ fn draw_on_adapter(
     Ok((drawn.report, drawn.log))
 }
 
-/// Draws without an adapter: for that reason, if it is not what was asked for.
+/// Draws with the software backend. `reason` is why wgpu cannot, if software was not requested.
 fn draw_in_software(
     arguments: &Arguments,
     name: BackendName,
@@ -148,11 +148,11 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
     Ok(scene)
 }
 
-/// What came of drawing all frames.
+/// The results of all frames.
 struct Drawn<B: Backend> {
     last: Submitted<B>,
     report: Report,
-    /// Empty unless somebody asked for it.
+    /// Empty unless a timeline was requested.
     log: Log,
 }
 
@@ -184,7 +184,7 @@ fn draw<B: Backend>(
     let mut last = None;
     for number in 0..frames {
         let first_recorded_frame = timeline::first_recorded_frame(arguments);
-        // Who records for the first time describes the graph and touches memory: that is no frame to look at, if there are more.
+        // The first recorded frame describes the graph and touches the rings' memory, so it is dropped if there are more.
         if first_recorded_frame.is_some_and(|first| first.saturating_sub(1) == number) {
             timeline.start();
         }
@@ -197,7 +197,7 @@ fn draw<B: Backend>(
         let frame_number = recorded.frame_number();
         let submitted = submitter.submit(recorded)?;
         let cpu = start.elapsed();
-        // The next frame is not to be measured against a device that is still busy with this one.
+        // The next frame must not compete with a device that is still busy with this one.
         device.wait(&submitted.submission, frame_number)?;
         measured.push((cpu, submitted.statistics.clone()));
         last = Some(submitted);
@@ -228,7 +228,7 @@ fn with_causes(error: &dyn Error) -> String {
     let mut cause = error.source();
     while let Some(inner) = cause {
         let inner_text = inner.to_string();
-        // Some errors end with what caused them already.
+        // Some messages include their cause already.
         if !text.ends_with(&inner_text) {
             text = format!("{text}: {inner_text}");
         }

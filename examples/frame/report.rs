@@ -1,4 +1,4 @@
-//! What the frames took, as a table and as JSON.
+//! The times of the frames, as a table and as JSON.
 
 use std::error::Error;
 use std::path::Path;
@@ -9,24 +9,24 @@ use serde::Serialize;
 
 use crate::arguments::{Arguments, BackendName, RecordName};
 
-/// What is told of the frames.
+/// The report on all frames.
 #[derive(Serialize)]
 pub struct Report {
     adapter: String,
     backend: &'static str,
     workers: usize,
     granularity: String,
-    /// How draws become commands of the device; none if that was left to what is measured.
+    /// The recording strategy; `None` if it is tuned.
     record: Option<&'static str>,
     objects: usize,
     frames: usize,
     views: Vec<View>,
     stages_ms: Stages,
     cpu_ms: Cpu,
-    /// What was left out or not drawn as asked; only printed.
+    /// What was left out or drawn differently; only printed.
     #[serde(skip)]
     rejections: Vec<String>,
-    /// Why it was not drawn by what was to draw it; only printed.
+    /// Why the preferred backend did not draw it; only printed.
     #[serde(skip)]
     reason: Option<String>,
 }
@@ -40,9 +40,9 @@ struct View {
     commands: usize,
     batches: usize,
     bundles: usize,
-    /// That were looked at before they were drawn.
+    /// Triangles that were tested.
     triangles: usize,
-    /// Those of them that were left out.
+    /// Triangles that were culled.
     culled_triangles: usize,
 }
 
@@ -57,7 +57,7 @@ struct Stages {
     submit: f64,
 }
 
-/// Wall time from the scene's hand-over to the return of submit.
+/// Wall time from the hand-over of the scene to the return of submit.
 #[derive(Serialize)]
 struct Cpu {
     median: f64,
@@ -65,7 +65,7 @@ struct Cpu {
 }
 
 impl Report {
-    /// From what each frame measured; there is at least one.
+    /// From the measurements of each frame, of which there is at least one.
     pub fn new(
         adapter: String,
         backend: BackendName,
@@ -121,7 +121,7 @@ impl Report {
         }
     }
 
-    /// The same of frames that another backend was to draw, which could not for this reason.
+    /// Adds why the preferred backend did not draw the frames.
     pub fn because(self, reason: Option<String>) -> Self {
         Self { reason, ..self }
     }

@@ -1,4 +1,4 @@
-//! The sorted commands of a whole frame.
+//! The sorted commands of a frame.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 
-/// What each process of a deferred pipeline draws in each view, of those that draw something.
+/// The commands of each process of a deferred pipeline in each view, without empty lists.
 ///
 /// # Errors
-/// If the frame cannot be drawn.
+/// Returns an error if the frame cannot be drawn.
 pub fn draw_lists(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Box<dyn Error>> {
     let scheduler = Arc::new(Scheduler::new(1)?);
     let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;

@@ -15,7 +15,7 @@ pub fn hostile_names() -> Vec<String> {
     names
 }
 
-/// A log in which everything has one of these names.
+/// A log in which all names are from this list.
 pub fn log_of(names: &[String]) -> Log {
     let labels = |name: &String| {
         let name = Some(name.clone());

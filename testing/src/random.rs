@@ -1,10 +1,10 @@
-//! Numbers that are the same on every machine.
+//! Random numbers that are the same on every machine.
 
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Vec3};
 
-/// A Weyl sequence, mixed: enough to scatter things.
+/// A mixed Weyl sequence.
 pub struct Random(u64);
 
 impl Default for Random {
@@ -18,12 +18,12 @@ impl Random {
         Self::stream(0)
     }
 
-    /// One of many sequences, for work that is shared out: which worker draws from it changes nothing.
+    /// One of many sequences, for parallel work: results do not depend on which worker uses which.
     pub fn stream(number: u64) -> Self {
         Self(0x5eed_d1a3_0000_0001_u64.wrapping_add(number.wrapping_mul(0xd134_2543_de82_ef95)))
     }
 
-    /// From `low` to `high`.
+    /// A number from `low` to `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -33,24 +33,23 @@ impl Random {
         (self.next() % count as u64) as usize
     }
 
-    /// Each coordinate from `low` to `high`.
+    /// A vector with coordinates from `low` to `high`.
     pub fn vector(&mut self, low: f64, high: f64) -> Vec3 {
         DVec3::from_array([(); 3].map(|()| self.between(low, high))).as_vec3()
     }
 
-    /// Of unit length.
+    /// A vector of unit length.
     pub fn direction(&mut self) -> DVec3 {
         let (height, turn) = (self.between(-1.0, 1.0), self.between(0.0, TAU));
         let across = (1.0 - height * height).sqrt();
         DVec3::new(across * turn.cos(), height, across * turn.sin())
     }
 
-    /// The numbers below `count`, in an order drawn anew: for who takes turns, so that it is not always the same one that
-    /// comes after one that left the machine in disorder.
+    /// The numbers below `count` in random order.
     pub fn order(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<_> = (0..count).collect();
-        for place in (1..count).rev() {
-            order.swap(place, self.below(place + 1));
+        for index in (1..count).rev() {
+            order.swap(index, self.below(index + 1));
         }
         order
     }

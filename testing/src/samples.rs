@@ -49,7 +49,6 @@ impl Samples {
     }
 
     /// The nearness of the nearest object at a sample; 0 if there is none, and outside the picture.
-    #[allow(dead_code, reason = "not all users read single samples")]
     pub fn nearness_at(&self, column: usize, row: usize) -> f64 {
         if column < self.columns && row < self.rows { self.nearness[row * self.columns + column] } else { 0.0 }
     }
@@ -175,7 +174,6 @@ impl ReferenceCamera {
     }
 
     /// Transforms a point from world to camera space: right, down and forward.
-    #[allow(dead_code, reason = "not all users transform single points")]
     pub fn camera_from_world(&self, point: DVec3) -> DVec3 {
         self.rotation * (point - self.position)
     }
@@ -186,7 +184,6 @@ impl ReferenceCamera {
     }
 
     /// The near plane's distance.
-    #[allow(dead_code, reason = "not all users transform single points")]
     pub fn near(&self) -> f64 {
         self.near
     }

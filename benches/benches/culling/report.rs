@@ -38,7 +38,7 @@ struct Line {
 impl Report {
     pub fn new(extent: &'static str, speeds: Vec<Speed>, spheres: &SphereTallies, boxes: &BoxTallies) -> Self {
         let drawloom = |test: &str, tallies| Line { test: test.to_owned(), is_drawloom: true, tallies };
-        let mut tests = vec![drawloom("sphere", spheres.ours)];
+        let mut tests = vec![drawloom("sphere", spheres.drawloom)];
         for (volume, tallies) in VOLUMES.iter().zip(boxes.volumes) {
             tests.push(drawloom(&format!("object, {volume:?}"), tallies));
         }

@@ -1,4 +1,4 @@
-//! Objects whose boxes all but touch what a camera sees, and others anywhere: from the scene to the answer.
+//! Objects whose boxes almost touch a frustum, and objects anywhere, tested from the scene to the result.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -15,14 +15,14 @@ use super::spheres::{any_along, any_aside, any_planes};
 use super::tally::Tallies;
 use crate::random::Random;
 
-/// The volumes that are asked for, in the order of what is counted.
+/// The volumes that are tested, in the order of the tallies.
 pub const VOLUMES: [CullingVolume; 3] = [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox];
 
-/// What was counted of each volume.
+/// The tallies of each volume.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BoxTallies {
     pub volumes: [Tallies; 3],
-    /// Objects that cannot be drawn: none should be.
+    /// Objects that the table rejected: there should be none.
     pub rejected: u64,
 }
 
@@ -179,10 +179,10 @@ impl Objects {
         let place = oracle.relative(position);
         let size =
             solid.center.abs().element_sum() + solid.half_axes.iter().map(|axis| axis.abs().element_sum()).sum::<f64>();
-        let object = oracle.judge(place, reaches, size);
+        let object = oracle.classify(place, reaches, size);
         let radius = f64::from(bounds.radius) * scale.abs().as_dvec3().max_element();
         let center = place + solid.center;
-        let around = |reach: &dyn Fn(DVec3) -> f64| oracle.judge(center, normals.map(reach), size + radius);
+        let around = |reach: &dyn Fn(DVec3) -> f64| oracle.classify(center, normals.map(reach), size + radius);
         let sphere = around(&|_| radius);
         let half = solid.half_axes.iter().fold(DVec3::ZERO, |half, axis| half + axis.abs());
         // The sphere is asked as well: what is outside of a plane by either of them is outside.

@@ -1,4 +1,4 @@
-//! Cameras as they are, and as they can be at the worst.
+//! Random cameras, typical and extreme.
 
 use drawloom::glam::{DVec3, Quat};
 use drawloom::scene::{Camera, Projection, ViewKind};
@@ -30,7 +30,7 @@ pub fn any_camera(random: &mut Random) -> Camera {
         _ => camera.near * magnitude(random, 0.001, 7.0) as f32,
     };
     let kind = random.below(10);
-    // Of those with perspective, one in two sees for ever.
+    // Half of the perspective cameras have no far plane.
     camera.far = if kind < 4 { f32::INFINITY } else { far };
     (camera.projection, camera.kind) = match kind {
         ..8 => {
@@ -51,7 +51,7 @@ pub fn any_camera(random: &mut Random) -> Camera {
     camera
 }
 
-/// Between two powers of ten, and any power of ten between them as likely as any other.
+/// A log-uniform number between two powers of ten.
 pub fn magnitude(random: &mut Random, low: f64, high: f64) -> f64 {
     10_f64.powf(random.between(low, high))
 }

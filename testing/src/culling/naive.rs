@@ -1,5 +1,4 @@
-//! How it is done elsewhere: planes from a matrix of f32 that takes the world to the picture (Gribb and Hartmann 2001), and
-//! places in the world in f32.
+//! The usual culling test: planes from an f32 clip-from-world matrix (Gribb and Hartmann 2001), and f32 world positions.
 
 use drawloom::glam::{DVec3, Mat4, Vec3, Vec4, Vec4Swizzles};
 use drawloom::scene::{Camera, Projection};
@@ -10,15 +9,15 @@ pub struct Naive {
 }
 
 impl Naive {
-    /// `None` for a picture that no matrix makes.
+    /// `None` for a projection that is not a matrix.
     pub fn new(camera: &Camera) -> Option<Self> {
         if camera.projection == Projection::Paraboloid {
             return None;
         }
-        let place = Mat4::from_translation(-camera.position.as_vec3());
-        let clip = RenderView::new(camera).clip_from_relative() * place;
+        let translation = Mat4::from_translation(-camera.position.as_vec3());
+        let clip = RenderView::new(camera).clip_from_relative() * translation;
         let [x, y, z, w] = [0, 1, 2, 3].map(|row| clip.row(row));
-        // The perspective matrix knows of no far plane: reversed depth only ends at 0.
+        // The perspective matrix has no far plane: reversed depth ends at 0.
         let planes = [w + x, w - x, w + y, w - y, w - z, z].map(|plane| plane / plane.xyz().length().max(1e-30));
         Some(Self { planes })
     }

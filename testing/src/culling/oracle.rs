@@ -1,36 +1,36 @@
-//! What a camera sees, in f64: the judge.
+//! A frustum oracle in f64.
 
 use drawloom::glam::{DMat3, DVec3};
 use drawloom::scene::{Camera, Projection, ViewKind};
 
-/// The six planes of a camera, each as far as it goes in f64.
+/// The six planes of a camera in f64.
 ///
-/// Its own error is that of some thirty operations of 2⁻⁵³ in terms no larger than what they are made of: 1e-14 of their sum is
-/// more than that, and a ten-millionth of what f32 makes of it. What is within that of a plane is not judged.
+/// Its own error is that of some thirty operations with relative errors of 2⁻⁵³: 1e-14 of the sum of the operands exceeds it, and is a
+/// ten-millionth of the error of f32. Bounds that close to a plane are not classified.
 pub struct Oracle {
     position: DVec3,
-    /// To the right, up, and where it looks.
+    /// Right, up and forward.
     axes: DMat3,
     edges: [Edge; 2],
     near: f64,
     far: f64,
 }
 
-/// Two opposite edges of the picture: what is at `sine · along + offset ≥ cosine · |aside|` is between them.
+/// Two opposite edges of the picture. Points with `sine · along + offset ≥ cosine · |aside|` are between them.
 struct Edge {
     sine: f64,
     cosine: f64,
     offset: f64,
 }
 
-/// Where something is.
+/// Where a bounding volume is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Inside of every plane with some of it.
+    /// A part of it is inside of every plane.
     Inside,
-    /// Outside of a plane as a whole.
+    /// All of it is outside of a plane.
     Outside,
-    /// It touches a plane: on which side of it, f64 does not tell.
+    /// It touches a plane to within the error of f64.
     Touching,
 }
 
@@ -51,19 +51,19 @@ impl Oracle {
                 let near = if camera.kind == ViewKind::Shadow { f64::NEG_INFINITY } else { near };
                 ([straight(half * aspect), straight(half)], near)
             }
-            // Half a ball, within a box that begins a little behind it.
+            // A half-sphere, within a box that begins a little behind it.
             _ => ([straight(far), straight(far)], -0.05 * far),
         };
         let axes = DMat3::from_cols(turn.x_axis, turn.y_axis, -turn.z_axis);
         Self { position: camera.position, axes, edges, near, far }
     }
 
-    /// A place in the world relative to the camera.
-    pub fn relative(&self, place: DVec3) -> DVec3 {
-        place - self.position
+    /// A world position relative to the camera.
+    pub fn relative(&self, position: DVec3) -> DVec3 {
+        position - self.position
     }
 
-    /// The planes' normals, towards the inside: of the edges two and two, of the near and of the far plane.
+    /// The planes' inward normals: right, left, top, bottom, near, far.
     pub fn normals(&self) -> [DVec3; 6] {
         let DMat3 { x_axis, y_axis, z_axis } = self.axes;
         let normal = |edge: &Edge, axis: DVec3, sign: f64| z_axis * edge.sine + axis * (edge.cosine * sign);
@@ -73,9 +73,9 @@ impl Oracle {
         [right, left, upper, lower, z_axis, -z_axis]
     }
 
-    /// How far a place relative to the camera is inside of each plane.
-    pub fn depths(&self, place: DVec3) -> [f64; 6] {
-        let local = self.axes.transpose() * place;
+    /// How far a point relative to the camera is inside of each plane.
+    pub fn depths(&self, point: DVec3) -> [f64; 6] {
+        let local = self.axes.transpose() * point;
         let depth = |edge: &Edge, aside: f64| edge.sine * local.z - edge.cosine * aside + edge.offset;
         let [sides, ends] = &self.edges;
         let [right, left] = [local.x, -local.x].map(|aside| depth(sides, aside));
@@ -83,13 +83,12 @@ impl Oracle {
         [right, left, upper, lower, local.z - self.near, self.far - local.z]
     }
 
-    /// Where something is that reaches so far from a place relative to the camera, towards each plane; `size` is how far in any
-    /// direction.
-    pub fn judge(&self, place: DVec3, reaches: [f64; 6], size: f64) -> Verdict {
+    /// Classifies a volume around a point relative to the camera. `reaches` is its extent towards each plane, `size` that in any direction.
+    pub fn classify(&self, center: DVec3, reaches: [f64; 6], size: f64) -> Verdict {
         let offsets = [self.edges[0].offset, self.edges[1].offset, self.near, self.far];
         let known = offsets.map(|offset| if offset.is_finite() { offset.abs() } else { 0.0 });
-        let error = 1e-14 * (place.abs().element_sum() + size + known.iter().fold(0.0, |most, &one| one.max(most)));
-        let depths = self.depths(place);
+        let error = 1e-14 * (center.abs().element_sum() + size + known.iter().fold(0.0, |most, &one| one.max(most)));
+        let depths = self.depths(center);
         let least = depths.iter().zip(reaches).map(|(depth, reach)| depth + reach).fold(f64::INFINITY, f64::min);
         match least {
             _ if least > error => Verdict::Inside,
@@ -98,10 +97,10 @@ impl Oracle {
         }
     }
 
-    /// A place relative to the camera that is `reaches` outside of the planes asked for, of which no two are opposite; and else
-    /// as far along and aside as `along` and `aside` say, the latter in shares of the picture.
-    pub fn touching(&self, asked: [bool; 6], reaches: [f64; 6], along: f64, aside: [f64; 2]) -> DVec3 {
-        let along = match asked {
+    /// A point relative to the camera that is `reaches` outside of the selected planes, no two of which are opposite. Other coordinates are
+    /// given by `along` and `aside`, the latter as shares of the picture.
+    pub fn touching(&self, selected: [bool; 6], reaches: [f64; 6], along: f64, aside: [f64; 2]) -> DVec3 {
+        let along = match selected {
             [.., true, _] if self.near.is_finite() => self.near - reaches[4],
             [.., true] if self.far.is_finite() => self.far + reaches[5],
             _ => along,
@@ -109,7 +108,7 @@ impl Oracle {
         let across = |pair: usize| {
             let edge = &self.edges[pair];
             let middle = edge.sine * along + edge.offset;
-            match [asked[pair * 2], asked[pair * 2 + 1]] {
+            match [selected[pair * 2], selected[pair * 2 + 1]] {
                 [true, _] => (middle + reaches[pair * 2]) / edge.cosine,
                 [_, true] => -(middle + reaches[pair * 2 + 1]) / edge.cosine,
                 _ => aside[pair] * middle / edge.cosine,
@@ -118,7 +117,7 @@ impl Oracle {
         self.axes * DVec3::new(across(0), across(1), along)
     }
 
-    /// The same place in the world, as near as f64 has it.
+    /// The world position of a point relative to the camera, rounded to f64.
     pub fn world(&self, relative: DVec3) -> DVec3 {
         self.position + relative
     }

@@ -1,4 +1,4 @@
-//! What was counted.
+//! Counts of wrong results.
 
 use serde::Serialize;
 
@@ -8,11 +8,11 @@ use super::oracle::Verdict;
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tally {
     pub cases: u64,
-    /// Culled, though the oracle says that it reaches inside.
+    /// Culled, but inside according to the oracle.
     pub false_culls: u64,
-    /// What the oracle says is outside.
+    /// Outside according to the oracle.
     pub outside: u64,
-    /// Of that, what was kept.
+    /// Outside, but not culled.
     pub false_visibles: u64,
 }
 
@@ -31,13 +31,13 @@ impl Tally {
         self.false_visibles += other.false_visibles;
     }
 
-    /// Of what is outside, the share that was kept.
+    /// The share of those outside that were not culled.
     pub fn false_share(&self) -> f64 {
         self.false_visibles as f64 / self.outside.max(1) as f64
     }
 }
 
-/// The same of what touches a plane by construction, and of what is anywhere.
+/// Tallies of volumes that touch a plane by construction, and of volumes anywhere.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tallies {
     pub tangent: Tally,

@@ -1,4 +1,4 @@
-//! Vertices at random: of objects as near to the camera as they are large and farther, turned and scaled, anywhere in the world.
+//! Random vertices of rotated and scaled objects anywhere in the world, at least as far from the camera as they are large.
 
 use std::f64::consts::TAU;
 
@@ -13,22 +13,22 @@ use crate::random::Random;
 /// A kind of view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A main camera's, with its vertical field of view in degrees and its picture in pixels.
+    /// A main camera's, with the vertical field of view in degrees and the picture size in pixels.
     Perspective { degrees: f64, size: [u32; 2] },
-    /// A main camera's along parallel rays, that sees so many times its picture's height far.
+    /// A main camera's orthographic view, as deep as `heights` times its height.
     Orthographic { heights: f64 },
-    /// A spot light's shadow map: degrees from its axis to where it ends.
+    /// A spot light's shadow map, with the outer angle in degrees.
     Spot { degrees: f64 },
-    /// A directional light's, around what a main camera sees as far as this, in metres.
+    /// A directional light's shadow map, around what a main camera sees up to `reach` metres.
     Directional { reach: f32 },
-    /// A hemispherical light's.
+    /// A hemispherical light's shadow map.
     Hemispherical,
 }
 
 impl Kind {
     pub const FULL_HD: [u32; 2] = [1920, 1080];
 
-    /// As tables print it.
+    /// Its name in tables.
     pub fn name(self) -> String {
         match self {
             Self::Perspective { degrees, size: [width, height] } => format!("perspective {degrees}°, {width}x{height}"),
@@ -39,7 +39,7 @@ impl Kind {
         }
     }
 
-    /// A camera of that kind, at `place`, turned at random.
+    /// A camera of this kind at `place`, with a random orientation.
     pub fn camera(self, place: DVec3, random: &mut Random) -> Camera {
         let orientation = rotation(random);
         let main = Camera { orientation, ..Camera::looking_at("main", place, place + DVec3::X) };
@@ -87,7 +87,7 @@ impl Kind {
 /// A vertex that `camera` sees, of a mesh that is at least as far from it as the mesh's radius around its own origin.
 pub fn vertex_of(camera: Camera, random: &mut Random) -> Case {
     let (way, distance) = sight(&camera, random);
-    // Of one in four the camera is just at the edge, where the most is lost.
+    // In one case of four the camera is at the mesh's edge, where the error is greatest.
     let radius = if random.below(4) == 0 { distance } else { distance * log_between(random, 1e-4, 1.0) };
     let orientation = rotation(random);
     let scale = Vec3::from_array([(); 3].map(|()| log_between(random, 1e-2, 1e2) as f32));
@@ -99,8 +99,8 @@ pub fn vertex_of(camera: Camera, random: &mut Random) -> Case {
     Case { camera, position, orientation, scale, vertex }
 }
 
-/// The way to a place in the picture, relative to the camera, and how far it is for whom the vertex is to be farther than its
-/// mesh's radius: along parallel rays, what counts is how large the mesh is in the picture.
+/// A random point in the picture, relative to the camera, and the distance that limits the mesh's radius. For orthographic views the
+/// limit is the size of the mesh in the picture.
 fn sight(camera: &Camera, random: &mut Random) -> (DVec3, f64) {
     let (x, y) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
     let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
@@ -126,14 +126,14 @@ fn sight(camera: &Camera, random: &mut Random) -> (DVec3, f64) {
     }
 }
 
-/// The object's record, as the table of objects has it.
-pub struct Records {
+/// Computes objects' GPU layouts with an object table.
+pub struct GpuObjects {
     scene: Scene,
     table: ObjectTable,
     object: RenderObject,
 }
 
-impl Records {
+impl GpuObjects {
     pub fn new() -> Result<Self, SceneError> {
         let mut scene = Scene::new();
         let corner = |x, y| Vertex { position: [x, y, 0.0], ..Vertex::default() };
@@ -144,10 +144,10 @@ impl Records {
         Ok(Self { scene, table: ObjectTable::default(), object })
     }
 
-    /// Calls `visit` with each case and its object's record.
+    /// Calls `visit` with each case and its object's GPU layout.
     ///
     /// # Errors
-    /// If an object cannot be.
+    /// Returns an error if the scene rejects an object.
     pub fn visit(&mut self, cases: &[Case], mut visit: impl FnMut(&Case, &GpuObject)) -> Result<(), SceneError> {
         let handles: Vec<_> = self.scene.objects().collect();
         for (index, case) in cases.iter().enumerate() {
@@ -163,16 +163,16 @@ impl Records {
         self.table.fill(&scene, 0..cases.len());
         assert!(self.table.rejections().list().is_empty(), "an object was left out");
         for block in 0..self.table.block_count() {
-            let (first, records) = self.table.gpu_objects(block);
-            for (index, record) in records.iter().enumerate() {
-                visit(&cases[first + index], record);
+            let (first, gpu_objects) = self.table.gpu_objects(block);
+            for (index, gpu_object) in gpu_objects.iter().enumerate() {
+                visit(&cases[first + index], gpu_object);
             }
         }
         Ok(())
     }
 }
 
-/// Each power of ten as likely.
+/// A log-uniform number.
 pub fn log_between(random: &mut Random, low: f64, high: f64) -> f64 {
     random.between(low.ln(), high.ln()).exp()
 }

@@ -1,44 +1,44 @@
-//! How far off vertices are, over many of them.
+//! The errors of many vertices.
 
 use drawloom::scene::SceneError;
 use drawloom::view::RenderView;
 
-use super::cases::{Kind, Records, log_between, vertex_of};
-use super::vertex::{is_seen, pixels_per_radian, record_of};
+use super::cases::{GpuObjects, Kind, log_between, vertex_of};
+use super::vertex::{gpu_view_of, is_seen, pixels_per_radian};
 use crate::random::Random;
 
 /// A distance from the world's origin, in metres.
 #[derive(Clone, Copy, Debug)]
 pub enum Origin {
-    /// Just that.
+    /// Exactly this.
     At(f64),
-    /// The origin itself in one case of ten, and otherwise up to 10⁹ m, each power of ten as likely.
+    /// Zero in one case of ten, and otherwise log-uniform up to 10⁹ m.
     Anywhere,
 }
 
-/// What was found.
+/// The errors.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
     pub cases: usize,
-    /// Pixels, of what shaders do.
+    /// Pixels, of the shaders' computation.
     pub greatest: f64,
     pub mean: f64,
-    /// The greatest error as an angle, in units of 2⁻²⁴ radians: see [`pixels_per_radian`]. Means nothing along parallel rays.
+    /// The greatest error as an angle, in units of 2⁻²⁴ radians: see [`pixels_per_radian`]. Meaningless for orthographic views.
     pub greatest_angle: f64,
-    /// Pixels, of absolute f32. What is lost altogether counts as the picture's diagonal.
+    /// Pixels, of absolute f32. A vertex that is lost counts as the picture's diagonal.
     pub absolute_greatest: f64,
     pub absolute_mean: f64,
 }
 
-/// Tries so many vertices in views of a kind, and counts those that are seen.
+/// Measures the visible ones of `cases` vertices in views of one kind.
 ///
 /// # Errors
-/// If an object cannot be.
+/// Returns an error if the scene rejects an object.
 pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) -> Result<Found, SceneError> {
-    let mut records = Records::new()?;
+    let mut gpu_objects = GpuObjects::new()?;
     let mut found = Found::default();
     let (mut sum, mut absolute_sum) = (0.0, 0.0);
-    for start in (0..cases).step_by(AT_ONCE) {
+    for start in (0..cases).step_by(BATCH) {
         let mut draw = || {
             let distance = match origin {
                 Origin::At(distance) => distance,
@@ -48,15 +48,15 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
             let place = random.direction() * distance;
             vertex_of(kind.camera(place, random), random)
         };
-        let some: Vec<_> = (start..cases.min(start + AT_ONCE)).map(|_| draw()).collect();
-        records.visit(&some, |case, object| {
+        let some: Vec<_> = (start..cases.min(start + BATCH)).map(|_| draw()).collect();
+        gpu_objects.visit(&some, |case, object| {
             if !is_seen(case) {
                 return;
             }
             let view = RenderView::new(&case.camera);
             let truth = case.truth();
-            let error = case.shaded(object, &record_of(&view)).distance(truth);
-            // Not a number is more than any.
+            let error = case.shaded(object, &gpu_view_of(&view)).distance(truth);
+            // NaN exceeds the diagonal.
             let diagonal = f64::from(case.camera.size[0]).hypot(f64::from(case.camera.size[1]));
             let bounded = |error: f64| if error <= diagonal { error } else { diagonal };
             let (error, absolute) = (bounded(error), bounded(case.absolute(&view).distance(truth)));
@@ -77,10 +77,10 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
 /// 2⁻²⁴.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / (1_u32 << 24) as f64;
 
-/// In pixels: what no vertex in a [`HELD`] view may be off by more than.
+/// The bound of a vertex's error in a [`HELD`] view, in pixels.
 pub const BOUND: f64 = 1e-3;
 
-/// The most that some thirty roundings, each at its worst and all of one sign, are as an angle: in units of 2⁻²⁴ radians. See
+/// The angle of some thirty roundings in the worst case, all of one sign, in units of 2⁻²⁴ radians. See
 /// [`GpuView`](drawloom::view::GpuView).
 pub const WORST_ANGLE: f64 = 30.0;
 
@@ -99,7 +99,7 @@ pub const HELD: [Kind; 11] = [
     Kind::Hemispherical,
 ];
 
-/// Views that magnify an angle too much for that: there the angle is held to [`WORST_ANGLE`].
+/// Views that magnify angles too much for [`BOUND`]: their bound is [`WORST_ANGLE`].
 pub const MAGNIFYING: [Kind; 10] = [
     Kind::Perspective { degrees: 0.1, size: Kind::FULL_HD },
     Kind::Perspective { degrees: 1.0, size: Kind::FULL_HD },
@@ -113,4 +113,4 @@ pub const MAGNIFYING: [Kind; 10] = [
     Kind::Spot { degrees: 85.0 },
 ];
 
-const AT_ONCE: usize = 1000;
+const BATCH: usize = 1000;

@@ -1,4 +1,4 @@
-//! Where one vertex comes to lie in a picture: as shaders work it out, as f32 in the world would have it, and where it is.
+//! The position of a vertex in a picture: as shaders compute it, from f32 world positions, and exact.
 
 use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
 use drawloom::scene::{Camera, Projection, Scene, ViewKind};
@@ -8,7 +8,7 @@ use drawloom::view::{GpuObject, GpuView, RenderView};
 #[derive(Clone, Debug)]
 pub struct Case {
     pub camera: Camera,
-    /// Of the object, in the world.
+    /// World position of the object.
     pub position: DVec3,
     pub orientation: Quat,
     pub scale: Vec3,
@@ -17,14 +17,14 @@ pub struct Case {
 }
 
 impl Case {
-    /// Where the vertex is, relative to the camera, along the world's axes: in f64. The camera's place is taken from the
-    /// object's first, which loses nothing that counts; a sum in the world would round to 10⁻⁷ m at 10⁹ m.
+    /// The vertex relative to the camera, along the world's axes, in f64. It subtracts the camera's position from the object's first,
+    /// which loses nothing relevant; a sum in world space would round to 10⁻⁷ m at 10⁹ m.
     pub fn relative(&self) -> DVec3 {
         let turned = unit(self.orientation) * (self.scale.as_dvec3() * self.vertex.as_dvec3());
         (self.position - self.camera.position) + turned
     }
 
-    /// Where it belongs in the picture, in pixels from the upper left: in f64, from what a camera is said to be.
+    /// The exact position in the picture, in pixels from the upper left, in f64 from the camera's definition.
     pub fn truth(&self) -> DVec2 {
         let local = unit(self.camera.orientation).inverse() * self.relative();
         let [width, height] = self.camera.size.map(f64::from);
@@ -91,8 +91,7 @@ impl Case {
     }
 }
 
-/// How many pixels a radian is, at most, at this distance from the middle of a perspective picture: towards the edge the
-/// picture is stretched. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, whose derivative
+/// Pixels per radian, at most, at this distance from the centre of a perspective picture, which is stretched towards its edges. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, whose derivative
 /// is f(1 + tan² a).
 pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
     match camera.projection {
@@ -105,11 +104,11 @@ pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
     }
 }
 
-/// The view's record as every backend has it.
+/// The view's GPU layout.
 ///
 /// # Panics
-/// If the camera is out of reach.
-pub fn record_of(view: &RenderView) -> GpuView {
+/// Panics if the camera is out of range.
+pub fn gpu_view_of(view: &RenderView) -> GpuView {
     GpuView::new(view, &Scene::new().as_scene_ref(), 0).expect("the camera is within reach")
 }
 
@@ -146,7 +145,7 @@ fn fixed_difference(object: &GpuObject, view: &GpuView) -> Vec3 {
 /// 2⁻³⁰ m.
 const STEP: f32 = 1.0 / (1_u32 << 30) as f32;
 
-/// Whether what the camera sees of that point is in its picture, and not before its near plane.
+/// Whether the vertex is in the picture and behind the near plane.
 pub fn is_seen(case: &Case) -> bool {
     let local = unit(case.camera.orientation).inverse() * case.relative();
     let place = case.truth();
