@@ -163,8 +163,8 @@ impl Backend for NullBackend {
         bundles: &mut Vec<NullBundle>,
     ) -> Result<NullPass, BackendError> {
         ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
-        let process = &request.plan.processes()[pass.process].process;
-        if !matches!(request.draws[pass.process], Draws::Commands(_)) {
+        let process = &request.plan.processes()[pass.process_index].process;
+        if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
             let has_none = bundles.is_empty() && list.batches.is_empty();
             ensure(has_none, || format!("{:?} draws no commands but has bundles", process.name()))?;
         }
@@ -177,13 +177,13 @@ impl Backend for NullBackend {
         ensure(end == prepared, || format!("{end} of {prepared} objects recorded"))?;
         Ok(NullPass {
             process: process.name().to_owned(),
-            view: pass.view,
+            view: pass.view_index,
             bundles: bundles.len(),
             batches: bundles.iter().map(|bundle| bundle.batches).sum(),
             objects: end,
             triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
-            lights: match &request.draws[pass.process] {
-                Draws::Lights(lights) => request.light_tables[pass.view].range(lights.class).len(),
+            lights: match &request.draws[pass.process_index] {
+                Draws::Lights(lights) => request.light_tables[pass.view_index].range(lights.class).len(),
                 _ => 0,
             },
         })

@@ -32,7 +32,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
 impl<B: Backend> FrameContext<'_, B> {
     /// The index of a pass' view.
     pub(super) fn view_of(&self, pass: usize) -> usize {
-        self.request.passes[pass].view
+        self.request.passes[pass].view_index
     }
 
     /// The number of objects that a pass' view sees.

@@ -19,19 +19,19 @@ pub(super) fn occluders(
         return None;
     }
     // Passes are in draw order.
-    let of_view = || passes.iter().filter(|pass| pass.view == index);
-    let depth_of = |pass: &Pass| plan.processes()[pass.process].declaration.depth();
+    let of_view = || passes.iter().filter(|pass| pass.view_index == index);
+    let depth_of = |pass: &Pass| plan.processes()[pass.process_index].declaration.depth();
     let colors_of = |pass: &Pass| -> Vec<&str> {
-        plan.processes()[pass.process].declaration.colors().map(|(target, _)| target).collect()
+        plan.processes()[pass.process_index].declaration.colors().map(|(target, _)| target).collect()
     };
     let (mut depth, mut colors, mut tests_only, mut occluders) = (None, Vec::new(), false, Vec::new());
     for pass in of_view() {
-        let Some(selection) = draws[pass.process].selection() else { continue };
+        let Some(selection) = draws[pass.process_index].selection() else { continue };
         let (target, access) = depth_of(pass)?;
         if *depth.get_or_insert(target) != target {
             return None;
         }
-        if access.writes() && draws[pass.process].hides() && selection.blending != Blending::Blended {
+        if access.writes() && draws[pass.process_index].hides() && selection.blending != Blending::Blended {
             let own = colors_of(pass);
             if tests_only || !(colors.is_empty() || own.is_empty() || own == colors) {
                 return None;

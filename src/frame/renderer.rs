@@ -216,8 +216,8 @@ impl<B: Backend> Renderer<B> {
     /// commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
-        let name = |pass: &Pass| graph.plan.processes()[pass.process].process.name();
-        let is_wanted = |pass: &Pass| pass.view == view && name(pass) == process;
+        let name = |pass: &Pass| graph.plan.processes()[pass.process_index].process.name();
+        let is_wanted = |pass: &Pass| pass.view_index == view && name(pass) == process;
         let table = self.tables.passes.get(graph.passes.iter().position(is_wanted)?)?;
         table.selection.map(|_| table.list.read())
     }
@@ -264,7 +264,7 @@ fn view_queues<B: Backend>(
     let mut queues: Vec<_> = (0..request.views.len()).map(empty).collect();
     for (&pass, recording) in request.passes.iter().zip(recordings) {
         let missing = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
-        queues[pass.view].passes.push((pass, recording.take().ok_or_else(missing)?));
+        queues[pass.view_index].passes.push((pass, recording.take().ok_or_else(missing)?));
     }
     Ok(queues)
 }

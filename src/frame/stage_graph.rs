@@ -80,7 +80,7 @@ impl<B: Backend> StageGraph<B> {
     ) -> Result<Self, FrameError> {
         let passes = passes_of(plan, views);
         for (index, view) in views.iter().enumerate() {
-            if !view.is_cached && !passes.iter().any(|pass| pass.view == index) {
+            if !view.is_cached && !passes.iter().any(|pass| pass.view_index == index) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
@@ -92,20 +92,24 @@ impl<B: Backend> StageGraph<B> {
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
-            let (view, process) = (&views[pass.view], plan.processes()[pass.process].process.name());
+            let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].process.name());
             let needs = StageNeeds {
-                draws_commands: draws[pass.process].selection().is_some(),
-                tests_occlusion: occlusion[pass.view].is_possible(),
+                draws_commands: draws[pass.process_index].selection().is_some(),
+                tests_occlusion: occlusion[pass.view_index].is_possible(),
                 culls_triangles: key.options.culls_triangles,
             };
             // The stages of a view stand right before those of its first pass: a serial run has what they write in its caches.
             let pass_scope = if needs.draws_commands {
-                let view_scope = view_scopes[pass.view].get_or_insert_with(|| {
-                    builder.add(frame.of_view(pass.view, view, needs.tests_occlusion), stages_of_view(pass.view), needs)
+                let view_scope = view_scopes[pass.view_index].get_or_insert_with(|| {
+                    builder.add(
+                        frame.of_view(pass.view_index, view, needs.tests_occlusion),
+                        stages_of_view(pass.view_index),
+                        needs,
+                    )
                 });
-                view_scope.of_process(pass.process, process)
+                view_scope.of_process(pass.process_index, process)
             } else {
-                frame.of_view(pass.view, view, needs.tests_occlusion).of_process(pass.process, process)
+                frame.of_view(pass.view_index, view, needs.tests_occlusion).of_process(pass.process_index, process)
             };
             builder.add(pass_scope, stages_of_pass(index), needs);
         }
@@ -130,7 +134,7 @@ impl<B: Backend> StageGraph<B> {
     ) {
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
-            let (selection, _) = self.key.draws[pass.process];
+            let (selection, _) = self.key.draws[pass.process_index];
             table.reset(selection, scene.object_count(), self.key.options.culls_triangles);
         }
         tables.reset(views.len(), workers);
@@ -270,7 +274,7 @@ fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
     for (process, planned) in plan.processes().iter().enumerate() {
         let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_cached;
         for (view, _) in views.iter().enumerate().filter(|(_, view)| is_drawn(view)) {
-            passes.push(Pass { process, view });
+            passes.push(Pass { process_index: process, view_index: view });
         }
     }
     passes

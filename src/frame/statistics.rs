@@ -95,7 +95,7 @@ impl ViewStatistics {
             bundles: 0,
             culled_triangles: CulledTriangles::default(),
         };
-        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view == index) {
+        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view_index == index) {
             let list = table.list.read();
             statistics.commands += list.objects.len();
             statistics.batches += list.batches.len();

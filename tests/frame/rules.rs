@@ -15,7 +15,7 @@ use drawloom_testing::scenes::field;
 
 use crate::renderer;
 
-const PASS: Pass = Pass { process: 0, view: 0 };
+const PASS: Pass = Pass { process_index: 0, view_index: 0 };
 
 /// Runs `play` on a worker, with a frame of the field's first view, and returns the rule that it broke.
 fn broken_rule(

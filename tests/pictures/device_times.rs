@@ -52,7 +52,7 @@ fn names_of(studio: &Studio, recorded: &Recorded<WgpuBackend>) -> Vec<(String, S
     let views = &recorded.statistics().views;
     let names =
         |(process, view): (usize, usize)| (processes[process].process.name().to_owned(), views[view].name.clone());
-    passes.into_iter().map(|pass| names((pass.process, pass.view))).collect()
+    passes.into_iter().map(|pass| names((pass.process_index, pass.view_index))).collect()
 }
 
 fn told(times: &DevicePassTimes) -> Vec<(String, String)> {

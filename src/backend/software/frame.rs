@@ -68,7 +68,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
 
 impl<R: Precision> TypedFrame<R> {
     fn draw(&self, pass: &SoftwarePass<R>, commands: &SoftwareCommands) -> Result<(), BackendError> {
-        let view = &self.views[pass.pass.view];
+        let view = &self.views[pass.pass.view_index];
         let context = PassContext {
             executor: &self.context.executor,
             view,

@@ -60,7 +60,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let FrameRequest { plan, views, passes, scene, rejections, .. } = *request;
         let view_states = (0..views.len()).map(|view| view_state(request, view)).collect::<Result<_, _>>()?;
         let targets = self.targets.lock().update(plan, views)?;
-        let pass = |&pass: &Pass| software_pass(request, pass, &shaders[pass.process], &targets);
+        let pass = |&pass: &Pass| software_pass(request, pass, &shaders[pass.process_index], &targets);
         let passes = passes.iter().map(pass).collect::<Result<_, _>>()?;
         self.context.subdivisions.begin_frame(scene.assets);
         // The reference draws the scene's own vertices.
@@ -121,9 +121,9 @@ fn software_pass<R: Precision>(
     shader: &CpuShader,
     targets: &SoftwareTargets<R>,
 ) -> Result<SoftwarePass<R>, BackendError> {
-    let planned = &request.plan.processes()[pass.process];
+    let planned = &request.plan.processes()[pass.process_index];
     let process = planned.process.name().to_owned();
-    let draws = match (&request.draws[pass.process], R::shader(shader)) {
+    let draws = match (&request.draws[pass.process_index], R::shader(shader)) {
         (Draws::Commands(draws), TypedCpuShader::Objects(shader)) => {
             SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth }
         }
@@ -131,7 +131,7 @@ fn software_pass<R: Precision>(
             SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
         }
         (Draws::Lights(draws), TypedCpuShader::Lights(shader)) => {
-            let lights = request.light_tables[pass.view].range(draws.class);
+            let lights = request.light_tables[pass.view_index].range(draws.class);
             SoftwareDraws::Lights { shader: Arc::clone(shader), lights: lights.start as usize..lights.end as usize }
         }
         _ => {
@@ -151,10 +151,10 @@ fn attachments<R: Precision>(
     pass: Pass,
     targets: &SoftwareTargets<R>,
 ) -> Result<Attachments<R>, BackendError> {
-    let declaration = &request.plan.processes()[pass.process].declaration;
-    let missing = |name: &str| BackendError::UnknownTarget { view: pass.view, target: name.to_owned() };
+    let declaration = &request.plan.processes()[pass.process_index].declaration;
+    let missing = |name: &str| BackendError::UnknownTarget { view: pass.view_index, target: name.to_owned() };
     let of_view = |name: &str| -> Result<SoftwareTarget<R>, BackendError> {
-        targets.find(pass.view, name).cloned().ok_or_else(|| missing(name))
+        targets.find(pass.view_index, name).cloned().ok_or_else(|| missing(name))
     };
     let layered = |kind: ViewKind, name: &str| targets.find_layered(kind, name).ok_or_else(|| missing(name));
     let color = |(name, clear): (&str, Option<ClearColor>)| {

@@ -68,7 +68,7 @@ impl WgpuBackend {
         let WgpuFrame { number, pipelines, assets, targets, buffers, .. } = frame;
         let (passes, parameters) = buffers.passes_mut();
         for pass in passes {
-            let Pass { process, view } = pass.pass;
+            let Pass { process_index: process, view_index: view } = pass.pass;
             let pipelines = &pipelines[process];
             let sampled = |(name, access): &(String, Access)| match access {
                 Access::Sample => targets.find(view, name).map(|target| &target.view),

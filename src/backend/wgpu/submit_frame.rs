@@ -67,7 +67,7 @@ impl WgpuBackend {
             if strategies > 1 {
                 let sample = pass.cost_sample(all, workers);
                 let report = |tuner: &mut StrategyTuner| tuner.report(frame.number, pass.strategy_index, sample);
-                pipelines.with_tuner(pass.pass.view, strategies, report);
+                pipelines.with_tuner(pass.pass.view_index, strategies, report);
             }
             // Reuses the string of the frame before.
             let mut name = latest.get_mut(count).map_or_else(String::new, |before| std::mem::take(&mut before.process));

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pass {
     /// The process' index in [`FramePlan::processes`](super::FramePlan::processes). Passes are submitted in this order first.
-    pub process: usize,
+    pub process_index: usize,
     /// The view's index among the frame's views.
-    pub view: usize,
+    pub view_index: usize,
 }

@@ -147,11 +147,11 @@ impl FrameBuffers {
         let is_timed = |process: usize| times_raw_passes || !matches!(request.draws[process], Draws::Raw(_));
         let mut timed_pass_indices = 0..;
         for pass in passes.iter_mut() {
-            pass.timed_pass_index = if is_timed(pass.pass.process) { timed_pass_indices.next() } else { None };
+            pass.timed_pass_index = if is_timed(pass.pass.process_index) { timed_pass_indices.next() } else { None };
         }
         let names =
             passes.iter().filter(|pass| pass.timed_pass_index.is_some()).map(|WgpuPassState { pass, .. }| {
-                (request.plan.processes()[pass.process].process.name(), request.views[pass.view].name())
+                (request.plan.processes()[pass.process_index].process.name(), request.views[pass.view_index].name())
             });
         timestamps.get_or_insert_default().begin_frame(device, names)
     }
@@ -264,9 +264,12 @@ impl Buffers {
         self.passes.resize_with(request.passes.len(), WgpuPassState::default);
         let mut command_pass_indices = 0..;
         for (state, &pass) in self.passes.iter_mut().zip(request.passes) {
-            let draws = &request.draws[pass.process];
+            let draws = &request.draws[pass.process_index];
             state.pass = pass;
-            state.set_label(request.plan.processes()[pass.process].process.name(), request.views[pass.view].name());
+            state.set_label(
+                request.plan.processes()[pass.process_index].process.name(),
+                request.views[pass.view_index].name(),
+            );
             state.command_pass_index =
                 if matches!(draws, Draws::Commands(_)) { command_pass_indices.next() } else { None };
             if state.command_pass_index.is_none() {
@@ -301,7 +304,7 @@ impl Buffers {
         pass: usize,
         objects_bound: usize,
     ) -> wgpu::BindGroup {
-        let WgpuPassState { pass: Pass { view, .. }, command_pass_index, .. } = self.passes[pass];
+        let WgpuPassState { pass: Pass { view_index: view, .. }, command_pass_index, .. } = self.passes[pass];
         // The layout requires a binding even if the pass draws no commands; it reads nothing from it.
         let stride = self.key.object_indices_stride;
         let (offset, size) = command_pass_index.map_or((0, ALIGNMENT), |index| (index * stride, stride));

@@ -44,7 +44,7 @@ pub(crate) struct WgpuPassState {
 impl Default for WgpuPassState {
     fn default() -> Self {
         Self {
-            pass: Pass { process: 0, view: 0 },
+            pass: Pass { process_index: 0, view_index: 0 },
             label: String::new(),
             command_pass_index: None,
             timed_pass_index: None,
@@ -121,7 +121,7 @@ impl WgpuPassState {
     pub(crate) fn statistics(&self, process: String) -> WgpuPassStatistics {
         WgpuPassStatistics {
             process,
-            view: self.pass.view,
+            view: self.pass.view_index,
             recording: self.strategy.recording,
             encoding: self.strategy.encoding,
             encoders: self.strategy.encoder_count(self.timing.bundles()),

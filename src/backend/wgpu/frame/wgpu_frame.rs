@@ -35,6 +35,6 @@ impl WgpuFrame {
 
     /// The pipelines of a pass's process.
     pub(crate) fn pipelines(&self, pass: Pass) -> &Arc<ProcessPipelines> {
-        &self.pipelines[pass.process]
+        &self.pipelines[pass.process_index]
     }
 }

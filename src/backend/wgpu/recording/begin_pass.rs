@@ -17,7 +17,7 @@ pub(crate) fn begin_pass<'a>(
     segment: PassSegment,
 ) -> wgpu::RenderPass<'a> {
     let pass = frame.pass(index);
-    let Pass { process, view } = pass.pass;
+    let Pass { process_index: process, view_index: view } = pass.pass;
     let declaration = &request.plan.processes()[process].declaration;
     let mut colors = [const { None }; MAX_COLOR_ATTACHMENTS];
     let mut count = 0;

@@ -22,7 +22,7 @@ pub(crate) fn encode_pass(
 ) -> Result<wgpu::CommandEncoder, BackendError> {
     use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
     let WgpuPassState { pass, strategy, .. } = *frame.pass(index);
-    encode(device, frame, index, |encoder| match (&request.draws[pass.process], strategy.recording) {
+    encode(device, frame, index, |encoder| match (&request.draws[pass.process_index], strategy.recording) {
         (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
         (Draws::Commands(_), Direct | Indirect) => {
             record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())

@@ -80,7 +80,7 @@ pub(crate) fn record_without_commands(
     index: usize,
 ) -> Result<(), BackendError> {
     let pass = frame.pass(index);
-    let Pass { process, view } = pass.pass;
+    let Pass { process_index: process, view_index: view } = pass.pass;
     let draws = &request.draws[process];
     let by_state = frame.pipelines(pass.pass).by_state();
     let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
@@ -119,10 +119,10 @@ pub(crate) fn encode_raw(
     raw: &dyn RawPass,
 ) -> Result<(), BackendError> {
     let &WgpuPassState { pass, timed_pass_index, .. } = frame.pass(index);
-    let textures = |name: &str| frame.targets.find(pass.view, name).map(|target| &target.texture);
+    let textures = |name: &str| frame.targets.find(pass.view_index, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
-    let size = request.views[pass.view].camera.size;
-    let resources = RawPassResources { device, view: pass.view, size, textures: &textures, layered: &layered };
+    let size = request.views[pass.view_index].camera.size;
+    let resources = RawPassResources { device, view: pass.view_index, size, textures: &textures, layered: &layered };
     let queries = timed_pass_index.and_then(|timed_pass| frame.buffers.timestamps()?.queries(timed_pass));
     if let Some((set, [begin, _])) = queries {
         encoder.write_timestamp(set, begin);
