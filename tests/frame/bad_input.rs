@@ -1,4 +1,4 @@
-//! What cannot be drawn is named, or counted and left out. Nothing panics, and the next frame is whole.
+//! Invalid input is refused by name, or counted and left out. Nothing panics, and the next frame is complete.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ fn error_of(scene: SceneRef<'_>) -> FrameError {
     let (mut renderer, submitter) = renderer(2, Granularity::default());
     let error = renderer.record(scene).err().expect("the scene cannot be drawn");
     let good = field(50);
-    let recorded = renderer.record(good.as_scene_ref()).expect("the next frame is whole");
+    let recorded = renderer.record(good.as_scene_ref()).expect("the next frame is complete");
     submitter.submit(recorded).unwrap();
     error
 }
@@ -27,19 +27,19 @@ fn rejected(scene: SceneRef<'_>) -> Vec<(RejectionReason, usize, usize)> {
     let (mut renderer, submitter) = renderer(2, Granularity::Chunk(5));
     let recorded = renderer.record(scene).unwrap();
     let statistics = submitter.submit(recorded).unwrap().statistics;
-    let told = statistics.rejections.iter();
-    told.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect()
+    let rejections = statistics.rejections.iter();
+    rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect()
 }
 
 #[test]
-fn an_empty_scene_is_a_frame_of_background() {
+fn an_empty_scene_draws_its_background() {
     let mut scene = Scene::new();
     scene.cameras = field(0).cameras.clone();
     let (mut renderer, submitter) = renderer(2, Granularity::default());
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let submitted = submitter.submit(recorded).unwrap();
     assert_eq!(submitted.statistics.objects, 0);
-    // The geometry buffer clears, and tone mapping maps; there is nothing to light.
+    // The geometry buffer and tone mapping in each of two views; there are no lights.
     assert_eq!(submitted.submission.passes.len(), 4);
 }
 
@@ -51,7 +51,7 @@ fn a_scene_without_a_camera_is_refused() {
 }
 
 #[test]
-fn a_picture_without_pixels_is_refused_by_its_views_name() {
+fn a_picture_without_pixels_is_refused_naming_the_view() {
     for size in [[0, 0], [0, 100], [100, 0]] {
         let mut scene = field(10);
         scene.cameras[1].size = size;
@@ -61,7 +61,7 @@ fn a_picture_without_pixels_is_refused_by_its_views_name() {
 }
 
 #[test]
-fn a_camera_that_cannot_be_is_refused_by_name() {
+fn an_invalid_camera_is_refused_by_name() {
     let perspective =
         |camera: &mut Camera, field_of_view| camera.projection = Projection::Perspective { field_of_view };
     let orthographic = |camera: &mut Camera, height| {
@@ -85,12 +85,12 @@ fn a_camera_that_cannot_be_is_refused_by_name() {
         &|camera| orthographic(camera, f32::NAN),
         // Without a far plane.
         &|camera| camera.projection = Projection::Orthographic { height: 1.0 },
-        // Only lights see like that.
+        // Only lights have this projection.
         &|camera| (camera.projection, camera.far) = (Projection::Paraboloid, 10.0),
     ];
-    for spoil in bad {
+    for invalidate in bad {
         let mut scene = field(10);
-        spoil(&mut scene.cameras[1]);
+        invalidate(&mut scene.cameras[1]);
         let error = error_of(scene.as_scene_ref());
         let named = matches!(&error, FrameError::Scene(SceneError::InvalidCamera { camera, .. }) if camera == "side");
         assert!(named, "{error}");
@@ -101,7 +101,7 @@ fn a_camera_that_cannot_be_is_refused_by_name() {
 }
 
 #[test]
-fn a_frame_that_failed_leaves_no_draw_list_of_the_one_before() {
+fn a_failed_frame_leaves_no_draw_list_of_an_earlier_one() {
     let (mut renderer, submitter) = renderer(2, Granularity::default());
     let mut scene = field(300);
     submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
@@ -143,7 +143,7 @@ fn slices_of_different_lengths_are_refused_by_name() {
 }
 
 #[test]
-fn colours_that_cannot_be_are_refused() {
+fn invalid_colours_are_refused() {
     for bad in [Vec3::splat(f32::NAN), Vec3::splat(f32::INFINITY), Vec3::splat(-1.0)] {
         let mut scene = field(10);
         scene.background = bad;
@@ -155,7 +155,7 @@ fn colours_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn objects_that_cannot_be_are_counted_and_left_out() {
+fn invalid_objects_are_counted_and_left_out() {
     let scene = field(40);
     let whole = scene.as_scene_ref();
     let mut positions = whole.positions.to_vec();
@@ -170,14 +170,14 @@ fn objects_that_cannot_be_are_counted_and_left_out() {
     bounds[8] = Bounds { center: Vec3::ZERO, radius: f32::NAN };
     bounds[9] = Bounds { center: Vec3::ZERO, radius: -1.0 };
     (bounds[10].radius, scales[10]) = (1e30, Vec3::splat(1e20));
-    let spoiled =
+    let invalid =
         SceneRef { positions: &positions, orientations: &orientations, scales: &scales, bounds: &bounds, ..whole };
     let expected = [
         (RejectionReason::InvalidTransform, 4, 3),
         (RejectionReason::InvalidBounds, 3, 8),
         (RejectionReason::OutOfReach, 1, 5),
     ];
-    assert_eq!(rejected(spoiled), expected);
+    assert_eq!(rejected(invalid), expected);
     assert_eq!(rejected(whole), []);
 }
 
@@ -195,24 +195,24 @@ fn extreme_scales_are_drawn() {
 }
 
 #[test]
-fn objects_whose_mesh_or_material_was_removed_are_counted_and_left_out() {
+fn objects_of_removed_meshes_or_materials_are_counted_and_left_out() {
     let mut scene = field(30);
     let reference = scene.as_scene_ref();
     let (mesh, material) = (reference.meshes[1], reference.materials[0]);
     scene.remove(mesh).unwrap();
     scene.remove(material).unwrap();
-    // Every third object has that mesh, and every fifth of the others that material.
+    // Every third object has this mesh, and every fifth of the others this material.
     let expected = [(RejectionReason::StaleMesh, 10, 1), (RejectionReason::StaleMaterial, 4, 0)];
     assert_eq!(rejected(scene.as_scene_ref()), expected);
 
-    // The slot is used again, and the stale handles still mean nothing.
+    // The slot is reused, and the stale handles stay invalid.
     let new: drawloom::handle::Handle<Mesh> = scene.add(cube()).unwrap();
     assert_eq!(new.index(), mesh.index());
     assert_eq!(rejected(scene.as_scene_ref()), expected);
 }
 
 #[test]
-fn lights_that_cannot_be_are_counted_and_left_out() {
+fn invalid_lights_are_counted_and_left_out() {
     let mut scene = field(10);
     let point =
         |intensity: f32, range| Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range };
@@ -253,7 +253,7 @@ fn lights_that_cannot_be_are_counted_and_left_out() {
 }
 
 #[test]
-fn a_renderer_that_cannot_be_is_refused() {
+fn invalid_renderers_are_refused() {
     let scheduler = || Arc::new(Scheduler::new(1).unwrap());
     let empty = Renderer::builder(NullBackend)
         .deferred(Deferred::to_picture())

@@ -1,4 +1,4 @@
-//! What changes while a renderer draws: its pipeline, its lights, and frames that fail in between.
+//! Changes between frames: of the pipeline and of lights, and failed frames in between.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ fn spot(position: DVec3) -> Light {
     }
 }
 
-/// One camera that looks at boxes, and nothing that lights them.
+/// One camera that looks at boxes, without lights.
 fn dark_field() -> Scene {
     let mut scene = field(50);
     scene.cameras.truncate(1);
@@ -46,7 +46,7 @@ fn processes(renderer: &Renderer<NullBackend>) -> Vec<&str> {
 }
 
 #[test]
-fn another_pipeline_draws_from_the_next_frame_on() {
+fn a_new_pipeline_takes_effect_in_the_next_frame() {
     let scene = dark_field();
     let (mut renderer, submitter) = deferred(Deferred::to_picture().leave_out("transparency"));
     drop(renderer.record(scene.as_scene_ref()).unwrap());
@@ -68,7 +68,7 @@ fn another_pipeline_draws_from_the_next_frame_on() {
 }
 
 #[test]
-fn after_a_frame_that_failed_the_last_one_can_still_be_looked_at() {
+fn a_failed_frame_leaves_the_earlier_draw_lists_readable() {
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0)];
     let (mut renderer, _) = deferred(Deferred::to_picture());
@@ -78,24 +78,25 @@ fn after_a_frame_that_failed_the_last_one_can_still_be_looked_at() {
     scene.lights.clear();
     scene.cameras[0].kind = ViewKind::Reflection;
     assert!(matches!(renderer.record(scene.as_scene_ref()), Err(FrameError::NoProcess { .. })));
-    assert!(renderer.draw_list("nobody", 0).is_none());
+    assert!(renderer.draw_list("unknown", 0).is_none());
     assert_eq!(renderer.draw_list("geometry buffer", 0).unwrap().objects.len(), drawn);
 }
 
 #[test]
-fn a_light_out_of_reach_is_counted_and_no_reason_to_fail() {
+fn a_light_out_of_reach_is_counted_and_the_frame_succeeds() {
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0), spot(DVec3::X * 5e9)];
     let (mut renderer, _) = deferred(Deferred::to_picture());
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let statistics = recorded.statistics();
-    let told: Vec<_> = statistics.rejections.iter().map(|told| (told.reason, told.count, told.first)).collect();
-    assert_eq!(told, [(RejectionReason::LightOutOfReach, 1, 1)]);
+    let rejections = statistics.rejections.iter();
+    let found: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
+    assert_eq!(found, [(RejectionReason::LightOutOfReach, 1, 1)]);
     assert_eq!(statistics.views.len(), 2);
 }
 
 #[test]
-fn a_light_that_no_camera_sees_has_no_map() {
+fn a_light_that_no_camera_sees_has_no_shadow_map() {
     let mut scene = dark_field();
     let behind = scene.cameras[0].position + DVec3::Z * 50.0;
     scene.lights = vec![spot(behind), spot(DVec3::Y * 5.0)];
@@ -107,7 +108,7 @@ fn a_light_that_no_camera_sees_has_no_map() {
 }
 
 #[test]
-fn tables_of_one_plan_leave_nothing_to_another() {
+fn alternating_plans_do_not_affect_each_other() {
     let mut scene = dark_field();
     let (mut renderer, _) = deferred(Deferred::to_picture());
     let mut first = None;
@@ -120,7 +121,7 @@ fn tables_of_one_plan_leave_nothing_to_another() {
     }
 }
 
-/// Light in the air, which asks the shadow maps what reaches it.
+/// Fog that samples the shadow maps.
 struct Fog;
 
 impl RenderProcess for Fog {
@@ -141,7 +142,7 @@ impl RenderProcess for Fog {
 }
 
 #[test]
-fn an_engines_process_may_read_shadow_maps_also_where_there_are_none() {
+fn an_engines_process_may_sample_shadow_maps_even_without_lights() {
     let mut scene = dark_field();
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Fog);
     let (mut renderer, _) = build(builder);
@@ -154,13 +155,13 @@ fn an_engines_process_may_read_shadow_maps_also_where_there_are_none() {
         let maps = renderer.plan().targets().iter().filter(|target| target.name == ShadowCasters::TARGET);
         assert_eq!(maps.map(|map| (map.layered, map.views)).collect::<Vec<_>>(), [(true, ViewKind::Shadow)]);
     }
-    // Nobody draws another pipeline's maps.
-    let alone = Renderer::builder(NullBackend).process(Fog).output("radiance");
-    assert!(alone.build(Arc::new(Scheduler::new(1).unwrap())).is_err());
+    // Without the deferred pipeline no process draws shadow maps.
+    let fog_only = Renderer::builder(NullBackend).process(Fog).output("radiance");
+    assert!(fog_only.build(Arc::new(Scheduler::new(1).unwrap())).is_err());
 }
 
 #[test]
-fn what_is_left_out_closes_the_chain_or_takes_its_shadows_along() {
+fn left_out_processes_leave_no_gap_and_without_casters_no_light_is_shadowed() {
     let steps = || Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0)];
@@ -178,7 +179,7 @@ fn what_is_left_out_closes_the_chain_or_takes_its_shadows_along() {
     assert_eq!(unshadowed, ["geometry buffer", "spot lights", "tone mapping", "fxaa"]);
 }
 
-/// Draws what lights see, as an engine does that has a use of its own for it.
+/// Draws shadow views into a target of the engine's own.
 struct OwnMaps;
 
 impl RenderProcess for OwnMaps {
@@ -198,7 +199,7 @@ impl RenderProcess for OwnMaps {
 }
 
 #[test]
-fn without_shadows_lights_are_lit_also_beside_maps_of_the_engines_own() {
+fn without_shadow_maps_lights_are_drawn_unshadowed_beside_an_engines_own_maps() {
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0)];
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().shadow_maps(None)).process(OwnMaps);

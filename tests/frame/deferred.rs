@@ -1,4 +1,4 @@
-//! The deferred pipeline: what an engine changes of it, and what a scene requires of it.
+//! The deferred pipeline: an engine's changes to it, and a scene's requirements.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
 use drawloom_testing::scenes::everything::{dark, everything};
 use drawloom_testing::scenes::sized;
 
-/// A process of an engine's own, which draws over `radiance` where it is told.
+/// An engine's own render process, declared by a closure.
 struct Own<F> {
     name: &'static str,
     declare: F,
@@ -78,7 +78,7 @@ fn spot() -> Light {
 }
 
 #[test]
-fn everything_goes_through_every_process_in_order() {
+fn a_scene_with_everything_uses_every_process_in_order() {
     let deferred = Deferred::to_picture().depth_pre_pass(true).geometry_shares(2).post(Fxaa::default());
     let expected = [
         "shadow casters",
@@ -103,10 +103,10 @@ fn everything_goes_through_every_process_in_order() {
 }
 
 #[test]
-fn an_empty_scene_goes_through_what_it_needs() {
+fn an_empty_scene_uses_only_the_required_processes() {
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let expected = ["geometry buffer", "tone mapping"];
-    // Before the first frame too.
+    // Also before the first frame.
     let planned: Vec<_> = renderer.plan().processes().iter().map(|planned| planned.process.name()).collect();
     assert_eq!(planned, expected);
     assert_eq!(processes(&mut renderer, &empty()), expected);
@@ -114,7 +114,7 @@ fn an_empty_scene_goes_through_what_it_needs() {
 }
 
 #[test]
-fn each_class_of_lights_gets_its_own_process() {
+fn each_class_of_lights_has_its_own_process() {
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let names = [
         "directional lights",
@@ -142,7 +142,7 @@ fn each_class_of_lights_gets_its_own_process() {
 }
 
 #[test]
-fn shadow_maps_that_cannot_be_are_refused() {
+fn invalid_shadow_maps_are_refused() {
     let good = ShadowMaps::default();
     let bad = [
         (ShadowMaps { side: 0, ..good }, "side"),
@@ -166,9 +166,9 @@ fn shadow_maps_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn names_that_are_nobodys_are_refused_and_those_there_are_listed() {
+fn unknown_names_are_refused_and_known_ones_are_listed() {
     let replaced = Deferred::to_picture().replace("fog", own("mist", |_| {}));
-    // There are none of these without what makes them.
+    // These processes exist only with their option.
     let no_maps = Deferred::to_picture().shadow_maps(None).leave_out("shadow casters");
     let no_pre_pass = Deferred::to_picture().leave_out("depth pre-pass");
     for (deferred, wrong) in [
@@ -184,14 +184,14 @@ fn names_that_are_nobodys_are_refused_and_those_there_are_listed() {
 }
 
 #[test]
-fn another_process_stands_in_the_place_of_the_one_it_replaces() {
+fn a_replacement_takes_the_position_of_the_replaced_process() {
     let glow = own("glow", |declare| declare.draws_over("radiance"));
     let curve = own("curve", |declare| {
         declare.samples("radiance");
         declare.clears_color("picture", Format::Rgba8Srgb, ClearColor::Background);
     });
     let deferred = Deferred::to_picture().replace("point lights", glow).replace("tone mapping", curve);
-    // Who comes after a process comes after what stands in its place.
+    // A process declared after the replaced one comes after the replacement.
     let fog = own("fog", |declare| {
         declare.draws_over("radiance");
         declare.after("point lights");
@@ -214,24 +214,24 @@ fn another_process_stands_in_the_place_of_the_one_it_replaces() {
         "curve",
     ];
     assert_eq!(names, expected);
-    // Where the scene does not require the place, nobody stands in it.
+    // If the scene does not require the replaced process, the replacement is left out too.
     assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "fog", "curve"]);
 }
 
 #[test]
-fn what_is_left_out_is_never_there() {
+fn a_left_out_process_is_in_no_plan() {
     let deferred = Deferred::to_picture().leave_out("point lights").leave_out("transparency");
     let mut renderer = build(builder(deferred)).unwrap();
     let names = processes(&mut renderer, &everything());
     assert_eq!(names.len(), 9);
     assert!(names.iter().all(|name| name != "point lights" && name != "transparency"), "{names:?}");
-    // What others read cannot be.
+    // A process whose targets others read cannot be left out.
     let error = build_error(builder(Deferred::to_picture().leave_out("geometry buffer"))).to_string();
     assert!(error.contains("nothing writes") && error.contains("lights"), "{error}");
 }
 
 #[test]
-fn processes_find_their_place_beside_one_that_is_not_there() {
+fn processes_may_be_ordered_relative_to_an_absent_one() {
     let after = own("rain", |declare| {
         declare.draws_over("radiance");
         declare.after("transparency");
@@ -253,7 +253,7 @@ fn processes_find_their_place_beside_one_that_is_not_there() {
 }
 
 #[test]
-fn an_order_that_is_missing_or_names_nobody_is_refused() {
+fn an_ambiguous_order_or_an_unknown_name_is_refused() {
     let after = |name: &'static str, other: &'static str| {
         own(name, move |declare| {
             declare.draws_over("radiance");
@@ -269,17 +269,17 @@ fn an_order_that_is_missing_or_names_nobody_is_refused() {
     for part in ["\"rain\"", "\"snow\"", "\"radiance\"", "put them in order"] {
         assert!(error.contains(part), "{error}");
     }
-    // To be in the pipeline's order is for the pipeline's own processes: this one says nothing about lights.
+    // Only the pipeline's own processes have an implicit order; this one declares none relative to lights.
     let error = build_error(builder(Deferred::to_picture()).process(after("rain", "geometry buffer"))).to_string();
     assert!(error.contains("\"rain\"") && error.contains("put them in order"), "{error}");
 }
 
 #[test]
-fn shadow_views_come_behind_the_cameras_and_are_named_by_their_light() {
+fn shadow_views_follow_the_cameras_and_are_named_after_their_light() {
     let mut scene = everything();
     scene.cameras.push(sized(Camera::looking_at("side", DVec3::X * 9.0, DVec3::ZERO), [20, 30]));
     let invalid = Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 };
-    // What is left out keeps its number.
+    // A left-out light keeps its number.
     scene.lights.insert(0, invalid);
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
@@ -298,7 +298,7 @@ fn shadow_views_come_behind_the_cameras_and_are_named_by_their_light() {
 }
 
 #[test]
-fn an_engines_own_camera_shares_the_maps_if_it_is_as_large() {
+fn an_engines_shadow_camera_shares_the_maps_if_its_size_matches() {
     let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
     let deferred = || Deferred::to_picture().shadow_maps(Some(maps));
     let mut scene = empty();
@@ -318,14 +318,14 @@ fn an_engines_own_camera_shares_the_maps_if_it_is_as_large() {
         }
         other => panic!("{:?}", other.map(|error| error.to_string())),
     }
-    // Without a light that casts shadows nobody draws such a view.
+    // Without a shadow-casting light no process draws shadow views.
     scene.lights.clear();
     let error = renderer.record(scene.as_scene_ref()).err().unwrap();
     assert!(matches!(&error, FrameError::NoProcess { view, kind: ViewKind::Shadow } if view == "own"), "{error}");
 }
 
 #[test]
-fn lights_that_are_dark_or_cannot_be_require_nothing() {
+fn dark_and_invalid_lights_require_no_process() {
     let mut scene = empty();
     scene.lights = everything().lights.into_iter().map(dark).collect();
     let broken = [f32::NAN, f32::INFINITY, -1.0].map(|range| match spot() {
@@ -339,10 +339,11 @@ fn lights_that_are_dark_or_cannot_be_require_nothing() {
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let statistics = recorded.statistics();
-    let told: Vec<_> = statistics.rejections.iter().map(|told| (told.reason, told.count, told.first)).collect();
+    let rejections = statistics.rejections.iter();
+    let found: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
     let mut expected = [(RejectionReason::DarkLight, 7, 0), (RejectionReason::InvalidLight, 4, 7)];
     expected.sort_by_key(|(reason, ..)| *reason as usize);
-    assert_eq!(told, expected);
+    assert_eq!(found, expected);
     assert_eq!((statistics.lights, statistics.views.len(), statistics.views[0].lights), (0, 1, 0));
     drop(recorded);
     assert_eq!(processes(&mut renderer, &scene), ["geometry buffer", "tone mapping"]);
@@ -350,10 +351,10 @@ fn lights_that_are_dark_or_cannot_be_require_nothing() {
 }
 
 #[test]
-fn plans_are_kept_for_what_scenes_require() {
+fn plans_are_cached_by_requirements() {
     let mut renderer =
         build(builder(Deferred::to_picture().post(ToneMapping::default()).leave_out("transparency"))).err();
-    // Two steps of one name are one too many.
+    // Two processes of the same name are refused.
     assert!(renderer.take().unwrap().to_string().contains("\"tone mapping\""));
 
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
@@ -370,7 +371,7 @@ fn plans_are_kept_for_what_scenes_require() {
 }
 
 #[test]
-fn a_class_that_is_left_out_is_not_lit_by_another() {
+fn lights_of_a_left_out_class_are_not_drawn_by_another() {
     let mut scene = empty();
     let unshadowed = match spot() {
         Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
@@ -379,7 +380,7 @@ fn a_class_that_is_left_out_is_not_lit_by_another() {
         other => other,
     };
     scene.lights = vec![spot(), unshadowed];
-    // Nothing reads the shadow map, so it is not drawn; that makes the light no other than it is.
+    // Nothing samples the shadow map, so it is not drawn. The light still belongs to the shadowed class.
     let deferred = Deferred::to_picture().leave_out("shadowed spot lights");
     let (mut renderer, submitter) = builder(deferred).build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();

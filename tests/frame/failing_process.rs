@@ -1,4 +1,4 @@
-//! A process that panics fails the frame by name, and the next frame is whole.
+//! A panicking render process fails the frame with an error that names it, and the next frame is complete.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 use drawloom_testing::scenes::field;
 
-/// Panics for as long as the switch is on.
+/// Panics while `breaks` is set.
 struct Fragile {
     breaks: Arc<AtomicBool>,
 }
@@ -31,7 +31,7 @@ impl RenderProcess for Fragile {
 }
 
 #[test]
-fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_runs() {
+fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_succeeds() {
     let breaks = Arc::new(AtomicBool::new(false));
     let scheduler = Arc::new(Scheduler::new(3).unwrap());
     let fragile = Fragile { breaks: Arc::clone(&breaks) };

@@ -1,13 +1,13 @@
-//! Frames down to the queue, on the backend that draws nothing and checks everything.
+//! Frames up to their submission, on the null backend, which draws nothing and checks the rules.
 
 mod bad_input;
 mod changes;
 mod deferred;
+mod determinism;
 mod failing_process;
+mod null_backend;
 mod occlusion;
 mod quality;
-mod rules;
-mod same_result;
 mod shadow_interval;
 mod timeline;
 mod triangles;

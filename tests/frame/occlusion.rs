@@ -1,4 +1,4 @@
-//! What a view's objects hide is left out of it, and of nothing else.
+//! Occlusion culling leaves out objects hidden in a view, and only those.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
 use drawloom_testing::scenes::{cube, field, sized};
 
-/// Before the first camera and behind the second a wall; behind it, or before it, and beside it small cubes, one in four of which
-/// is glass.
+/// A wall before the first camera, and small cubes behind and beside it, one in four of them glass. The second camera sees the
+/// scene from behind, so that its cubes are in front of the wall.
 fn yard() -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add(cube()).unwrap();
@@ -23,9 +23,9 @@ fn yard() -> Scene {
     let wall = RenderObject::new(mesh, stone, DVec3::Z * -10.0);
     scene.add_object(RenderObject { scale: Vec3::new(4.0, 4.0, 0.1), ..wall }).unwrap();
     for index in 0..300 {
-        let place = DVec3::new(f64::from(index % 20) - 9.5, f64::from(index / 20) * 0.5 - 3.5, -20.0);
+        let position = DVec3::new(f64::from(index % 20) - 9.5, f64::from(index / 20) * 0.5 - 3.5, -20.0);
         let material = if index % 4 == 0 { glass } else { stone };
-        let object = RenderObject::new(mesh, material, place);
+        let object = RenderObject::new(mesh, material, position);
         scene.add_object(RenderObject { scale: Vec3::splat(0.2), ..object }).unwrap();
     }
     scene.cameras = vec![
@@ -46,7 +46,7 @@ fn renderer(occlusion: Option<u32>, workers: usize, granularity: Granularity) ->
     with_quality(Quality { occlusion, ..Quality::balanced() }, workers, granularity)
 }
 
-/// What the next frame draws by a process, in each of the scene's cameras.
+/// The objects that a process draws in the next frame, for each camera of the scene.
 fn drawn(renderer: &mut Renderer<NullBackend>, scene: &Scene, process: &str) -> (Vec<BTreeSet<u32>>, FrameStatistics) {
     let statistics = renderer.record(scene.as_scene_ref()).unwrap().statistics().clone();
     let objects = |view| renderer.draw_list(process, view).unwrap().objects.iter().copied().collect();
@@ -54,31 +54,31 @@ fn drawn(renderer: &mut Renderer<NullBackend>, scene: &Scene, process: &str) -> 
 }
 
 #[test]
-fn what_is_hidden_is_not_drawn_and_all_else_is() {
+fn hidden_objects_are_culled_and_all_others_are_drawn() {
     let scene = yard();
-    // All of a cube is behind the wall that is 4 m wide to either side at 9.9 m: a metre of slack for squares of 8 pixels.
+    // The wall at 9.9 m is 4 m wide to either side. A metre of slack allows for tiles of 8 pixels.
     let is_behind = |object: u32, within: f64| {
-        let place = scene.as_scene_ref().positions[object as usize];
-        object > 0 && place.x.abs().max(place.y.abs()) < within
+        let position = scene.as_scene_ref().positions[object as usize];
+        object > 0 && position.x.abs().max(position.y.abs()) < within
     };
     for process in ["geometry buffer", "transparency"] {
         let (all, before) = drawn(&mut renderer(None, 2, Granularity::default()), &scene, process);
         assert!(before.views.iter().all(|view| view.occluded == 0));
-        let (left, statistics) = drawn(&mut renderer(Some(8), 2, Granularity::default()), &scene, process);
-        assert_eq!(left[1], all[1], "nothing is hidden from the other side");
+        let (remaining, statistics) = drawn(&mut renderer(Some(8), 2, Granularity::default()), &scene, process);
+        assert_eq!(remaining[1], all[1], "nothing is hidden from the other side");
         assert_eq!(statistics.views[1].occluded, 0);
-        assert!(left[0].is_subset(&all[0]) && left[0].len() < all[0].len() / 2 && !left[0].is_empty());
-        let hidden: BTreeSet<u32> = all[0].difference(&left[0]).copied().collect();
+        assert!(remaining[0].is_subset(&all[0]) && remaining[0].len() < all[0].len() / 2 && !remaining[0].is_empty());
+        let hidden: BTreeSet<u32> = all[0].difference(&remaining[0]).copied().collect();
         assert!(hidden.iter().all(|&object| is_behind(object, 8.0)), "{hidden:?}");
-        assert!(left[0].iter().all(|&object| !is_behind(object, 6.5)), "{:?}", left[0]);
-        let [was, is] = [&before.views[0], &statistics.views[0]];
-        assert_eq!(is.visible + is.occluded, was.visible);
-        assert!(is.occluded > hidden.len() && is.commands < was.commands, "{is:?}");
+        assert!(remaining[0].iter().all(|&object| !is_behind(object, 6.5)), "{:?}", remaining[0]);
+        let [without, with] = [&before.views[0], &statistics.views[0]];
+        assert_eq!(with.visible + with.occluded, without.visible);
+        assert!(with.occluded > hidden.len() && with.commands < without.commands, "{with:?}");
     }
 }
 
 #[test]
-fn whoever_does_the_work_the_same_is_hidden() {
+fn workers_and_granularity_do_not_change_what_is_occluded() {
     for scene in [yard(), field(3000)] {
         for side in Quality::OCCLUSION_TILE_SIZES {
             let first = |workers, granularity| {
@@ -98,19 +98,19 @@ fn whoever_does_the_work_the_same_is_hidden() {
 }
 
 #[test]
-fn it_is_left_out_now_and_then_and_that_changes_no_picture_list_but_by_what_is_hidden() {
+fn the_occlusion_policy_tries_both_and_only_occluded_objects_differ() {
     let scene = yard();
     let mut with = renderer(Some(4), 1, Granularity::default());
     let all = drawn(&mut renderer(None, 1, Granularity::default()), &scene, "geometry buffer").0;
-    let left = drawn(&mut with, &scene, "geometry buffer").0;
+    let remaining = drawn(&mut with, &scene, "geometry buffer").0;
     let mut lists = BTreeSet::new();
     for _ in 0..20 {
         let (drawn, statistics) = drawn(&mut with, &scene, "geometry buffer");
         let is_on = statistics.views[0].occluded > 0;
-        assert_eq!(drawn, if is_on { left.clone() } else { all.clone() });
+        assert_eq!(drawn, if is_on { remaining.clone() } else { all.clone() });
         lists.insert(is_on);
     }
-    assert_eq!(lists.len(), 2, "it is tried, and so is to do without");
+    assert_eq!(lists.len(), 2, "frames with and without culling are tried");
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn quality_changes_between_frames() {
 }
 
 #[test]
-fn shadow_maps_keep_what_is_hidden_from_the_light() {
+fn shadow_maps_are_not_occlusion_culled() {
     let mut scene = yard();
     scene.cameras.truncate(1);
     scene.lights = vec![Light::Spot {
@@ -149,7 +149,7 @@ fn shadow_maps_keep_what_is_hidden_from_the_light() {
     assert!(with[0].occluded > 0);
 }
 
-/// Draws objects before the depth that it declares.
+/// Draws objects with the depth test that it declares.
 struct Own(fn(&mut Declare));
 
 impl RenderProcess for Own {
@@ -170,7 +170,7 @@ impl RenderProcess for Own {
 }
 
 #[test]
-fn where_something_is_drawn_whatever_is_before_it_nothing_is_left_out() {
+fn nothing_is_culled_if_a_process_draws_without_the_depth_test() {
     let scene = yard();
     let occluded = |depth: fn(&mut Declare)| {
         let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
@@ -185,7 +185,7 @@ fn where_something_is_drawn_whatever_is_before_it_nothing_is_left_out() {
     assert_eq!(occluded(|declare| declare.clears_depth("another depth", Format::Depth32Float)), 0);
 }
 
-/// Only glass is drawn, so that there is nothing to hide behind.
+/// Draws only glass, which occludes nothing.
 struct Glass;
 
 impl RenderProcess for Glass {
@@ -205,10 +205,10 @@ impl RenderProcess for Glass {
 }
 
 #[test]
-fn what_is_not_drawn_hides_nothing() {
+fn objects_that_are_not_drawn_occlude_nothing() {
     let quality = Quality { occlusion: Some(4), culling: CullingVolume::Sphere, ..Quality::balanced() };
     let builder = Renderer::builder(NullBackend).process(Glass).output("picture").quality(quality);
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     assert_eq!(renderer.record(yard().as_scene_ref()).unwrap().statistics().views[0].occluded, 0);
-    assert!(!renderer.jobs_to_dot().unwrap().contains("coarse depth"), "so nobody looks");
+    assert!(!renderer.jobs_to_dot().unwrap().contains("coarse depth"), "no coarse depth buffer is drawn");
 }

@@ -1,4 +1,4 @@
-//! What a quality does to a frame's commands.
+//! The effect of a quality on a frame's commands.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use drawloom::scene::{Blend, Light, Scene};
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::field;
 
-/// What a process draws in a view of a frame of this quality.
+/// The draw list of a process in a view of a frame of this quality.
 fn drawn(scene: &Scene, quality: Quality, process: &str, view: usize) -> DrawList {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
@@ -21,17 +21,17 @@ fn drawn(scene: &Scene, quality: Quality, process: &str, view: usize) -> DrawLis
     renderer.draw_list(process, view).unwrap().clone()
 }
 
-/// How far each object is along the first camera's axis, in the order they are drawn.
+/// The depth of each object along the first camera's axis, in draw order.
 fn depths(scene: &Scene, list: &DrawList) -> Vec<f32> {
     let camera = &scene.cameras[0];
     let forward = camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
-    let place = |object: &u32| scene.as_scene_ref().positions[*object as usize];
-    // What f32 can tell apart of the exact distances.
-    list.objects.iter().map(|object| forward.dot(place(object) - camera.position) as f32).collect()
+    let position = |object: &u32| scene.as_scene_ref().positions[*object as usize];
+    // Rounded to f32, as keys are.
+    list.objects.iter().map(|object| forward.dot(position(object) - camera.position) as f32).collect()
 }
 
 #[test]
-fn keys_have_as_many_bits_of_depth_as_asked_for() {
+fn keys_have_as_many_depth_bits_as_configured() {
     let scene = field(2_000);
     for bits in [6, 12] {
         for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }] {
@@ -42,15 +42,18 @@ fn keys_have_as_many_bits_of_depth_as_asked_for() {
                 let keys: Vec<_> = list.commands().map(|command| command.key.bits()).collect();
                 let differing = keys.iter().fold(0, |differing, key| differing | (key ^ keys[0]));
                 let width = if process == "transparency" { 62 } else { 20 };
-                let of_depth = differing & ((1 << width) - 1);
-                assert!(of_depth != 0 && of_depth.trailing_zeros() >= lowest, "{process}: {order:?} {of_depth:x}");
+                let depth_bits = differing & ((1 << width) - 1);
+                assert!(
+                    depth_bits != 0 && depth_bits.trailing_zeros() >= lowest,
+                    "{process}: {order:?} {depth_bits:x}"
+                );
             }
         }
     }
 }
 
 #[test]
-fn blended_objects_are_in_the_wrong_order_by_a_step_at_most() {
+fn blended_objects_are_out_of_order_by_at_most_one_step() {
     let scene = field(3_000);
     let (near, far) = (scene.cameras[0].near, scene.cameras[0].far);
     let mut orders = vec![DepthKey::EXACT];
@@ -70,15 +73,15 @@ fn blended_objects_are_in_the_wrong_order_by_a_step_at_most() {
         assert!(depths.len() > 300);
         let mut nearest = f32::INFINITY;
         for &depth in &depths {
-            let before_by = f64::from(depth) - f64::from(nearest);
-            assert!(before_by <= blended_order.step(depth, near, far), "{nearest} {depth} {blended_order:?}");
+            let behind = f64::from(depth) - f64::from(nearest);
+            assert!(behind <= blended_order.step(depth, near, far), "{nearest} {depth} {blended_order:?}");
             nearest = nearest.min(depth);
         }
     }
 }
 
 #[test]
-fn half_the_angle_is_a_halving_more() {
+fn half_the_angle_raises_the_subdivision_level_by_one() {
     let mut scene = field(300);
     scene.lights = vec![Light::Hemispherical {
         position: DVec3::new(0.0, 30.0, 0.0),
@@ -90,12 +93,12 @@ fn half_the_angle_is_a_halving_more() {
     let level = |widest_edge: f32| {
         let shadows = ShadowQuality { widest_edge, ..ShadowQuality::default() };
         let list = drawn(&scene, Quality { shadows, ..Quality::balanced() }, "shadow casters", 2);
-        let mut of_objects: Vec<_> =
+        let mut levels: Vec<_> =
             list.commands().map(|command| (command.object, command.state.subdivision_level())).collect();
-        of_objects.sort();
-        of_objects
+        levels.sort();
+        levels
     };
-    // No edge is seen under that.
+    // No edge subtends this angle.
     assert!(level(90.0).iter().all(|(_, level)| *level == 0));
     let fine = level(0.5);
     assert!(fine.len() > 100 && fine.iter().any(|(_, level)| *level > 1));

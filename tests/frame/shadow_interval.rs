@@ -1,4 +1,4 @@
-//! Shadow maps that are drawn in every so many-th frame, and when that is not enough.
+//! Shadow maps that are drawn every n-th frame, and the changes that draw them earlier.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
-/// A renderer whose shadow maps are drawn in every so many-th frame.
-struct Studio {
+/// A renderer whose shadow maps are drawn every n-th frame.
+struct Fixture {
     renderer: Renderer<NullBackend>,
     submitter: Submitter<NullBackend>,
 }
 
-impl Studio {
+impl Fixture {
     fn new(interval: u32) -> Self {
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
         let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(every(interval));
@@ -26,7 +26,7 @@ impl Studio {
         Self { renderer, submitter }
     }
 
-    /// Draws a frame, and says of which views it draws the shadow map.
+    /// Draws a frame, and returns the views whose shadow map it draws.
     fn drawn(&mut self, scene: &Scene) -> Vec<usize> {
         let recorded = self.renderer.record(scene.as_scene_ref()).unwrap();
         let passes = self.submitter.submit(recorded).unwrap().submission.passes;
@@ -62,7 +62,7 @@ fn lamp() -> Light {
     Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 9.0 }
 }
 
-/// Two views, and behind them those of two lights.
+/// Two cameras, followed by the shadow views of two lights.
 fn two_lights() -> Scene {
     let mut scene = field(300);
     scene.lights = vec![spot(3.0), sun()];
@@ -70,34 +70,34 @@ fn two_lights() -> Scene {
 }
 
 #[test]
-fn maps_are_drawn_in_every_so_many_th_frame() {
+fn shadow_maps_are_drawn_every_nth_frame() {
     for interval in 1..=4 {
-        let (scene, mut studio) = (two_lights(), Studio::new(interval));
+        let (scene, mut fixture) = (two_lights(), Fixture::new(interval));
         for frame in 0..9 {
             let expected = if frame % interval == 0 { vec![2, 3] } else { Vec::new() };
-            assert_eq!(studio.drawn(&scene), expected, "frame {frame} of {interval}");
+            assert_eq!(fixture.drawn(&scene), expected, "frame {frame} of {interval}");
         }
     }
 }
 
 #[test]
-fn nothing_is_done_for_a_map_that_is_kept() {
-    let (scene, mut studio) = (two_lights(), Studio::new(2));
-    studio.drawn(&scene);
-    assert!(studio.renderer.draw_list("shadow casters", 2).is_some());
-    let recorded = studio.renderer.record(scene.as_scene_ref()).unwrap();
+fn a_cached_map_costs_no_culling_and_no_commands() {
+    let (scene, mut fixture) = (two_lights(), Fixture::new(2));
+    fixture.drawn(&scene);
+    assert!(fixture.renderer.draw_list("shadow casters", 2).is_some());
+    let recorded = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     for view in &recorded.statistics().views[2..] {
         assert_eq!((view.visible, view.commands, view.batches, view.bundles), (0, 0, 0, 0));
     }
     assert!(recorded.queues()[2..].iter().all(|queue| queue.passes.is_empty()));
-    assert!(studio.renderer.draw_list("shadow casters", 2).is_none());
-    assert!(!studio.renderer.jobs_to_dot().unwrap().contains("shadow casters"));
+    assert!(fixture.renderer.draw_list("shadow casters", 2).is_none());
+    assert!(!fixture.renderer.jobs_to_dot().unwrap().contains("shadow casters"));
 }
 
 #[test]
-fn what_moves_leaves_maps_as_they_are() {
-    let (mut scene, mut studio) = (two_lights(), Studio::new(100));
-    assert_eq!(studio.drawn(&scene), [2, 3]);
+fn movements_do_not_draw_cached_maps_early() {
+    let (mut scene, mut fixture) = (two_lights(), Fixture::new(100));
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
     let handle = scene.objects().next().unwrap();
     let object = scene.object(handle).unwrap();
     let moves: [&dyn Fn(&mut Scene); 4] = [
@@ -108,66 +108,66 @@ fn what_moves_leaves_maps_as_they_are() {
     ];
     for change in moves {
         change(&mut scene);
-        assert!(studio.drawn(&scene).is_empty());
+        assert!(fixture.drawn(&scene).is_empty());
     }
 }
 
 #[test]
-fn other_maps_are_drawn_at_once() {
-    let (mut scene, mut studio) = (two_lights(), Studio::new(100));
-    studio.drawn(&scene);
+fn a_change_of_lights_or_views_draws_all_maps_at_once() {
+    let (mut scene, mut fixture) = (two_lights(), Fixture::new(100));
+    fixture.drawn(&scene);
     type Change<'a> = &'a dyn Fn(&mut Scene);
     let changes: [(&str, Change<'_>, &[usize]); 9] = [
         ("another plan", &|scene| scene.lights.push(lamp()), &[2, 3]),
         ("a light more", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4]),
         ("a light in between", &|scene| scene.lights.insert(0, lamp()), &[2, 3, 4]),
-        ("two that change places", &|scene| scene.lights.swap(1, 2), &[2, 3, 4]),
+        ("two lights swapped", &|scene| scene.lights.swap(1, 2), &[2, 3, 4]),
         ("a light less", &|scene| _ = scene.lights.pop(), &[2, 3]),
         ("a light again", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4]),
         ("a camera more", &|scene| scene.cameras.push(scene.cameras[0].clone()), &[3, 4, 5]),
         ("a camera less", &|scene| _ = scene.cameras.pop(), &[2, 3, 4]),
-        ("one that casts shadows too", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5]),
+        ("one more light casts shadows", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5]),
     ];
     for (what, change, drawn) in changes {
         change(&mut scene);
-        assert_eq!(studio.drawn(&scene), drawn, "{what}");
-        assert!(studio.drawn(&scene).is_empty(), "the frame after {what}");
+        assert_eq!(fixture.drawn(&scene), drawn, "{what}");
+        assert!(fixture.drawn(&scene).is_empty(), "the frame after {what}");
     }
 }
 
 #[test]
-fn another_quality_or_pipeline_draws_them_at_once() {
-    let (scene, mut studio) = (two_lights(), Studio::new(100));
-    studio.drawn(&scene);
-    studio.renderer.set_quality(every(50)).unwrap();
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    assert!(studio.drawn(&scene).is_empty());
+fn a_change_of_quality_or_pipeline_draws_all_maps_at_once() {
+    let (scene, mut fixture) = (two_lights(), Fixture::new(100));
+    fixture.drawn(&scene);
+    fixture.renderer.set_quality(every(50)).unwrap();
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert!(fixture.drawn(&scene).is_empty());
     let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
-    studio.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    assert!(studio.drawn(&scene).is_empty());
-    studio.renderer.set_quality(every(1)).unwrap();
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    assert_eq!(studio.drawn(&scene), [2, 3]);
+    fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert!(fixture.drawn(&scene).is_empty());
+    fixture.renderer.set_quality(every(1)).unwrap();
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
 }
 
 #[test]
-fn maps_that_nobody_drew_are_not_kept() {
-    let (scene, mut studio) = (two_lights(), Studio::new(100));
-    // Never submitted.
-    drop(studio.renderer.record(scene.as_scene_ref()).unwrap());
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    // Recorded before it is known that the one before is never submitted.
-    studio.renderer.set_quality(every(100)).unwrap();
-    let first = studio.renderer.record(scene.as_scene_ref()).unwrap();
-    let second = studio.renderer.record(scene.as_scene_ref()).unwrap();
+fn maps_of_frames_that_were_not_submitted_are_not_cached() {
+    let (scene, mut fixture) = (two_lights(), Fixture::new(100));
+    // A frame that is never submitted.
+    drop(fixture.renderer.record(scene.as_scene_ref()).unwrap());
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    // The second frame is recorded before the first one is dropped.
+    fixture.renderer.set_quality(every(100)).unwrap();
+    let first = fixture.renderer.record(scene.as_scene_ref()).unwrap();
+    let second = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     drop(first);
-    studio.submitter.submit(second).unwrap();
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    // Failed.
+    fixture.submitter.submit(second).unwrap();
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    // A failed frame.
     let mut bad = two_lights();
     bad.cameras[0].position.x = 1e300;
-    assert!(studio.renderer.record(bad.as_scene_ref()).is_err());
-    assert_eq!(studio.drawn(&scene), [2, 3]);
-    assert!(studio.drawn(&scene).is_empty());
+    assert!(fixture.renderer.record(bad.as_scene_ref()).is_err());
+    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert!(fixture.drawn(&scene).is_empty());
 }

@@ -1,4 +1,4 @@
-//! What a timeline says of frames, and that it changes nothing of them.
+//! The timeline of a frame, and that recording it changes nothing.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -10,7 +10,7 @@ use drawloom_testing::scenes::field;
 use crate::renderer;
 
 #[test]
-fn a_recorded_frame_draws_the_same() {
+fn a_frame_draws_the_same_while_the_timeline_records() {
     let scene = field(500);
     for workers in [1, 2] {
         let (mut renderer, submitter) = renderer(workers, Granularity::Chunk(64));
@@ -45,7 +45,7 @@ fn a_log_accounts_for_whole_frames() {
             assert!(frame.began <= spans[0].began && spans[0].began < run.began && run.ended < spans[0].ended);
             assert!(spans[0].ended <= spans[1].began && spans[1].ended == frame.ended);
 
-            // Objects are counted by whoever looks at them, whatever the size of a job.
+            // Each object is counted once by the visibility stage, whatever the size of its jobs.
             let processes = run.graph.nodes.iter().enumerate();
             let seen = processes.filter(|(_, process)| process.labels.stage.as_deref() == Some("visibility"));
             let seen: Vec<_> = seen.map(|(index, _)| run.width(index)).collect();
@@ -60,7 +60,7 @@ fn a_log_accounts_for_whole_frames() {
 }
 
 #[test]
-fn every_job_says_which_process_stage_and_view_it_belongs_to() {
+fn every_node_is_labelled_with_its_process_stage_and_view() {
     let scene = field(300);
     let (mut renderer, _submitter) = renderer(1, Granularity::default());
     renderer.scheduler().timeline().start();
@@ -91,7 +91,7 @@ fn every_job_says_which_process_stage_and_view_it_belongs_to() {
 }
 
 #[test]
-fn a_frame_that_was_not_recorded_cannot_be_reported_on() {
+fn a_frame_without_a_run_has_no_report() {
     let (mut renderer, _submitter) = renderer(1, Granularity::default());
     let mut scene = field(10);
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();

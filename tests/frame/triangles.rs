@@ -1,4 +1,4 @@
-//! Triangles that nobody sees, of meshes that ask for it.
+//! Triangle culling, of meshes that request it.
 
 use std::sync::Arc;
 
@@ -15,19 +15,19 @@ use drawloom_testing::scenes::{as_list, culled, field, square, with_meshes};
 
 use crate::renderer;
 
-/// A frame's statistics, and the renderer that still has its lists.
+/// A frame's statistics, and the renderer with its draw lists.
 fn frame(scene: &Scene, workers: usize, granularity: Granularity) -> (FrameStatistics, Renderer<NullBackend>) {
     let (mut renderer, submitter) = renderer(workers, granularity);
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let submitted = submitter.submit(recorded).unwrap();
-    let of_views: usize = submitted.statistics.views.iter().map(|view| view.culled_triangles.culled()).sum();
+    let culled: usize = submitted.statistics.views.iter().map(|view| view.culled_triangles.culled()).sum();
     let (mut drawn, mut all) = (0, 0);
     for pass in &submitted.submission.passes {
         drawn += pass.triangles;
         let list = renderer.draw_list(&pass.process, pass.view);
         all += list.map_or(0, |list| list.commands().map(|command| triangles_of(scene, command.mesh)).sum());
     }
-    assert_eq!(drawn, all - of_views, "what is not culled is drawn");
+    assert_eq!(drawn, all - culled, "all other triangles are drawn");
     (submitted.statistics, renderer)
 }
 
@@ -37,7 +37,7 @@ fn triangles_of(scene: &Scene, slot: u32) -> usize {
 }
 
 #[test]
-fn what_is_left_is_what_the_view_says_of_each_object() {
+fn remaining_triangles_match_the_views_culling_of_each_object() {
     let scene = with_meshes(field(400), culled);
     for (workers, granularity) in
         [(1, Granularity::Adaptive), (2, Granularity::Chunk(7)), (3, Granularity::PerDraw), (2, Granularity::PerCamera)]
@@ -48,13 +48,13 @@ fn what_is_left_is_what_the_view_says_of_each_object() {
             let mut expected = CulledTriangles::default();
             for process in ["geometry buffer", "transparency"] {
                 let list = renderer.draw_list(process, index).unwrap();
-                for (place, batch) in list.batches.iter().enumerate() {
-                    assert_eq!(batch.count, 1, "each is a draw of its own");
+                for (index, batch) in list.batches.iter().enumerate() {
+                    assert_eq!(batch.count, 1, "each object is a batch of its own");
                     let mut kept = Vec::new();
                     let object = list.objects[batch.first as usize] as usize;
                     expected += view.cull_triangles(&scene.as_scene_ref(), object, &mut kept);
                     let all = triangles_of(&scene, batch.mesh) * 3;
-                    match list.remaining(place) {
+                    match list.remaining(index) {
                         Some(remaining) => {
                             let remaining = remaining.start as usize..remaining.end as usize;
                             assert_eq!(list.remaining_indices()[remaining], kept[..]);
@@ -71,7 +71,7 @@ fn what_is_left_is_what_the_view_says_of_each_object() {
 }
 
 #[test]
-fn nobody_looks_at_what_does_not_ask() {
+fn meshes_that_do_not_request_it_are_not_culled() {
     let (statistics, renderer) = frame(&field(400), 2, Granularity::Adaptive);
     assert!(statistics.views.iter().all(|view| view.culled_triangles == CulledTriangles::default()));
     assert!(!renderer.jobs_to_dot().unwrap().contains("triangles"));
@@ -79,13 +79,13 @@ fn nobody_looks_at_what_does_not_ask() {
     let some = with_meshes(field(400), |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
     let (statistics, renderer) = frame(&some, 2, Granularity::Adaptive);
     let list = renderer.draw_list("geometry buffer", 0).unwrap();
-    let merged = list.batches.iter().enumerate().filter(|(place, _)| list.remaining(*place).is_none());
+    let merged = list.batches.iter().enumerate().filter(|(index, _)| list.remaining(*index).is_none());
     assert!(merged.clone().count() > 0 && merged.clone().any(|(_, batch)| batch.count > 1));
     assert!(statistics.views[0].culled_triangles.back_facing > 0 && statistics.views[0].batches > list.batches.len());
 }
 
 #[test]
-fn asking_can_change_between_frames() {
+fn the_request_may_change_between_frames() {
     let (mut renderer, submitter) = renderer(2, Granularity::Adaptive);
     let mut scene = field(200);
     let mut culled_in = |scene: &Scene| {
@@ -104,7 +104,7 @@ fn asking_can_change_between_frames() {
 }
 
 #[test]
-fn absolute_places_and_paraboloids_keep_every_triangle() {
+fn absolute_transforms_and_paraboloids_cull_no_triangles() {
     let scene = with_meshes(everything(), culled);
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     let absolute = Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() };
@@ -126,10 +126,10 @@ fn absolute_places_and_paraboloids_keep_every_triangle() {
 }
 
 #[test]
-fn a_strip_becomes_the_list_that_it_stands_for() {
+fn a_culled_strip_becomes_an_equivalent_list() {
     let strip = square(Topology::TriangleStrip);
-    let asking = culled(&strip);
-    assert!(asking.culls_triangles() && !strip.culls_triangles());
-    assert_eq!((asking.topology(), asking.triangle_count()), (Topology::TriangleList, strip.triangle_count()));
-    assert!(asking.triangles().eq(strip.triangles()));
+    let requesting = culled(&strip);
+    assert!(requesting.culls_triangles() && !strip.culls_triangles());
+    assert_eq!((requesting.topology(), requesting.triangle_count()), (Topology::TriangleList, strip.triangle_count()));
+    assert!(requesting.triangles().eq(strip.triangles()));
 }

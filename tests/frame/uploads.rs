@@ -1,4 +1,4 @@
-//! What a frame says it has uploaded, on wgpu's backend that does nothing else.
+//! The number of bytes that a frame uploads, on wgpu's noop backend.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 
 #[test]
-fn a_frame_says_how_many_bytes_it_uploaded_and_so_does_its_timeline() {
+fn statistics_and_timeline_report_the_uploaded_bytes() {
     let (device, queue) = adapter::noop_device().unwrap();
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
@@ -28,13 +28,13 @@ fn a_frame_says_how_many_bytes_it_uploaded_and_so_does_its_timeline() {
     used.dedup();
     let meshes = used.into_iter().map(|mesh| scene.assets().get(mesh).unwrap());
     let meshes: usize = meshes.map(|mesh| size_of_val(mesh.vertices()) + size_of_val(mesh.indices())).sum();
-    for (place, statistics) in uploaded.iter().enumerate() {
-        // What all objects are, and four bytes for each that is drawn.
+    for (frame, statistics) in uploaded.iter().enumerate() {
+        // All objects, and a four-byte index per command.
         let commands: usize = statistics.views.iter().map(|view| view.commands).sum();
         let every_frame = (600 * size_of::<GpuObject>() + commands * 4) as u64;
         assert!(statistics.uploaded >= every_frame, "{} of {every_frame}", statistics.uploaded);
         let assets = statistics.uploaded - every_frame;
-        assert_eq!(place == 0, assets > meshes as u64, "frame {place} uploaded {assets} bytes beside what it must");
+        assert_eq!(frame == 0, assets > meshes as u64, "frame {frame} uploaded {assets} bytes of assets");
     }
     let log = scheduler.timeline().take();
     let counted: Vec<_> = log.counters.iter().map(|counter| (counter.name.as_str(), counter.value)).collect();

@@ -1,4 +1,4 @@
-//! Views of several kinds, each drawn by the processes that are for it.
+//! Views of several kinds, each drawn by the processes for its kind.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use drawloom_testing::scenes::field;
 
 use crate::renderer;
 
-/// The depth that a light sees.
+/// Draws a light's depth.
 struct ShadowDepth;
 
 impl RenderProcess for ShadowDepth {
@@ -31,7 +31,7 @@ impl RenderProcess for ShadowDepth {
 }
 
 #[test]
-fn each_kind_goes_through_its_own_processes_and_shadows_go_first() {
+fn each_kind_of_view_has_its_own_processes_and_shadows_come_first() {
     let mut scene = field(400);
     scene.lights = vec![Light::Spot {
         position: DVec3::new(3.0, 30.0, 3.0),
@@ -43,15 +43,15 @@ fn each_kind_goes_through_its_own_processes_and_shadows_go_first() {
         casts_shadow: true,
     }];
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    // The light's own maps are replaced by the engine's.
+    // The engine's process replaces the shipped shadow casters.
     let deferred = Deferred::to_picture().replace("shadow casters", ShadowDepth);
     let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(deferred).build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let queues: Vec<_> = recorded.queues().iter().map(|queue| (queue.view, queue.passes.len())).collect();
     assert_eq!(queues, [(0, 4), (1, 4), (2, 1)]);
     assert_eq!(recorded.statistics().views[2].kind, ViewKind::Shadow);
-    let seen = recorded.statistics().views[2].visible;
-    assert!((10..200).contains(&seen), "{seen} objects in the cone");
+    let visible = recorded.statistics().views[2].visible;
+    assert!((10..200).contains(&visible), "{visible} objects in the cone");
 
     let passes = submitter.submit(recorded).unwrap().submission.passes;
     let order: Vec<_> = passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
@@ -73,7 +73,7 @@ fn each_kind_goes_through_its_own_processes_and_shadows_go_first() {
 }
 
 #[test]
-fn graphs_can_be_looked_at() {
+fn graphs_can_be_exported_to_dot() {
     let (mut renderer, _) = renderer(1, Granularity::default());
     assert!(renderer.jobs_to_dot().is_none());
     drop(renderer.record(field(3).as_scene_ref()).unwrap());
@@ -84,7 +84,7 @@ fn graphs_can_be_looked_at() {
 #[test]
 fn bundles_hold_256_batches_whatever_the_granularity() {
     let mut scene = field(3000);
-    // Every object gets a mesh of its own, so that nothing merges.
+    // Every object has a mesh of its own, so no commands merge.
     let (cube, stone) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
     let cube = scene.assets().get(cube).unwrap().clone();
     for handle in scene.objects().collect::<Vec<_>>() {

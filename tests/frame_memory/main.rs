@@ -1,16 +1,15 @@
-//! How often a steady frame asks for memory, and whose code it is that asks: the crate's, which in its jobs never does, or
-//! wgpu's.
+//! Counts the allocations of steady frames by the code that allocates: the crate, which never does in its jobs, or wgpu.
 //!
-//! The allocator of this binary counts for all threads, so everything is in one test. Frames are static and repeat exactly;
-//! only counted are those after a warm-up in which tables, pools and queues grow to their size.
+//! The allocator of this binary counts for all threads, so there is only one test. Frames are static and repeat exactly.
+//! Counting starts after a warm-up in which tables, pools and queues grow to their final size.
 //!
-//! `DRAWLOOM_SHOW_REQUESTS=1 cargo test --test frame_memory -- --nocapture` prints every place as well. Who asks is read off
-//! stacks, so this takes a build with line tables; and stacks are walked by what unwinds panics on Unix.
+//! `DRAWLOOM_SHOW_ALLOCATIONS=1 cargo test --test frame_memory -- --nocapture` prints every call site as well. The owner of an
+//! allocation is read from its backtrace, so this needs a build with line tables, and Unix's unwinder.
 
 #![cfg(unix)]
 
+mod counting_allocator;
 mod report;
-mod requests;
 mod stack;
 
 use std::env;
@@ -29,46 +28,46 @@ use drawloom_testing::{adapter, scenes};
 use report::Report;
 use stack::{Owner, Stage};
 
-const WARMING: usize = 30;
-const COUNTED: usize = 20;
-const SPELLS: usize = 3;
+const WARM_UP_FRAMES: usize = 30;
+const COUNTED_FRAMES: usize = 20;
+const ROUNDS: usize = 3;
 
-/// wgpu walks stacks itself where `RUST_BACKTRACE` asks for it, which is memory that it otherwise does not take, and a lock
-/// that what counts here needs too. The standard library reads that variable once, so another process is started without.
+/// With `RUST_BACKTRACE` wgpu captures backtraces itself: these allocate, and take a lock that the counting allocator needs too.
+/// The standard library reads the variable once, so the test runs in a child process without it.
 #[test]
-#[cfg_attr(not(debug_assertions), ignore = "without line tables nobody knows where a request comes from")]
-fn requests_for_memory_in_steady_frames() {
+#[cfg_attr(not(debug_assertions), ignore = "backtraces need line tables")]
+fn jobs_of_steady_frames_do_not_allocate() {
     const VARIABLE: &str = "RUST_LIB_BACKTRACE";
     if env::var_os(VARIABLE).is_some_and(|value| value == "0") {
-        return count_requests();
+        return count_allocations();
     }
     let again = Command::new(env::current_exe().unwrap()).args(env::args_os().skip(1)).env(VARIABLE, "0").status();
     assert!(again.unwrap().success());
 }
 
-fn count_requests() {
-    let show = env::var_os("DRAWLOOM_SHOW_REQUESTS").is_some_and(|value| value == "1");
+fn count_allocations() {
+    let show = env::var_os("DRAWLOOM_SHOW_ALLOCATIONS").is_some_and(|value| value == "1");
     let scenes = [("colonnade", demo::colonnade().unwrap()), ("4 × 2,000 boxes", four_cameras())];
     for (name, scene) in &scenes {
         for workers in [1, 2] {
-            let spells = steady_frames(scene, workers);
-            // Whatever a thread does for the first time may take memory once, in any frame.
-            let own = |report: &Report| report.requests_of(Owner::Drawloom, Stage::Jobs);
-            let report = spells.into_iter().min_by_key(own).unwrap();
+            let rounds = steady_frames(scene, workers);
+            // A thread may allocate when it does something for the first time, in any frame. So take the best round.
+            let own = |report: &Report| report.allocations_of(Owner::Drawloom, Stage::Jobs);
+            let report = rounds.into_iter().min_by_key(own).unwrap();
             report.print(&format!("{name}, {workers} workers"), show);
-            assert_eq!(own(&report), 0, "{name}, {workers} workers: requests of jobs in {COUNTED} frames");
-            assert!(report.requests_of(Owner::Wgpu, Stage::Jobs) > 0, "wgpu does take memory, so this would find it");
-            let unknown = [Owner::Drawloom, Owner::Wgpu].map(|owner| report.requests_of(owner, Stage::Unknown));
-            assert_eq!(unknown, [0, 0], "every request of a frame is of a stage");
+            assert_eq!(own(&report), 0, "{name}, {workers} workers: allocations of jobs in {COUNTED_FRAMES} frames");
+            assert!(report.allocations_of(Owner::Wgpu, Stage::Jobs) > 0, "wgpu allocates in jobs, so counting works");
+            let unknown = [Owner::Drawloom, Owner::Wgpu].map(|owner| report.allocations_of(owner, Stage::Unknown));
+            assert_eq!(unknown, [0, 0], "every allocation of a frame has a known stage");
         }
     }
 }
 
-/// What some spells of frames asked for.
+/// The allocations of several rounds of frames.
 fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let (device, queue) = adapter::noop_device().unwrap();
-    // To try another way takes memory once.
+    // Fixed strategies, because a trial of the tuner allocates once.
     let backend = WgpuBackend::new(device, queue)
         .unwrap()
         .recording_strategy(RecordingStrategy::CachedBundles)
@@ -77,24 +76,24 @@ fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {
-        requests::count(is_counted);
+        counting_allocator::count(is_counted);
         let recorded = renderer.record(scene.as_scene_ref()).unwrap();
         let submission: WgpuSubmission = submitter.submit(recorded).unwrap().submission;
-        requests::count(false);
+        counting_allocator::count(false);
         submission.wait().unwrap();
     };
-    // Resolving a stack takes far longer than a frame. So the last of the warming frames meet those that there are, and the
-    // scheduler then learns again what a frame costs.
-    (0..WARMING).for_each(|index| frame(index % 3 == 2));
-    let mut spell = || {
-        requests::forget();
-        (0..COUNTED).for_each(|_| frame(true));
-        Report::new(requests::take(), COUNTED)
+    // Resolving a backtrace takes far longer than a frame. So some warm-up frames count, which resolves the backtraces, and the
+    // others let the scheduler learn a frame's usual cost again.
+    (0..WARM_UP_FRAMES).for_each(|index| frame(index % 3 == 2));
+    let mut round = || {
+        counting_allocator::reset();
+        (0..COUNTED_FRAMES).for_each(|_| frame(true));
+        Report::new(counting_allocator::take(), COUNTED_FRAMES)
     };
-    (0..SPELLS).map(|_| spell()).collect()
+    (0..ROUNDS).map(|_| round()).collect()
 }
 
-/// Four cameras around one cloud of boxes: each sees nearly all of it.
+/// Four cameras around a cloud of boxes; each sees nearly all of it.
 fn four_cameras() -> Scene {
     let mut scene = scenes::field(2_000);
     let around = [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z];

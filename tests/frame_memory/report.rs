@@ -1,60 +1,60 @@
-//! What was counted, by stage and by place.
+//! Allocations by stage and by call site.
 
 use std::collections::BTreeMap;
 
-use crate::requests::Request;
-use crate::stack::{self, Owner, Place, Stage};
+use crate::counting_allocator::AllocationSite;
+use crate::stack::{self, CallSite, Owner, Stage};
 
-/// The requests of some frames.
+/// The allocations of a number of frames.
 pub struct Report {
     frames: usize,
-    places: BTreeMap<Place, usize>,
+    call_sites: BTreeMap<CallSite, usize>,
 }
 
 impl Report {
-    pub fn new(requests: Vec<Request>, frames: usize) -> Self {
-        let mut places = BTreeMap::new();
-        for request in requests {
-            *places.entry(stack::read(&request.stack)).or_default() += request.count;
+    pub fn new(sites: Vec<AllocationSite>, frames: usize) -> Self {
+        let mut call_sites = BTreeMap::new();
+        for site in sites {
+            *call_sites.entry(stack::read(&site.backtrace)).or_default() += site.count;
         }
-        Self { frames, places }
+        Self { frames, call_sites }
     }
 
-    /// How many requests are of this owner, at this stage, over all frames.
-    pub fn requests_of(&self, owner: Owner, stage: Stage) -> usize {
-        self.sum(|place| (place.owner, place.stage) == (owner, stage))
+    /// The number of this owner's allocations at this stage, over all frames.
+    pub fn allocations_of(&self, owner: Owner, stage: Stage) -> usize {
+        self.sum(|site| (site.owner, site.stage) == (owner, stage))
     }
 
-    /// Prints requests a frame by stage; and every place, if it is to `show` them.
+    /// Prints the allocations per frame by stage, and all call sites if `show` is set.
     pub fn print(&self, case: &str, show: bool) {
-        println!("\n{case}: requests a frame, of {} frames", self.frames);
+        println!("\n{case}: allocations per frame, mean of {} frames", self.frames);
         println!("| {:<7} | {:>8} | {:>8} | {:>8} |", "stage", "drawloom", "wgpu", "others");
         println!("| ------- | -------: | -------: | -------: |");
         for stage in [Stage::Jobs, Stage::Around, Stage::Submit, Stage::Unknown] {
-            let [ours, wgpu, others] =
-                [Owner::Drawloom, Owner::Wgpu, Owner::Nobody].map(|owner| self.a_frame(self.requests_of(owner, stage)));
+            let [ours, wgpu, others] = [Owner::Drawloom, Owner::Wgpu, Owner::Other]
+                .map(|owner| self.per_frame(self.allocations_of(owner, stage)));
             let name = format!("{stage:?}").to_lowercase();
             println!("| {name:<7} | {ours:>8.2} | {wgpu:>8.2} | {others:>8.2} |");
         }
         if show {
-            self.print_places();
+            self.print_call_sites();
         }
     }
 
-    fn print_places(&self) {
-        let mut places: Vec<_> = self.places.iter().collect();
-        places.sort_by_key(|&(place, &count)| (place.owner, std::cmp::Reverse(count)));
-        for (place, &count) in places {
-            let Place { stage, owner, lines } = place;
-            println!("{:>9.2} {owner:?}, {stage:?}: {}", self.a_frame(count), lines.join(" < "));
+    fn print_call_sites(&self) {
+        let mut call_sites: Vec<_> = self.call_sites.iter().collect();
+        call_sites.sort_by_key(|&(site, &count)| (site.owner, std::cmp::Reverse(count)));
+        for (site, &count) in call_sites {
+            let CallSite { stage, owner, lines } = site;
+            println!("{:>9.2} {owner:?}, {stage:?}: {}", self.per_frame(count), lines.join(" < "));
         }
     }
 
-    fn sum(&self, is_wanted: impl Fn(&Place) -> bool) -> usize {
-        self.places.iter().filter(|(place, _)| is_wanted(place)).map(|(_, count)| count).sum()
+    fn sum(&self, is_counted: impl Fn(&CallSite) -> bool) -> usize {
+        self.call_sites.iter().filter(|(site, _)| is_counted(site)).map(|(_, count)| count).sum()
     }
 
-    fn a_frame(&self, count: usize) -> f64 {
+    fn per_frame(&self, count: usize) -> f64 {
         count as f64 / self.frames as f64
     }
 }

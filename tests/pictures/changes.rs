@@ -7,8 +7,8 @@ use drawloom_testing::scenes::{cube, field, square, textured};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::assert_different;
-use crate::studio::{Studio, draw};
+use crate::fixture::{Fixture, draw};
+use crate::image_distance::assert_different;
 
 pub const CASES: &[Case] = &[
     ("a_resized_view_draws_what_a_new_one_draws", resized),
@@ -23,22 +23,22 @@ pub const CASES: &[Case] = &[
 
 fn resized() -> Result<(), Failed> {
     let mut scene = field(200);
-    let mut studio = Studio::new()?;
-    let first = studio.draw(&scene)?;
+    let mut fixture = Fixture::new()?;
+    let first = fixture.draw(&scene)?;
     for size in [[100, 300], [333, 77], [1, 1]] {
         scene.cameras[0].size = size;
-        if studio.draw(&scene)? != draw(&scene)? {
+        if fixture.draw(&scene)? != draw(&scene)? {
             return Err(format!("{size:?}").into());
         }
     }
     scene.cameras[0].size = field(0).cameras[0].size;
-    if studio.draw(&scene)? == first { Ok(()) } else { Err("back at the first size it differs".into()) }
+    if fixture.draw(&scene)? == first { Ok(()) } else { Err("back at the first size it differs".into()) }
 }
 
 fn objects_come_and_go() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for count in [10, 3000, 0, 257, 256] {
-        if studio.draw(&field(count))? != draw(&field(count))? {
+        if fixture.draw(&field(count))? != draw(&field(count))? {
             return Err(format!("{count} objects").into());
         }
     }
@@ -47,8 +47,8 @@ fn objects_come_and_go() -> Result<(), Failed> {
 
 fn assets_change() -> Result<(), Failed> {
     let mut scene = field(100);
-    let mut studio = Studio::new()?;
-    let mut previous = studio.draw(&scene)?;
+    let mut fixture = Fixture::new()?;
+    let mut previous = fixture.draw(&scene)?;
     let (mesh, material) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
 
     let checker = [[255, 0, 0, 255], [0, 0, 255, 255]].concat().repeat(8);
@@ -70,7 +70,7 @@ fn assets_change() -> Result<(), Failed> {
     ];
     for (name, change) in changes {
         change(&mut scene)?;
-        let picture = studio.draw(&scene)?;
+        let picture = fixture.draw(&scene)?;
         assert_different(&picture, &previous).map_err(|_| format!("{name}: nothing changed"))?;
         if picture != draw(&scene)? {
             return Err(format!("{name}: a new renderer draws something else").into());
@@ -83,14 +83,14 @@ fn assets_change() -> Result<(), Failed> {
         let material = scene.add(Material::default())?;
         scene.add_object(RenderObject::new(new, material, DVec3::new(0.0, 0.0, -500.0)))?;
     }
-    if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("after the move it differs".into()) }
+    if fixture.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("after the move it differs".into()) }
 }
 
 fn frames_in_flight() -> Result<(), Failed> {
     let mut scene = field(300);
     let before = draw(&scene)?;
-    let mut studio = Studio::new()?;
-    let first = studio.record(&scene)?;
+    let mut fixture = Fixture::new()?;
+    let first = fixture.record(&scene)?;
     let (mesh, material) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
     scene.replace(mesh, square(Topology::TriangleList))?;
     scene.replace(material, Material { diffuse: Vec3::X, ..Material::default() })?;
@@ -105,29 +105,29 @@ fn frames_in_flight() -> Result<(), Failed> {
         }
     }
     scene.cameras[0].position.y += 3.0;
-    let second = studio.record(&scene)?;
+    let second = fixture.record(&scene)?;
     let after = draw(&scene)?;
-    if studio.submit(first)?.read(0, "picture")? != before {
+    if fixture.submit(first)?.read(0, "picture")? != before {
         return Err("the first frame shows what came after it".into());
     }
-    if studio.submit(second)?.read(0, "picture")? != after { Err("the second frame differs".into()) } else { Ok(()) }
+    if fixture.submit(second)?.read(0, "picture")? != after { Err("the second frame differs".into()) } else { Ok(()) }
 }
 
 fn dropped() -> Result<(), Failed> {
     let (one, other) = (field(300), field(50));
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for _ in 0..3 {
-        drop(studio.record(&one)?);
+        drop(fixture.record(&one)?);
     }
-    let recorded = studio.record(&other)?;
-    drop(studio.record(&one)?);
-    let picture = studio.submit(recorded)?.read(0, "picture")?;
+    let recorded = fixture.record(&other)?;
+    drop(fixture.record(&one)?);
+    let picture = fixture.submit(recorded)?.read(0, "picture")?;
     if picture == draw(&other)? { Ok(()) } else { Err("a dropped frame shows".into()) }
 }
 
 fn another_scene() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
-    studio.draw(&field(100))?;
+    let mut fixture = Fixture::new()?;
+    fixture.draw(&field(100))?;
     // The same slots, in collections that have changed as often, with other things in them.
     let with = |mesh: Mesh| -> Result<Scene, Failed> {
         let mut scene = field(0);
@@ -135,17 +135,17 @@ fn another_scene() -> Result<(), Failed> {
         scene.add_object(RenderObject { scale: Vec3::splat(3.0), ..RenderObject::new(mesh, material, DVec3::ZERO) })?;
         Ok(scene)
     };
-    studio.draw(&with(cube())?)?;
+    fixture.draw(&with(cube())?)?;
     let scene = with(square(Topology::TriangleList))?;
-    if studio.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("it is mixed with the first".into()) }
+    if fixture.draw(&scene)? == draw(&scene)? { Ok(()) } else { Err("it is mixed with the first".into()) }
 }
 
 fn removed_texture() -> Result<(), Failed> {
     let (mut scene, textures) = textured(3);
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     scene.remove(textures[1])?;
     for _ in 0..2 {
-        let recorded = studio.record(&scene)?;
+        let recorded = fixture.record(&scene)?;
         let told = recorded.statistics().rejections.iter();
         let told: Vec<_> = told.map(|rejection| (rejection.reason, rejection.count)).collect();
         if told != [(RejectionReason::StaleTexture, 1)] {
@@ -156,12 +156,12 @@ fn removed_texture() -> Result<(), Failed> {
 }
 
 fn views_come_and_go() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let scene = field(100);
     for cameras in [&scene.cameras[..1], &scene.cameras[..], &scene.cameras[1..], &scene.cameras[..]] {
         let mut part = field(100);
         part.cameras = cameras.to_vec();
-        if studio.draw(&part)? != draw(&part)? {
+        if fixture.draw(&part)? != draw(&part)? {
             return Err(format!("{} views", cameras.len()).into());
         }
     }

@@ -1,4 +1,4 @@
-//! When the device drew which pass, on the timeline's axis.
+//! When the device drew each pass, on the timeline's axis.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -20,74 +20,76 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::studio::Studio;
-use crate::techniques::{device, drawn_anew, expect, many_batches, pictures, studio_of, techniques};
+use crate::fixture::Fixture;
+use crate::strategies::{device, drawn_by_a_new_renderer, expect, fixture_of, many_batches, pictures, strategies};
 
 pub const CASES: &[Case] = &[
     ("every_pass_is_timed_once_however_it_is_recorded", however_recorded),
-    ("times_of_frames_on_their_way_stay_apart", on_their_way),
+    ("times_of_frames_in_flight_stay_apart", frames_in_flight),
     ("more_passes_than_a_query_set_holds_are_timed", many_passes),
-    ("raw_passes_are_timed_where_the_device_can", raw_passes),
-    ("times_of_frames_that_were_not_timed_or_are_lost_are_an_error", no_times),
+    ("raw_passes_are_timed_if_the_device_supports_it", raw_passes),
+    ("reading_times_of_untimed_or_lost_frames_is_an_error", no_times),
 ];
 
-/// A timing backend on the machine's adapter; `None` where that writes no timestamps, and then it has to say so.
+/// A timing backend on the machine's adapter; `None` if that writes no timestamps, which must be an error naming the feature.
 fn timing() -> Result<Option<WgpuBackend>, Failed> {
     let (device, queue) = device()?;
-    let has_them = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    let has_timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
     match WgpuBackend::new(device, queue)?.time_passes() {
-        Ok(backend) if has_them => Ok(Some(backend)),
-        Err(BackendError::MissingFeature { missing }) if !has_them && missing.contains("TIMESTAMP_QUERY") => Ok(None),
+        Ok(backend) if has_timestamps => Ok(Some(backend)),
+        Err(BackendError::MissingFeature { missing }) if !has_timestamps && missing.contains("TIMESTAMP_QUERY") => {
+            Ok(None)
+        }
         Ok(_) => Err("passes are timed without timestamps".into()),
         Err(other) => Err(other.into()),
     }
 }
 
-/// Process and view of every pass of a frame, in the order they are submitted.
-fn names_of(studio: &Studio, recorded: &Recorded<WgpuBackend>) -> Vec<(String, String)> {
+/// The names of process and view of every pass of a frame, in submission order.
+fn names_of(fixture: &Fixture, recorded: &Recorded<WgpuBackend>) -> Vec<(String, String)> {
     let mut passes: Vec<_> =
         recorded.queues().iter().flat_map(|queue| queue.passes.iter().map(|(pass, _)| *pass)).collect();
     passes.sort();
-    let processes = studio.renderer.plan().processes();
+    let processes = fixture.renderer.plan().processes();
     let views = &recorded.statistics().views;
     let names =
         |(process, view): (usize, usize)| (processes[process].process.name().to_owned(), views[view].name.clone());
     passes.into_iter().map(|pass| names((pass.process_index, pass.view_index))).collect()
 }
 
-fn told(times: &DevicePassTimes) -> Vec<(String, String)> {
+fn names_in(times: &DevicePassTimes) -> Vec<(String, String)> {
     times.passes.iter().map(|pass| (pass.process.clone(), pass.view.clone())).collect()
 }
 
-/// Draws a frame, and checks its times: every pass once, in order, while it was drawn.
-fn timed(studio: &mut Studio, scene: &Scene) -> Result<(WgpuSubmission, DeviceLog), Failed> {
-    let scheduler = Arc::clone(studio.renderer.scheduler());
+/// Draws a frame, and checks its times: each pass once, in order, within the time of drawing.
+fn timed(fixture: &mut Fixture, scene: &Scene) -> Result<(WgpuSubmission, DeviceLog), Failed> {
+    let scheduler = Arc::clone(fixture.renderer.scheduler());
     let timeline = scheduler.timeline();
     let clock =
-        |studio: &Studio| -> Result<DeviceClock, Failed> { Ok(studio.renderer.backend().device_clock(timeline)?) };
-    let earlier = clock(studio)?;
-    let recorded = studio.record(scene)?;
-    let expected = names_of(studio, &recorded);
+        |fixture: &Fixture| -> Result<DeviceClock, Failed> { Ok(fixture.renderer.backend().device_clock(timeline)?) };
+    let earlier = clock(fixture)?;
+    let recorded = fixture.record(scene)?;
+    let expected = names_of(fixture, &recorded);
     let before = timeline.now();
-    let submission = studio.submit(recorded)?;
+    let submission = fixture.submit(recorded)?;
     submission.wait()?;
     let after = timeline.now();
     let times = submission.pass_times()?;
-    expect(submission.pass_times()? == times, || "asked again, the device says something else".to_owned())?;
+    expect(submission.pass_times()? == times, || "a second read returns other times".to_owned())?;
     expect(times.skipped == 0, || format!("{} passes were skipped", times.skipped))?;
-    expect(told(&times) == expected, || format!("{:?} instead of {expected:?}", told(&times)))?;
+    expect(names_in(&times) == expected, || format!("{:?} instead of {expected:?}", names_in(&times)))?;
     let ordered = times.passes.iter().all(|pass| Duration::ZERO < pass.began && pass.began <= pass.ended);
     expect(ordered, || format!("out of order: {times:?}"))?;
 
-    let log = earlier.until(clock(studio)?).log([(7, times)]);
+    let log = earlier.until(clock(fixture)?).log([(7, times)]);
     let [mut of_log, mut of_frame] =
         [log.passes.iter().map(|pass| (pass.process.clone(), pass.view.clone())).collect::<Vec<_>>(), expected];
     of_log.sort();
     of_frame.sort();
     expect(of_log == of_frame, || format!("the log has {of_log:?}"))?;
     expect(log.passes.iter().all(|pass| pass.frame == 7), || "passes of another frame".to_owned())?;
-    expect(log.passes.is_sorted_by_key(|pass| pass.began), || "not by when they began".to_owned())?;
-    expect(log.name == studio.renderer.backend().adapter_name(), || log.name.clone())?;
+    expect(log.passes.is_sorted_by_key(|pass| pass.began), || "not sorted by begin".to_owned())?;
+    expect(log.name == fixture.renderer.backend().adapter_name(), || log.name.clone())?;
     for pass in &log.passes {
         let while_drawn = pass.began + log.error >= before && pass.ended <= after + log.error;
         expect(while_drawn, || format!("not from {before:?} to {after:?}, ± {:?}: {pass:?}", log.error))?;
@@ -97,29 +99,30 @@ fn timed(studio: &mut Studio, scene: &Scene) -> Result<(WgpuSubmission, DeviceLo
 
 fn however_recorded() -> Result<(), Failed> {
     let scene = many_batches();
-    let expected = drawn_anew(&scene)?;
-    for (record, encode) in techniques()? {
+    let expected = drawn_by_a_new_renderer(&scene)?;
+    for (recording, encoding) in strategies()? {
         let Some(backend) = timing()? else { return Ok(()) };
-        let mut studio = studio_of(backend.recording_strategy(record)?.encoding_strategy(encode))?;
+        let mut fixture = fixture_of(backend.recording_strategy(recording)?.encoding_strategy(encoding))?;
         for frame in 0..2 {
-            let named = |failed: Failed| Failed::from(format!("{record:?}, {encode:?}, frame {frame}: {failed:?}"));
-            timed(&mut studio, &scene).map_err(named)?;
-            let split = studio.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
-            expect(split == (encode == EncodingStrategy::Split), || {
-                format!("{encode:?}, and passes are split: {split}")
+            let named =
+                |failed: Failed| Failed::from(format!("{recording:?}, {encoding:?}, frame {frame}: {failed:?}"));
+            timed(&mut fixture, &scene).map_err(named)?;
+            let split = fixture.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
+            expect(split == (encoding == EncodingStrategy::Split), || {
+                format!("{encoding:?}, and passes are split: {split}")
             })?;
         }
-        let recorded = studio.record(&scene)?;
-        let same = pictures(&studio, recorded, &scene)? == expected;
-        expect(same, || format!("{record:?}, {encode:?}: with times the picture is another one"))?;
+        let recorded = fixture.record(&scene)?;
+        let same = pictures(&fixture, recorded, &scene)? == expected;
+        expect(same, || format!("{recording:?}, {encoding:?}: with times the picture differs"))?;
     }
     Ok(())
 }
 
-fn on_their_way() -> Result<(), Failed> {
+fn frames_in_flight() -> Result<(), Failed> {
     let Some(backend) = timing()? else { return Ok(()) };
-    let mut studio = studio_of(backend)?;
-    // Of other passes each: one more view, no lights.
+    let mut fixture = fixture_of(backend)?;
+    // Each with other passes: one more view, no lights.
     let mut scenes = vec![everything(), everything(), everything()];
     let another = Camera { name: "another".to_owned(), ..scenes[1].cameras[0].clone() };
     scenes[1].cameras.push(another);
@@ -127,19 +130,19 @@ fn on_their_way() -> Result<(), Failed> {
     for round in 0..3 {
         let mut submitted = Vec::new();
         for scene in &scenes {
-            let recorded = studio.record(scene)?;
-            let names = names_of(&studio, &recorded);
-            // One that is never submitted lies between them.
-            drop(studio.record(&scenes[round])?);
-            submitted.push((names, studio.submit(recorded)?));
+            let recorded = fixture.record(scene)?;
+            let names = names_of(&fixture, &recorded);
+            // A frame in between is never submitted.
+            drop(fixture.record(&scenes[round])?);
+            submitted.push((names, fixture.submit(recorded)?));
         }
         let counts: Vec<_> = submitted.iter().map(|(names, _)| names.len()).collect();
         expect(counts[0] < counts[1] && counts[2] < counts[0], || format!("{counts:?} passes"))?;
         let mut earlier: Vec<DevicePassTimes> = Vec::new();
         for (names, submission) in &submitted {
             let times = submission.pass_times()?;
-            expect(told(&times) == *names, || format!("round {round}: {times:?} instead of {names:?}"))?;
-            expect(!earlier.contains(&times), || "two frames were drawn at once".to_owned())?;
+            expect(names_in(&times) == *names, || format!("round {round}: {times:?} instead of {names:?}"))?;
+            expect(!earlier.contains(&times), || "two frames have the same times".to_owned())?;
             earlier.push(times);
         }
         for ((_, submission), times) in submitted.iter().zip(earlier) {
@@ -151,22 +154,23 @@ fn on_their_way() -> Result<(), Failed> {
 
 fn many_passes() -> Result<(), Failed> {
     let Some(backend) = timing()? else { return Ok(()) };
-    let mut studio =
-        studio_of(backend.recording_strategy(RecordingStrategy::Direct)?.encoding_strategy(EncodingStrategy::PerPass))?;
+    let mut fixture = fixture_of(
+        backend.recording_strategy(RecordingStrategy::Direct)?.encoding_strategy(EncodingStrategy::PerPass),
+    )?;
     let mut scene = field(20);
     let camera = scene.cameras[0].clone();
     for cameras in [2, 130, 30] {
         let named = |number| Camera { name: format!("camera {number}"), size: [4, 4], ..camera.clone() };
         scene.cameras = (0..cameras).map(named).collect();
-        let (_, log) = timed(&mut studio, &scene)?;
-        let least = cameras * studio.renderer.plan().processes().len() / 2;
-        expect(log.passes.len() >= least, || format!("{} passes of {cameras} cameras", log.passes.len()))?;
+        let (_, log) = timed(&mut fixture, &scene)?;
+        let min_passes = cameras * fixture.renderer.plan().processes().len() / 2;
+        expect(log.passes.len() >= min_passes, || format!("{} passes of {cameras} cameras", log.passes.len()))?;
         expect(cameras < 130 || log.passes.len() > 512, || format!("only {} passes", log.passes.len()))?;
     }
     Ok(())
 }
 
-/// A pass that encodes itself, and one that does not.
+/// A raw pass, or one that is not.
 struct Own {
     is_raw: bool,
 }
@@ -231,21 +235,21 @@ fn raw_passes() -> Result<(), Failed> {
             .process(Own { is_raw: false })
             .output("drawn");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
-        let mut studio = Studio { renderer, submitter };
+        let mut fixture = Fixture { renderer, submitter };
         let mut scene = field(3);
         scene.cameras.truncate(1);
         let (times_raw, view) = (features == WgpuBackend::TIMING_FEATURES, scene.cameras[0].name.clone());
-        let recorded = studio.record(&scene)?;
-        let times = studio.submit(recorded)?.pass_times()?;
+        let recorded = fixture.record(&scene)?;
+        let times = fixture.submit(recorded)?.pass_times()?;
         let expected = [("raw", times_raw), ("drawn", true)].into_iter().filter(|(_, is_timed)| *is_timed);
         let expected: Vec<_> = expected.map(|(process, _)| (process.to_owned(), view.clone())).collect();
-        expect(told(&times) == expected && times.skipped == 0, || format!("{features:?}: {times:?}"))?;
+        expect(names_in(&times) == expected && times.skipped == 0, || format!("{features:?}: {times:?}"))?;
     }
     Ok(())
 }
 
 fn no_times() -> Result<(), Failed> {
-    let mut untimed = Studio::new()?;
+    let mut untimed = Fixture::new()?;
     let recorded = untimed.record(&field(3))?;
     match untimed.submit(recorded)?.pass_times() {
         Err(BackendError::NotTimed) => {}
@@ -259,17 +263,17 @@ fn no_times() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
     let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
-    let mut studio = Studio { renderer, submitter };
-    let recorded = studio.record(&field(3))?;
-    let submission = studio.submit(recorded)?;
+    let mut fixture = Fixture { renderer, submitter };
+    let recorded = fixture.record(&field(3))?;
+    let submission = fixture.submit(recorded)?;
     device.destroy();
     let times = submission.pass_times();
     expect(matches!(times, Err(BackendError::DeviceLost { .. })), || format!("{times:?}"))?;
-    let clock = studio.renderer.backend().device_clock(scheduler.timeline());
+    let clock = fixture.renderer.backend().device_clock(scheduler.timeline());
     expect(clock.is_err(), || format!("{clock:?}"))
 }
 
-/// The machine's adapter with these features alone.
+/// A device on the machine's adapter with only these features.
 fn device_with(required_features: wgpu::Features) -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions {

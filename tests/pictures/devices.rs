@@ -1,4 +1,4 @@
-//! Devices that draw nothing, or too little.
+//! Devices that draw nothing, or lack features or limits.
 
 use std::sync::Arc;
 
@@ -16,14 +16,14 @@ use libtest_mimic::Failed;
 use crate::Case;
 
 pub const CASES: &[Case] = &[
-    ("noop_takes_every_frame", noop),
-    ("a_device_with_low_limits_is_refused_by_the_limits_name", low_limits),
-    ("a_way_to_record_that_the_device_lacks_a_feature_for_is_refused_by_the_features_name", no_indirect_draws),
-    ("times_of_passes_on_a_device_that_writes_none_are_refused_by_the_features_name", no_timestamps),
-    ("indirect_draws_that_wgpu_panics_over_are_an_error", indirect_draws_on_noop),
+    ("the_noop_device_accepts_every_frame", noop),
+    ("a_device_with_a_low_limit_is_refused_naming_the_limit", low_limits),
+    ("a_recording_strategy_without_its_feature_is_refused_naming_the_feature", no_indirect_draws),
+    ("timing_passes_without_timestamps_is_refused_naming_the_feature", no_timestamps),
+    ("a_panic_of_wgpu_over_indirect_draws_is_an_error", indirect_draws_on_noop),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
-    ("more_objects_than_a_shader_can_read_are_refused_and_fewer_drawn_again", many_objects),
-    ("more_shadow_maps_than_a_texture_has_layers_are_refused_and_fewer_drawn_again", many_shadow_maps),
+    ("too_many_objects_for_a_storage_buffer_are_refused_and_later_frames_are_drawn", many_objects),
+    ("more_shadow_maps_than_texture_layers_are_refused_and_later_frames_are_drawn", many_shadow_maps),
     ("a_lost_device_is_an_error", lost_device),
     ("textures_beyond_the_devices_layers_are_counted", many_textures),
 ];
@@ -58,8 +58,8 @@ fn low_limits() -> Result<(), Failed> {
 
 fn no_indirect_draws() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
-    for record in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
-        WgpuBackend::new(device.clone(), queue.clone())?.recording_strategy(record)?;
+    for recording in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
+        WgpuBackend::new(device.clone(), queue.clone())?.recording_strategy(recording)?;
     }
     match WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::Indirect).err() {
         Some(BackendError::MissingFeature { missing }) if missing.contains("INDIRECT_FIRST_INSTANCE") => Ok(()),
@@ -69,7 +69,7 @@ fn no_indirect_draws() -> Result<(), Failed> {
 
 fn no_timestamps() -> Result<(), Failed> {
     let scheduler = Scheduler::new(1)?;
-    // wgpu's own backend claims every feature.
+    // wgpu's noop backend claims every feature.
     for (features, reason) in [(wgpu::Features::empty(), ""), (WgpuBackend::TIMING_FEATURES, "noop")] {
         let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, features)?;
         let clock = WgpuBackend::new(device.clone(), queue.clone())?.device_clock(scheduler.timeline());
@@ -84,18 +84,19 @@ fn no_timestamps() -> Result<(), Failed> {
     Ok(())
 }
 
-/// On wgpu's own backend its check of indirect draws panics as a pass is finished, on whatever thread that is.
+/// On wgpu's noop backend, its validation of indirect draws panics when a pass is finished, on whichever thread does that.
 fn indirect_draws_on_noop() -> Result<(), Failed> {
-    for encode in [EncodingStrategy::PerPass, EncodingStrategy::OnSubmit] {
+    for encoding in [EncodingStrategy::PerPass, EncodingStrategy::OnSubmit] {
         let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, WgpuBackend::OPTIONAL_FEATURES)?;
-        let backend =
-            WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::Indirect)?.encoding_strategy(encode);
+        let backend = WgpuBackend::new(device, queue)?
+            .recording_strategy(RecordingStrategy::Indirect)?
+            .encoding_strategy(encoding);
         let (mut renderer, submitter) =
             Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
         let scene = field(500);
         for _ in 0..2 {
             if renderer.record(scene.as_scene_ref()).is_ok_and(|frame| submitter.submit(frame).is_ok()) {
-                return Err(format!("{encode:?}: wgpu takes them by now").into());
+                return Err(format!("{encoding:?}: wgpu accepts them by now").into());
             }
         }
     }
@@ -185,18 +186,18 @@ fn many_textures() -> Result<(), Failed> {
 }
 
 fn lost_device() -> Result<(), Failed> {
-    for record in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
-        for encode in [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit] {
-            lost_while(record, encode).map_err(|failed| format!("{record:?} {encode:?}: {failed:?}"))?;
+    for recording in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
+        for encoding in [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit] {
+            lost_while(recording, encoding).map_err(|failed| format!("{recording:?} {encoding:?}: {failed:?}"))?;
         }
     }
     Ok(())
 }
 
-fn lost_while(record: RecordingStrategy, encode: EncodingStrategy) -> Result<(), Failed> {
+fn lost_while(recording: RecordingStrategy, encoding: EncodingStrategy) -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(record)?.encoding_strategy(encode);
+    let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
     let scene = field(500);
     submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;

@@ -7,8 +7,8 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::assert_color;
-use crate::studio::{Studio, draw, pixel};
+use crate::fixture::{Fixture, draw, pixel};
+use crate::image_distance::assert_color;
 
 pub const CASES: &[Case] = &[
     ("a_black_surface_stays_black_in_any_light", black),
@@ -66,15 +66,15 @@ fn coarse() -> Result<(), Failed> {
     let object = RenderObject::new(mesh, material, DVec3::NEG_Z * 9.0);
     scene.add_object(RenderObject { scale: Vec3::splat(1e4), ..object })?;
     scene.lights = vec![lamp(1.0, 5.0, true), lamp(2.0, 5.0, true)];
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for _ in 0..2 {
-        let recorded = studio.record(&scene)?;
+        let recorded = fixture.record(&scene)?;
         let told: Vec<_> = recorded.statistics().rejections.clone();
         let counts: Vec<_> = told.iter().map(|told| (told.reason, told.count, told.first)).collect();
         if counts != [(RejectionReason::CoarseEdges, 1, 1)] {
             return Err(format!("{counts:?}").into());
         }
-        studio.submit(recorded)?;
+        fixture.submit(recorded)?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What a quality says of formats: of the geometry buffer's targets, of vertices, and of the picture's tones.
+//! Formats of a quality: the geometry buffer's targets, vertices, and the tone curve.
 
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec2, Vec3};
@@ -13,35 +13,35 @@ use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{Distance, as_image, assert_color, tone_mapped};
+use crate::fixture::{Fixture, draw, pixel};
+use crate::image_distance::{Distance, as_image, assert_color, tone_mapped};
 use crate::references::colonnade;
-use crate::studio::{Studio, draw, pixel};
 
 pub const CASES: &[Case] = &[
     ("normals_read_back_are_within_their_bound", normals),
     ("packed_normals_read_back_are_within_their_bound", packed_normals),
-    ("vertices_that_pack_without_loss_change_no_byte", packed_without_loss),
-    ("packed_vertices_show_the_same_to_the_eye", packed_alike),
-    ("normals_and_diffuse_colours_of_a_quality_show_the_same_to_the_eye", targets_alike),
-    ("formats_that_change_between_frames_leave_no_trace", changes),
-    ("a_frame_on_its_way_keeps_its_vertices", frame_on_its_way),
+    ("vertices_that_pack_losslessly_change_no_byte", packed_without_loss),
+    ("packed_vertices_change_the_picture_within_their_bound", packed_alike),
+    ("formats_of_normals_and_diffuse_colours_change_the_picture_within_their_bounds", targets_alike),
+    ("frames_after_a_change_of_formats_are_those_of_a_new_renderer", changes),
+    ("a_frame_in_flight_keeps_its_vertices", frame_in_flight),
     ("diffuse_colours_read_back_are_within_their_bound", diffuse),
-    ("the_clipped_curve_cuts_off_at_1", clipped),
-    ("a_quality_changes_the_curve_and_leaves_other_steps_alone", curve_of_quality),
+    ("the_clipped_curve_clips_at_1", clipped),
+    ("a_quality_changes_the_tone_curve_and_no_other_post_process", curve_of_quality),
 ];
 
 const NORMALS: [NormalFormat; 4] =
     [NormalFormat::Octahedral8, NormalFormat::Octahedral10, NormalFormat::Octahedral16, NormalFormat::HalfFloat];
 
-fn studio(quality: Quality) -> Result<Studio, Failed> {
-    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+fn fixture(quality: Quality) -> Result<Fixture, Failed> {
+    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
 }
 
-/// Pixels along a side of the pictures that show a vertex a pixel.
+/// The size of pictures in which each pixel shows one vertex.
 const SIDE: usize = 128;
 
-/// A scene that shows in each pixel, row by row, a square that faces the camera, of one of these normals and texture coordinates.
-fn one_a_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
+/// A scene with one quad per pixel, row by row. Each faces the camera and has one of these normals and texture coordinates.
+fn one_quad_per_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
     for (number, (normal, uv)) in shown.iter().enumerate() {
         let left_top = [(number % SIDE) as f32 - SIDE as f32 / 2.0, SIDE as f32 / 2.0 - (number / SIDE) as f32];
@@ -66,8 +66,8 @@ fn one_a_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture
     Ok(scene)
 }
 
-/// As many normals as there are pixels: the axes, some beside the fold of the octahedron, those in the middle between the steps
-/// of each format where these are widest apart, and the rest spread evenly (a Fibonacci spiral).
+/// One normal per pixel: the axes, some beside the fold of the octahedron, those midway between the steps of each format where
+/// the steps are largest, and the rest distributed evenly (a Fibonacci spiral).
 fn directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
     for index in 0..200 {
@@ -90,9 +90,9 @@ fn directions() -> Vec<Vec3> {
     all
 }
 
-/// The normals that a target holds, worked out in f64 from its bytes.
+/// The normals in a target, decoded in f64.
 fn decoded(picture: &Picture) -> Result<Vec<DVec3>, Failed> {
-    let of_point = |x: f64, y: f64| {
+    let from_point = |x: f64, y: f64| {
         let z = 1.0 - x.abs() - y.abs();
         let away = |other: f64, own: f64| (1.0 - other.abs()).copysign(own);
         if z < 0.0 { DVec3::new(away(y, x), away(x, y), z).normalize() } else { DVec3::new(x, y, z).normalize() }
@@ -112,49 +112,50 @@ fn decoded(picture: &Picture) -> Result<Vec<DVec3>, Failed> {
         _ => None,
     };
     let points: Option<Vec<_>> = picture.bytes.chunks_exact(picture.format.bytes()).map(point).collect();
-    let points = points.ok_or_else(|| format!("{:?} was not asked for", picture.format))?;
-    Ok(points.into_iter().map(|(x, y)| of_point(x, y)).collect())
+    let points = points.ok_or_else(|| format!("{:?} is unexpected", picture.format))?;
+    Ok(points.into_iter().map(|(x, y)| from_point(x, y)).collect())
 }
 
-fn off(one: DVec3, other: DVec3) -> f64 {
+/// The angle between two directions in degrees.
+fn angle(one: DVec3, other: DVec3) -> f64 {
     one.cross(other).length().atan2(one.dot(other)).to_degrees()
 }
 
 /// The target `normal` of a scene of these normals.
 fn normals_of(directions: &[Vec3], quality: Quality) -> Result<Vec<DVec3>, Failed> {
     let shown: Vec<_> = directions.iter().map(|&normal| (normal, Vec2::ZERO)).collect();
-    let scene = one_a_pixel(&shown, Material::default(), Vec::new())?;
-    let mut studio = studio(quality)?;
-    let recorded = studio.record(&scene)?;
-    decoded(&studio.submit(recorded)?.read(0, "normal")?)
+    let scene = one_quad_per_pixel(&shown, Material::default(), Vec::new())?;
+    let mut fixture = fixture(quality)?;
+    let recorded = fixture.record(&scene)?;
+    decoded(&fixture.submit(recorded)?.read(0, "normal")?)
 }
 
-/// How far the normals of the target are off at most, in degrees.
-fn worst(directions: &[Vec3], quality: Quality) -> Result<f64, Failed> {
+/// The largest error of the target's normals in degrees.
+fn max_error(directions: &[Vec3], quality: Quality) -> Result<f64, Failed> {
     let found = normals_of(directions, quality)?;
-    Ok(found.iter().zip(directions).map(|(found, meant)| off(*found, meant.as_dvec3())).fold(0.0, f64::max))
+    Ok(found.iter().zip(directions).map(|(found, expected)| angle(*found, expected.as_dvec3())).fold(0.0, f64::max))
 }
 
 fn normals() -> Result<(), Failed> {
     let directions = directions();
     for normals in NORMALS {
         let quality = Quality { normals, ..Quality::balanced() };
-        let worst = worst(&directions, quality)?;
-        println!("{normals:?}: up to {worst:.5} degrees off, of {}", normals.max_error_degrees());
-        // Or else the directions are not those that are hard.
-        if !(normals.max_error_degrees() * 0.4..=normals.max_error_degrees()).contains(&worst) {
-            return Err(format!("{normals:?} is {worst} off, of {}", normals.max_error_degrees()).into());
+        let error = max_error(&directions, quality)?;
+        println!("{normals:?}: an error of up to {error:.5} degrees, of {}", normals.max_error_degrees());
+        // A much smaller error means that the directions do not include the worst cases.
+        if !(normals.max_error_degrees() * 0.4..=normals.max_error_degrees()).contains(&error) {
+            return Err(format!("{normals:?} has an error of {error}, of {}", normals.max_error_degrees()).into());
         }
         let axes = &directions[..6];
         for (found, axis) in normals_of(axes, quality)?.into_iter().zip(axes) {
-            // f32 in the shader.
-            if off(found, axis.as_dvec3()) > 1e-4 {
+            // The shader computes in f32.
+            if angle(found, axis.as_dvec3()) > 1e-4 {
                 return Err(format!("{normals:?}: {axis} is {found}").into());
             }
         }
-        // A normal of 0 stands for the triangle's own, which is found by differences of places a pixel apart.
+        // A normal of 0 means the triangle's own, which the shader computes from the positions of neighbouring pixels.
         for found in &normals_of(&[Vec3::ZERO; SIDE], quality)?[..SIDE] {
-            if off(*found, DVec3::Z) > normals.max_error_degrees() + 0.002 {
+            if angle(*found, DVec3::Z) > normals.max_error_degrees() + 0.002 {
                 return Err(format!("{normals:?}: none is {found}").into());
             }
         }
@@ -166,19 +167,21 @@ fn packed_normals() -> Result<(), Failed> {
     let normals = NormalFormat::Octahedral16;
     let directions = directions();
     let quality = Quality { normals, vertices: VertexFormat::Packed, ..Quality::balanced() };
-    let (worst, bound) =
-        (worst(&directions, quality)?, VertexFormat::Packed.max_normal_error_degrees() + normals.max_error_degrees());
-    println!("packed: up to {worst:.5} degrees off, of {bound}");
-    if !(0.3..=bound).contains(&worst) {
-        return Err(format!("{worst} degrees off, of {bound}").into());
+    let (error, bound) = (
+        max_error(&directions, quality)?,
+        VertexFormat::Packed.max_normal_error_degrees() + normals.max_error_degrees(),
+    );
+    println!("packed: an error of up to {error:.5} degrees, of {bound}");
+    if !(0.3..=bound).contains(&error) {
+        return Err(format!("an error of {error} degrees, of {bound}").into());
     }
-    // A packed vertex is what its unpacked form says.
+    // The shader's normal is that of the unpacked vertex.
     let unpacked = |normal: &Vec3| {
         let vertex = Vertex { normal: normal.to_array(), ..Vertex::default() };
         DVec3::from(drawloom::scene::PackedVertex::new(&vertex, Default::default()).unpacked().normal.map(f64::from))
     };
     for (found, normal) in normals_of(&directions, quality)?.into_iter().zip(&directions) {
-        if off(found, unpacked(normal)) > normals.max_error_degrees() {
+        if angle(found, unpacked(normal)) > normals.max_error_degrees() {
             return Err(format!("{normal} is {found}, and should be {}", unpacked(normal)).into());
         }
     }
@@ -188,23 +191,24 @@ fn packed_normals() -> Result<(), Failed> {
 fn diffuse() -> Result<(), Failed> {
     for diffuse in (0..=40).map(|step| Vec3::new(0.025, 0.02, 0.0247) * step as f32) {
         let material = Material { diffuse, ..Material::default() };
-        let scene = one_a_pixel(&[(Vec3::Z, Vec2::ZERO)], material, Vec::new())?;
+        let scene = one_quad_per_pixel(&[(Vec3::Z, Vec2::ZERO)], material, Vec::new())?;
         let read = |diffuse| -> Result<_, Failed> {
-            let mut studio = studio(Quality { diffuse, ..Quality::balanced() })?;
-            let recorded = studio.record(&scene)?;
-            Ok(studio.submit(recorded)?.read(0, "diffuse")?)
+            let mut fixture = fixture(Quality { diffuse, ..Quality::balanced() })?;
+            let recorded = fixture.record(&scene)?;
+            Ok(fixture.submit(recorded)?.read(0, "diffuse")?)
         };
         let (bytes, halves) = (read(DiffuseFormat::Srgb8)?, read(DiffuseFormat::HalfFloat)?);
         if [bytes.format, halves.format] != [Format::Rgba8Srgb, Format::Rgba16Float] {
             return Err(format!("{:?} and {:?}", bytes.format, halves.format).into());
         }
         for channel in 0..3 {
-            let meant = f64::from(diffuse[channel]);
+            let expected = f64::from(diffuse[channel]);
             let byte = f64::from(bytes.bytes[channel]);
             let half = f16::from_le_bytes([halves.bytes[channel * 2], halves.bytes[channel * 2 + 1]]).to_f64();
-            let off = [(byte - srgb(meant) * 255.0).abs() / 0.6, (half - meant).abs() / (meant / 1024.0).max(1e-7)];
-            if off.iter().any(|off| *off > 1.0) {
-                return Err(format!("{meant} became {byte} and {half}").into());
+            let errors =
+                [(byte - srgb(expected) * 255.0).abs() / 0.6, (half - expected).abs() / (expected / 1024.0).max(1e-7)];
+            if errors.iter().any(|error| *error > 1.0) {
+                return Err(format!("{expected} became {byte} and {half}").into());
             }
         }
     }
@@ -215,7 +219,7 @@ fn packed() -> Quality {
     Quality { vertices: VertexFormat::Packed, ..Quality::balanced() }
 }
 
-/// A scene with a texture of which each pixel shows another texel, by coordinates that half floats hold.
+/// A scene with a texture. Each pixel shows another texel, by texture coordinates that half floats hold exactly.
 fn texels() -> Result<Scene, Failed> {
     let pixels = (0..=255_u8).flat_map(|row| (0..=255_u8).flat_map(move |column| [column, row, column ^ row, 255]));
     let texture = Texture::new("numbers", 256, 256, pixels.collect())?;
@@ -224,16 +228,16 @@ fn texels() -> Result<Scene, Failed> {
         (Vec3::Z, Vec2::new(5.0 + (column as f32 + 0.5) / 256.0, -9.0 + (row as f32 + 0.5) / 256.0))
     };
     let shown: Vec<_> = (0..SIDE * SIDE).map(texel).collect();
-    one_a_pixel(&shown, Material { diffuse: Vec3::ONE, ..Material::default() }, vec![texture])
+    one_quad_per_pixel(&shown, Material { diffuse: Vec3::ONE, ..Material::default() }, vec![texture])
 }
 
 fn packed_without_loss() -> Result<(), Failed> {
     for (name, scene) in [("everything", everything()), ("field", field(400)), ("texels", texels()?)] {
         let read = |quality| -> Result<_, Failed> {
-            let mut studio = studio(quality)?;
-            let recorded = studio.record(&scene)?;
+            let mut fixture = fixture(quality)?;
+            let recorded = fixture.record(&scene)?;
             let uploaded = recorded.statistics().uploaded;
-            let submission = studio.submit(recorded)?;
+            let submission = fixture.submit(recorded)?;
             let targets = ["picture", "depth", "normal", "diffuse"].map(|target| submission.read(0, target));
             Ok((targets.into_iter().collect::<Result<Vec<_>, _>>()?, uploaded))
         };
@@ -247,7 +251,7 @@ fn packed_without_loss() -> Result<(), Failed> {
             colors.sort_unstable();
             colors.dedup();
             if colors.len() != SIDE * SIDE {
-                return Err(format!("{} texels are seen", colors.len()).into());
+                return Err(format!("{} texels are visible", colors.len()).into());
             }
             let saved = (SIDE * SIDE * 4 * 12) as u64;
             if full_bytes - small_bytes != saved {
@@ -264,35 +268,35 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Fails where a quality's picture of a scene is farther from that of the balanced one than these.
-fn expect_alike(name: &str, scene: &Scene, quality: Quality, most: Distance) -> Result<(), Failed> {
-    let distance = Distance::between(&as_image(&studio(quality)?.draw(scene)?)?, &as_image(&draw(scene)?)?)?;
+/// Fails if the distance between the pictures of this quality and of the balanced one exceeds `max`.
+fn expect_alike(name: &str, scene: &Scene, quality: Quality, max: Distance) -> Result<(), Failed> {
+    let distance = Distance::between(&as_image(&fixture(quality)?.draw(scene)?)?, &as_image(&draw(scene)?)?)?;
     println!("{name}: {distance:?}");
-    if distance.root_mean_square > most.root_mean_square || distance.worst_square > most.worst_square {
+    if distance.root_mean_square > max.root_mean_square || distance.worst_tile > max.worst_tile {
         return Err(format!("{name}: {distance:?}").into());
     }
     Ok(())
 }
 
-/// A cosine is off by no more than the angle, 0.0068; a picture by at most as much (the curve's slope is below that of sRGB's
-/// inverse where it counts) and half a step of 255, and in one square by a few pixels of a texture besides.
+/// The error of a cosine is at most the angle, 0.0068. The error of a picture is at most as much, because the tone curve is
+/// flatter than sRGB's inverse where it matters, plus half a step of 255. One tile may also differ in a few pixels of a texture.
 fn packed_alike() -> Result<(), Failed> {
-    let most = Distance { root_mean_square: 0.0068 + 0.002, worst_square: 0.03 };
-    expect_alike("colonnade", &small_colonnade()?, packed(), most)
+    let max = Distance { root_mean_square: 0.0068 + 0.002, worst_tile: 0.03 };
+    expect_alike("colonnade", &small_colonnade()?, packed(), max)
 }
 
 fn targets_alike() -> Result<(), Failed> {
     let balanced = Quality::balanced();
     for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
         for normals in NORMALS {
-            // As above, of the angles by which both are off.
+            // As above, for the sum of both errors.
             let angle = (normals.max_error_degrees() + NormalFormat::HalfFloat.max_error_degrees()).to_radians();
-            let most = Distance { root_mean_square: angle + 0.002, worst_square: 2.0 * angle + 0.004 };
-            expect_alike(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, most)?;
+            let max = Distance { root_mean_square: angle + 0.002, worst_tile: 2.0 * angle + 0.004 };
+            expect_alike(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, max)?;
         }
         let quality = Quality { diffuse: DiffuseFormat::HalfFloat, ..balanced };
-        let most = Distance { root_mean_square: 0.003, worst_square: 0.005 };
-        expect_alike(&format!("{name}, diffuse as half floats"), &scene, quality, most)?;
+        let max = Distance { root_mean_square: 0.003, worst_tile: 0.005 };
+        expect_alike(&format!("{name}, diffuse as half floats"), &scene, quality, max)?;
     }
     Ok(())
 }
@@ -312,11 +316,11 @@ fn qualities() -> Vec<Quality> {
 
 fn changes() -> Result<(), Failed> {
     for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
-        let mut changing = Studio::new()?;
+        let mut changing = Fixture::new()?;
         changing.draw(&scene)?;
         for quality in qualities() {
             changing.renderer.set_quality(quality)?;
-            let expected = studio(quality)?.draw(&scene)?;
+            let expected = fixture(quality)?.draw(&scene)?;
             for frame in 0..3 {
                 if changing.draw(&scene)? != expected {
                     return Err(format!("{name}, frame {frame} of {quality:?}").into());
@@ -327,36 +331,36 @@ fn changes() -> Result<(), Failed> {
     Ok(())
 }
 
-fn frame_on_its_way() -> Result<(), Failed> {
+fn frame_in_flight() -> Result<(), Failed> {
     let scene = small_colonnade()?;
-    let (full, small) = (draw(&scene)?, studio(packed())?.draw(&scene)?);
-    let mut studio = Studio::new()?;
-    let mut previous = studio.record(&scene)?;
+    let (full, small) = (draw(&scene)?, fixture(packed())?.draw(&scene)?);
+    let mut fixture = Fixture::new()?;
+    let mut previous = fixture.record(&scene)?;
     for (index, (quality, expected)) in [(packed(), &full), (Quality::balanced(), &small)].into_iter().enumerate() {
-        studio.renderer.set_quality(quality)?;
-        let next = studio.record(&scene)?;
-        if studio.submit(previous)?.read(0, "picture")? != *expected {
-            return Err(format!("frame {index} shows what came after it").into());
+        fixture.renderer.set_quality(quality)?;
+        let next = fixture.record(&scene)?;
+        if fixture.submit(previous)?.read(0, "picture")? != *expected {
+            return Err(format!("frame {index} shows a later frame's vertices").into());
         }
         previous = next;
     }
-    if studio.submit(previous)?.read(0, "picture")? == full { Ok(()) } else { Err("the last frame differs".into()) }
+    if fixture.submit(previous)?.read(0, "picture")? == full { Ok(()) } else { Err("the last frame differs".into()) }
 }
 
-/// The picture of a scene that is all background.
+/// A pixel of the picture of an empty scene with this background.
 fn background(deferred: Deferred, quality: Option<Quality>, radiance: Vec3) -> Result<[u8; 3], Failed> {
     let mut scene = Scene::new();
     scene.background = radiance;
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z, DVec3::ZERO), [4, 4])];
-    let mut studio = Studio::with(1, |builder| {
+    let mut fixture = Fixture::with(1, |builder| {
         let builder = builder.deferred(deferred);
         if let Some(quality) = quality { builder.quality(quality) } else { builder }
     })?;
-    Ok(pixel(&studio.draw(&scene)?, 1, 2))
+    Ok(pixel(&fixture.draw(&scene)?, 1, 2))
 }
 
-/// sRGB of what is cut off at 1, worked out in f64.
-fn cut_off(radiance: Vec3) -> [u8; 3] {
+/// sRGB of a radiance clipped at 1, computed in f64.
+fn clipped_srgb(radiance: Vec3) -> [u8; 3] {
     radiance.to_array().map(|radiance| (srgb(f64::from(radiance).clamp(0.0, 1.0)) * 255.0).round() as u8)
 }
 
@@ -376,12 +380,12 @@ fn clipped() -> Result<(), Failed> {
     ] {
         let times = if exposure > 0.0 { exposure.min(1e30) } else { 0.0 };
         let found = background(Deferred::new().post(tone_mapping(exposure)), None, radiance)?;
-        assert_color(found, cut_off(radiance * times))?;
+        assert_color(found, clipped_srgb(radiance * times))?;
     }
     Ok(())
 }
 
-/// Takes away red.
+/// Removes red.
 struct WithoutRed(String, String);
 
 impl RenderProcess for WithoutRed {
@@ -415,12 +419,15 @@ fn curve_of_quality() -> Result<(), Failed> {
     let without_red = |source: &str, target: &str| WithoutRed(source.to_owned(), target.to_owned());
     let deferred = || Deferred::new().post(without_red).post(ToneMapping::new(exposure.clone()));
     let with = |tone_curve| Some(Quality { tone_curve, ..Quality::balanced() });
-    let seen = Vec3::new(0.0, 0.6, 0.8);
-    let filmic = |exposure: f32| tone_mapped((seen * exposure).to_array().map(f64::from));
+    let without_red_radiance = Vec3::new(0.0, 0.6, 0.8);
+    let filmic = |exposure: f32| tone_mapped((without_red_radiance * exposure).to_array().map(f64::from));
     assert_color(background(deferred(), None, radiance)?, filmic(0.5))?;
     assert_color(background(deferred(), with(ToneCurve::Filmic), radiance)?, filmic(0.5))?;
-    assert_color(background(deferred(), with(ToneCurve::Clipped), radiance)?, cut_off(seen * 0.5))?;
-    // It still is the engine's exposure.
+    assert_color(
+        background(deferred(), with(ToneCurve::Clipped), radiance)?,
+        clipped_srgb(without_red_radiance * 0.5),
+    )?;
+    // The quality leaves the engine's exposure.
     exposure.set(1.0);
-    assert_color(background(deferred(), with(ToneCurve::Clipped), radiance)?, cut_off(seen))
+    assert_color(background(deferred(), with(ToneCurve::Clipped), radiance)?, clipped_srgb(without_red_radiance))
 }

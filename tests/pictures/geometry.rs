@@ -8,9 +8,9 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{Distance, as_image};
+use crate::fixture::Fixture;
+use crate::image_distance::{Distance, as_image};
 use crate::references::colonnade;
-use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
     ("a_depth_pre_pass_changes_no_byte", depth_pre_pass),
@@ -53,9 +53,9 @@ fn deferred() -> Deferred {
 }
 
 fn drawn(deferred: Deferred, scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    let mut studio = Studio::with(2, |builder| builder.deferred(deferred))?;
-    let recorded = studio.record(scene)?;
-    let submission = studio.submit(recorded)?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let recorded = fixture.record(scene)?;
+    let submission = fixture.submit(recorded)?;
     let targets = ["picture", "depth", "normal", "diffuse"];
     let views = 0..scene.cameras.len();
     views.flat_map(|view| targets.map(|target| Ok(submission.read(view, target)?))).collect()
@@ -86,25 +86,25 @@ fn shares() -> Result<(), Failed> {
 
 fn shares_are_processes() -> Result<(), Failed> {
     let scene = small_colonnade()?;
-    let mut whole = Studio::with(2, |builder| builder.deferred(deferred()))?;
+    let mut whole = Fixture::with(2, |builder| builder.deferred(deferred()))?;
     let recorded = whole.record(&scene)?;
     let passes = recorded.queues()[0].passes.len();
     drop(recorded);
-    let drawn_by = |studio: &Studio, process: &str| -> Result<Vec<u32>, Failed> {
-        Ok(studio.renderer.draw_list(process, 0).ok_or("it draws no commands")?.objects.clone())
+    let drawn_by = |fixture: &Fixture, process: &str| -> Result<Vec<u32>, Failed> {
+        Ok(fixture.renderer.draw_list(process, 0).ok_or("it draws no commands")?.objects.clone())
     };
     let mut all = drawn_by(&whole, "geometry buffer")?;
     all.sort_unstable();
     for shares in [2, 3, 7] {
-        let mut studio = Studio::with(2, |builder| builder.deferred(deferred().geometry_shares(shares)))?;
-        let recorded = studio.record(&scene)?;
+        let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred().geometry_shares(shares)))?;
+        let recorded = fixture.record(&scene)?;
         if recorded.queues()[0].passes.len() != passes + shares as usize - 1 {
             return Err(format!("{shares} shares: {} passes", recorded.queues()[0].passes.len()).into());
         }
         drop(recorded);
         let mut together = Vec::new();
         for share in 1..=shares {
-            let drawn = drawn_by(&studio, &format!("geometry buffer {share} of {shares}"))?;
+            let drawn = drawn_by(&fixture, &format!("geometry buffer {share} of {shares}"))?;
             if drawn.is_empty() {
                 return Err(format!("share {share} of {shares} draws nothing").into());
             }
@@ -136,9 +136,9 @@ fn formats() -> Result<(), Failed> {
     for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
         let picture = |formats| as_image(&drawn(deferred().formats(formats), &scene)?[0]);
         let expected = picture(usual)?;
-        for (formats, root_mean_square, worst_square) in bounds {
+        for (formats, root_mean_square, worst_tile) in bounds {
             let distance = Distance::between(&picture(formats)?, &expected)?;
-            if distance.root_mean_square > root_mean_square || distance.worst_square > worst_square {
+            if distance.root_mean_square > root_mean_square || distance.worst_tile > worst_tile {
                 return Err(format!("{name}, {formats:?}: {distance:?}").into());
             }
         }
@@ -160,7 +160,7 @@ fn misfits() -> Result<(), Failed> {
     ] {
         for &format in misfits {
             let deferred = Deferred::to_picture().formats(with(target, format));
-            let error = Studio::with(1, |builder| builder.deferred(deferred)).err().ok_or("it should be refused")?;
+            let error = Fixture::with(1, |builder| builder.deferred(deferred)).err().ok_or("it should be refused")?;
             let text = error.message().unwrap_or_default();
             for part in ["geometry buffer", target, &format!("{format:?}")] {
                 if !text.contains(part) {

@@ -8,21 +8,21 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::{Fixture, radiance};
 use crate::rays::{Panel, Stage};
 use crate::shadows::{MAPS, camera, hemisphere, spot};
-use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] =
     &[("no_light_that_ends_early_takes_more_away_than_stated", bound), ("a_light_that_ends_early_reaches_less", reach)];
 
-fn with_cut_off(light_cut_off: f32) -> Result<Studio, Failed> {
+fn with_cut_off(light_cut_off: f32) -> Result<Fixture, Failed> {
     let quality = Quality { light_cut_off, ..Quality::balanced() };
-    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
 }
 
-fn radiance_of(studio: &mut Studio, scene: &Scene) -> Result<Vec<[f64; 3]>, Failed> {
-    let recorded = studio.record(scene)?;
-    radiance(&studio.submit(recorded)?, 0)
+fn radiance_of(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<[f64; 3]>, Failed> {
+    let recorded = fixture.record(scene)?;
+    radiance(&fixture.submit(recorded)?, 0)
 }
 
 /// The field in lights of each kind with falloff, which reach far beyond it.

@@ -7,8 +7,8 @@ use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::{Fixture, radiance};
 use crate::rays::{Counts, Panel, Stage};
-use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] = &[
     ("lights_reach_to_the_end_of_their_range", end_of_range),
@@ -66,7 +66,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
 }
 
 fn end_of_range() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let place = DVec3::new(0.3, -0.2, 0.5);
     for light in [point(place), spot(place, DVec3::NEG_Z, 45.0), hemisphere(place, DVec3::NEG_Z)] {
         for (share, is_lit) in [(0.02, true), (0.5, true), (0.97, true), (0.999, true), (1.0, false), (1.2, false)] {
@@ -79,7 +79,7 @@ fn end_of_range() -> Result<(), Failed> {
                 camera(place + DVec3::new(1.5, 0.3, 0.3), target, 3.0),
                 camera(place + DVec3::new(1.5, 0.3, 0.3), target, 120.0),
             ];
-            let counts = stage.expect(&mut studio, &views)?;
+            let counts = stage.expect(&mut fixture, &views)?;
             if (counts.lit > 0) != is_lit {
                 return Err(format!("{light:?} at {share} of its range: {counts:?}").into());
             }
@@ -93,7 +93,7 @@ fn end_of_range() -> Result<(), Failed> {
             casts_shadow: false,
         };
         let stage = Stage::new(vec![Panel::facing(DVec3::NEG_Z * distance, DVec3::Z, distance)], vec![sun]);
-        let counts = stage.expect(&mut studio, &[camera(DVec3::ZERO, DVec3::NEG_Z, 80.0)])?;
+        let counts = stage.expect(&mut fixture, &[camera(DVec3::ZERO, DVec3::NEG_Z, 80.0)])?;
         expect_lit(counts, 1.0)?;
     }
     Ok(())
@@ -113,7 +113,7 @@ fn room(light: Light) -> Stage {
 }
 
 fn cones() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for degrees in [1.0_f32, 10.0, 45.0, 80.0, 90.0] {
         for direction in directions() {
             // Tilted, so that the axis meets no corner.
@@ -127,7 +127,7 @@ fn cones() -> Result<(), Failed> {
                 camera(place + aside * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
                 camera(place + (direction + aside) * 0.4, place - direction, 100.0),
             ];
-            let counts = stage.expect(&mut studio, &views).map_err(|failed| told(failed, degrees, direction))?;
+            let counts = stage.expect(&mut fixture, &views).map_err(|failed| told(failed, degrees, direction))?;
             expect_lit(counts, 0.05).map_err(|failed| told(failed, degrees, direction))?;
         }
     }
@@ -139,7 +139,7 @@ fn told(failed: Failed, degrees: f32, direction: DVec3) -> Failed {
 }
 
 fn hemispheres() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for direction in directions() {
         let place = DVec3::new(0.11, -0.23, 0.17);
         let aside = direction.any_orthonormal_vector();
@@ -148,14 +148,14 @@ fn hemispheres() -> Result<(), Failed> {
             camera(place + direction * 2.0, place + aside, 100.0),
             camera(place - aside, place - direction + aside * 4.0, 100.0),
         ];
-        let counts = room(hemisphere(place, direction)).expect(&mut studio, &views)?;
+        let counts = room(hemisphere(place, direction)).expect(&mut fixture, &views)?;
         expect_lit(counts, 0.15).map_err(|failed| told(failed, 90.0, direction))?;
     }
     Ok(())
 }
 
 fn spheres() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     // Walls through the centre of a sphere, seen from all sides: the lit discs have the sphere's outline.
     for direction in directions() {
         let place = DVec3::new(0.3, 0.1, -0.2);
@@ -167,13 +167,13 @@ fn spheres() -> Result<(), Failed> {
             camera(place + (direction + aside * 2.0) * 3.0, place, 70.0),
             camera(place + (direction * 0.1 - aside) * 3.0, place, 100.0),
         ];
-        expect_lit(stage.expect(&mut studio, &views)?, 0.2)?;
+        expect_lit(stage.expect(&mut fixture, &views)?, 0.2)?;
     }
     Ok(())
 }
 
 fn from_within() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let place = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.6, 0.0, -0.8);
     let half_angle = 30.0_f32;
@@ -201,7 +201,7 @@ fn from_within() -> Result<(), Failed> {
         let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
         for eye in eyes {
             let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
-            stage.expect(&mut studio, &views).map_err(|failed| told(failed, half_angle, eye))?;
+            stage.expect(&mut fixture, &views).map_err(|failed| told(failed, half_angle, eye))?;
         }
     }
     // In the room above, much of the walls is out of range; in this one all walls are lit.
@@ -209,7 +209,7 @@ fn from_within() -> Result<(), Failed> {
         for eye in [DVec3::ZERO, direction * 1.5, -direction, edge] {
             let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
             let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
-            let counts = room(light).expect(&mut studio, &views).map_err(|failed| told(failed, half_angle, eye))?;
+            let counts = room(light).expect(&mut fixture, &views).map_err(|failed| told(failed, half_angle, eye))?;
             expect_lit(counts, 0.01)?;
         }
     }
@@ -217,7 +217,7 @@ fn from_within() -> Result<(), Failed> {
 }
 
 fn near_plane() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let place = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.0, 0.6, -0.8);
     for light in [point(place), spot(place, direction, 40.0), hemisphere(place, direction)] {
@@ -227,7 +227,7 @@ fn near_plane() -> Result<(), Failed> {
                 let view = camera(eye, place + direction * 2.0 + DVec3::X * 0.1, 90.0);
                 Camera { near, ..view }
             });
-            stage_of_near_plane(light).expect(&mut studio, &views).map_err(|failed| told(failed, near, direction))?;
+            stage_of_near_plane(light).expect(&mut fixture, &views).map_err(|failed| told(failed, near, direction))?;
         }
     }
     Ok(())
@@ -241,7 +241,7 @@ fn stage_of_near_plane(light: Light) -> Stage {
 }
 
 fn hundred() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 8.0);
     let light = |index: u32| {
         let [column, row] = [index % 10, index / 10].map(f64::from);
@@ -251,10 +251,10 @@ fn hundred() -> Result<(), Failed> {
     };
     let stage = Stage::new(vec![wall], (0..100).map(light).collect());
     let view = camera(DVec3::new(0.5, -1.0, 9.0), DVec3::ZERO, 65.0);
-    expect_lit(stage.expect(&mut studio, std::slice::from_ref(&view))?, 0.7)?;
+    expect_lit(stage.expect(&mut fixture, std::slice::from_ref(&view))?, 0.7)?;
 
-    let recorded = studio.record(&stage.scene(&[view])?)?;
-    let processes = studio.renderer.plan().processes().iter();
+    let recorded = fixture.record(&stage.scene(&[view])?)?;
+    let processes = fixture.renderer.plan().processes().iter();
     let names: Vec<_> = processes.map(|planned| planned.process.name().to_owned()).collect();
     if names != ["geometry buffer", "point lights", "tone mapping"] || recorded.statistics().views[0].lights != 100 {
         return Err(format!("{names:?} draw {} lights", recorded.statistics().views[0].lights).into());
@@ -270,16 +270,16 @@ fn depth_is_left_alone() -> Result<(), Failed> {
         other => other,
     };
     let lights = [small(point(behind)), spot(behind, DVec3::NEG_Z, 60.0), hemisphere(behind, DVec3::NEG_Z)];
-    let mut studio = Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).output("depth"))?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).output("depth"))?;
     let view = camera(DVec3::new(1.0, 0.5, 4.0), DVec3::ZERO, 60.0);
     let mut depths = Vec::new();
     // Behind the wall; on both of its sides; in front of it.
     let before = lights.map(|light| shifted(light, DVec3::Z * 2.0));
     for lights in [vec![], lights.to_vec(), lights.into_iter().chain(before).collect(), before.to_vec()] {
         let stage = Stage::new(vec![wall, Panel::facing(DVec3::NEG_Z * 2.5, DVec3::Z, 1.0)], lights);
-        stage.expect(&mut studio, std::slice::from_ref(&view))?;
-        let recorded = studio.record(&stage.scene(std::slice::from_ref(&view))?)?;
-        depths.push(studio.submit(recorded)?.read(0, "depth")?);
+        stage.expect(&mut fixture, std::slice::from_ref(&view))?;
+        let recorded = fixture.record(&stage.scene(std::slice::from_ref(&view))?)?;
+        depths.push(fixture.submit(recorded)?.read(0, "depth")?);
     }
     if depths.iter().any(|depth| *depth != depths[0]) {
         return Err("lights change the depth".into());
@@ -298,7 +298,7 @@ fn shifted(light: Light, shift: DVec3) -> Light {
 }
 
 fn orthographic() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let place = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
     let sun = Light::Directional {
@@ -318,7 +318,7 @@ fn orthographic() -> Result<(), Failed> {
             let looking = Camera::looking_at("plan", from, from + DVec3::new(-0.1, -0.1, -1.0));
             let projection = Projection::Orthographic { height: 5.0 };
             let view = sized(Camera { projection, near, far, ..looking }, [64, 64]);
-            let counts = room(light).expect(&mut studio, &[view]).map_err(|failed| told(failed, far, from))?;
+            let counts = room(light).expect(&mut fixture, &[view]).map_err(|failed| told(failed, far, from))?;
             if counts.lit == 0 {
                 return Err(format!("{light:?} from {from}: {counts:?}").into());
             }
@@ -328,7 +328,7 @@ fn orthographic() -> Result<(), Failed> {
 }
 
 fn far_away() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let shift = DVec3::new(1e6, -5e5, 2.5e5);
     let place = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
@@ -337,13 +337,13 @@ fn far_away() -> Result<(), Failed> {
         stage.panels.iter_mut().for_each(|panel| panel.center += shift);
         let eye = shift + DVec3::new(-1.0, 0.5, 2.0);
         let view = camera(eye, eye + direction, 100.0);
-        expect_lit(stage.expect(&mut studio, std::slice::from_ref(&view))?, 0.04)?;
+        expect_lit(stage.expect(&mut fixture, std::slice::from_ref(&view))?, 0.04)?;
 
         // To the precision of half floats, it equals the picture that is drawn near the origin.
         let near = Camera { position: view.position - shift, ..view.clone() };
         let pictures = [(room(light), near), (stage, view)].map(|(stage, view)| {
-            let recorded = studio.record(&stage.scene(&[view])?)?;
-            radiance(&studio.submit(recorded)?, 0)
+            let recorded = fixture.record(&stage.scene(&[view])?)?;
+            radiance(&fixture.submit(recorded)?, 0)
         });
         let [one, other] = pictures;
         let differ = one?

@@ -8,8 +8,8 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_color, tone_mapped};
-use crate::studio::{draw, pixel};
+use crate::fixture::{draw, pixel};
+use crate::image_distance::{assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
     ("a_directional_light_by_its_angle", directional),

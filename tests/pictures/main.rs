@@ -1,34 +1,34 @@
-//! Real pictures, drawn by wgpu on the machine's adapter.
+//! Pictures drawn by wgpu on the machine's adapter.
 //!
-//! Without an adapter, and without the scenes beside the repository, the cases that need them show as ignored; with
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` writes the references anew: look
-//! at each before it is kept.
+//! Without an adapter, or without the scenes beside the repository, the cases that need them are reported as ignored. With
+//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: look at
+//! each of them before you commit it.
 
 mod changes;
+mod changing_shaders;
+mod determinism;
 mod device_times;
 mod devices;
 mod extremes;
+mod fixture;
 mod formats;
 mod geometry;
-mod judge;
+mod image_distance;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
-mod painted;
 mod placement;
 mod post;
 mod processes;
 mod rays;
 mod references;
 mod requirements;
-mod same_bytes;
 mod shadow_bias;
 mod shadow_casters;
 mod shadow_interval;
 mod shadows;
 mod software;
-mod studio;
-mod techniques;
+mod strategies;
 mod transforms;
 mod transparency;
 mod triangles;
@@ -41,7 +41,7 @@ type Case = (&'static str, fn() -> Result<(), Failed>);
 
 fn main() {
     let arguments = Arguments::from_args();
-    let no_adapter = studio::device().is_none();
+    let no_adapter = fixture::device().is_none();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let mut trials = Vec::new();
     let cases = [
@@ -52,16 +52,16 @@ fn main() {
         (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
-        (painted::CASES, Needs::Adapter),
+        (changing_shaders::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (requirements::CASES, Needs::Adapter),
-        (same_bytes::CASES, Needs::Adapter),
-        (same_bytes::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
-        (techniques::CASES, Needs::Adapter),
+        (determinism::CASES, Needs::Adapter),
+        (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (strategies::CASES, Needs::Adapter),
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),
@@ -92,7 +92,7 @@ enum Needs {
     AdapterAndSharedScenes,
 }
 
-/// Scenes that lie beside the repository, where they are there at all.
+/// The folder of scenes beside the repository, which may be missing.
 fn shared_scenes() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
 }

@@ -7,8 +7,8 @@ use drawloom_testing::scenes::{cube, field, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_alike, assert_different};
-use crate::studio::{Studio, draw, pixel};
+use crate::fixture::{Fixture, draw, pixel};
+use crate::image_distance::{assert_alike, assert_different};
 
 pub const CASES: &[Case] = &[
     ("up_is_up_and_right_is_right", up_is_up),
@@ -197,9 +197,9 @@ fn extreme_scales() -> Result<(), Failed> {
         let mut object = RenderObject::new(mesh, material, DVec3::ZERO);
         object.scale = scale;
         scene.add_object(object)?;
-        let mut studio = Studio::new()?;
-        let recorded = studio.record(&scene)?;
-        let radiance = studio.submit(recorded)?.read(0, "radiance")?;
+        let mut fixture = Fixture::new()?;
+        let recorded = fixture.record(&scene)?;
+        let radiance = fixture.submit(recorded)?.read(0, "radiance")?;
         // A half float is infinite or NaN if its exponent is all ones.
         let broken = radiance.bytes.chunks_exact(2).any(|half| half[1] & 0x7c == 0x7c);
         if broken {
@@ -250,9 +250,9 @@ fn far_away() -> Result<(), Failed> {
 
 fn two_views() -> Result<(), Failed> {
     let scene = field(200);
-    let mut studio = Studio::new()?;
-    let recorded = studio.record(&scene)?;
-    let submission = studio.submit(recorded)?;
+    let mut fixture = Fixture::new()?;
+    let recorded = fixture.record(&scene)?;
+    let submission = fixture.submit(recorded)?;
     for (view, camera) in scene.cameras.iter().enumerate() {
         let together = submission.read(view, "picture")?;
         if [together.width, together.height] != camera.size {

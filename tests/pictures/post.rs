@@ -12,8 +12,8 @@ use image::{Rgb, RgbImage};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{Distance, as_image, assert_color, tone_mapped};
-use crate::studio::{Studio, pixel};
+use crate::fixture::{Fixture, pixel};
+use crate::image_distance::{Distance, as_image, assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
     ("a_slanted_edge_comes_nearer_to_its_coverage", slanted_edge),
@@ -101,11 +101,11 @@ fn empty_scene(size: [u32; 2]) -> Scene {
 /// A pattern of this size, before and after anti-aliasing.
 fn smoothed(size: [u32; 2], fxaa: Fxaa, body: &str, numbers: [f32; 4]) -> Result<(Picture, Picture), Failed> {
     let pattern = Step::pattern("pattern", Format::Rgba8Srgb, body, numbers);
-    let mut studio = Studio::with(2, |builder| {
+    let mut fixture = Fixture::with(2, |builder| {
         builder.process(pattern).process(fxaa.process("pattern", "picture")).output("pattern").output("picture")
     })?;
-    let recorded = studio.record(&empty_scene(size))?;
-    let submission = studio.submit(recorded)?;
+    let recorded = fixture.record(&empty_scene(size))?;
+    let submission = fixture.submit(recorded)?;
     Ok((submission.read(0, "pattern")?, submission.read(0, "picture")?))
 }
 
@@ -284,7 +284,7 @@ fn settings() -> Result<(), Failed> {
 fn after_steps(background: Vec3, steps: &[&dyn PostStep]) -> Result<[u8; 3], Failed> {
     let mut scene = empty_scene([8, 8]);
     scene.background = background;
-    let mut studio = Studio::with(2, |builder| {
+    let mut fixture = Fixture::with(2, |builder| {
         let mut builder = builder.process(GeometryBuffer::new(GeometryFormats::default())).output("picture");
         let mut source = "radiance".to_owned();
         for (index, step) in steps.iter().enumerate() {
@@ -295,7 +295,7 @@ fn after_steps(background: Vec3, steps: &[&dyn PostStep]) -> Result<[u8; 3], Fai
         }
         builder
     })?;
-    Ok(pixel(&studio.draw(&scene)?, 5, 2))
+    Ok(pixel(&fixture.draw(&scene)?, 5, 2))
 }
 
 fn own_step() -> Result<(), Failed> {
@@ -347,8 +347,8 @@ fn extreme_radiance() -> Result<(), Failed> {
         let numbers = [radiance, 0.25, radiance, 1.0];
         let pattern = Step::pattern("radiance", Format::Rgba16Float, "return numbers;", numbers);
         let tone_mapping = ToneMapping::new(exposure);
-        let mut studio = Studio::with(2, |builder| builder.process(pattern).process(tone_mapping).output("picture"))?;
-        let [red, green, blue] = pixel(&studio.draw(&empty_scene([4, 4]))?, 1, 1);
+        let mut fixture = Fixture::with(2, |builder| builder.process(pattern).process(tone_mapping).output("picture"))?;
+        let [red, green, blue] = pixel(&fixture.draw(&empty_scene([4, 4]))?, 1, 1);
         let exposed = if exposure > 0.0 { f64::from(exposure.min(1e9)) * 0.25 } else { 0.0 };
         let [_, ordinary, _] = tone_mapped([exposed; 3]);
         if [red, blue] != [expected; 2] || green.abs_diff(ordinary) > 1 {

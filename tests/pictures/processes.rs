@@ -17,8 +17,8 @@ use drawloom_testing::scenes::{field, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_color, tone_mapped};
-use crate::studio::{Studio, pixel};
+use crate::fixture::{Fixture, pixel};
+use crate::image_distance::{assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
     ("an_engine_can_have_its_own_pipeline", own_pipeline),
@@ -101,10 +101,10 @@ fn panes(depths_and_blends: &[(f64, Vec3, Blend)]) -> Result<Scene, Failed> {
 }
 
 fn own_pipeline() -> Result<(), Failed> {
-    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain"))?;
+    let mut fixture = Fixture::with(2, |builder| builder.process(PLAIN).output("plain"))?;
     let scene = panes(&[(0.0, Vec3::new(1.0, 0.5, 0.25), Blend::None)])?;
-    let recorded = studio.record(&scene)?;
-    let picture = studio.submit(recorded)?.read(0, "plain")?;
+    let recorded = fixture.record(&scene)?;
+    let picture = fixture.submit(recorded)?.read(0, "plain")?;
     assert_color(pixel(&picture, 16, 16), [255, 128, 64])?;
     assert_color(pixel(&picture, 0, 0), [0, 0, 255])
 }
@@ -119,10 +119,10 @@ fn back_to_front() -> Result<(), Failed> {
     // Over blue: half red over it, half green over that, then half a blue added, then a quarter of green subtracted.
     let expected = [64, 128 - 64, 64 + 128];
     for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
-        let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain"))?;
+        let mut fixture = Fixture::with(2, |builder| builder.process(PLAIN).output("plain"))?;
         let scene = panes(&order.map(|index: usize| glass[index]))?;
-        let recorded = studio.record(&scene)?;
-        let picture = studio.submit(recorded)?.read(0, "plain")?;
+        let recorded = fixture.record(&scene)?;
+        let picture = fixture.submit(recorded)?.read(0, "plain")?;
         assert_color(pixel(&picture, 16, 16), expected)
             .map_err(|failed| format!("{order:?}: {}", failed.message().unwrap_or("")))?;
     }
@@ -163,12 +163,12 @@ impl RenderProcess for Grey {
 fn parameters() -> Result<(), Failed> {
     let percent = Arc::new(AtomicU32::new(0));
     let grey = Grey { percent: Arc::clone(&percent) };
-    let mut studio = Studio::with(2, |builder| builder.process(grey).output("grey"))?;
+    let mut fixture = Fixture::with(2, |builder| builder.process(grey).output("grey"))?;
     let scene = panes(&[])?;
     for value in [0, 20, 100] {
         percent.store(value, Ordering::Relaxed);
-        let recorded = studio.record(&scene)?;
-        let picture = studio.submit(recorded)?.read(0, "grey")?;
+        let recorded = fixture.record(&scene)?;
+        let picture = fixture.submit(recorded)?.read(0, "grey")?;
         assert_color(pixel(&picture, 3, 3), [(value * 255 / 100) as u8; 3])?;
     }
     Ok(())
@@ -234,9 +234,10 @@ impl RawPass for RawProcess {
 }
 
 fn raw_pass() -> Result<(), Failed> {
-    let mut studio = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::ClearYellow }).output("raw"))?;
-    let recorded = studio.record(&panes(&[])?)?;
-    let picture = studio.submit(recorded)?.read(0, "raw")?;
+    let mut fixture =
+        Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::ClearYellow }).output("raw"))?;
+    let recorded = fixture.record(&panes(&[])?)?;
+    let picture = fixture.submit(recorded)?.read(0, "raw")?;
     assert_color(pixel(&picture, 5, 5), [255, 255, 0])
 }
 
@@ -271,7 +272,7 @@ impl RenderProcess for Changing {
 fn other_draws() -> Result<(), Failed> {
     let step = Arc::new(AtomicU32::new(0));
     let changing = Changing { step: Arc::clone(&step) };
-    let mut studio = Studio::with(2, |builder| builder.process(changing).output("changing"))?;
+    let mut fixture = Fixture::with(2, |builder| builder.process(changing).output("changing"))?;
     let scene = panes(&[(0.0, Vec3::ONE, Blend::None)])?;
     let expected = [
         ([255, 0, 0], [255, 0, 0]),
@@ -283,8 +284,8 @@ fn other_draws() -> Result<(), Failed> {
         [(0, expected[0]), (1, expected[1]), (2, expected[2]), (3, expected[3]), (0, expected[0])]
     {
         step.store(index, Ordering::Relaxed);
-        let recorded = studio.record(&scene)?;
-        let picture = studio.submit(recorded)?.read(0, "changing")?;
+        let recorded = fixture.record(&scene)?;
+        let picture = fixture.submit(recorded)?.read(0, "changing")?;
         assert_color(pixel(&picture, 16, 16), middle)?;
         assert_color(pixel(&picture, 0, 0), corner)?;
     }
@@ -305,17 +306,17 @@ fn behind_everything() -> Result<(), Failed> {
             })
         },
     };
-    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).process(sky).output("plain"))?;
-    let recorded = studio.record(&panes(&[(0.0, Vec3::X, Blend::None)])?)?;
-    let picture = studio.submit(recorded)?.read(0, "plain")?;
+    let mut fixture = Fixture::with(2, |builder| builder.process(PLAIN).process(sky).output("plain"))?;
+    let recorded = fixture.record(&panes(&[(0.0, Vec3::X, Blend::None)])?)?;
+    let picture = fixture.submit(recorded)?.read(0, "plain")?;
     assert_color(pixel(&picture, 16, 16), [255, 0, 0])?;
     assert_color(pixel(&picture, 0, 0), [255; 3])
 }
 
 fn blended_leaves_depth() -> Result<(), Failed> {
-    let mut studio = Studio::with(2, |builder| builder.process(PLAIN).output("plain depth").output("plain"))?;
-    let recorded = studio.record(&panes(&[(0.0, Vec3::X, Blend::Alpha)])?)?;
-    let depth = studio.submit(recorded)?.read(0, "plain depth")?;
+    let mut fixture = Fixture::with(2, |builder| builder.process(PLAIN).output("plain depth").output("plain"))?;
+    let recorded = fixture.record(&panes(&[(0.0, Vec3::X, Blend::Alpha)])?)?;
+    let depth = fixture.submit(recorded)?.read(0, "plain depth")?;
     let untouched = depth.bytes.iter().all(|&byte| byte == 0);
     if untouched { Ok(()) } else { Err("glass wrote its depth".into()) }
 }
@@ -325,11 +326,11 @@ fn exposure() -> Result<(), Failed> {
     scene.background = Vec3::splat(0.1);
     let exposure = Exposure::new(1.0);
     let tone_mapping = ToneMapping::new(exposure.clone());
-    let mut alone = Studio::with(2, |builder| {
+    let mut alone = Fixture::with(2, |builder| {
         builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
     })?;
     let step = ToneMapping::new(exposure.clone());
-    let mut placed = Studio::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
+    let mut placed = Fixture::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
     for value in [0.5, 1.0, 4.0] {
         exposure.set(value);
         let expected = tone_mapped([0.1 * f64::from(value); 3]);
@@ -351,7 +352,7 @@ fn missing_entry_point() -> Result<(), Failed> {
             declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
             draws,
         };
-        let error = error_of(Studio::with(2, |builder| builder.process(nameless).output("picture"))?)?;
+        let error = error_of(Fixture::with(2, |builder| builder.process(nameless).output("picture"))?)?;
         expect_named(&error, "nameless", "entry point")?;
     }
     Ok(())
@@ -376,16 +377,16 @@ fn short_parameters() -> Result<(), Failed> {
             })
         },
     };
-    let error = error_of(Studio::with(2, |builder| builder.process(short).output("picture"))?)?;
+    let error = error_of(Fixture::with(2, |builder| builder.process(short).output("picture"))?)?;
     expect_named(&error, "short", "size")
 }
 
-fn error_of(mut studio: Studio) -> Result<FrameError, Failed> {
+fn error_of(mut fixture: Fixture) -> Result<FrameError, Failed> {
     let mut scene = field(600);
     scene.cameras.truncate(1);
-    let first = studio.renderer.record(scene.as_scene_ref()).err().ok_or("the first frame should fail")?;
+    let first = fixture.renderer.record(scene.as_scene_ref()).err().ok_or("the first frame should fail")?;
     // A second attempt fails the same way, rather than hanging or passing.
-    let second = studio.renderer.record(scene.as_scene_ref()).err().ok_or("the second frame should fail")?;
+    let second = fixture.renderer.record(scene.as_scene_ref()).err().ok_or("the second frame should fail")?;
     if first.to_string() == second.to_string() { Ok(first) } else { Err(format!("{first} / {second}").into()) }
 }
 
@@ -406,7 +407,7 @@ fn broken_shader() -> Result<(), Failed> {
         declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
         draws: || Draws::FullScreen(FullScreen { shader: "fn fragment( {", ..FullScreen::default() }),
     };
-    let error = error_of(Studio::with(2, |builder| builder.process(broken).output("picture"))?)?;
+    let error = error_of(Fixture::with(2, |builder| builder.process(broken).output("picture"))?)?;
     expect_named(&error, "broken shader", "fragment")
 }
 
@@ -437,22 +438,22 @@ fn refused_pass() -> Result<(), Failed> {
         declare: |declare| declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background),
         draws: || plain_color(Selection::OPAQUE),
     };
-    let studio = Studio::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
-    expect_named(&error_of(studio)?, "ouroboros", "finish")?;
+    let fixture = Fixture::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
+    expect_named(&error_of(fixture)?, "ouroboros", "finish")?;
 
     let nonsense = RawProcess { deed: Deed::CopyNonsense };
-    let studio = Studio::with(2, |builder| builder.process(nonsense).output("raw"))?;
-    expect_named(&error_of(studio)?, "raw process", "refused")
+    let fixture = Fixture::with(2, |builder| builder.process(nonsense).output("raw"))?;
+    expect_named(&error_of(fixture)?, "raw process", "refused")
 }
 
 fn failing_raw_pass() -> Result<(), Failed> {
-    let fail = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::Fail }).output("raw"))?;
+    let fail = Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::Fail }).output("raw"))?;
     let error = error_of(fail)?;
     expect_named(&error, "raw process", "the well is dry")?;
     let FrameError::Failed { source, .. } = &error else { return Err(format!("{error:?}").into()) };
     if source.downcast_ref::<BackendError>().is_none() {
         return Err("the backend's error is lost".into());
     }
-    let panics = Studio::with(2, |builder| builder.process(RawProcess { deed: Deed::Panic }).output("raw"))?;
+    let panics = Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::Panic }).output("raw"))?;
     expect_named(&error_of(panics)?, "raw process", "the well is poisoned")
 }

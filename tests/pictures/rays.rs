@@ -7,7 +7,7 @@ use drawloom::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, S
 use drawloom::view::ShadowMaps;
 use libtest_mimic::Failed;
 
-use crate::studio::{Studio, radiance};
+use crate::fixture::{Fixture, radiance};
 
 /// A flat white parallelogram that reflects all light, visible from the side that right × up points to.
 #[derive(Clone, Copy, Debug)]
@@ -161,14 +161,14 @@ pub struct Counts {
 
 impl Stage {
     /// Draws the panels, and fails if a pixel of any camera differs from the ray cast result.
-    pub fn expect(&self, studio: &mut Studio, cameras: &[Camera]) -> Result<Counts, Failed> {
-        self.expect_of(studio, &self.scene(cameras)?)
+    pub fn expect(&self, fixture: &mut Fixture, cameras: &[Camera]) -> Result<Counts, Failed> {
+        self.expect_of(fixture, &self.scene(cameras)?)
     }
 
     /// Draws a scene, and fails if a pixel of any camera differs from the ray cast result.
-    pub fn expect_of(&self, studio: &mut Studio, scene: &Scene) -> Result<Counts, Failed> {
-        let recorded = studio.record(scene)?;
-        let submission = studio.submit(recorded)?;
+    pub fn expect_of(&self, fixture: &mut Fixture, scene: &Scene) -> Result<Counts, Failed> {
+        let recorded = fixture.record(scene)?;
+        let submission = fixture.submit(recorded)?;
         let mut counts = Counts::default();
         for (view, camera) in scene.cameras.iter().enumerate() {
             let found = radiance(&submission, view)?;

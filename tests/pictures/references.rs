@@ -1,4 +1,4 @@
-//! Pictures against stored references; and what would be a mistake is seen to be one.
+//! Pictures against stored references; and typical mistakes exceed the bound.
 
 use std::path::PathBuf;
 
@@ -8,22 +8,22 @@ use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
-use crate::judge::{Distance, as_image, assert_different};
-use crate::studio::draw;
+use crate::fixture::draw;
+use crate::image_distance::{Distance, as_image, assert_different};
 use crate::{Case, shared_scenes};
 
 pub const CASES: &[Case] = &[
     ("reference_of_the_projects_own_scene", || compare("colonnade", &colonnade()?)),
     ("reference_of_a_field_of_boxes", || compare("field", &field(400))),
-    ("a_wrong_light_is_seen", a_wrong_light_is_seen),
-    ("a_missing_object_is_seen", a_missing_object_is_seen),
-    ("flipped_normals_are_seen", flipped_normals_are_seen),
+    ("a_wrong_light_exceeds_the_bound", a_wrong_light_exceeds_the_bound),
+    ("a_missing_object_exceeds_the_bound", a_missing_object_exceeds_the_bound),
+    ("flipped_normals_exceed_the_bound", flipped_normals_exceed_the_bound),
 ];
 
 pub const CASES_OF_SHARED_SCENES: &[Case] = &[
     ("reference_of_cornell", || compare("cornell", &cornell()?)),
     ("reference_of_sponza", || compare("sponza", &sponza()?)),
-    ("every_malformed_file_that_loads_gives_a_picture", malformed_files),
+    ("every_malformed_file_that_loads_can_be_drawn", malformed_files),
 ];
 
 pub fn colonnade() -> Result<Scene, Failed> {
@@ -72,7 +72,7 @@ fn reference_path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/pictures/references").join(format!("{name}.png"))
 }
 
-fn a_wrong_light_is_seen() -> Result<(), Failed> {
+fn a_wrong_light_exceeds_the_bound() -> Result<(), Failed> {
     let wrong = |color: &mut Vec3| *color = Vec3::new(color.z, color.x, color.y);
     let right = draw(&field(400))?;
     for index in 0..field(0).lights.len() {
@@ -82,7 +82,7 @@ fn a_wrong_light_is_seen() -> Result<(), Failed> {
             Light::Point { intensity, .. } => wrong(intensity),
             other => return Err(format!("no case for {other:?}").into()),
         }
-        assert_different(&draw(&scene)?, &right).map_err(|_| format!("light {index} could be wrong"))?;
+        assert_different(&draw(&scene)?, &right).map_err(|_| format!("a wrong light {index} goes unnoticed"))?;
     }
     let right = draw(&colonnade()?)?;
     let mut scene = colonnade()?;
@@ -94,9 +94,9 @@ fn a_wrong_light_is_seen() -> Result<(), Failed> {
     assert_different(&draw(&scene)?, &right)
 }
 
-fn a_missing_object_is_seen() -> Result<(), Failed> {
+fn a_missing_object_exceeds_the_bound() -> Result<(), Failed> {
     let right = draw(&field(60))?;
-    let mut seen = 0;
+    let mut tested = 0;
     for index in 0..20 {
         let mut scene = field(60);
         let handle = scene.objects().nth(index).ok_or("the field has 60 objects")?;
@@ -104,16 +104,16 @@ fn a_missing_object_is_seen() -> Result<(), Failed> {
         let large = object.scale.x.abs() > 0.6 && object.position.z > 0.0 && object.position.x.abs() < 12.0;
         let opaque = scene.assets().get(object.material)?.blend == drawloom::scene::Blend::None;
         if large && opaque {
-            assert_different(&draw(&scene)?, &right).map_err(|_| format!("object {index} could be missing"))?;
-            seen += 1;
+            assert_different(&draw(&scene)?, &right).map_err(|_| format!("a missing object {index} goes unnoticed"))?;
+            tested += 1;
         }
     }
-    if seen == 0 { Err("no object was large enough".into()) } else { Ok(()) }
+    if tested == 0 { Err("no object was large enough".into()) } else { Ok(()) }
 }
 
-fn flipped_normals_are_seen() -> Result<(), Failed> {
+fn flipped_normals_exceed_the_bound() -> Result<(), Failed> {
     let right = draw(&colonnade()?)?;
-    // What is single-sided has the normals of its mesh; the rest turns them to the camera.
+    // Single-sided materials use the mesh's normals; double-sided ones turn them to the camera.
     let mut scene = colonnade()?;
     let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
     for (handle, mesh) in meshes {

@@ -8,7 +8,7 @@ use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, gla
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::studio::Studio;
+use crate::fixture::Fixture;
 
 pub const CASES: &[Case] = &[
     ("a_class_without_lights_costs_nothing", || no_light_of_a_class(false)),
@@ -62,8 +62,8 @@ impl Cost {
 /// A new renderer's picture of a scene, and its costs.
 fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     let output = deferred.output();
-    let mut studio = Studio::with(2, |builder| builder.deferred(deferred))?;
-    let recorded = studio.record(scene)?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let recorded = fixture.record(scene)?;
     let views = &recorded.statistics().views;
     let mut cost = Cost {
         passes: recorded.queues().iter().map(|queue| queue.passes.len() as i64).sum(),
@@ -71,8 +71,8 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
         lights: views.iter().map(|view| view.lights as i64).sum(),
         ..Cost::default()
     };
-    let picture = studio.submit(recorded)?.read(0, output)?;
-    let WgpuResources { pipelines, targets, target_bytes, .. } = studio.renderer.backend().resources();
+    let picture = fixture.submit(recorded)?.read(0, output)?;
+    let WgpuResources { pipelines, targets, target_bytes, .. } = fixture.renderer.backend().resources();
     (cost.pipelines, cost.targets, cost.target_bytes) = (pipelines as i64, targets as i64, target_bytes as i64);
     Ok((cost, picture))
 }
@@ -237,9 +237,9 @@ fn no_post() -> Result<(), Failed> {
         }
     }
     expect_changed("fxaa", &one_picture, &two_picture)?;
-    let mut studio = Studio::with(2, |builder| builder.deferred(deferred()))?;
-    let recorded = studio.record(&everything())?;
-    let radiance = studio.submit(recorded)?.read(0, "radiance")?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let recorded = fixture.record(&everything())?;
+    let radiance = fixture.submit(recorded)?.read(0, "radiance")?;
     if radiance == without.1 { Ok(()) } else { Err("without tone mapping, radiance is another".into()) }
 }
 
@@ -255,17 +255,17 @@ fn no_depth_pre_pass() -> Result<(), Failed> {
 
 fn every_process_counts() -> Result<(), Failed> {
     let all = || deferred().depth_pre_pass(true).post(Fxaa::default());
-    let mut studio = Studio::with(2, |builder| builder.deferred(all()))?;
-    let picture = studio.draw(&everything())?;
-    let names = studio.renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
+    let picture = fixture.draw(&everything())?;
+    let names = fixture.renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
     let mut needed_by_others = Vec::new();
     let (mut count, mut changed) = (0, 0);
     for name in names {
         count += 1;
         let without = all().leave_out(&name);
-        match Studio::with(2, |builder| builder.deferred(without)) {
-            Ok(mut studio) => {
-                expect_changed(&name, &picture, &studio.draw(&everything())?)?;
+        match Fixture::with(2, |builder| builder.deferred(without)) {
+            Ok(mut fixture) => {
+                expect_changed(&name, &picture, &fixture.draw(&everything())?)?;
                 changed += 1;
             }
             Err(error) => needed_by_others.push((name, error.message().unwrap_or_default().to_owned())),
@@ -339,17 +339,17 @@ fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
 }
 
 fn processes_follow() -> Result<(), Failed> {
-    let mut studio = Studio::with(2, |builder| builder.deferred(deferred()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
     let mut scene = everything();
     let mut pictures = Vec::new();
     let mut pipelines = 0;
     for (what, plans, new_pipelines, change) in STEPS {
         change(&mut scene)?;
-        let picture = studio.draw(&scene)?;
-        if studio.renderer.plan_count() != *plans {
-            return Err(format!("{what}: {} plans should be {plans}", studio.renderer.plan_count()).into());
+        let picture = fixture.draw(&scene)?;
+        if fixture.renderer.plan_count() != *plans {
+            return Err(format!("{what}: {} plans should be {plans}", fixture.renderer.plan_count()).into());
         }
-        let kept = studio.renderer.backend().resources();
+        let kept = fixture.renderer.backend().resources();
         pipelines += new_pipelines;
         if kept.pipelines != pipelines {
             return Err(format!("{what}: {} pipelines should be {pipelines}", kept.pipelines).into());
@@ -365,13 +365,13 @@ fn processes_follow() -> Result<(), Failed> {
         }
         pictures.push(picture);
     }
-    let kept = |studio: &Studio| (studio.renderer.plan_count(), studio.renderer.backend().resources().pipelines);
-    let before = kept(&studio);
+    let kept = |fixture: &Fixture| (fixture.renderer.plan_count(), fixture.renderer.backend().resources().pipelines);
+    let before = kept(&fixture);
     for ((what, .., change), before) in STEPS.iter().zip(&pictures) {
         change(&mut scene)?;
-        if studio.draw(&scene)? != *before {
+        if fixture.draw(&scene)? != *before {
             return Err(format!("{what}: the second time, the picture is another").into());
         }
     }
-    if kept(&studio) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&studio)).into()) }
+    if kept(&fixture) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&fixture)).into()) }
 }

@@ -9,9 +9,9 @@ use drawloom_testing::scenes::{cube, sized};
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::{Fixture, radiance};
 use crate::rays::{Panel, Stage};
 use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told, without_shadow};
-use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] = &[
     ("lit_surfaces_do_not_shadow_themselves_in_the_sun", || surfaces(|_, axis| sun(axis), &[0.0])),
@@ -26,11 +26,11 @@ pub const CASES: &[Case] = &[
 ];
 
 /// The greatest loss of light of a surface by self-shadowing, as a fraction of its light.
-fn most_kept(studio: &mut Studio, lit: &Scene, shadowed: &Scene) -> Result<f64, Failed> {
+fn most_kept(fixture: &mut Fixture, lit: &Scene, shadowed: &Scene) -> Result<f64, Failed> {
     let mut shots = Vec::new();
     for scene in [lit, shadowed] {
-        let recorded = studio.record(scene)?;
-        shots.push(radiance(&studio.submit(recorded)?, 0)?);
+        let recorded = fixture.record(scene)?;
+        shots.push(radiance(&fixture.submit(recorded)?, 0)?);
     }
     let pixels = shots[0].iter().zip(&shots[1]).map(|(lit, shadowed)| (lit[0], shadowed[0]));
     let kept = pixels.filter(|(lit, _)| *lit > 0.0).map(|(lit, shadowed)| (lit - shadowed) / lit);
@@ -66,12 +66,12 @@ fn surfaces(light: impl Fn(DVec3, DVec3) -> Light, leavings: &[f64]) -> Result<(
     let turns: Vec<_> = turns.collect();
     for (side, filter) in [(64, 1), (256, 0), (1024, 4), (2048, 1)] {
         let maps = ShadowMaps { side, filter, max_distance: 60.0, ..MAPS };
-        let mut studio = studio_with(maps)?;
+        let mut fixture = studio_with(maps)?;
         for (distance, angle) in [0.5, 12.0].into_iter().flat_map(|distance| SLOPES.map(|angle| (distance, angle))) {
             for &[turn, leaving] in &turns {
                 let (panel, view, light) = slope(&light, distance, [angle, turn, leaving]);
                 let scene = |light| Stage::new(vec![panel], vec![light]).scene(std::slice::from_ref(&view));
-                let kept = most_kept(&mut studio, &scene(without_shadow(light))?, &scene(light)?)?;
+                let kept = most_kept(&mut fixture, &scene(without_shadow(light))?, &scene(light)?)?;
                 if kept.is_nan() || kept > 5e-3 {
                     let which = format!("{angle} degrees, {distance} m, {leaving} degrees aside, {turn}, {maps:?}");
                     return Err(format!("it keeps {kept} of the light from itself: {which}").into());
@@ -87,13 +87,13 @@ const SLOPES: [f64; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 /// Otherwise the cases before this one could not fail.
 fn without_bias() -> Result<(), Failed> {
     for bias in [0.0, 0.5] {
-        let mut studio = studio_with(ShadowMaps { bias, ..MAPS })?;
+        let mut fixture = studio_with(ShadowMaps { bias, ..MAPS })?;
         for light in
             [|_, axis| sun(axis), |place, axis| spot(place, axis, 57.0), hemisphere] as [fn(DVec3, DVec3) -> Light; 3]
         {
             let (panel, view, light) = slope(light, 4.0, [70.0, PI / 4.0, 0.0]);
             let scene = |light| Stage::new(vec![panel], vec![light]).scene(std::slice::from_ref(&view));
-            let kept = most_kept(&mut studio, &scene(without_shadow(light))?, &scene(light)?)?;
+            let kept = most_kept(&mut fixture, &scene(without_shadow(light))?, &scene(light)?)?;
             if kept < 0.02 {
                 return Err(format!("with a bias of {bias}, {light:?} loses only {kept}").into());
             }
@@ -125,7 +125,7 @@ fn ball_mesh(strips: u32) -> Result<Mesh, Failed> {
 fn ball() -> Result<(), Failed> {
     // If a pixel of the map is much smaller than a facet, the facet's geometric slope shows, which differs from its normals'.
     for (side, strips, most) in [(256, 16, 0.01), (512, 32, 0.01), (2048, 64, 0.01), (2048, 16, 0.2)] {
-        let mut studio = studio_with(ShadowMaps { side, ..MAPS })?;
+        let mut fixture = studio_with(ShadowMaps { side, ..MAPS })?;
         let axis = DVec3::new(0.3, -0.9, -0.3).normalize();
         let place = -axis * 5.0;
         for light in [sun(axis), spot(place, axis, 30.0), hemisphere(place, axis)] {
@@ -140,7 +140,7 @@ fn ball() -> Result<(), Failed> {
                 scene.add_object(object)?;
                 Ok(scene)
             };
-            let kept = most_kept(&mut studio, &scene(without_shadow(light))?, &scene(light)?)?;
+            let kept = most_kept(&mut fixture, &scene(without_shadow(light))?, &scene(light)?)?;
             if kept.is_nan() || kept > most {
                 return Err(format!("{strips} strips, {side} pixels, {light:?}: it keeps {kept} from itself").into());
             }
@@ -153,7 +153,7 @@ fn ball() -> Result<(), Failed> {
 fn box_on_a_floor() -> Result<(), Failed> {
     for (side, filter) in [(512, 1), (2048, 4)] {
         let maps = ShadowMaps { side, filter, ..MAPS };
-        let mut studio = studio_with(maps)?;
+        let mut fixture = studio_with(maps)?;
         for degrees in [15.0_f64, 45.0, 70.0] {
             let (sine, cosine) = degrees.to_radians().sin_cos();
             let axis = DVec3::new(sine * 0.8, -cosine, sine * 0.6);
@@ -169,7 +169,7 @@ fn box_on_a_floor() -> Result<(), Failed> {
                 scene.add_object(RenderObject { scale: half, ..RenderObject::new(mesh, material, DVec3::Y) })?;
                 stage.panels.extend(Panel::closed_box(DVec3::Y, half.as_dvec3()));
                 let counts = stage
-                    .expect_of(&mut studio, &scene)
+                    .expect_of(&mut fixture, &scene)
                     .map_err(|failed| told(failed, format!("{degrees} {side} {filter} {light:?}")))?;
                 if counts.dark < 50 || counts.lit < 1500 {
                     return Err(format!("{degrees}: too little to judge: {counts:?}").into());
@@ -185,7 +185,7 @@ fn box_on_a_floor() -> Result<(), Failed> {
 fn close_to_a_wall() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };
-        let mut studio = studio_with(maps)?;
+        let mut fixture = studio_with(maps)?;
         for degrees in [15.0_f64, 30.0, 45.0, 60.0, 75.0] {
             let (sine, cosine) = degrees.to_radians().sin_cos();
             let axis = DVec3::new(sine, -cosine, 0.0);
@@ -197,8 +197,8 @@ fn close_to_a_wall() -> Result<(), Failed> {
             let height = (2.0 * half_width / 16.0) as f32;
             let view =
                 sized(Camera { projection: Projection::Orthographic { height }, ..looking }, [width, width / 16]);
-            let recorded = studio.record(&Stage::new(vec![wall, floor], vec![light]).scene(&[view])?)?;
-            let found = radiance(&studio.submit(recorded)?, 0)?;
+            let recorded = fixture.record(&Stage::new(vec![wall, floor], vec![light]).scene(&[view])?)?;
+            let found = radiance(&fixture.submit(recorded)?, 0)?;
             let middle = (width * (width / 32)) as usize;
             let pixel = 2.0 * 6.0 * 20_f64.to_radians().tan() / f64::from(maps.side) / cosine;
             let lit = (0..width).rev().find(|x| found[middle + *x as usize][0] > 0.0);

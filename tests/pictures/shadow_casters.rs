@@ -72,7 +72,7 @@ fn white() -> Material {
 }
 
 fn boxes() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         for signs in [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, -1.0), Vec3::NEG_ONE] {
             let half = Vec3::new(0.5, 0.15, 0.3);
@@ -80,7 +80,7 @@ fn boxes() -> Result<(), Failed> {
             let mesh = set.scene.add(cube())?;
             set.add(mesh, white(), |object| object.scale = half * signs)?;
             let stage = set.with(Panel::closed_box(DVec3::Y, half.as_dvec3()));
-            let counts = stage.expect_of(&mut studio, &set.scene).map_err(|failed| told(failed, signs))?;
+            let counts = stage.expect_of(&mut fixture, &set.scene).map_err(|failed| told(failed, signs))?;
             if counts.dark < 50 {
                 return Err(format!("too little to judge: {counts:?}").into());
             }
@@ -90,7 +90,7 @@ fn boxes() -> Result<(), Failed> {
 }
 
 fn squares() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         for (topology, mirrored) in
             [(Topology::TriangleList, 1.0), (Topology::TriangleStrip, 1.0), (Topology::TriangleStrip, -1.0)]
@@ -105,7 +105,7 @@ fn squares() -> Result<(), Failed> {
                 })?;
                 let up = -f64::from(turn).signum();
                 let panel = Panel { double_sided, ..Panel::new(DVec3::Y, DVec3::X * 0.5, DVec3::NEG_Z * (0.4 * up)) };
-                let counts = set.with(vec![panel]).expect_of(&mut studio, &set.scene);
+                let counts = set.with(vec![panel]).expect_of(&mut fixture, &set.scene);
                 let counts =
                     counts.map_err(|failed| told(failed, format!("{topology:?} {mirrored} {double_sided} {turn}")))?;
                 if (counts.fading > 20) != (double_sided || up > 0.0) {
@@ -118,7 +118,7 @@ fn squares() -> Result<(), Failed> {
 }
 
 fn blended_casts_none() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
             let mut set = Set::new(light)?;
@@ -128,7 +128,7 @@ fn blended_casts_none() -> Result<(), Failed> {
             set.add(mesh, Material { blend, opacity: 0.9, ..white() }, |object| {
                 object.scale = Vec3::new(0.6, 0.1, 0.6)
             })?;
-            let counts = set.floor.expect_of(&mut studio, &set.scene)?;
+            let counts = set.floor.expect_of(&mut fixture, &set.scene)?;
             if counts.lit < 2500 {
                 return Err(format!("too little to judge: {counts:?}").into());
             }
@@ -139,7 +139,7 @@ fn blended_casts_none() -> Result<(), Failed> {
 
 /// A floor of glass that reflects half of the light, with nothing behind it.
 fn blended_receives() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         for blend in [Blend::Alpha, Blend::Additive] {
             let shade = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
@@ -155,7 +155,7 @@ fn blended_receives() -> Result<(), Failed> {
             let mut stage = set.with(vec![shade]);
             stage.lights = vec![halved(light)];
             let counts =
-                stage.expect_of(&mut studio, &set.scene).map_err(|failed| told(failed, format!("{light:?}")))?;
+                stage.expect_of(&mut fixture, &set.scene).map_err(|failed| told(failed, format!("{light:?}")))?;
             if counts.lit < 1000 || counts.dark < 50 {
                 return Err(format!("too little to judge: {counts:?}").into());
             }
@@ -176,7 +176,7 @@ fn halved(light: Light) -> Light {
 }
 
 fn extreme_scales() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         for scale in [
             Vec3::ZERO,
@@ -194,7 +194,7 @@ fn extreme_scales() -> Result<(), Failed> {
                 object.scale = Vec3::splat(0.4);
             })?;
             let square = Panel::facing(DVec3::Y, DVec3::Y, 0.4).double_sided();
-            let counts = set.with(vec![square]).expect_of(&mut studio, &set.scene);
+            let counts = set.with(vec![square]).expect_of(&mut fixture, &set.scene);
             let counts = counts.map_err(|failed| told(failed, format!("{scale} {light:?}")))?;
             if counts.dark < 50 {
                 return Err(format!("too little to judge: {counts:?}").into());
@@ -205,15 +205,15 @@ fn extreme_scales() -> Result<(), Failed> {
 }
 
 fn depths() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for light in lights() {
         let mut panels = Panel::room(DVec3::Y * 3.5, 3.5);
         panels.extend(Panel::closed_box(DVec3::new(0.3, 1.2, -0.2), DVec3::new(0.5, 0.2, 0.6)));
         let stage = Stage { panels, lights: vec![light], maps: MAPS };
         let view = camera(DVec3::new(2.0, 3.0, 2.0), DVec3::ZERO, 60.0);
         let map = MAPS.camera(String::new(), &light, std::slice::from_ref(&view)).ok_or("there is no map")?;
-        let recorded = studio.record(&stage.scene(&[view])?)?;
-        let picture = studio.submit(recorded)?.read(1, "shadow map")?;
+        let recorded = fixture.record(&stage.scene(&[view])?)?;
+        let picture = fixture.submit(recorded)?.read(1, "shadow map")?;
         if [picture.width, picture.height] != [MAPS.side; 2] {
             return Err(format!("it is {} by {}", picture.width, picture.height).into());
         }

@@ -8,9 +8,9 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_alike, assert_different};
+use crate::fixture::Fixture;
+use crate::image_distance::{assert_alike, assert_different};
 use crate::shadows::{hemisphere, spot, sun};
-use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
     ("cached_shadow_maps_equal_new_ones_while_nothing_moves", nothing_moves),
@@ -21,10 +21,10 @@ pub const CASES: &[Case] = &[
     ("another_number_of_lights_or_views_leaves_no_old_shadow", other_lists),
 ];
 
-fn every(interval: u32) -> Result<Studio, Failed> {
+fn every(interval: u32) -> Result<Fixture, Failed> {
     let quality = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { interval, side: 512, ..quality.shadows }, ..quality };
-    Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
 }
 
 fn lights() -> Vec<Light> {
@@ -62,9 +62,9 @@ fn nothing_moves() -> Result<(), Failed> {
     unlit.lights.clear();
     assert_different(&expected, &every(1)?.draw(&unlit)?)?;
     for interval in [2, 3] {
-        let mut studio = every(interval)?;
+        let mut fixture = every(interval)?;
         for frame in 0..5 {
-            if studio.draw(&scene)? != expected {
+            if fixture.draw(&scene)? != expected {
                 return Err(format!("frame {frame} of {interval}").into());
             }
         }
@@ -74,23 +74,23 @@ fn nothing_moves() -> Result<(), Failed> {
 
 fn moved_casters() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut studio = every(3)?;
-    studio.draw(&scene)?;
+    let mut fixture = every(3)?;
+    fixture.draw(&scene)?;
     shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
     let expected = every(1)?.draw(&scene)?;
-    let late = [studio.draw(&scene)?, studio.draw(&scene)?];
+    let late = [fixture.draw(&scene)?, fixture.draw(&scene)?];
     if late[0] == expected || late[0] != late[1] {
         return Err("the shadows are not those of the frame before".into());
     }
-    if studio.draw(&scene)? == expected { Ok(()) } else { Err("the shadows do not catch up".into()) }
+    if fixture.draw(&scene)? == expected { Ok(()) } else { Err("the shadows do not catch up".into()) }
 }
 
 fn moved_light() -> Result<(), Failed> {
     for index in 0..3 {
         let mut scene = field(300);
         scene.lights = vec![lights()[index]];
-        let mut studio = every(2)?;
-        let before = studio.draw(&scene)?;
+        let mut fixture = every(2)?;
+        let before = fixture.draw(&scene)?;
         match &mut scene.lights[0] {
             Light::Spot { position, .. } | Light::Hemispherical { position, .. } => position.x += 1.0,
             Light::Directional { direction, .. } => *direction = Vec3::new(0.5, -0.8, 0.1).normalize(),
@@ -98,10 +98,10 @@ fn moved_light() -> Result<(), Failed> {
         }
         let expected = every(1)?.draw(&scene)?;
         assert_different(&before, &expected)?;
-        if studio.draw(&scene)? != before {
+        if fixture.draw(&scene)? != before {
             return Err(format!("light {index} moved without its map").into());
         }
-        if studio.draw(&scene)? != expected {
+        if fixture.draw(&scene)? != expected {
             return Err(format!("light {index} does not catch up").into());
         }
     }
@@ -110,28 +110,28 @@ fn moved_light() -> Result<(), Failed> {
 
 fn moved_camera() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut studio = every(2)?;
-    studio.draw(&scene)?;
+    let mut fixture = every(2)?;
+    fixture.draw(&scene)?;
     for camera in &mut scene.cameras {
         camera.position += DVec3::new(2.0, 0.5, -3.0);
     }
     // The sun's new map has its pixels at other positions.
-    assert_alike(&studio.draw(&scene)?, &every(1)?.draw(&scene)?)
+    assert_alike(&fixture.draw(&scene)?, &every(1)?.draw(&scene)?)
 }
 
 fn dropped() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut studio = every(2)?;
-    studio.draw(&scene)?;
-    studio.draw(&scene)?;
+    let mut fixture = every(2)?;
+    fixture.draw(&scene)?;
+    fixture.draw(&scene)?;
     shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
-    drop(studio.record(&scene)?);
+    drop(fixture.record(&scene)?);
     let expected = every(1)?.draw(&scene)?;
-    if studio.draw(&scene)? == expected { Ok(()) } else { Err("the dropped frame's maps are missing".into()) }
+    if fixture.draw(&scene)? == expected { Ok(()) } else { Err("the dropped frame's maps are missing".into()) }
 }
 
 fn other_lists() -> Result<(), Failed> {
-    let mut studio = every(100)?;
+    let mut fixture = every(100)?;
     let mut scene = scene();
     let changes: [&dyn Fn(&mut Scene); 6] = [
         &|_| {},
@@ -145,7 +145,7 @@ fn other_lists() -> Result<(), Failed> {
         change(&mut scene);
         let expected = every(1)?.draw(&scene)?;
         for frame in 0..2 {
-            if studio.draw(&scene)? != expected {
+            if fixture.draw(&scene)? != expected {
                 return Err(format!("frame {frame} of step {step}").into());
             }
         }

@@ -8,8 +8,8 @@ use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::{Fixture, radiance};
 use crate::rays::{Counts, Panel, Stage};
-use crate::studio::{Studio, radiance};
 
 pub const CASES: &[Case] = &[
     ("a_square_casts_the_shadow_of_its_geometry", square_occluder),
@@ -30,8 +30,8 @@ pub const CASES: &[Case] = &[
 pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1 };
 
 /// The shipped processes with these shadow maps.
-pub fn studio_with(maps: ShadowMaps) -> Result<Studio, Failed> {
-    Studio::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
+pub fn studio_with(maps: ShadowMaps) -> Result<Fixture, Failed> {
+    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
 }
 
 pub fn sun(direction: DVec3) -> Light {
@@ -103,7 +103,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
 fn square_occluder() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };
-        let mut studio = studio_with(maps)?;
+        let mut fixture = studio_with(maps)?;
         // The filter does not depend on the direction.
         for up in directions().skip(if filter == 1 { 0 } else { 7 }) {
             let aside = up.any_orthonormal_vector();
@@ -118,7 +118,7 @@ fn square_occluder() -> Result<(), Failed> {
             for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
                 let stage = stage(vec![floor, square], vec![light], maps);
                 let view = camera(eye, aside * -0.5, 50.0);
-                let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, up))?;
+                let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, up))?;
                 if filter == 1 {
                     expect(counts, 0.4, 0.01).map_err(|failed| told(failed, format!("{light:?}")))?;
                 }
@@ -136,7 +136,7 @@ fn leaving(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
 }
 
 fn around_a_hemisphere() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let place = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions() {
         for degrees in [5.0, 45.0, 75.0, 85.0] {
@@ -147,7 +147,7 @@ fn around_a_hemisphere() -> Result<(), Failed> {
             let aside = way.cross(axis).normalize_or(way.any_orthonormal_vector());
             let view = camera(place + aside * 0.8, wall.center, 40.0);
             let what = format!("{degrees} degrees from {axis}");
-            let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, &what))?;
+            let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, &what))?;
             expect(counts, 0.3, 0.05).map_err(|failed| told(failed, &what))?;
         }
     }
@@ -156,7 +156,7 @@ fn around_a_hemisphere() -> Result<(), Failed> {
 
 fn long_beam() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 1024, ..MAPS };
-    let mut studio = studio_with(maps)?;
+    let mut fixture = studio_with(maps)?;
     let floor = Panel::facing(DVec3::Y * -4.0, DVec3::Y, 12.0);
     let wall = Panel::facing(DVec3::Z * -6.0, DVec3::Z, 12.0);
     // Below the light; to its side; near its plane. All are about 2.2 m away, and extend 10 m to either side.
@@ -178,7 +178,7 @@ fn long_beam() -> Result<(), Failed> {
             let counts = if maps.max_distance == 20.0 {
                 stage.expect(&mut studio_with(maps)?, &views)
             } else {
-                stage.expect(&mut studio, &views)
+                stage.expect(&mut fixture, &views)
             };
             let counts = counts.map_err(|failed| told(failed, format!("({y}, {z}) {light:?}")))?;
             if counts.lit < 3000 {
@@ -196,7 +196,7 @@ fn before(place: DVec3, axis: DVec3) -> [Panel; 2] {
 }
 
 fn across_the_rim() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let place = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions().skip(4) {
         for (turn, distance) in [(40.0, 1.0), (80.0, 0.5), (100.0, 1.0), (150.0, 0.6)] {
@@ -211,7 +211,7 @@ fn across_the_rim() -> Result<(), Failed> {
                 camera(place - away * 2.0, place + axis + away, 90.0),
             ];
             let what = format!("{turn} degrees from {axis}, {distance} m away");
-            let counts = stage.expect(&mut studio, &views).map_err(|failed| told(failed, &what))?;
+            let counts = stage.expect(&mut fixture, &views).map_err(|failed| told(failed, &what))?;
             if counts.lit < 500 {
                 return Err(format!("{what}: too little to judge: {counts:?}").into());
             }
@@ -221,7 +221,7 @@ fn across_the_rim() -> Result<(), Failed> {
 }
 
 fn close_behind() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let place = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions().skip(5) {
         for turn in [170.0, 175.0, 180.0] {
@@ -235,7 +235,7 @@ fn close_behind() -> Result<(), Failed> {
                 let stage = stage(panels, vec![hemisphere(place, axis)], MAPS);
                 let view = camera(place + axis * 0.5, place + axis * 3.0, 90.0);
                 let what = format!("{turn} degrees from {axis}, {distance} m away");
-                let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, &what))?;
+                let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, &what))?;
                 if counts.lit < 500 {
                     return Err(format!("{what}: too little to judge: {counts:?}").into());
                 }
@@ -246,14 +246,14 @@ fn close_behind() -> Result<(), Failed> {
 }
 
 fn far_towards_the_sun() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     for height in [5.0, 50.0, 500.0, 5000.0] {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let kite = Panel::facing(-down * height, DVec3::Y, 1.0).double_sided();
         let stage = stage(vec![floor, kite], vec![sun(down)], MAPS);
         let view = camera(DVec3::new(2.0, 3.0, 4.0), DVec3::ZERO, 50.0);
-        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, height))?;
+        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, height))?;
         expect(counts, 0.4, 0.1).map_err(|failed| told(failed, height))?;
     }
     Ok(())
@@ -261,7 +261,7 @@ fn far_towards_the_sun() -> Result<(), Failed> {
 
 /// Each of its triangles extends from the ground to far above everything that the camera sees.
 fn tower() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     for (height, lean) in [(20.0, 0.0), (100.0, 0.3), (200.0, 0.0)] {
         let up = DVec3::new(0.0, height / 2.0, lean * height);
         let tower = Panel::new(up, DVec3::Z * 3.0, up).double_sided();
@@ -269,7 +269,7 @@ fn tower() -> Result<(), Failed> {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let stage = stage(vec![tower, wall, floor], vec![sun(DVec3::new(0.6, -0.8, 0.0))], MAPS);
         let view = camera(DVec3::new(0.3, 2.0, 5.0), DVec3::new(1.5, 3.0, -0.5), 70.0);
-        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, height))?;
+        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, height))?;
         expect(counts, 0.05, 0.1).map_err(|failed| told(failed, height))?;
     }
     Ok(())
@@ -277,7 +277,7 @@ fn tower() -> Result<(), Failed> {
 
 fn beyond_the_reach() -> Result<(), Failed> {
     let maps = ShadowMaps { max_distance: 5.0, ..MAPS };
-    let mut studio = studio_with(maps)?;
+    let mut fixture = studio_with(maps)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     // The surface that its shadow would fall on is too far away, so all of it is lit.
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
@@ -287,7 +287,7 @@ fn beyond_the_reach() -> Result<(), Failed> {
         Light::Directional { direction: down.as_vec3(), illuminance: Vec3::new(3.0, 2.0, 1.0), casts_shadow: false };
     let found = [sun(down), lit].map(|light| {
         let scene = stage(vec![floor, square], vec![light], maps).scene(std::slice::from_ref(&view))?;
-        studio.draw(&scene)
+        fixture.draw(&scene)
     });
     let [shadowed, lit] = found;
     if shadowed? != lit? {
@@ -295,11 +295,11 @@ fn beyond_the_reach() -> Result<(), Failed> {
     }
     // At this distance there are shadows.
     let near = camera(DVec3::new(1.0, 2.0, 2.0), DVec3::ZERO, 50.0);
-    expect(stage(vec![floor, square], vec![sun(down)], maps).expect(&mut studio, &[near])?, 0.3, 0.02)
+    expect(stage(vec![floor, square], vec![sun(down)], maps).expect(&mut fixture, &[near])?, 0.3, 0.02)
 }
 
 fn several_lights() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
     let square = Panel::facing(DVec3::new(0.1, 1.0, 0.2), DVec3::Y, 0.5).double_sided();
     let tinted = |light: Light, tint: Vec3| match light {
@@ -342,7 +342,7 @@ fn several_lights() -> Result<(), Failed> {
             // Not every light reaches what this camera sees.
             camera(DVec3::new(-4.0, 1.0, 1.0), DVec3::new(-1.0, 0.0, 0.0), 50.0),
         ];
-        stage(vec![floor, square], lights, MAPS).expect(&mut studio, &views)?;
+        stage(vec![floor, square], lights, MAPS).expect(&mut fixture, &views)?;
     }
     Ok(())
 }
@@ -350,7 +350,7 @@ fn several_lights() -> Result<(), Failed> {
 fn smallest_maps() -> Result<(), Failed> {
     for side in [1, 2] {
         let maps = ShadowMaps { side, ..MAPS };
-        let mut studio = studio_with(maps)?;
+        let mut fixture = studio_with(maps)?;
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
         let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
         let place = DVec3::Y * 3.0;
@@ -364,8 +364,8 @@ fn smallest_maps() -> Result<(), Failed> {
                 (vec![floor], without_shadow(light)),
                 (vec![floor], light),
             ] {
-                let recorded = studio.record(&stage(panels, vec![light], maps).scene(std::slice::from_ref(&view))?)?;
-                shots.push(radiance(&studio.submit(recorded)?, 0)?.into_flattened());
+                let recorded = fixture.record(&stage(panels, vec![light], maps).scene(std::slice::from_ref(&view))?)?;
+                shots.push(radiance(&fixture.submit(recorded)?, 0)?.into_flattened());
             }
             let [lit, shadowed, bare_lit, bare] = &shots[..] else { return Err("a picture is missing".into()) };
             if lit.iter().zip(shadowed).any(|(lit, shadowed)| !(*shadowed >= 0.0 && shadowed <= lit))
@@ -380,14 +380,14 @@ fn smallest_maps() -> Result<(), Failed> {
 
 fn widest_spot() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 2048, ..MAPS };
-    let mut studio = studio_with(maps)?;
+    let mut fixture = studio_with(maps)?;
     let place = DVec3::Y * 2.0;
     for degrees in [80.0, 84.9, 90.0] {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let square = Panel::facing(DVec3::new(0.3, 1.0, 0.0), DVec3::Y, 0.6).double_sided();
         let stage = stage(vec![floor, square], vec![spot(place, DVec3::NEG_Y, degrees)], maps);
         let view = camera(DVec3::new(1.0, 4.0, 5.0), DVec3::ZERO, 60.0);
-        let counts = stage.expect(&mut studio, &[view]).map_err(|failed| told(failed, degrees))?;
+        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, degrees))?;
         if counts.dark < 10 || counts.lit < 1200 {
             return Err(format!("{degrees}: too little to judge: {counts:?}").into());
         }
@@ -396,7 +396,7 @@ fn widest_spot() -> Result<(), Failed> {
 }
 
 fn orthographic() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
     let square = Panel::facing(DVec3::Y, DVec3::Y, 0.6).double_sided();
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
@@ -406,7 +406,7 @@ fn orthographic() -> Result<(), Failed> {
             let looking = Camera::looking_at("plan", DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO);
             let projection = Projection::Orthographic { height: 4.0 };
             let view = sized(Camera { projection, far, ..looking }, [80, 80]);
-            let counts = stage(vec![floor, square], vec![light], MAPS).expect(&mut studio, &[view])?;
+            let counts = stage(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?;
             expect(counts, 0.4, 0.02)?;
         }
     }
@@ -414,7 +414,7 @@ fn orthographic() -> Result<(), Failed> {
 }
 
 fn far_away() -> Result<(), Failed> {
-    let mut studio = studio_with(MAPS)?;
+    let mut fixture = studio_with(MAPS)?;
     let shift = DVec3::new(1e6, -5e5, 2.5e5);
     let floor = Panel::facing(shift, DVec3::Y, 6.0);
     let square = Panel::facing(shift + DVec3::Y, DVec3::Y, 0.6).double_sided();
@@ -422,7 +422,7 @@ fn far_away() -> Result<(), Failed> {
     let place = shift + DVec3::new(0.5, 3.0, 0.2);
     for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
         let view = camera(shift + DVec3::new(1.0, 4.0, 4.0), shift, 45.0);
-        expect(stage(vec![floor, square], vec![light], MAPS).expect(&mut studio, &[view])?, 0.4, 0.01)?;
+        expect(stage(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?, 0.4, 0.01)?;
     }
     Ok(())
 }

@@ -13,8 +13,8 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::draw;
 use crate::references::shared;
-use crate::studio::draw;
 
 pub const CASES: &[Case] = &[
     ("software_draws_the_demo_scene_as_wgpu_does", || judge(demo::colonnade()?)),

@@ -8,8 +8,8 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_alike, assert_different};
-use crate::studio::Studio;
+use crate::fixture::Fixture;
+use crate::image_distance::{assert_alike, assert_different};
 
 pub const CASES: &[Case] = &[
     ("absolute_transforms_are_accurate_only_near_the_origin", absolute),
@@ -39,7 +39,7 @@ fn field_at(shift: DVec3) -> Result<Scene, SceneError> {
 
 fn absolute() -> Result<(), Failed> {
     let of =
-        |transforms| Studio::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality(transforms)));
+        |transforms| Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality(transforms)));
     let mut exact = of(TransformPrecision::CameraRelative)?;
     let mut absolute = of(TransformPrecision::Absolute)?;
     for (distance, is_near) in [(0.0, true), (100.0, true), (1e6, false), (1e7, false)] {
@@ -54,13 +54,13 @@ fn absolute() -> Result<(), Failed> {
 
 fn changes() -> Result<(), Failed> {
     let scene = field_at(DVec3::new(1e6, -5e5, 2.5e5))?;
-    let mut studio = Studio::new()?;
-    let exact = studio.draw(&scene)?;
+    let mut fixture = Fixture::new()?;
+    let exact = fixture.draw(&scene)?;
     for _ in 0..2 {
-        studio.renderer.set_quality(quality(TransformPrecision::Absolute))?;
-        assert_different(&studio.draw(&scene)?, &exact)?;
-        studio.renderer.set_quality(quality(TransformPrecision::CameraRelative))?;
-        if studio.draw(&scene)? != exact {
+        fixture.renderer.set_quality(quality(TransformPrecision::Absolute))?;
+        assert_different(&fixture.draw(&scene)?, &exact)?;
+        fixture.renderer.set_quality(quality(TransformPrecision::CameraRelative))?;
+        if fixture.draw(&scene)? != exact {
             return Err("back at the first precision it differs".into());
         }
     }

@@ -12,8 +12,8 @@ use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::judge::{assert_color, tone_mapped};
-use crate::studio::{Studio, pixel};
+use crate::fixture::{Fixture, pixel};
+use crate::image_distance::{assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
     ("the_order_of_submission_does_not_change_the_picture", every_order),
@@ -61,9 +61,9 @@ fn behind(radiance: [f64; 3], pane: &Material) -> [f64; 3] {
 }
 
 /// A scene's radiance and picture.
-fn drawn(studio: &mut Studio, scene: &Scene) -> Result<(Picture, Picture), Failed> {
-    let recorded = studio.record(scene)?;
-    let submission = studio.submit(recorded)?;
+fn drawn(fixture: &mut Fixture, scene: &Scene) -> Result<(Picture, Picture), Failed> {
+    let recorded = fixture.record(scene)?;
+    let submission = fixture.submit(recorded)?;
     Ok((submission.read(0, "radiance")?, submission.read(0, "picture")?))
 }
 
@@ -103,7 +103,7 @@ fn every_order() -> Result<(), Failed> {
         Material { emission: Vec3::new(0.0, 0.2, 0.0), ..glass(Blend::Additive, Vec3::new(0.6, 0.1, 0.2), 0.5) },
         Material { emission: Vec3::new(0.1, 0.0, 0.0), ..glass(Blend::Subtractive, Vec3::new(0.1, 0.2, 0.1), 0.7) },
     ];
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let mut colors = Vec::new();
     for far_to_near in ORDERS {
         let expected = far_to_near
@@ -113,7 +113,7 @@ fn every_order() -> Result<(), Failed> {
         let mut first = None;
         for submitted in ORDERS {
             let scene = panes(&submitted.map(|pane| (depth_of(pane), glasses[pane].clone())))?;
-            let found = drawn(&mut studio, &scene)?;
+            let found = drawn(&mut fixture, &scene)?;
             expect(&format!("{far_to_near:?}, submitted as {submitted:?}"), &found, expected)?;
             if *first.get_or_insert_with(|| found.clone()) != found {
                 return Err(format!("{far_to_near:?}, submitted as {submitted:?}: other bytes").into());
@@ -130,15 +130,15 @@ fn every_order() -> Result<(), Failed> {
 fn behind_a_wall() -> Result<(), Failed> {
     let wall = Material { diffuse: Vec3::new(0.3, 0.7, 0.5), ..Material::default() };
     let of_wall = behind(BACKGROUND.as_dvec3().to_array(), &wall);
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
         let pane = glass(blend, Vec3::new(0.4, 0.1, 0.2), 0.6);
-        let alone = drawn(&mut studio, &panes(&[(0.0, wall.clone())])?)?;
+        let alone = drawn(&mut fixture, &panes(&[(0.0, wall.clone())])?)?;
         expect("the wall", &alone, of_wall)?;
-        if drawn(&mut studio, &panes(&[(-1.0, pane.clone()), (0.0, wall.clone())])?)? != alone {
+        if drawn(&mut fixture, &panes(&[(-1.0, pane.clone()), (0.0, wall.clone())])?)? != alone {
             return Err(format!("{blend:?} is seen through a wall").into());
         }
-        let before = drawn(&mut studio, &panes(&[(1.0, pane.clone()), (0.0, wall.clone())])?)?;
+        let before = drawn(&mut fixture, &panes(&[(1.0, pane.clone()), (0.0, wall.clone())])?)?;
         expect(&format!("{blend:?} before a wall"), &before, behind(of_wall, &pane))?;
     }
     Ok(())
@@ -180,7 +180,7 @@ fn lit_like_opaque() -> Result<(), Failed> {
         })?;
         let place = DVec3::new(0.0, 0.4, 1.0);
         scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..RenderObject::new(block, stone, place) })?;
-        Studio::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
+        Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
     };
     let mut before = Vec::new();
     for light in lights() {
@@ -199,35 +199,35 @@ fn lit_like_opaque() -> Result<(), Failed> {
 }
 
 fn scales_with_opacity() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
         for opacity in [0.0, 0.25, 0.5, 1.0] {
             let pane = glass(blend, Vec3::new(0.5, 0.2, 0.1), opacity);
             let pane = Material { emission: Vec3::new(0.1, 0.0, 0.05), ..pane };
             let expected = behind(BACKGROUND.as_dvec3().to_array(), &pane);
-            expect(&format!("{blend:?} at {opacity}"), &drawn(&mut studio, &panes(&[(0.0, pane)])?)?, expected)?;
+            expect(&format!("{blend:?} at {opacity}"), &drawn(&mut fixture, &panes(&[(0.0, pane)])?)?, expected)?;
         }
     }
     Ok(())
 }
 
 fn equal_depths() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let (red, green) = (glass(Blend::Alpha, Vec3::X, 0.7), glass(Blend::Alpha, Vec3::Y, 0.6));
     let added = glass(Blend::Additive, Vec3::Z, 1.0);
     for order in [[&red, &green, &added], [&green, &red, &added], [&added, &green, &red], [&red, &added, &green]] {
         let expected = order.iter().fold(BACKGROUND.as_dvec3().to_array(), |radiance, pane| behind(radiance, pane));
         let scene = panes(&order.map(|pane| (0.5, pane.clone())))?;
-        expect(&format!("{order:?}"), &drawn(&mut studio, &scene)?, expected)?;
+        expect(&format!("{order:?}"), &drawn(&mut fixture, &scene)?, expected)?;
     }
     Ok(())
 }
 
 fn black_at_worst() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     for taken in [0.6, 3.0, 60_000.0, 1e30] {
         let pane = Material { emission: Vec3::splat(taken), ..glass(Blend::Subtractive, Vec3::ONE, 1.0) };
-        let found = drawn(&mut studio, &panes(&[(0.0, pane.clone()), (1.0, pane.clone())])?)?;
+        let found = drawn(&mut fixture, &panes(&[(0.0, pane.clone()), (1.0, pane.clone())])?)?;
         if middle(&found.0).iter().any(|channel| channel.is_nan() || *channel >= 0.0) {
             return Err(format!("{taken} twice leaves {:?}", middle(&found.0)).into());
         }
@@ -237,11 +237,11 @@ fn black_at_worst() -> Result<(), Failed> {
     let taken = glass(Blend::Subtractive, Vec3::ONE, 1.0);
     let added = Material { emission: Vec3::ONE, ..glass(Blend::Additive, Vec3::ZERO, 1.0) };
     let expected = behind(behind(BACKGROUND.as_dvec3().to_array(), &taken), &added);
-    expect("added to what lacks", &drawn(&mut studio, &panes(&[(0.0, taken), (1.0, added)])?)?, expected)
+    expect("added to what lacks", &drawn(&mut fixture, &panes(&[(0.0, taken), (1.0, added)])?)?, expected)
 }
 
 fn lit_on_the_seen_side() -> Result<(), Failed> {
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     // The diffuse colour is not stored anywhere, so it is exact.
     let lit = 4.0 * (1.0 - (2.0_f64 / 8.0).powi(4)).powi(2) / 4.0 * 0.5 / PI;
     for (eye, lamp, double_sided, expected) in [
@@ -259,7 +259,7 @@ fn lit_on_the_seen_side() -> Result<(), Failed> {
         scene.lights = vec![Light::Point { position: DVec3::Z * 2.0 * lamp, intensity: Vec3::splat(4.0), range: 8.0 }];
         let expected = expected.map_or(BACKGROUND.as_dvec3().to_array(), |radiance| [radiance; 3]);
         let what = format!("seen from {eye}, lit from {lamp}, double-sided: {double_sided}");
-        expect(&what, &drawn(&mut studio, &scene)?, expected)?;
+        expect(&what, &drawn(&mut fixture, &scene)?, expected)?;
     }
     Ok(())
 }
@@ -267,7 +267,7 @@ fn lit_on_the_seen_side() -> Result<(), Failed> {
 fn many_batches() -> Result<(), Failed> {
     // Bundles end at 256, 512 and 699, each after another colour, so that the last drawn one shows.
     const COUNT: usize = 699;
-    let mut studio = Studio::new()?;
+    let mut fixture = Fixture::new()?;
     let colors = [Vec3::X, Vec3::Y, Vec3::Z].map(|diffuse| glass(Blend::Alpha, diffuse, 0.1));
     let mut pictures = Vec::new();
     for meshes in [1, 2] {
@@ -282,12 +282,12 @@ fn many_batches() -> Result<(), Failed> {
             let place = DVec3::Z * (-2.0 + pane as f64 * 0.004);
             scene.add_object(RenderObject::new(meshes[pane % meshes.len()], material, place))?;
         }
-        let recorded = studio.record(&scene)?;
+        let recorded = fixture.record(&scene)?;
         let (batches, bundles) = (recorded.statistics().views[0].batches, recorded.statistics().views[0].bundles);
         if (batches, bundles) != if meshes.len() == 1 { (1, 1) } else { (COUNT, 3) } {
             return Err(format!("{} meshes make {batches} batches in {bundles} bundles", meshes.len()).into());
         }
-        let submission = studio.submit(recorded)?;
+        let submission = fixture.submit(recorded)?;
         pictures.push((submission.read(0, "radiance")?, submission.read(0, "picture")?));
     }
     let expected =

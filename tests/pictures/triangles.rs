@@ -13,8 +13,8 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::references::colonnade;
-use crate::techniques::{
-    device, drawn_anew, expect, many_batches, pictures, small_maps, studio_of, technique, techniques,
+use crate::strategies::{
+    device, drawn_by_a_new_renderer, expect, fixture_of, fixture_with, many_batches, pictures, small_maps, strategies,
 };
 
 pub const CASES: &[Case] = &[
@@ -61,20 +61,20 @@ fn any_technique() -> Result<(), Failed> {
         let mut whole = with_meshes(scene()?, as_list);
         let mut expected = Vec::new();
         for _ in 0..FRAMES {
-            expected.push(drawn_anew(&whole)?);
+            expected.push(drawn_by_a_new_renderer(&whole)?);
             change(&mut whole)?;
         }
-        for (record, encode) in techniques()? {
-            let (mut studio, mut asking) = (technique(record, encode)?, asking(scene()?, every));
+        for (record, encode) in strategies()? {
+            let (mut fixture, mut asking) = (fixture_with(record, encode)?, asking(scene()?, every));
             for (frame, expected) in expected.iter().enumerate() {
-                let recorded = studio.record(&asking)?;
+                let recorded = fixture.record(&asking)?;
                 let culled = culled_in(&recorded);
-                if culled == 0 || pictures(&studio, recorded, &asking)? != *expected {
+                if culled == 0 || pictures(&fixture, recorded, &asking)? != *expected {
                     return Err(format!("frame {frame} differs with {record:?}, {encode:?}; {culled} culled").into());
                 }
                 change(&mut asking)?;
             }
-            let is_split = studio.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
+            let is_split = fixture.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
             let has_to_be = encode == EncodingStrategy::Split && every > 1;
             expect(is_split || !has_to_be, || "no pass was split".to_owned())?;
         }
@@ -89,36 +89,36 @@ fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
 /// With other causes of change: a depth pre-pass, several frames in flight, another quality and back, and meshes that stop being
 /// cullable.
 fn whatever_else_changes() -> Result<(), Failed> {
-    let expected = |scene: &Scene| drawn_anew(scene);
+    let expected = |scene: &Scene| drawn_by_a_new_renderer(scene);
     let mut whole = with_meshes(everything(), as_list);
     let first = expected(&whole)?;
     change(&mut whole)?;
     let second = expected(&whole)?;
 
-    let mut studio = technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?;
-    studio.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+    let mut fixture = fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?;
+    fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
     let mut scene = asking(everything(), 1);
     for _ in 0..2 {
-        let on_its_way = studio.record(&scene)?;
+        let on_its_way = fixture.record(&scene)?;
         let is_culled = culled_in(&on_its_way) > 0;
         change(&mut scene)?;
-        drop(studio.record(&scene)?);
-        let later = studio.record(&scene)?;
-        let drawn = [pictures(&studio, on_its_way, &scene)?, pictures(&studio, later, &scene)?];
+        drop(fixture.record(&scene)?);
+        let later = fixture.record(&scene)?;
+        let drawn = [pictures(&fixture, on_its_way, &scene)?, pictures(&fixture, later, &scene)?];
         expect(is_culled && drawn == [first.clone(), second.clone()], || "a frame on its way differs".to_owned())?;
 
         // Absolute transforms disable culling.
-        studio.renderer.set_quality(Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() })?;
-        let recorded = studio.record(&scene)?;
+        fixture.renderer.set_quality(Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() })?;
+        let recorded = fixture.record(&scene)?;
         expect(culled_in(&recorded) == 0, || "absolute places were culled".to_owned())?;
-        drop(studio.submit(recorded)?);
-        studio.renderer.set_quality(Quality::balanced())?;
-        studio.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+        drop(fixture.submit(recorded)?);
+        fixture.renderer.set_quality(Quality::balanced())?;
+        fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
 
         scene = with_meshes(scene, as_list);
-        let recorded = studio.record(&scene)?;
+        let recorded = fixture.record(&scene)?;
         let is_culled = culled_in(&recorded) > 0;
-        let same = pictures(&studio, recorded, &scene)? == second;
+        let same = pictures(&fixture, recorded, &scene)? == second;
         expect(same && !is_culled, || "what no longer asks differs".to_owned())?;
         scene = asking(everything(), 1);
     }
@@ -129,14 +129,14 @@ const FRAMES: usize = 3;
 
 fn measured() -> Result<(), Failed> {
     let (device, queue) = device()?;
-    let mut studio = studio_of(WgpuBackend::new(device, queue)?)?;
+    let mut fixture = fixture_of(WgpuBackend::new(device, queue)?)?;
     let scene = asking(everything(), 3);
-    let expected = drawn_anew(&with_meshes(everything(), as_list))?;
+    let expected = drawn_by_a_new_renderer(&with_meshes(everything(), as_list))?;
     for frame in 0..40 {
-        let recorded = studio.record(&scene)?;
+        let recorded = fixture.record(&scene)?;
         let culled = culled_in(&recorded);
-        if culled == 0 || pictures(&studio, recorded, &scene)? != expected {
-            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().pass_statistics()).into());
+        if culled == 0 || pictures(&fixture, recorded, &scene)? != expected {
+            return Err(format!("frame {frame} differs: {:?}", fixture.renderer.backend().pass_statistics()).into());
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! The same bytes for every number of workers and every granularity.
+//! Pictures have the same bytes for every number of workers and every granularity.
 
 use drawloom::Granularity;
 use drawloom::scene::{Blend, Material, Scene};
@@ -6,18 +6,18 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::Fixture;
 use crate::references::{colonnade, cornell, sponza};
-use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
     ("same_bytes_of_the_projects_own_scene", || same_for_all(&colonnade()?)),
     ("same_bytes_of_a_field_of_boxes", || same_for_all(&field(1500))),
     ("same_bytes_of_coincident_copies", || {
         let mut scene = opaque(colonnade()?)?;
-        let once = Studio::new()?.draw(&scene)?;
+        let once = Fixture::new()?.draw(&scene)?;
         scene.duplicate_objects(3);
-        if Studio::new()?.draw(&scene)? != once {
-            return Err("copies at the same place change the picture".into());
+        if Fixture::new()?.draw(&scene)? != once {
+            return Err("copies at the same position change the picture".into());
         }
         same_for_all(&scene)
     }),
@@ -26,7 +26,7 @@ pub const CASES: &[Case] = &[
 pub const CASES_OF_SHARED_SCENES: &[Case] =
     &[("same_bytes_of_cornell", || same_for_all(&cornell()?)), ("same_bytes_of_sponza", || same_for_all(&sponza()?))];
 
-/// Without what adds up: glass before glass at the same place is darker.
+/// The scene without blending: two panes of glass at the same position would be darker than one.
 fn opaque(mut scene: Scene) -> Result<Scene, Failed> {
     let materials: Vec<_> =
         scene.assets().iter::<Material>().map(|(handle, material)| (handle, material.clone())).collect();
@@ -42,17 +42,17 @@ fn same_for_all(scene: &Scene) -> Result<(), Failed> {
         for granularity in
             [Granularity::PerCamera, Granularity::PerDraw, Granularity::Chunk(5), Granularity::Chunk(256)]
         {
-            let mut studio = Studio::cut(workers, granularity)?;
-            let picture = studio.draw(scene)?;
+            let mut fixture = Fixture::with_granularity(workers, granularity)?;
+            let picture = fixture.draw(scene)?;
             let processes = ["shadow casters", "geometry buffer", "transparency"];
             let views = 0..scene.cameras.len() + scene.lights.iter().filter(|light| light.casts_shadow()).count();
-            let list = |process, view| studio.renderer.draw_list(process, view).map(|list| list.clone());
+            let list = |process, view| fixture.renderer.draw_list(process, view).map(|list| list.clone());
             let lists: Vec<_> = views.map(|view| processes.map(|process| list(process, view))).collect();
-            let (one_picture, one_lists) = first.get_or_insert_with(|| (picture.clone(), lists.clone()));
-            if *one_lists != lists {
+            let (first_picture, first_lists) = first.get_or_insert_with(|| (picture.clone(), lists.clone()));
+            if *first_lists != lists {
                 return Err(format!("commands or batches differ with {workers} workers, {granularity:?}").into());
             }
-            if *one_picture != picture {
+            if *first_picture != picture {
                 return Err(format!("pictures differ with {workers} workers, {granularity:?}").into());
             }
         }

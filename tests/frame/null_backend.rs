@@ -1,4 +1,4 @@
-//! The null backend refuses what breaks a rule of the frame.
+//! The null backend refuses frames that break a rule between frame and backend.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use crate::renderer;
 
 const PASS: Pass = Pass { process_index: 0, view_index: 0 };
 
-/// Runs `play` on a worker, with a frame of the field's first view, and returns the rule that it broke.
+/// Runs `calls` on a worker, with a frame of the field's first view, and returns the broken rule.
 fn broken_rule(
-    play: impl Fn(&Worker, &<NullBackend as Backend>::Frame, &DrawList, &FrameRequest<'_>) -> Result<(), BackendError>
+    calls: impl Fn(&Worker, &<NullBackend as Backend>::Frame, &DrawList, &FrameRequest<'_>) -> Result<(), BackendError>
     + Sync,
 ) -> String {
     let scene = one_view();
@@ -46,7 +46,7 @@ fn broken_rule(
     Scheduler::new(1)
         .unwrap()
         .parallel_for(1, 1, |_, worker| {
-            let Err(error) = play(worker, &frame, &list, &request) else { return };
+            let Err(error) = calls(worker, &frame, &list, &request) else { return };
             *rule.lock().unwrap() = error.to_string();
         })
         .unwrap();
@@ -75,7 +75,7 @@ fn one_view() -> Scene {
 }
 
 #[test]
-fn a_frame_by_the_rules_breaks_none() {
+fn a_valid_frame_is_accepted() {
     let rule = broken_rule(|worker, frame, list, request| {
         NullBackend.prepare(worker, frame, &pass(request, list))?;
         let mut bundles = record(worker, frame, &pass(request, list), 0..list.bundle_count())?;
@@ -100,7 +100,7 @@ fn commands_out_of_order_are_refused() {
 }
 
 #[test]
-fn a_bundle_that_is_lost_or_recorded_twice_is_refused() {
+fn a_missing_bundle_or_one_recorded_twice_is_refused() {
     let lost = broken_rule(|worker, frame, list, request| {
         NullBackend.prepare(worker, frame, &pass(request, list))?;
         NullBackend.finish(worker, frame, &pass(request, list), &mut Vec::new()).map(|_| ())

@@ -1,5 +1,5 @@
-//! The same bytes for every way to record and every way to encode, while scenes change; and what is kept is used again, and
-//! only then.
+//! Every recording and encoding strategy draws the same bytes while scenes change; and cached bundles are replayed exactly when
+//! nothing that they depend on changed.
 
 use std::sync::{Arc, OnceLock};
 
@@ -15,28 +15,29 @@ use drawloom_testing::scenes::{cube, field};
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::Fixture;
 use crate::references::colonnade;
-use crate::studio::Studio;
 
 pub const CASES: &[Case] = &[
-    ("every_technique_draws_alike", alike),
-    ("every_technique_keeps_frames_on_their_way_apart", on_their_way),
-    ("ways_that_are_measured_and_tried_draw_alike", measured),
-    ("kept_bundles_are_replayed_while_objects_move", moving),
-    ("kept_bundles_are_recorded_anew_where_something_changed", recorded_anew),
-    ("kept_bundles_follow_meshes_that_are_subdivided_otherwise", subdivided_otherwise),
-    ("a_pass_refused_at_submission_is_named", refused_at_submission),
+    ("every_strategy_draws_the_same_bytes", same_bytes),
+    ("every_strategy_keeps_frames_in_flight_apart", frames_in_flight),
+    ("trials_of_the_tuner_draw_the_same_bytes", tuned),
+    ("cached_bundles_are_replayed_while_objects_move", moving),
+    ("cached_bundles_are_recorded_again_when_their_inputs_change", recorded_again),
+    ("cached_bundles_are_recorded_again_when_a_subdivision_level_changes", subdivided_again),
+    ("an_error_at_submission_names_the_pass", refused_at_submission),
 ];
 
-const RECORDS: [RecordingStrategy; 4] = [
+const RECORDING_STRATEGIES: [RecordingStrategy; 4] = [
     RecordingStrategy::Direct,
     RecordingStrategy::Bundles,
     RecordingStrategy::CachedBundles,
     RecordingStrategy::Indirect,
 ];
-const ENCODES: [EncodingStrategy; 3] = [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit];
+const ENCODING_STRATEGIES: [EncodingStrategy; 3] =
+    [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit];
 
-/// The machine's adapter with all features that Drawloom has a use for.
+/// A device on the machine's adapter with all features that Drawloom uses.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
     let open = || {
@@ -56,50 +57,52 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     Ok(DEVICE.get_or_init(open).clone()?)
 }
 
-/// The techniques that the adapter has.
-pub fn techniques() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
+/// The strategies that the adapter supports.
+pub fn strategies() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
     let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
-    let records = RECORDS.into_iter().filter(|record| has_indirect || *record != RecordingStrategy::Indirect);
-    Ok(records.flat_map(|record| ENCODES.map(|encode| (record, encode))).collect())
+    let recordings =
+        RECORDING_STRATEGIES.into_iter().filter(|recording| has_indirect || *recording != RecordingStrategy::Indirect);
+    Ok(recordings.flat_map(|recording| ENCODING_STRATEGIES.map(|encoding| (recording, encoding))).collect())
 }
 
-pub fn studio_of(backend: WgpuBackend) -> Result<Studio, Failed> {
+/// A fixture with this backend.
+pub fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let builder = Renderer::builder(backend).deferred(small_maps()).granularity(Granularity::Chunk(300));
     let (renderer, submitter) = builder.build(scheduler)?;
-    Ok(Studio { renderer, submitter })
+    Ok(Fixture { renderer, submitter })
 }
 
-/// Small shadow maps are soon drawn, and hold as many draws as large ones.
+/// The deferred pipeline with small shadow maps, which are fast to draw and take as many draws as large ones.
 pub fn small_maps() -> Deferred {
     Deferred::to_picture().shadow_maps(Some(ShadowMaps { side: 64, ..ShadowMaps::default() }))
 }
 
-/// One that draws by one technique alone.
-pub fn technique(record: RecordingStrategy, encode: EncodingStrategy) -> Result<Studio, Failed> {
+/// A fixture with fixed strategies.
+pub fn fixture_with(recording: RecordingStrategy, encoding: EncodingStrategy) -> Result<Fixture, Failed> {
     let (device, queue) = device()?;
-    studio_of(WgpuBackend::new(device, queue)?.recording_strategy(record)?.encoding_strategy(encode))
+    fixture_of(WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding))
 }
 
-/// Every main view's picture, and the light in it.
-pub fn pictures(studio: &Studio, recorded: Recorded<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    let submission = studio.submit(recorded)?;
+/// The picture and the radiance of every main view.
+pub fn pictures(fixture: &Fixture, recorded: Recorded<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+    let submission = fixture.submit(recorded)?;
     let targets = (0..scene.cameras.len()).flat_map(|view| [(view, "picture"), (view, "radiance")]);
     Ok(targets.map(|(view, target)| submission.read(view, target)).collect::<Result<_, _>>()?)
 }
 
-fn draw(studio: &mut Studio, scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    let recorded = studio.record(scene)?;
-    pictures(studio, recorded, scene)
+fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+    let recorded = fixture.record(scene)?;
+    pictures(fixture, recorded, scene)
 }
 
-/// What a renderer draws that has drawn nothing before.
-pub fn drawn_anew(scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    draw(&mut technique(RecordingStrategy::Bundles, EncodingStrategy::PerPass)?, scene)
+/// What a new renderer draws.
+pub fn drawn_by_a_new_renderer(scene: &Scene) -> Result<Vec<Picture>, Failed> {
+    draw(&mut fixture_with(RecordingStrategy::Bundles, EncodingStrategy::PerPass)?, scene)
 }
 
-/// The colonnade in a small picture. Its lamp casts no shadow: to halve the edges of all that is near it takes each technique
-/// seconds, and `everything` has such a lamp as well.
+/// The colonnade in a small picture. Its lamp casts no shadow: the subdivision of all objects near it takes seconds per strategy,
+/// and `everything` has such a lamp as well.
 fn small_colonnade() -> Result<Scene, Failed> {
     let mut scene = colonnade()?;
     scene.cameras[0].size = [120, 80];
@@ -111,7 +114,7 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// So many meshes and panes of glass that nearly nothing merges: several bundles a view, of what is opaque and of what is not.
+/// Many meshes and panes of glass of which nearly none merge: several bundles of opaque and of blended batches per view.
 pub fn many_batches() -> Scene {
     let mut scene = field(3200);
     let meshes: Vec<_> = (0..1600).map(|_| scene.add(cube()).unwrap()).collect();
@@ -130,7 +133,7 @@ pub fn many_batches() -> Scene {
     scene
 }
 
-/// Moves every object a little: opaque ones stay the same batches.
+/// Moves every object a little. The batches of opaque objects stay the same.
 fn move_all(scene: &mut Scene, by: f64) -> Result<(), Failed> {
     for handle in scene.objects().collect::<Vec<_>>() {
         let object = scene.object(handle)?;
@@ -142,9 +145,9 @@ fn move_all(scene: &mut Scene, by: f64) -> Result<(), Failed> {
 
 type Change = fn(&mut Scene) -> Result<(), Failed>;
 
-/// What happens to a scene before each frame: nothing at first, then everything moves, an object goes and comes back, assets
-/// are added, a picture is resized.
-const STORY: [Change; 8] = [
+/// The change of a scene before each frame: none at first, then everything moves, an object is removed and added, assets are
+/// added, a picture is resized.
+const CHANGES: [Change; 8] = [
     |_| Ok(()),
     |_| Ok(()),
     |scene| move_all(scene, 1.0),
@@ -173,35 +176,36 @@ const STORY: [Change; 8] = [
     |scene| move_all(scene, -2.0),
 ];
 
-fn alike() -> Result<(), Failed> {
-    let mut studios = Vec::new();
-    for (record, encode) in techniques()? {
-        studios.push((record, encode, technique(record, encode)?));
+fn same_bytes() -> Result<(), Failed> {
+    let mut fixtures = Vec::new();
+    for (recording, encoding) in strategies()? {
+        fixtures.push((recording, encoding, fixture_with(recording, encoding)?));
     }
     for mut scene in [small_colonnade()?, many_batches(), everything()] {
-        for (frame, change) in STORY.into_iter().enumerate() {
+        for (frame, change) in CHANGES.into_iter().enumerate() {
             change(&mut scene)?;
             let mut expected = None;
-            for (record, encode, studio) in &mut studios {
-                let drawn = draw(studio, &scene)?;
+            for (recording, encoding, fixture) in &mut fixtures {
+                let drawn = draw(fixture, &scene)?;
                 if *expected.get_or_insert_with(|| drawn.clone()) != drawn {
-                    return Err(format!("frame {frame} differs with {record:?}, {encode:?}").into());
+                    return Err(format!("frame {frame} differs with {recording:?}, {encoding:?}").into());
                 }
-                let passes = studio.renderer.backend().pass_statistics();
-                if passes.is_empty() || passes.iter().any(|pass| (pass.recording, pass.encoding) != (*record, *encode))
+                let passes = fixture.renderer.backend().pass_statistics();
+                if passes.is_empty()
+                    || passes.iter().any(|pass| (pass.recording, pass.encoding) != (*recording, *encoding))
                 {
-                    return Err(format!("these should be {record:?}, {encode:?}: {passes:?}").into());
+                    return Err(format!("these should be {recording:?}, {encoding:?}: {passes:?}").into());
                 }
             }
-            if frame == STORY.len() - 1 && expected != Some(drawn_anew(&scene)?) {
-                return Err("a renderer that has drawn nothing before draws something else".into());
+            if frame == CHANGES.len() - 1 && expected != Some(drawn_by_a_new_renderer(&scene)?) {
+                return Err("a new renderer draws other bytes".into());
             }
         }
     }
     Ok(())
 }
 
-fn on_their_way() -> Result<(), Failed> {
+fn frames_in_flight() -> Result<(), Failed> {
     let change = |scene: &mut Scene, round| -> Result<(), Failed> {
         move_all(scene, 20.0)?;
         if round == 1 {
@@ -212,61 +216,64 @@ fn on_their_way() -> Result<(), Failed> {
         Ok(())
     };
     let mut scene = many_batches();
-    let mut expected = vec![drawn_anew(&scene)?];
+    let mut expected = vec![drawn_by_a_new_renderer(&scene)?];
     for round in 0..3 {
         change(&mut scene, round)?;
-        expected.push(drawn_anew(&scene)?);
+        expected.push(drawn_by_a_new_renderer(&scene)?);
     }
     expect(expected.windows(2).all(|pair| pair[0] != pair[1]), || "nothing changes".to_owned())?;
-    for (record, encode) in techniques()? {
-        let (mut scene, mut studio) = (many_batches(), technique(record, encode)?);
+    for (recording, encoding) in strategies()? {
+        let (mut scene, mut fixture) = (many_batches(), fixture_with(recording, encoding)?);
         for round in 0..3 {
-            let told = |which| Failed::from(format!("the {which} differs: {record:?}, {encode:?}, round {round}"));
-            let first = studio.record(&scene)?;
+            let differs =
+                |which| Failed::from(format!("the {which} differs: {recording:?}, {encoding:?}, round {round}"));
+            let first = fixture.record(&scene)?;
             change(&mut scene, round)?;
-            // One that is never submitted lies between them.
-            drop(studio.record(&scene)?);
-            let second = studio.record(&scene)?;
+            // A frame in between is never submitted.
+            drop(fixture.record(&scene)?);
+            let second = fixture.record(&scene)?;
             if round == 1 {
-                // Both are submitted before either is read. They share their targets, so only the second can be seen.
-                drop(studio.submit(first)?);
-            } else if pictures(&studio, first, &scene)? != expected[round] {
-                return Err(told("first"));
+                // Both are submitted before either is read. They share their targets, so only the second can be read.
+                drop(fixture.submit(first)?);
+            } else if pictures(&fixture, first, &scene)? != expected[round] {
+                return Err(differs("first"));
             }
-            if pictures(&studio, second, &scene)? != expected[round + 1] {
-                return Err(told("second"));
+            if pictures(&fixture, second, &scene)? != expected[round + 1] {
+                return Err(differs("second"));
             }
         }
     }
     Ok(())
 }
 
-fn measured() -> Result<(), Failed> {
+fn tuned() -> Result<(), Failed> {
     let (mut scene, (device, queue)) = (many_batches(), device()?);
     scene.cameras[0].size = [24, 18];
     scene.cameras[1].size = [20, 20];
-    let expected = drawn_anew(&scene)?;
-    let mut studio = studio_of(WgpuBackend::new(device, queue)?)?;
-    let mut seen: Vec<(RecordingStrategy, bool)> = Vec::new();
+    let expected = drawn_by_a_new_renderer(&scene)?;
+    let mut fixture = fixture_of(WgpuBackend::new(device, queue)?)?;
+    let mut used: Vec<(RecordingStrategy, bool)> = Vec::new();
     for frame in 0..40 {
-        if draw(&mut studio, &scene)? != expected {
-            return Err(format!("frame {frame} differs: {:?}", studio.renderer.backend().pass_statistics()).into());
+        if draw(&mut fixture, &scene)? != expected {
+            return Err(format!("frame {frame} differs: {:?}", fixture.renderer.backend().pass_statistics()).into());
         }
-        seen.extend(studio.renderer.backend().pass_statistics().iter().map(|pass| (pass.recording, pass.encoders > 1)));
+        used.extend(
+            fixture.renderer.backend().pass_statistics().iter().map(|pass| (pass.recording, pass.encoders > 1)),
+        );
     }
-    for (record, _) in techniques()? {
-        if !seen.contains(&(record, false)) {
-            return Err(format!("{record:?} was not tried").into());
+    for (recording, _) in strategies()? {
+        if !used.contains(&(recording, false)) {
+            return Err(format!("{recording:?} was not tried").into());
         }
     }
-    if seen.iter().any(|(_, is_split)| *is_split) { Ok(()) } else { Err("no pass was split".into()) }
+    if used.iter().any(|(_, is_split)| *is_split) { Ok(()) } else { Err("no pass was split".into()) }
 }
 
-/// Bundles that were recorded and that were replayed, over the passes that `is_meant` picks.
-pub fn counts(studio: &Studio, is_meant: impl Fn(&WgpuPassStatistics) -> bool) -> (usize, usize) {
-    let passes = studio.renderer.backend().pass_statistics();
-    let meant = passes.iter().filter(|pass| is_meant(pass));
-    meant
+/// The numbers of recorded and of replayed bundles in the passes that `is_counted` selects.
+pub fn counts(fixture: &Fixture, is_counted: impl Fn(&WgpuPassStatistics) -> bool) -> (usize, usize) {
+    let passes = fixture.renderer.backend().pass_statistics();
+    let counted = passes.iter().filter(|pass| is_counted(pass));
+    counted
         .fold((0, 0), |(recorded, replayed), pass| (recorded + pass.recorded_bundles, replayed + pass.replayed_bundles))
 }
 
@@ -275,105 +282,113 @@ pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> 
 }
 
 fn moving() -> Result<(), Failed> {
-    for encode in ENCODES {
-        let (mut scene, mut studio) = (many_batches(), technique(RecordingStrategy::CachedBundles, encode)?);
-        draw(&mut studio, &scene)?;
-        let (recorded, replayed) = counts(&studio, |_| true);
+    for encoding in ENCODING_STRATEGIES {
+        let (mut scene, mut fixture) = (many_batches(), fixture_with(RecordingStrategy::CachedBundles, encoding)?);
+        draw(&mut fixture, &scene)?;
+        let (recorded, replayed) = counts(&fixture, |_| true);
         expect(recorded > 10 && replayed == 0, || format!("at first {recorded} and {replayed}"))?;
-        for pass in studio.renderer.backend().pass_statistics() {
+        for pass in fixture.renderer.backend().pass_statistics() {
             expect(pass.view != 0 || pass.recorded_bundles > 3, || format!("not many bundles: {pass:?}"))?;
         }
         for frame in 0..4 {
             if frame > 1 {
-                // A millimetre changes no order and nobody's visibility, but every pixel at an edge.
+                // A millimetre changes no order and no visibility, but every pixel at an edge.
                 move_all(&mut scene, 0.01)?;
             }
-            draw(&mut studio, &scene)?;
-            let (again, replayed) = counts(&studio, |_| true);
-            expect((again, replayed) == (0, recorded), || format!("{encode:?}, {frame}: {again} and {replayed}"))?;
+            draw(&mut fixture, &scene)?;
+            let (again, replayed) = counts(&fixture, |_| true);
+            expect((again, replayed) == (0, recorded), || format!("{encoding:?}, {frame}: {again} and {replayed}"))?;
         }
-        if draw(&mut studio, &scene)? != drawn_anew(&scene)? {
-            return Err("what is replayed shows where objects were".into());
+        if draw(&mut fixture, &scene)? != drawn_by_a_new_renderer(&scene)? {
+            return Err("replayed bundles draw objects where they were".into());
         }
     }
     Ok(())
 }
 
-fn recorded_anew() -> Result<(), Failed> {
-    let (mut scene, mut studio) =
-        (many_batches(), technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
-    let steady = |studio: &mut Studio, scene: &Scene, after: &str| {
-        draw(studio, scene)?;
-        let (recorded, replayed) = counts(studio, |_| true);
+fn recorded_again() -> Result<(), Failed> {
+    let (mut scene, mut fixture) =
+        (many_batches(), fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
+    let steady = |fixture: &mut Fixture, scene: &Scene, after: &str| {
+        draw(fixture, scene)?;
+        let (recorded, replayed) = counts(fixture, |_| true);
         expect(recorded == 0 && replayed > 10, || format!("after {after}: {recorded} and {replayed}"))
     };
-    draw(&mut studio, &scene)?;
-    steady(&mut studio, &scene, "the first frame")?;
+    draw(&mut fixture, &scene)?;
+    steady(&mut fixture, &scene, "the first frame")?;
 
-    // One of the bundles: those before it stay.
+    // This changes one bundle and those after it; earlier ones stay.
     let in_sight = scene.objects().nth(700).ok_or("there are objects")?;
     let object = scene.remove_object(in_sight)?;
-    draw(&mut studio, &scene)?;
-    let (recorded, replayed) = counts(&studio, |_| true);
+    draw(&mut fixture, &scene)?;
+    let (recorded, replayed) = counts(&fixture, |_| true);
     expect(recorded > 0 && replayed > 0, || format!("without an object {recorded} and {replayed}"))?;
-    steady(&mut studio, &scene, "an object went")?;
+    steady(&mut fixture, &scene, "an object went")?;
     scene.add_object(object)?;
-    draw(&mut studio, &scene)?;
-    expect(counts(&studio, |_| true).0 > 0, || "an object came back, and nothing was recorded".to_owned())?;
-    steady(&mut studio, &scene, "an object came back")?;
+    draw(&mut fixture, &scene)?;
+    expect(counts(&fixture, |_| true).0 > 0, || "an object came back, and nothing was recorded".to_owned())?;
+    steady(&mut fixture, &scene, "an object came back")?;
 
-    // What every bundle is recorded with.
+    // An input of every bundle.
     scene.add(Material::default())?;
-    draw(&mut studio, &scene)?;
-    expect(counts(&studio, |_| true).1 == 0, || "bundles of other materials were replayed".to_owned())?;
-    steady(&mut studio, &scene, "a material came")?;
+    draw(&mut fixture, &scene)?;
+    expect(counts(&fixture, |_| true).1 == 0, || "bundles of other materials were replayed".to_owned())?;
+    steady(&mut fixture, &scene, "a material came")?;
 
-    // A picture of the same shape shows the same objects, and bundles know no size.
+    // A picture of the same aspect ratio shows the same objects, and bundles do not depend on the size.
     scene.cameras[0].size = [48, 27];
-    let resized = draw(&mut studio, &scene)?;
-    expect(counts(&studio, |_| true).0 == 0, || "bundles were recorded for another size".to_owned())?;
-    expect(resized == drawn_anew(&scene)?, || "at another size it differs".to_owned())?;
+    let resized = draw(&mut fixture, &scene)?;
+    expect(counts(&fixture, |_| true).0 == 0, || "bundles were recorded for another size".to_owned())?;
+    expect(resized == drawn_by_a_new_renderer(&scene)?, || "at another size it differs".to_owned())?;
 
-    // Other buffers, as there are more objects; none of them is in sight.
+    // More objects, all out of sight, take new buffers.
     for _ in 0..8000 {
         scene.add_object(RenderObject { position: DVec3::splat(1e6), ..object })?;
     }
-    draw(&mut studio, &scene)?;
-    expect(counts(&studio, |_| true).1 == 0, || "bundles of other buffers were replayed".to_owned())?;
-    steady(&mut studio, &scene, "other buffers")?;
+    draw(&mut fixture, &scene)?;
+    expect(counts(&fixture, |_| true).1 == 0, || "bundles of other buffers were replayed".to_owned())?;
+    steady(&mut fixture, &scene, "other buffers")?;
 
-    // More objects than there was room for.
+    // Objects beyond the capacity of the buffers.
     scene.duplicate_objects(3);
-    draw(&mut studio, &scene)?;
-    steady(&mut studio, &scene, "three times the objects")?;
-    if draw(&mut studio, &scene)? == drawn_anew(&scene)? { Ok(()) } else { Err("at last it differs".into()) }
+    draw(&mut fixture, &scene)?;
+    steady(&mut fixture, &scene, "three times the objects")?;
+    if draw(&mut fixture, &scene)? == drawn_by_a_new_renderer(&scene)? {
+        Ok(())
+    } else {
+        Err("the last frame differs".into())
+    }
 }
 
-/// As the lamp of `everything` comes near, edges are halved more often; and as meshes change, what is subdivided does.
-fn subdivided_otherwise() -> Result<(), Failed> {
-    let (mut scene, mut studio) =
-        (everything(), technique(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
-    draw(&mut studio, &scene)?;
-    draw(&mut studio, &scene)?;
-    let shadows = |studio: &Studio| counts(studio, |pass| pass.process == "shadow casters");
-    let (recorded, replayed) = shadows(&studio);
+/// When the lamp of `everything` comes closer, subdivision levels rise; and when meshes change, so do their subdivisions.
+fn subdivided_again() -> Result<(), Failed> {
+    let (mut scene, mut fixture) =
+        (everything(), fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
+    draw(&mut fixture, &scene)?;
+    draw(&mut fixture, &scene)?;
+    let shadows = |fixture: &Fixture| counts(fixture, |pass| pass.process == "shadow casters");
+    let (recorded, replayed) = shadows(&fixture);
     expect(recorded == 0 && replayed > 0, || format!("{recorded} and {replayed}"))?;
-    // So near to the floor and its neighbours that they are cut finer.
+    // So close to the floor and its neighbours that their subdivision levels rise.
     for handle in scene.objects().collect::<Vec<_>>() {
         let object = scene.object(handle)?;
         scene.replace_object(handle, RenderObject { position: object.position + DVec3::Y * 1.5, ..object })?;
     }
-    if draw(&mut studio, &scene)? != drawn_anew(&scene)? {
+    if draw(&mut fixture, &scene)? != drawn_by_a_new_renderer(&scene)? {
         return Err("nearer to the lamp it differs".into());
     }
-    let (recorded, _) = shadows(&studio);
+    let (recorded, _) = shadows(&fixture);
     expect(recorded > 0, || "nothing was recorded nearer to the lamp".to_owned())?;
     let mesh = scene.as_scene_ref().meshes[3];
     scene.replace(mesh, drawloom_testing::scenes::cube_with_flipped_normals())?;
-    if draw(&mut studio, &scene)? == drawn_anew(&scene)? { Ok(()) } else { Err("with another mesh it differs".into()) }
+    if draw(&mut fixture, &scene)? == drawn_by_a_new_renderer(&scene)? {
+        Ok(())
+    } else {
+        Err("with another mesh it differs".into())
+    }
 }
 
-/// A process that reads what it draws into.
+/// A process that samples the target that it draws into.
 struct Ouroboros;
 
 impl RenderProcess for Ouroboros {
@@ -398,7 +413,7 @@ impl RenderProcess for Ouroboros {
     }
 }
 
-/// Draws what the other reads.
+/// Draws the target that the other one samples.
 struct Head;
 
 impl RenderProcess for Head {

@@ -1,4 +1,4 @@
-//! Whoever does the work, and however it is cut: the queues are the same.
+//! Draw lists do not depend on the number of workers and the granularity.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ const GRANULARITIES: [Granularity; 7] = [
 
 fn drawn(scene: &Scene, workers: usize, granularity: Granularity) -> (Vec<DrawList>, Vec<NullPass>, FrameStatistics) {
     let (mut renderer, submitter) = renderer(workers, granularity);
-    // The second frame finds what the first one left behind.
+    // The second frame reuses the first one's tables.
     let mut result = None;
     for _ in 0..2 {
         let recorded = renderer.record(scene.as_scene_ref()).unwrap();
@@ -53,12 +53,12 @@ fn assert_same_for_all(scene: &Scene) {
 }
 
 #[test]
-fn a_field_of_boxes() {
+fn a_field_of_boxes_has_the_same_draw_lists() {
     assert_same_for_all(&field(3000));
 }
 
 #[test]
-fn a_view_of_so_many_objects_that_it_is_sorted_in_parts() {
+fn a_view_sorted_in_several_buckets_has_the_same_draw_lists() {
     let mut scene = field(1500);
     scene.cameras.truncate(1);
     scene.duplicate_objects(40);
@@ -77,7 +77,7 @@ fn a_view_of_so_many_objects_that_it_is_sorted_in_parts() {
 }
 
 #[test]
-fn without_instancing_the_same_objects_are_drawn_each_by_itself() {
+fn without_instancing_each_object_is_a_batch_of_its_own() {
     let scene = field(1000);
     let (lists, ..) = drawn(&scene, 2, Granularity::default());
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
@@ -85,22 +85,22 @@ fn without_instancing_the_same_objects_are_drawn_each_by_itself() {
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     for (view, list) in lists.iter().enumerate() {
-        let apart = renderer.draw_list("geometry buffer", view).unwrap();
-        assert!(list.batches.len() < list.objects.len() && apart.batches.len() == list.objects.len());
-        assert_eq!(apart.objects, list.objects);
-        assert!(apart.commands().eq(list.commands()));
-        assert!(apart.batches.iter().all(|batch| batch.count == 1));
+        let separate = renderer.draw_list("geometry buffer", view).unwrap();
+        assert!(list.batches.len() < list.objects.len() && separate.batches.len() == list.objects.len());
+        assert_eq!(separate.objects, list.objects);
+        assert!(separate.commands().eq(list.commands()));
+        assert!(separate.batches.iter().all(|batch| batch.count == 1));
     }
     submitter.submit(recorded).unwrap();
 }
 
 #[test]
-fn the_projects_own_scene() {
+fn the_projects_own_scene_has_the_same_draw_lists() {
     assert_same_for_all(&demo::colonnade().unwrap());
 }
 
 #[test]
-fn coincident_copies() {
+fn coincident_copies_have_the_same_draw_lists() {
     let mut scene = field(100);
     scene.duplicate_objects(5);
     let (lists, ..) = drawn(&scene, 2, Granularity::Chunk(64));
@@ -111,7 +111,7 @@ fn coincident_copies() {
 }
 
 #[test]
-fn a_view_draws_what_a_plain_loop_finds_visible() {
+fn visibility_matches_a_reference_loop() {
     let scene = field(2000);
     let (lists, _, statistics) = drawn(&scene, 2, Granularity::default());
     for (camera, (list, view)) in scene.cameras.iter().zip(lists.iter().zip(&statistics.views)) {
@@ -120,18 +120,19 @@ fn a_view_draws_what_a_plain_loop_finds_visible() {
             let bounds = reference.bounds[object];
             let offset =
                 reference.orientations[object].as_dquat() * (reference.scales[object] * bounds.center).as_dvec3();
-            let place =
+            let position =
                 camera.orientation.as_dquat().inverse() * (reference.positions[object] + offset - camera.position);
             let radius = f64::from(bounds.radius * reference.scales[object].abs().max_element());
             let Projection::Perspective { field_of_view } = camera.projection else { unreachable!() };
             let half = f64::from(field_of_view) * 0.5;
             let half_x = (half.tan() * f64::from(camera.aspect())).atan();
-            let beside = |coordinate: f64, angle: f64| coordinate.abs() * angle.cos() + place.z * angle.sin() <= radius;
-            -place.z + radius >= f64::from(camera.near) && beside(place.x, half_x) && beside(place.y, half)
+            let beside =
+                |coordinate: f64, angle: f64| coordinate.abs() * angle.cos() + position.z * angle.sin() <= radius;
+            -position.z + radius >= f64::from(camera.near) && beside(position.x, half_x) && beside(position.y, half)
         };
         let seen: Vec<u32> =
             (0..reference.object_count()).filter(|&object| inside(object)).map(|object| object as u32).collect();
-        // Spheres that touch a plane to within rounding may be on either side of it.
+        // A sphere that touches a plane may be on either side of it, depending on rounding.
         assert!(view.visible.abs_diff(seen.len()) <= 1, "{} against {}", view.visible, seen.len());
         assert!(view.visible > 100 && view.visible < 2000, "the camera {} tests something", camera.name);
         let is_opaque =

@@ -1,4 +1,4 @@
-//! Kept bundles of a process that draws otherwise from one frame to the next.
+//! Cached bundles of a process whose shader and parameters change from frame to frame.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -11,12 +11,13 @@ use drawloom::task::Scheduler;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::studio::Studio;
-use crate::techniques::{counts, device, expect, many_batches};
+use crate::fixture::Fixture;
+use crate::strategies::{counts, device, expect, many_batches};
 
-pub const CASES: &[Case] = &[("kept_bundles_follow_a_process_that_draws_otherwise", painted_otherwise)];
+pub const CASES: &[Case] =
+    &[("cached_bundles_are_recorded_again_when_a_shader_or_its_parameters_change", changing_shader)];
 
-/// Paints everything in one colour: its shader's own, or that of its parameters, of which there are more or fewer.
+/// Paints everything in one colour: a constant of its shader, or one of its parameters, whose number changes.
 struct Painted {
     step: Arc<AtomicU32>,
 }
@@ -70,32 +71,34 @@ impl RenderProcess for Painted {
     }
 }
 
-fn painted_otherwise() -> Result<(), Failed> {
+fn changing_shader() -> Result<(), Failed> {
     let scene = many_batches();
     let step = Arc::new(AtomicU32::new(0));
-    let studio = |record| {
+    let fixture = |recording| {
         let (device, queue) = device()?;
         let builder = Renderer::builder(
-            WgpuBackend::new(device, queue)?.recording_strategy(record)?.encoding_strategy(EncodingStrategy::PerPass),
+            WgpuBackend::new(device, queue)?
+                .recording_strategy(recording)?
+                .encoding_strategy(EncodingStrategy::PerPass),
         );
         let builder = builder.process(Painted { step: Arc::clone(&step) }).output("paint");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
-        Ok::<_, Failed>(Studio { renderer, submitter })
+        Ok::<_, Failed>(Fixture { renderer, submitter })
     };
-    let paint = |studio: &mut Studio| {
-        let recorded = studio.record(&scene)?;
-        Ok::<_, Failed>(studio.submit(recorded)?.read(0, "paint")?)
+    let paint = |fixture: &mut Fixture| {
+        let recorded = fixture.record(&scene)?;
+        Ok::<_, Failed>(fixture.submit(recorded)?.read(0, "paint")?)
     };
-    let mut kept = studio(RecordingStrategy::CachedBundles)?;
-    // Other bytes in the same place are read by the bundles that are there.
+    let mut cached = fixture(RecordingStrategy::CachedBundles)?;
+    // Cached bundles read new parameter values of the same size, so they need no recording.
     let steps = [(0, true), (4, true), (1, true), (2, false), (5, true), (3, true), (0, true), (3, true), (1, true)];
     for (next, is_recorded) in steps {
         step.store(next, Ordering::Relaxed);
-        let expected = paint(&mut studio(RecordingStrategy::Direct)?)?;
-        for turn in 0..2 {
-            expect(paint(&mut kept)? == expected, || format!("step {next}, frame {turn}: another picture"))?;
-            let (recorded, replayed) = counts(&kept, |_| true);
-            let is_new = is_recorded && turn == 0;
+        let expected = paint(&mut fixture(RecordingStrategy::Direct)?)?;
+        for frame in 0..2 {
+            expect(paint(&mut cached)? == expected, || format!("step {next}, frame {frame}: another picture"))?;
+            let (recorded, replayed) = counts(&cached, |_| true);
+            let is_new = is_recorded && frame == 0;
             expect((recorded > 0, replayed > 0) == (is_new, !is_new), || format!("{next}: {recorded}, {replayed}"))?;
         }
     }

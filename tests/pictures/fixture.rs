@@ -1,4 +1,4 @@
-//! Draws scenes.
+//! A renderer and its submitter on the machine's adapter.
 
 use std::sync::{Arc, OnceLock};
 
@@ -11,25 +11,25 @@ use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
 
-/// The machine's adapter as a device that all cases share; `None` where there is none.
+/// A device on the machine's adapter, which all cases share; `None` without an adapter.
 pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
     static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
     DEVICE.get_or_init(|| adapter::device().ok()).clone()
 }
 
 /// A renderer and its submitter.
-pub struct Studio {
+pub struct Fixture {
     pub renderer: Renderer<WgpuBackend>,
     pub submitter: Submitter<WgpuBackend>,
 }
 
-impl Studio {
+impl Fixture {
     /// The shipped processes on two workers.
     pub fn new() -> Result<Self, Failed> {
         Self::with(2, |builder| builder.deferred(Deferred::to_picture()))
     }
 
-    /// Other processes, or other settings.
+    /// With other render processes or settings.
     pub fn with(
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
@@ -41,7 +41,7 @@ impl Studio {
     }
 
     /// The shipped processes with this many workers and this granularity.
-    pub fn cut(workers: usize, granularity: Granularity) -> Result<Self, Failed> {
+    pub fn with_granularity(workers: usize, granularity: Granularity) -> Result<Self, Failed> {
         Self::with(workers, |builder| builder.deferred(Deferred::to_picture()).granularity(granularity))
     }
 
@@ -60,9 +60,9 @@ impl Studio {
     }
 }
 
-/// The picture that the shipped processes draw of a scene.
+/// The picture of a scene, drawn by the shipped processes.
 pub fn draw(scene: &Scene) -> Result<Picture, Failed> {
-    Studio::new()?.draw(scene)
+    Fixture::new()?.draw(scene)
 }
 
 /// Red, green and blue of a pixel.
