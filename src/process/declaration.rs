@@ -3,8 +3,8 @@
 use super::Format;
 use crate::scene::ViewKind;
 
-/// Collects what a process reads and writes. Targets have names. Each view of the process' kind has targets of its own, of the
-/// size of its picture.
+/// Collects what a process reads and writes. Targets have names. Each view of the process' kind has targets of its own,
+/// of the size of its picture.
 #[derive(Debug, Default)]
 pub struct Declare {
     declaration: Declaration,
@@ -36,8 +36,8 @@ impl Declare {
         self.access(target, Access::DrawDepth);
     }
 
-    /// Tests and writes a depth target that all views of its kind share: a texture array with one layer for each view, first
-    /// cleared to 0, infinitely far away. The pictures of those views have the same size.
+    /// Tests and writes a depth target that all views of its kind share: a texture array with one layer for each view,
+    /// first cleared to 0, infinitely far away. The pictures of those views have the same size.
     pub fn clears_depth_layer(&mut self, target: &str, format: Format) {
         self.access(target, Access::ClearDepthLayer(format));
     }
@@ -57,7 +57,8 @@ impl Declare {
         self.access(target, Access::Sample);
     }
 
-    /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as [`Declare::samples`] does.
+    /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
+    /// [`Declare::samples`] does.
     pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
         self.access(target, Access::SampleLayers(views));
     }
@@ -138,7 +139,8 @@ impl Declaration {
         depth.map(|(target, access)| (target.as_str(), *access))
     }
 
-    /// The targets that the shader samples in the order of their bindings, each with the kind of view that it belongs to.
+    /// The targets that the shader samples in the order of their bindings, each with the kind of view that it belongs
+    /// to.
     pub fn samples(&self) -> impl Iterator<Item = (ViewKind, &str)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
             Access::Sample => Some((self.views, target.as_str())),

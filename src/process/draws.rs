@@ -50,8 +50,8 @@ impl Default for CommandDraws<'_> {
     }
 }
 
-/// Every pixel of the view, once, by one triangle infinitely far away: if the process tests depth, only pixels where nothing was
-/// drawn.
+/// Every pixel of the view, once, by one triangle infinitely far away: if the process tests depth, only pixels where
+/// nothing was drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FullScreen<'a> {
     /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is
@@ -63,9 +63,9 @@ pub struct FullScreen<'a> {
     pub parameters: Cow<'a, [u8]>,
 }
 
-/// The pixels that lights reach. Each light is drawn as a light volume (L 4.2.1), all lights of a class in one instanced draw,
-/// with additive blending. A process that draws lights tests depth, so that pixels whose surface is behind the light volume are
-/// rejected before they are shaded.
+/// The pixels that lights reach. Each light is drawn as a light volume (L 4.2.1), all lights of a class in one
+/// instanced draw, with additive blending. A process that draws lights tests depth, so that pixels whose surface is
+/// behind the light volume are rejected before they are shaded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightDraws<'a> {
     /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `fragment`, whose input is

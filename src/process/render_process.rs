@@ -6,8 +6,8 @@ use super::{CpuShader, Declare, Draws};
 
 /// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
-/// A process draws once in each view of its kind. All workers share it while a frame is recorded, so it keeps what changes over
-/// frames behind a lock or in an atomic.
+/// A process draws once in each view of its kind. All workers share it while a frame is recorded, so it keeps what
+/// changes over frames behind a lock or in an atomic.
 ///
 /// ```
 /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -43,16 +43,16 @@ pub trait RenderProcess: Send + Sync {
     /// Its name in errors, reports and the graph, unique among the processes of a frame.
     fn name(&self) -> &str;
 
-    /// Declares the views that it draws in, and what it reads and writes. Called once for every plan that it is part of: when
-    /// the renderer is built, and when a scene requires other processes beside it.
+    /// Declares the views that it draws in, and what it reads and writes. Called once for every plan that it is part
+    /// of: when the renderer is built, and when a scene requires other processes beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// What it draws. Called once per frame, and the result may change: new parameters cost nothing, another shader or blending
-    /// needs new pipelines.
+    /// What it draws. Called once per frame, and the result may change: new parameters cost nothing, another shader or
+    /// blending needs new pipelines.
     fn draws(&self) -> Draws<'_>;
 
-    /// What the software backend runs in place of the process' WGSL. Without one, frames with this process return an error on
-    /// that backend. Called once per frame, by the software backend only.
+    /// What the software backend runs in place of the process' WGSL. Without one, frames with this process return an
+    /// error on that backend. Called once per frame, by the software backend only.
     fn cpu_shader(&self) -> Option<CpuShader> {
         None
     }

@@ -20,7 +20,8 @@ pub const CASES: &[Case] = &[
     ("formats_that_lack_channels_are_refused_by_name", misfits),
 ];
 
-/// Scenes with mirrored objects and strips, perspective and orthographic, and one with pairs of objects at one position.
+/// Scenes with mirrored objects and strips, perspective and orthographic, and one with pairs of objects at one
+/// position.
 fn scenes() -> Result<Vec<(&'static str, Scene)>, Failed> {
     let mut boxes = field(400);
     for camera in &mut boxes.cameras {

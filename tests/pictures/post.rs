@@ -27,8 +27,8 @@ pub const CASES: &[Case] = &[
     ("negative_radiance_is_black_and_infinite_radiance_white", extreme_radiance),
 ];
 
-/// An engine's full-screen process. Its WGSL is the body of a function from `pixel`, the pixel's centre, and `source`, the
-/// colour there before, to a colour.
+/// An engine's full-screen process. Its WGSL is the body of a function from `pixel`, the pixel's centre, and `source`,
+/// the colour there before, to a colour.
 struct Step {
     name: &'static str,
     source: Option<String>,
@@ -231,8 +231,8 @@ fn sub_pixel() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Half planes and stripes in colour, on a picture of size `numbers.zw` that begins at `numbers.xy` and continues beyond its
-/// border.
+/// Half planes and stripes in colour, on a picture of size `numbers.zw` that begins at `numbers.xy` and continues
+/// beyond its border.
 const BUSY: &str = "
     let place = clamp(floor(pixel - numbers.xy), vec2(0.0), numbers.zw - 1.0);
     let slanted = select(0.1, 0.9, place.x * 0.3 + place.y * 1.1 > 6.0);

@@ -301,8 +301,8 @@ impl Rays<'_> {
         Some(Bounds { low: sum.low * (1.0 - rounding) - smallest, high: sum.high * (1.0 + rounding) + smallest })
     }
 
-    /// The least and the greatest fraction of a light after shadowing: 0 or 1, but anything in between where the filter meets an
-    /// edge, and so close behind the shadow caster that the bias may reach past it.
+    /// The least and the greatest fraction of a light after shadowing: 0 or 1, but anything in between where the filter
+    /// meets an edge, and so close behind the shadow caster that the bias may reach past it.
     fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
         if !light.casts_shadow() {
             return [1.0; 2];
@@ -330,7 +330,8 @@ impl Rays<'_> {
         [least, most]
     }
 
-    /// The distance from a point to the face that blocks a light from it, if one does; the point lies on the face at `index`.
+    /// The distance from a point to the face that blocks a light from it, if one does; the point lies on the face at
+    /// `index`.
     fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
         let (from, along) = match *light {
             Light::Directional { direction, .. } => {
@@ -348,8 +349,8 @@ impl Rays<'_> {
     }
 }
 
-/// The width of a pixel of a light's map: in metres for a directional light, and at a distance of 1 m for others, as the
-/// documentation of [`ShadowMaps`] defines it.
+/// The width of a pixel of a light's map: in metres for a directional light, and at a distance of 1 m for others, as
+/// the documentation of [`ShadowMaps`] defines it.
 fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     let side = f64::from(maps.side);
     match *light {
@@ -367,9 +368,9 @@ fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
     }
 }
 
-/// How far from its geometric edge a shadow may fade, in metres on the surface: half of the filter's width and half a pixel of
-/// the map, along a diagonal of the map's pixels, and more on a surface that is inclined to the light. A pixel is that of
-/// [`map_pixel`].
+/// How far from its geometric edge a shadow may fade, in metres on the surface: half of the filter's width and half a
+/// pixel of the map, along a diagonal of the map's pixels, and more on a surface that is inclined to the light. A pixel
+/// is that of [`map_pixel`].
 fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
@@ -394,8 +395,8 @@ fn color(light: &Light) -> DVec3 {
 
 /// The least and the greatest illuminance of a light of intensity 1 at a point that is known to within `error` metres.
 fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
-    // An octahedral normal of half floats is up to 0.12° off if a device truncates them. Those along an axis are exact, except
-    // for the rounding of f32.
+    // An octahedral normal of half floats is up to 0.12° off if a device truncates them. Those along an axis are exact,
+    // except for the rounding of f32.
     let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
     let (position, range) = match *light {
         Light::Directional { direction, .. } => {

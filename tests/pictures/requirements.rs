@@ -77,8 +77,8 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     Ok((cost, picture))
 }
 
-/// Fails unless a scene without a feature costs as much, and has the same picture byte for byte, as with a pipeline that has no
-/// process for it; and costs less than the scene with everything by the expected savings.
+/// Fails unless a scene without a feature costs as much, and has the same picture byte for byte, as with a pipeline
+/// that has no process for it; and costs less than the scene with everything by the expected savings.
 fn expect_saved(
     full: &(Cost, Picture),
     what: &str,

@@ -38,7 +38,8 @@ fn most_kept(fixture: &mut Fixture, lit: &Scene, shadowed: &Scene) -> Result<f64
     Ok(kept.fold(0.0, |most, kept| if kept <= most { most } else { kept }))
 }
 
-/// A panel that a light meets at an angle, this many degrees from the light's axis; a camera in front of it; and the light.
+/// A panel that a light meets at an angle, this many degrees from the light's axis; a camera in front of it; and the
+/// light.
 fn slope(
     light: impl Fn(DVec3, DVec3) -> Light,
     distance: f64,
@@ -123,7 +124,8 @@ fn ball_mesh(strips: u32) -> Result<Mesh, Failed> {
 }
 
 fn ball() -> Result<(), Failed> {
-    // If a pixel of the map is much smaller than a facet, the facet's geometric slope shows, which differs from its normals'.
+    // If a pixel of the map is much smaller than a facet, the facet's geometric slope shows, which differs from its
+    // normals'.
     for (side, strips, most) in [(256, 16, 0.01), (512, 32, 0.01), (2048, 64, 0.01), (2048, 16, 0.2)] {
         let mut fixture = studio_with(ShadowMaps { side, ..MAPS })?;
         let axis = DVec3::new(0.3, -0.9, -0.3).normalize();
@@ -180,8 +182,8 @@ fn box_on_a_floor() -> Result<(), Failed> {
     Ok(())
 }
 
-/// The floor behind a wall is dark from where the filter reads nothing of what is in front of the wall, and half a pixel, which
-/// covers the bias.
+/// The floor behind a wall is dark from where the filter reads nothing of what is in front of the wall, and half a
+/// pixel, which covers the bias.
 fn close_to_a_wall() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };

@@ -95,7 +95,8 @@ fn squares() -> Result<(), Failed> {
         for (topology, mirrored) in
             [(Topology::TriangleList, 1.0), (Topology::TriangleStrip, 1.0), (Topology::TriangleStrip, -1.0)]
         {
-            // Visible from both sides; from the light's side only; from the other side only, and then it casts no shadow.
+            // Visible from both sides; from the light's side only; from the other side only, and then it casts no
+            // shadow.
             for (double_sided, turn) in [(true, -90.0_f32), (true, 90.0), (false, -90.0), (false, 90.0)] {
                 let mut set = Set::new(light)?;
                 let mesh = set.scene.add(square(topology))?;
@@ -266,8 +267,8 @@ fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) 
             Projection::Perspective { .. } => near / depth(x, y),
             _ => far - depth(x, y) * (far - near),
         };
-        // Straight edges of 5° are off by half a pixel of 1024, which is a quarter here; and in between, distances are longer by a
-        // thousandth.
+        // Straight edges of 5° are off by half a pixel of 1024, which is a quarter here; and in between, distances are
+        // longer by a thousandth.
         let slope = hits.iter().map(|hit| (hit.0 - hits[0].0).abs()).fold(0.0, f64::max);
         if (found - hits[0].0).abs() > 0.3 * slope + 1e-3 * hits[0].0 {
             return Err(format!("at ({x}, {y}) it is {found} m away, and should be {}", hits[0].0));

@@ -82,7 +82,8 @@ fn stage(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> Stage {
     Stage { panels, lights, maps }
 }
 
-/// Fails unless at least these fractions of the pixels are surely lit and surely dark, and at most a fifth is uncertain.
+/// Fails unless at least these fractions of the pixels are surely lit and surely dark, and at most a fifth is
+/// uncertain.
 fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
     let all = (counts.lit + counts.dark + counts.fading + counts.edges) as f64;
     let enough = counts.lit as f64 >= lit * all && counts.dark as f64 >= dark * all;
@@ -356,7 +357,8 @@ fn smallest_maps() -> Result<(), Failed> {
         let place = DVec3::Y * 3.0;
         for light in [sun(DVec3::NEG_Y), spot(place, DVec3::NEG_Y, 50.0), hemisphere(place, DVec3::NEG_Y)] {
             let view = camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0);
-            // The positions of shadows are undefined, but nothing is brighter than its light, and nothing is shadowed without a caster.
+            // The positions of shadows are undefined, but nothing is brighter than its light, and nothing is shadowed
+            // without a caster.
             let mut shots = Vec::new();
             for (panels, light) in [
                 (vec![floor, square], without_shadow(light)),

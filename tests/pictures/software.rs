@@ -73,8 +73,8 @@ impl Difference {
         Self { root_mean_square: (squares / count).sqrt(), near: near / count }
     }
 
-    /// Whether the difference is acceptable. Where rounding decides which surface a pixel on an edge shows, or whether a pixel on a
-    /// shadow's edge is lit, the whole pixel differs.
+    /// Whether the difference is acceptable. Where rounding decides which surface a pixel on an edge shows, or whether
+    /// a pixel on a shadow's edge is lit, the whole pixel differs.
     fn is_within_bound(&self) -> bool {
         self.root_mean_square <= 2.0 && self.near >= 0.99
     }

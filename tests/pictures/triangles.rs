@@ -35,8 +35,8 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// The scene with the triangles of every n-th mesh culled, and of lists only: a strip's triangles are rounded differently than
-/// a list's.
+/// The scene with the triangles of every n-th mesh culled, and of lists only: a strip's triangles are rounded
+/// differently than a list's.
 fn asking(scene: Scene, every: usize) -> Scene {
     let number = Cell::new(0_usize);
     with_meshes(scene, |mesh| {
@@ -86,8 +86,8 @@ fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
     recorded.statistics().views.iter().map(|view| view.culled_triangles.culled()).sum()
 }
 
-/// With other causes of change: a depth pre-pass, several frames in flight, another quality and back, and meshes that stop being
-/// cullable.
+/// With other causes of change: a depth pre-pass, several frames in flight, another quality and back, and meshes that
+/// stop being cullable.
 fn whatever_else_changes() -> Result<(), Failed> {
     let expected = |scene: &Scene| drawn_by_a_new_renderer(scene);
     let mut whole = with_meshes(everything(), as_list);

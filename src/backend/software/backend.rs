@@ -20,8 +20,8 @@ use crate::view::ObjectTable;
 /// Every process of a frame needs a [`CpuShader`](crate::process::CpuShader): see
 /// [`RenderProcess::cpu_shader`](crate::process::RenderProcess::cpu_shader). Those that come with the crate have one.
 ///
-/// In f32, targets hold what their formats can: values are rounded when they are stored. The reference keeps f64, and only
-/// clamps to the range of a format. Neither stores NaN: 0 is stored instead.
+/// In f32, targets hold what their formats can: values are rounded when they are stored. The reference keeps f64, and
+/// only clamps to the range of a format. Neither stores NaN: 0 is stored instead.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -69,7 +69,8 @@ impl SoftwareBackend {
         Self { rasterizer: Arc::new(Rasterizer::<f32>::new(Executor::Scheduler(scheduler))) }
     }
 
-    /// Draws in f64, on the thread that submits, and keeps its targets in f64: the reference for what a picture should be.
+    /// Draws in f64, on the thread that submits, and keeps its targets in f64: the reference for what a picture should
+    /// be.
     pub fn reference() -> Self {
         Self { rasterizer: Arc::new(Rasterizer::<f64>::new(Executor::CallingThread)) }
     }

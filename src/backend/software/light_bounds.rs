@@ -14,12 +14,12 @@ pub(super) struct LightBounds {
 }
 
 impl LightBounds {
-    /// A light reaches no farther than its range, so it is bounded by a sphere. The sphere's outline and its two ends along the
-    /// camera's axis are computed in f64, whatever precision the shader has.
+    /// A light reaches no farther than its range, so it is bounded by a sphere. The sphere's outline and its two ends
+    /// along the camera's axis are computed in f64, whatever precision the shader has.
     ///
     /// Margins cover the shader's rounding: a pixel and a thousandth of the sphere around the outline; along the axis a
-    /// thousandth of the range and a hundred-thousandth of the distance, a hundred times the rounding of f32. If the camera is
-    /// inside of the sphere or beside it, the outline is the whole picture.
+    /// thousandth of the range and a hundred-thousandth of the distance, a hundred times the rounding of f32. If the
+    /// camera is inside of the sphere or beside it, the outline is the whole picture.
     pub(super) fn new<R: Real>(view: &ShaderView<R>, light: &ShaderLight<R>) -> Self {
         let whole = Self { pixels: PixelBounds::of_picture(view.size), depths: [0.0, f64::INFINITY] };
         if light.kind == LightKind::Directional {
@@ -72,8 +72,8 @@ fn depths_at<R: Real>(view: &ShaderView<R>, ends: [f64; 2]) -> Option<[f64; 2]> 
     depths.iter().all(|depth| !depth.is_nan()).then_some(depths)
 }
 
-/// The two slopes between which a disc is seen in perspective, by its centre's distances aside and ahead; `None` if some of
-/// the disc is beside the camera.
+/// The two slopes between which a disc is seen in perspective, by its centre's distances aside and ahead; `None` if
+/// some of the disc is beside the camera.
 ///
 /// The lines through the camera that touch the disc have the slopes (a·z ± r·√(a² + z² − r²)) ÷ (z² − r²).
 fn disc_slopes(aside: f64, ahead: f64, radius: f64) -> Option<[f64; 2]> {

@@ -25,8 +25,8 @@ pub(super) struct MaterialCache {
 }
 
 impl MaterialCache {
-    /// The materials of these assets. Mip chains are built only for textures that a material uses and that changed since the
-    /// last frame; if nothing changed, the same table is returned.
+    /// The materials of these assets. Mip chains are built only for textures that a material uses and that changed
+    /// since the last frame; if nothing changed, the same table is returned.
     pub(super) fn update(&mut self, assets: &Assets, rejections: &Rejections) -> Arc<MaterialTable> {
         let wanted = [
             (assets.materials.identity(), assets.materials.revision()),

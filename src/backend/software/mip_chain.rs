@@ -23,8 +23,8 @@ impl MipChain {
         Self { side: side as usize, levels: mip_chain(texture, side) }
     }
 
-    /// Samples trilinearly. At the level of detail, the longer of the steps to the next column and to the next row is one pixel long
-    /// (Vulkan, "Level-of-Detail Operation").
+    /// Samples trilinearly. At the level of detail, the longer of the steps to the next column and to the next row is
+    /// one pixel long (Vulkan, "Level-of-Detail Operation").
     pub(super) fn trilinear<R: Real>(&self, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
         // Numbers that are not finite count as 0, as on devices: they would not lead to a pixel.
         let finite = |value: R| if value.is_finite() { value } else { R::zero() };
@@ -119,9 +119,9 @@ pub(super) mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// In f32, the point in a level's pixels is off by u·(|uv| + 2·side), and so is each weight; a step of one pixel changes the
-        /// result by 1 at most in each direction. The level is off by 8u and a few u of its logarithm, whose logarithm is 9 at most:
-        /// 20u; sums and products add 10u.
+        /// In f32, the point in a level's pixels is off by u·(|uv| + 2·side), and so is each weight; a step of one
+        /// pixel changes the result by 1 at most in each direction. The level is off by 8u and a few u of its
+        /// logarithm, whose logarithm is 9 at most: 20u; sums and products add 10u.
         #[test]
         fn it_is_trilinear(
             uv in prop::array::uniform2(-3.0..3.0_f32),

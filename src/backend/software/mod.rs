@@ -1,13 +1,13 @@
 //! The software backend: it draws on the CPU what the other backends draw on a device.
 //!
-//! It executes the same commands with each process' [`CpuShader`](crate::process::CpuShader) in place of its WGSL. In f32 it
-//! runs on all workers of a scheduler, so that a machine without a graphics adapter has a picture too; in f64 it runs on one
-//! thread, as the reference that the other backends are compared with.
+//! It executes the same commands with each process' [`CpuShader`](crate::process::CpuShader) in place of its WGSL. In
+//! f32 it runs on all workers of a scheduler, so that a machine without a graphics adapter has a picture too; in f64 it
+//! runs on one thread, as the reference that the other backends are compared with.
 //!
-//! Recording a pass only copies its list of draws. All drawing happens when a frame is submitted, pass after pass: triangles
-//! are set up in chunks of a fixed size and binned into tiles of the picture, and each tile is drawn by one job, with its
-//! triangles in the order of the commands. Chunks and tiles depend on the frame alone, so neither the number of workers nor
-//! how the work is distributed changes a byte.
+//! Recording a pass only copies its list of draws. All drawing happens when a frame is submitted, pass after pass:
+//! triangles are set up in chunks of a fixed size and binned into tiles of the picture, and each tile is drawn by one
+//! job, with its triangles in the order of the commands. Chunks and tiles depend on the frame alone, so neither the
+//! number of workers nor how the work is distributed changes a byte.
 
 mod attachments;
 mod backend;

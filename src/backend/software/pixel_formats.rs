@@ -104,8 +104,8 @@ fn rounded(encoding: ChannelEncoding, value: f64) -> f64 {
     }
 }
 
-/// The nearest half float. For a greater number than the greatest half float, a device may store that or infinity. Here it is
-/// that: blending an opaque colour over it multiplies it by 0, which would make NaN of infinity.
+/// The nearest half float. For a greater number than the greatest half float, a device may store that or infinity. Here
+/// it is that: blending an opaque colour over it multiplies it by 0, which would make NaN of infinity.
 fn half_of(value: f64) -> f16 {
     let end = f16::MAX.to_f64();
     f16::from_f32(value.clamp(-end, end) as f32)

@@ -40,8 +40,8 @@ pub(super) fn draw_full_screen<R: Precision>(
     })
 }
 
-/// Draws the pixels that some of the view's lights reach: adds the shader's result at each pixel within a light's bounds; if
-/// depth is tested, only where something was drawn.
+/// Draws the pixels that some of the view's lights reach: adds the shader's result at each pixel within a light's
+/// bounds; if depth is tested, only where something was drawn.
 ///
 /// # Errors
 /// If the CPU shader panics.

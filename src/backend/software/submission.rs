@@ -14,7 +14,8 @@ impl SoftwareSubmission {
         Self { targets }
     }
 
-    /// One of a view's targets in its format, in whichever precision it was drawn. The next frame draws into the same target.
+    /// One of a view's targets in its format, in whichever precision it was drawn. The next frame draws into the same
+    /// target.
     ///
     /// # Errors
     /// If there is no such target.
@@ -22,8 +23,8 @@ impl SoftwareSubmission {
         self.targets.picture(view, target).ok_or_else(|| unknown(view, target))
     }
 
-    /// The same as numbers, before they are converted to the format: rows from top to bottom, four numbers a pixel. Colours are
-    /// linear; channels that the format lacks are those of opaque black.
+    /// The same as numbers, before they are converted to the format: rows from top to bottom, four numbers a pixel.
+    /// Colours are linear; channels that the format lacks are those of opaque black.
     ///
     /// # Errors
     /// If there is no such target.

@@ -66,7 +66,8 @@ impl<R> SoftwareTargets<R> {
     }
 }
 
-/// Keeps targets over frames, and replaces those whose size or plan changes. Targets that no frame needs any more are dropped.
+/// Keeps targets over frames, and replaces those whose size or plan changes. Targets that no frame needs any more are
+/// dropped.
 pub(super) struct TargetCache<R> {
     current: Arc<SoftwareTargets<R>>,
 }

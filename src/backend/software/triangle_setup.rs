@@ -156,7 +156,8 @@ fn culled_winding(cull: Cull) -> Option<Winding> {
     }
 }
 
-/// Runs the vertex shader for one object's vertices, and caches the latest results: consecutive triangles share most vertices.
+/// Runs the vertex shader for one object's vertices, and caches the latest results: consecutive triangles share most
+/// vertices.
 struct PostTransformCache<'a, R: Precision, const V: usize> {
     shader: &'a dyn ObjectCpuShader<R>,
     view: &'a ShaderView<R>,

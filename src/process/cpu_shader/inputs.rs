@@ -65,8 +65,8 @@ pub trait SampledTexture<R: Real>: Sync {
     /// Width and height in pixels.
     fn size(&self) -> [usize; 2];
 
-    /// `textureLoad`: a pixel, of one layer if views share the target as layers. Depth is the first number. The coordinates are
-    /// inside the texture.
+    /// `textureLoad`: a pixel, of one layer if views share the target as layers. Depth is the first number. The
+    /// coordinates are inside the texture.
     fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R>;
 }
 
@@ -139,7 +139,8 @@ pub struct ShaderMaterial<R> {
 /// A light: `Light` in `drawloom.wgsl`.
 #[derive(Clone, Copy, Debug)]
 pub struct ShaderLight<R> {
-    /// Relative to the camera, along the world's axes. For a directional light: the position of its shadow map's camera.
+    /// Relative to the camera, along the world's axes. For a directional light: the position of its shadow map's
+    /// camera.
     pub position: Vector3<R>,
     /// What kind of light it is.
     pub kind: LightKind,

@@ -68,8 +68,8 @@ pub trait FullScreenCpuShader<R: Real>: Send + Sync {
 
 /// A fragment shader that runs for every pixel that a light may reach.
 ///
-/// It runs for the pixels within conservative bounds of the light whose surface is nearer than the light's far side. No light
-/// geometry is drawn, so the shader discards pixels that the light does not reach.
+/// It runs for the pixels within conservative bounds of the light whose surface is nearer than the light's far side. No
+/// light geometry is drawn, so the shader discards pixels that the light does not reach.
 pub trait LightCpuShader<R: Real>: Send + Sync {
     /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
     fn fragment(

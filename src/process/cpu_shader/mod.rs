@@ -1,7 +1,7 @@
 //! CPU shaders: the same shaders in Rust, which the software backend runs in place of a process' WGSL.
 //!
-//! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`, and
-//! `built_in` those of WGSL itself.
+//! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`,
+//! and `built_in` those of WGSL itself.
 
 pub(super) mod built_in;
 mod inputs;

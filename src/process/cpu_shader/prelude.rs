@@ -11,8 +11,8 @@ impl<R: Real> ShaderObject<R> {
         self.origin + self.orientation.rotate(self.scale * position) - self.camera
     }
 
-    /// A normal from object space to the world's axes, of unit length; 0 if there is none: `world_normal`. It works for a scale of 0
-    /// along one axis too.
+    /// A normal from object space to the world's axes, of unit length; 0 if there is none: `world_normal`. It works for
+    /// a scale of 0 along one axis too.
     pub fn world_normal(&self, normal: Vector3<R>) -> Vector3<R> {
         let largest = self.scale.0.into_iter().fold(R::zero(), |largest, size| largest.max(size.abs()));
         // Products of the unnormalized scale could leave the range of f32.
@@ -25,8 +25,8 @@ impl<R: Real> ShaderObject<R> {
 }
 
 impl<R: Real> ShaderView<R> {
-    /// From a position relative to the camera, along the world's axes, to clip space: `clip_position`. CPU shaders that call it with
-    /// the same position draw at exactly the same depth.
+    /// From a position relative to the camera, along the world's axes, to clip space: `clip_position`. CPU shaders that
+    /// call it with the same position draw at exactly the same depth.
     pub fn clip_position(&self, relative: Vector3<R>) -> Vector4<R> {
         let [right, up, back, origin] = self.clip_from_relative;
         let [x, y, z] = relative.0;
@@ -47,13 +47,14 @@ impl<R: Real> ShaderView<R> {
         let forward = -position[2] / nonzero;
         let depth = (self.far - distance) / (self.far - self.near);
         let divisor = nonzero * (R::one() + forward).max(R::of(0.1));
-        // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and clipped.
+        // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture
+        // and clipped.
         let depth = if forward < R::of(-0.6) { -R::one() } else { depth };
         Vector([position[0] / divisor, position[1] / divisor, depth, R::one()])
     }
 
-    /// From a pixel's clip coordinates and depth to its position relative to the camera, along the world's axes, in metres:
-    /// `position_from_depth`. In perspective, a depth of 0 is infinitely far away.
+    /// From a pixel's clip coordinates and depth to its position relative to the camera, along the world's axes, in
+    /// metres: `position_from_depth`. In perspective, a depth of 0 is infinitely far away.
     pub fn position_from_depth(&self, clip: Vector2<R>, depth: R) -> Vector3<R> {
         let across = self.right * clip[0] + self.up * clip[1];
         if self.is_perspective() {
@@ -73,7 +74,8 @@ impl<R: Real> ShaderView<R> {
 }
 
 impl<R: Real> PassInputs<'_, R> {
-    /// The diffuse colour and opacity of the material in a slot at texture coordinates with these derivatives: `diffuse_at`.
+    /// The diffuse colour and opacity of the material in a slot at texture coordinates with these derivatives:
+    /// `diffuse_at`.
     pub fn diffuse_at(
         &self,
         slot: u32,
@@ -215,10 +217,11 @@ mod tests {
             }
         }
 
-        /// The sum of three numbers rounds twice and the quotient once, so the point is off by 3.001u of each coordinate a and b,
-        /// where a + b ≤ 1. Folded and unfolded, which rounds once each, that is 3u·a + 2u, and the third coordinate is off by
-        /// 7u. Where it is so near to 0 that it gets the wrong sign, the others are off by 6u + 3u·a; that is most: 11.9u in
-        /// all. The octahedron is 1/√3 from its middle at least, so the direction is 20.6u off. Bringing it to unit length adds
+        /// The sum of three numbers rounds twice and the quotient once, so the point is off by 3.001u of each
+        /// coordinate a and b, where a + b ≤ 1. Folded and unfolded, which rounds once each, that is 3u·a + 2u, and the
+        /// third coordinate is off by 7u. Where it is so near to 0 that it gets the wrong sign, the others are off by
+        /// 6u + 3u·a; that is most: 11.9u in all. The octahedron is 1/√3 from its middle at least, so the direction is
+        /// 20.6u off. Bringing it to unit length adds
         /// 4.5u.
         #[test]
         fn octahedral_in_f32_is_that_of_f64(normal in direction()) {

@@ -5,8 +5,9 @@ mod cpu_shader;
 use self::cpu_shader::DepthPrePassCpuShader;
 use crate::process::{CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
 
-/// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once instead
-/// of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more than vertices.
+/// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once
+/// instead of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more
+/// than vertices.
 ///
 /// Of two surfaces at exactly the same depth, the one drawn last is visible, and not the one drawn first.
 #[derive(Clone, Copy, Debug, Default)]

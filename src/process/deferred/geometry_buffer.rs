@@ -9,7 +9,8 @@ use super::GeometryFormats;
 use crate::command::{Blending, MaterialShare, Selection};
 use crate::process::{ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
 
-/// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for radiance:
+/// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
+/// radiance:
 ///
 /// | target | content | default format |
 /// | --- | --- | --- |
@@ -18,8 +19,8 @@ use crate::process::{ClearColor, CommandDraws, CpuShader, Declare, Draws, Format
 /// | `diffuse` | the fraction of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
 /// | `radiance` | emitted light and reflected ambient light; elsewhere the scene's background | [`Format::Rgba16Float`] |
 ///
-/// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the depth; draw
-/// each object; finish. The viewport is the picture's, and the states are the pipelines'.
+/// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the
+/// depth; draw each object; finish. The viewport is the picture's, and the states are the pipelines'.
 #[derive(Clone, Debug)]
 pub struct GeometryBuffer {
     name: String,
@@ -35,8 +36,8 @@ impl GeometryBuffer {
         Self::of_share(formats, MaterialShare::ALL)
     }
 
-    /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over it: all of
-    /// them are recorded at the same time.
+    /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over
+    /// it: all of them are recorded at the same time.
     pub fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
         let name = if share.of <= 1 {
             String::from("geometry buffer")
@@ -51,7 +52,8 @@ impl GeometryBuffer {
         Self { name, shader: shader.concat(), formats, share, has_depth: false }
     }
 
-    /// The same after a [`DepthPrePass`](super::DepthPrePass): it draws only pixels whose depth equals the stored depth.
+    /// The same after a [`DepthPrePass`](super::DepthPrePass): it draws only pixels whose depth equals the stored
+    /// depth.
     pub fn after_depth_pre_pass(self) -> Self {
         Self { has_depth: true, ..self }
     }

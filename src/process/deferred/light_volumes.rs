@@ -11,17 +11,17 @@ use crate::process::{CpuShader, Declare, Draws, LightDraws, RenderProcess};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
-/// Lights the geometry buffer with the lights of one class, and adds the reflected light to the target `radiance`. Surfaces are
-/// Lambertian.
+/// Lights the geometry buffer with the lights of one class, and adds the reflected light to the target `radiance`.
+/// Surfaces are Lambertian.
 ///
-/// A light is drawn as a light volume (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or hemispherical
-/// light, the whole picture for a directional one. The back faces are drawn, and a pixel is shaded if they are behind its surface:
-/// so a light costs only the pixels that it may reach, and the camera may be inside of the volume. All lights of a class are one
-/// instanced draw, whose cost is N + L and not N × L (L 2).
+/// A light is drawn as a light volume (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or
+/// hemispherical light, the whole picture for a directional one. The back faces are drawn, and a pixel is shaded if
+/// they are behind its surface: so a light costs only the pixels that it may reach, and the camera may be inside of the
+/// volume. All lights of a class are one instanced draw, whose cost is N + L and not N × L (L 2).
 ///
-/// The steps of L 4.2.1 are: set the viewport; the radiance as target; test depth but do not write it; the rasterizer state;
-/// the geometry buffer as the shader's input; draw each light; finish. Those of L 4.2.2 that concern a light with a shadow map
-/// are the same with the map as one more input.
+/// The steps of L 4.2.1 are: set the viewport; the radiance as target; test depth but do not write it; the rasterizer
+/// state; the geometry buffer as the shader's input; draw each light; finish. Those of L 4.2.2 that concern a light
+/// with a shadow map are the same with the map as one more input.
 #[derive(Clone, Debug)]
 pub struct LightVolumes {
     name: String,

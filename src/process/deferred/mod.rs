@@ -1,7 +1,7 @@
 //! The deferred pipeline (L 4) and the processes that it is made of.
 //!
-//! `pipeline` puts the processes together that a scene requires. Each process has a file, and a folder with its WGSL and its CPU
-//! shader. `shading` is what several of their shaders share.
+//! `pipeline` puts the processes together that a scene requires. Each process has a file, and a folder with its WGSL
+//! and its CPU shader. `shading` is what several of their shaders share.
 
 mod depth_pre_pass;
 mod geometry_buffer;

@@ -9,12 +9,12 @@ use crate::quality::Quality;
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 
-/// The deferred pipeline of L 4: its settings, its post-processing, and the processes that an engine replaces or leaves out. An
-/// engine adds further processes to the renderer's builder.
+/// The deferred pipeline of L 4: its settings, its post-processing, and the processes that an engine replaces or leaves
+/// out. An engine adds further processes to the renderer's builder.
 ///
-/// It has only the processes that a scene requires. A class of lights without lights has no process; without a light that casts
-/// shadows there is no shadow map; without a blended material there is no transparency. When a scene's requirements change, so do
-/// the processes.
+/// It has only the processes that a scene requires. A class of lights without lights has no process; without a light
+/// that casts shadows there is no shadow map; without a blended material there is no transparency. When a scene's
+/// requirements change, so do the processes.
 ///
 /// ```text
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
@@ -65,8 +65,8 @@ impl Deferred {
         Self { depth_pre_pass, ..self }
     }
 
-    /// Sets into how many processes the geometry buffer is split, by material (L 5), clamped to 1 to 64. Their names are "geometry
-    /// buffer 1 of 2" and so on.
+    /// Sets into how many processes the geometry buffer is split, by material (L 5), clamped to 1 to 64. Their names
+    /// are "geometry buffer 1 of 2" and so on.
     pub fn geometry_shares(self, geometry_shares: u32) -> Self {
         Self { geometry_shares, ..self }
     }
@@ -81,9 +81,9 @@ impl Deferred {
         Self { shadow_maps, ..self }
     }
 
-    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the post-processing
-    /// steps added so far and to the shadow maps if there are any. It changes neither the format of `radiance` nor how far the
-    /// shadow maps of directional lights reach.
+    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the
+    /// post-processing steps added so far and to the shadow maps if there are any. It changes neither the format of
+    /// `radiance` nor how far the shadow maps of directional lights reach.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
@@ -106,8 +106,8 @@ impl Deferred {
         self
     }
 
-    /// Replaces the process called `name`, in the frames that have it, with a process of the engine. A later replacement of the
-    /// same process overrides an earlier one.
+    /// Replaces the process called `name`, in the frames that have it, with a process of the engine. A later
+    /// replacement of the same process overrides an earlier one.
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
         let name = name.into();
         self.replaced.retain(|(other, _)| *other != name);
@@ -115,8 +115,9 @@ impl Deferred {
         self
     }
 
-    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. If it is a step of post-processing, the
-    /// next step reads what it would have read; without `"shadow casters"`, no light casts shadows.
+    /// Leaves out the process called `name`, such as `"transparency"` or `"point lights"`. If it is a step of
+    /// post-processing, the next step reads what it would have read; without `"shadow casters"`, no light casts
+    /// shadows.
     pub fn leave_out(mut self, name: impl Into<String>) -> Self {
         self.left_out.push(name.into());
         self

@@ -9,18 +9,18 @@ use crate::scene::ViewKind;
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
 /// [`ViewKind::Shadow`], which has a layer for each light.
 ///
-/// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same time
-/// (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the rasterizer
-/// state; clear the depth; draw all objects that cast shadows. The last three are those of
+/// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same
+/// time (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the
+/// rasterizer state; clear the depth; draw all objects that cast shadows. The last three are those of
 /// [`LightVolumes`](super::LightVolumes).
 ///
 /// An engine's process may read the maps too, with
-/// [`Declare::samples_layers`](crate::process::Declare::samples_layers): if a scene's [`Deferred`](super::Deferred) pipeline
-/// has no light that casts shadows, it reads an empty map of one pixel.
+/// [`Declare::samples_layers`](crate::process::Declare::samples_layers): if a scene's [`Deferred`](super::Deferred)
+/// pipeline has no light that casts shadows, it reads an empty map of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowCasters {
-    /// Whether there are hemispherical lights, whose maps must not show what is behind the light. They need a fragment shader,
-    /// and other maps do not.
+    /// Whether there are hemispherical lights, whose maps must not show what is behind the light. They need a fragment
+    /// shader, and other maps do not.
     pub hemispheres: bool,
 }
 

@@ -10,15 +10,15 @@ use crate::process::{CommandDraws, CpuShader, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
 
-/// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with alpha,
-/// additive or subtractive blending (M listing 10.1).
+/// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with
+/// alpha, additive or subtractive blending (M listing 10.1).
 ///
-/// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and adds their
-/// emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result may be negative, which
-/// tone mapping shows as black. Blended objects cast no shadows.
+/// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and
+/// adds their emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result
+/// may be negative, which tone mapping shows as black. Blended objects cast no shadows.
 ///
-/// If lights add up to more than the greatest half float, some devices store infinity, and infinity times 0 is NaN: on those even
-/// an opaque pixel that is blended over it does not hide it.
+/// If lights add up to more than the greatest half float, some devices store infinity, and infinity times 0 is NaN: on
+/// those even an opaque pixel that is blended over it does not hide it.
 #[derive(Clone, Debug)]
 pub struct Transparency {
     shader: String,

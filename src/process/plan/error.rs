@@ -86,8 +86,8 @@ pub enum ProcessError {
         /// What the panic said.
         message: String,
     },
-    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads one
-    /// by commands of its own.
+    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
+    /// one by commands of its own.
     #[error("process {process:?} does not use target {target:?} in the way that it declares")]
     Misdeclared {
         /// The process.

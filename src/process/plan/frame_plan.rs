@@ -27,9 +27,9 @@ impl FramePlan {
     /// Orders processes by what they read and write, and drops those on which no output depends. Where reads and writes
     /// leave the order open, the earlier [`ViewKind`] goes first, then the process that was added first (M 10.4).
     ///
-    /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot may be
-    /// empty because the frame needs no such process; other processes may still be ordered before or after it. The chain does
-    /// not order its processes against writers of the same target that are outside of it.
+    /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot
+    /// may be empty because the frame needs no such process; other processes may still be ordered before or after it.
+    /// The chain does not order its processes against writers of the same target that are outside of it.
     ///
     /// # Errors
     /// See [`PlanError`].
@@ -140,7 +140,8 @@ impl FramePlan {
         &self.dropped
     }
 
-    /// The processes as a graph in the DOT language; edges are labelled with the targets that one process leaves to the next.
+    /// The processes as a graph in the DOT language; edges are labelled with the targets that one process leaves to the
+    /// next.
     pub fn to_dot(&self) -> &str {
         &self.dot
     }
@@ -148,8 +149,8 @@ impl FramePlan {
 
 static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 
-/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a texture
-/// to bind.
+/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
+/// texture to bind.
 fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Option<PlannedTarget> {
     let is_map = |(target, access): &(String, Access)| {
         target == ShadowCasters::TARGET && *access == Access::SampleLayers(ViewKind::Shadow)

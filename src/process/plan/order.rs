@@ -60,8 +60,8 @@ pub(super) fn order_constraints(
     Ok(orders)
 }
 
-/// The process of this name; if it is an empty slot of the chain, the process in the nearest slot for which `is_on_side` holds,
-/// which is given the empty slot and the other.
+/// The process of this name; if it is an empty slot of the chain, the process in the nearest slot for which
+/// `is_on_side` holds, which is given the empty slot and the other.
 ///
 /// # Errors
 /// If neither a process nor a slot has this name.

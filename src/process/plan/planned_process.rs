@@ -33,7 +33,8 @@ impl PlannedProcess {
     /// What the process draws in this frame.
     ///
     /// # Errors
-    /// If the process panics, or its draws do not fit its declaration: only raw passes use targets by their own commands.
+    /// If the process panics, or its draws do not fit its declaration: only raw passes use targets by their own
+    /// commands.
     pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
         let process = || self.process.name().to_owned();
         let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };

@@ -11,24 +11,25 @@ use crate::process::{CpuShader, FullScreen, RenderProcess};
 
 /// Smooths aliased edges, from the picture alone (Lottes, "FXAA", NVIDIA 2009, in its last version, 3.11).
 ///
-/// Where brightness changes enough from a pixel to its neighbours, it searches along the edge for the nearer end of the step,
-/// and blends in as much of the other side as a straight edge would cover. Other pixels, and straight edges along rows or
-/// columns, stay the same, byte for byte.
+/// Where brightness changes enough from a pixel to its neighbours, it searches along the edge for the nearer end of the
+/// step, and blends in as much of the other side as a straight edge would cover. Other pixels, and straight edges along
+/// rows or columns, stay the same, byte for byte.
 ///
 /// It belongs after [`ToneMapping`](super::ToneMapping): its source and its target are
 /// [`Format::Rgba8Srgb`](crate::process::Format).
 ///
-/// Brightness is perceived brightness, the square root of luminance, from 0 to 1. Settings are clamped to 0 to 1; NaN counts as
+/// Brightness is perceived brightness, the square root of luminance, from 0 to 1. Settings are clamped to 0 to 1; NaN
+/// counts as
 /// 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fxaa {
-    /// The least contrast of an edge, as a fraction of the greatest brightness among a pixel and its four neighbours. From 1/3,
-    /// which skips many edges, to 1/16, which finds all visible ones.
+    /// The least contrast of an edge, as a fraction of the greatest brightness among a pixel and its four neighbours.
+    /// From 1/3, which skips many edges, to 1/16, which finds all visible ones.
     pub contrast_threshold: f32,
     /// The least contrast of an edge in brightness: in dark areas, even a large relative contrast is hardly visible.
     pub dark_threshold: f32,
-    /// How much details smaller than a pixel are blended with their surroundings: 0 keeps thin lines and single pixels, 1 removes
-    /// most of their flicker and some of their sharpness.
+    /// How much details smaller than a pixel are blended with their surroundings: 0 keeps thin lines and single pixels,
+    /// 1 removes most of their flicker and some of their sharpness.
     pub sub_pixel: f32,
 }
 

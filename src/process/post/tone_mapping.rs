@@ -11,16 +11,17 @@ use super::shipped_step::{BoundStep, ShippedStep, declare_step};
 use crate::process::{CpuShader, Declare, Draws, FullScreen, RenderProcess};
 use crate::quality::{Quality, ToneCurve};
 
-/// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from subtractive
-/// blending, becomes black.
+/// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from
+/// subtractive blending, becomes black.
 ///
-/// As a process it reads the target `radiance` and draws the target `picture`; as a [`PostStep`], its source and target are
-/// given.
+/// As a process it reads the target `radiance` and draws the target `picture`; as a [`PostStep`], its source and target
+/// are given.
 #[derive(Clone, Debug, Default)]
 pub struct ToneMapping {
     /// Multiplies radiance.
     pub exposure: Exposure,
-    /// Maps radiance to 0 to 1. [`Deferred::quality`](crate::process::Deferred::quality) sets it to the quality's curve.
+    /// Maps radiance to 0 to 1. [`Deferred::quality`](crate::process::Deferred::quality) sets it to the quality's
+    /// curve.
     pub curve: ToneCurve,
 }
 

@@ -158,18 +158,19 @@ fn clip_position(relative: vec3<f32>) -> vec4<f32> {
     return clip;
 }
 
-// From the camera's axes to clip space, by a paraboloid mapping (Brabec et al. 2002). The half space in front of the camera is
-// mapped to a disc as wide as the picture, and depth is the distance.
+// From the camera's axes to clip space, by a paraboloid mapping (Brabec et al. 2002). The half space in front of the
+// camera is mapped to a disc as wide as the picture, and depth is the distance.
 fn paraboloid_position(position: vec3<f32>) -> vec4<f32> {
     let distance = length(position);
     let forward = -position.z / max(distance, 1e-30);
     let depth = (view.far - distance) / (view.far - view.near);
-    // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and clipped.
+    // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and
+    // clipped.
     return vec4<f32>(position.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
 }
 
-// A normal from object space to the world's axes, of unit length; 0 if there is none. The cofactors of a scale need no division,
-// so it works for a scale of 0 along one axis too.
+// A normal from object space to the world's axes, of unit length; 0 if there is none. The cofactors of a scale need no
+// division, so it works for a scale of 0 along one axis too.
 fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
     // Products of the unnormalized scale could leave the range of f32.
     let sizes = abs(object.scale);
@@ -223,8 +224,8 @@ fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
     return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
 }
 
-// A material's diffuse colour and opacity at texture coordinates. The caller takes the derivatives of `uv`, because that needs
-// uniform control flow.
+// A material's diffuse colour and opacity at texture coordinates. The caller takes the derivatives of `uv`, because
+// that needs uniform control flow.
 fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
     var texel = vec4<f32>(1.0);
     switch material.texture_array {

@@ -6,14 +6,14 @@ use glam::DVec3;
 
 use crate::scene::LightKind;
 
-/// Geometry that contains all that a light can reach, so that only those pixels are lit: a sphere for a point light, a cone for a
-/// spot light, and the screen for a light that reaches everywhere (L 4.2.1).
+/// Geometry that contains all that a light can reach, so that only those pixels are lit: a sphere for a point light, a
+/// cone for a spot light, and the screen for a light that reaches everywhere (L 4.2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum LightVolume {
     /// A polyhedron that contains the unit sphere, to be scaled by the light's range.
     Sphere,
-    /// A cone of sixteen sides with a cylinder at its wide end, whose corners `cone_corner` positions. At 90° it is a cylinder with
-    /// the range as its radius and height, which contains what a hemispherical light reaches too.
+    /// A cone of sixteen sides with a cylinder at its wide end, whose corners `cone_corner` positions. At 90° it is a
+    /// cylinder with the range as its radius and height, which contains what a hemispherical light reaches too.
     Cone,
     /// One triangle that covers clip space.
     Screen,
@@ -31,8 +31,8 @@ impl LightVolume {
 
     /// Three corners for each triangle, counter-clockwise seen from outside. The volumes are closed.
     ///
-    /// A sphere's corners are positions; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x, y) in clip
-    /// space and 0.
+    /// A sphere's corners are positions; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x,
+    /// y) in clip space and 0.
     pub(crate) fn corners(self) -> Vec<[f32; 3]> {
         match self {
             Self::Sphere => sphere(),
@@ -52,7 +52,8 @@ const NEAR_RING: f32 = 1.0;
 const FAR_RING: f32 = 2.0;
 const FAR_MIDDLE: f32 = 3.0;
 
-/// An icosahedron with each face split into four and the corners moved to the unit sphere, scaled so that it contains the sphere.
+/// An icosahedron with each face split into four and the corners moved to the unit sphere, scaled so that it contains
+/// the sphere.
 fn sphere() -> Vec<[f32; 3]> {
     let split = |[a, b, c]: [DVec3; 3]| {
         let [ab, bc, ca] = [a + b, b + c, c + a].map(DVec3::normalize);
@@ -116,14 +117,15 @@ mod tests {
     /// The position of a corner (x, y, tier) of `LightVolume::Cone`, in metres, for a light at the origin that shines
     /// along +Z.
     ///
-    /// A light of half-angle α reaches, within its range r, no farther out than r·sin α, and no farther ahead than r. So
-    /// the cone ends at r·cos α, with a radius of r·sin α, and a cylinder continues to r.
+    /// A light of half-angle α reaches, within its range r, no farther out than r·sin α, and no farther ahead than r.
+    /// So the cone ends at r·cos α, with a radius of r·sin α, and a cylinder continues to r.
     ///
-    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. The
-    /// radius and the far end are larger by a ten-thousandth of the range, and the tip and its cone are moved back by as much, to
-    /// cover rounding in the shader.
+    /// Tier 0 is the tip, 1 and 2 are the rings at the cylinder's two ends, 3 is the middle of its far end. The radius
+    /// and the far end are larger by a ten-thousandth of the range, and the tip and its cone are moved back by as much,
+    /// to cover rounding in the shader.
     ///
-    /// `cosine_of_half_angle` is clamped to 0 to 1. `range` is in metres. It is the same function as in `light_volume.wgsl`.
+    /// `cosine_of_half_angle` is clamped to 0 to 1. `range` is in metres. It is the same function as in
+    /// `light_volume.wgsl`.
     fn cone_corner(corner: [f32; 3], cosine_of_half_angle: f32, range: f32) -> Vec3 {
         let [x, y, tier] = corner;
         let along = cosine_of_half_angle.clamp(0.0, 1.0);
@@ -137,8 +139,8 @@ mod tests {
         Vec3::new(x * radius, y * radius, height) * range
     }
 
-    /// How much greater the sine's square may be than the cosine implies. Near 1 a cosine in f32 is off by up to 2⁻²⁵, and so is
-    /// the one that a shader compares it with; at 0° that hides an angle of some 0.03°.
+    /// How much greater the sine's square may be than the cosine implies. Near 1 a cosine in f32 is off by up to 2⁻²⁵,
+    /// and so is the one that a shader compares it with; at 0° that hides an angle of some 0.03°.
     const COSINE_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
     /// cos(π/16): the middle of each side is closer to the axis than its edges by this factor.

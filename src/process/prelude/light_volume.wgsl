@@ -14,8 +14,8 @@ fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instanc
     }
     var clip = clip_position(light.position + local);
     if view.projection == ORTHOGRAPHIC && dot(light.position, view.forward) + 2.0 * range > view.far {
-        // The far plane would clip the far side of the volume, and the surfaces in front of it would stay dark. All corners of a
-        // light are moved, because moving only some would tilt a side.
+        // The far plane would clip the far side of the volume, and the surfaces in front of it would stay dark. All
+        // corners of a light are moved, because moving only some would tilt a side.
         clip.z = 0.0;
     }
     return LightPixel(clip, instance);
@@ -30,8 +30,8 @@ const COSINE_ROUNDING: f32 = 0x1p-22;
 // cos(π/16): the middle of each of the cone's sixteen sides is closer to the axis than its edges by this factor.
 const APOTHEM: f32 = 0.98078528;
 
-// The position of a corner (x, y, tier) of the cone, for a light at the origin that shines along +Z. `cosine` is the cosine of the
-// cone's half-angle, from 0 to 1.
+// The position of a corner (x, y, tier) of the cone, for a light at the origin that shines along +Z. `cosine` is the
+// cosine of the cone's half-angle, from 0 to 1.
 fn cone_corner(corner: vec3<f32>, cosine: f32, range: f32) -> vec3<f32> {
     let along = clamp(cosine, 0.0, 1.0);
     let sine = sqrt(max(1.0 - along * along, 0.0) + COSINE_ROUNDING);
@@ -45,7 +45,8 @@ fn cone_corner(corner: vec3<f32>, cosine: f32, range: f32) -> vec3<f32> {
     return vec3<f32>(corner.xy * radius, height) * range;
 }
 
-// Rotates a vector so that +Z becomes an axis of unit length (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017). The sign keeps the divisor away from 0.
+// Rotates a vector so that +Z becomes an axis of unit length (Duff et al., "Building an Orthonormal Basis, Revisited",
+// JCGT 2017). The sign keeps the divisor away from 0.
 fn around_axis(axis: vec3<f32>, local: vec3<f32>) -> vec3<f32> {
     let sign = select(-1.0, 1.0, axis.z >= 0.0);
     let a = -1.0 / (sign + axis.z);

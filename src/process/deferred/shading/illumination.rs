@@ -89,11 +89,11 @@ mod tests {
     proptest! {
         /// In f64, to within what f32 cosines and directions that are not quite of unit length make.
         ///
-        /// In f32, u being 2⁻²⁴: the way to the light is off by u in each coordinate, its square by 5u of itself, and its direction
-        /// by 6u; the two cosines, sums of three products, by 6u√3 + 3u < 14u. The window's share is off by 8u of itself, so
-        /// the window by 17u and its square by 36u. Each factor is at most 1, so what is left of their product is
-        /// 14u·(2 for a hemispherical light, or 1.5/(begin − end) for a spot light) + 14u + 36u, and 10u for products and the
-        /// quotient, of I/d².
+        /// In f32, u being 2⁻²⁴: the way to the light is off by u in each coordinate, its square by 5u of itself, and
+        /// its direction by 6u; the two cosines, sums of three products, by 6u√3 + 3u < 14u. The window's share is off
+        /// by 8u of itself, so the window by 17u and its square by 36u. Each factor is at most 1, so what is left of
+        /// their product is 14u·(2 for a hemispherical light, or 1.5/(begin − end) for a spot light) + 14u + 36u, and
+        /// 10u for products and the quotient, of I/d².
         #[test]
         fn illuminance_follows_the_documentation_of_lights(
             way in prop::array::uniform3(-4.0..4.0_f32),

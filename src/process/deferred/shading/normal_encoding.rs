@@ -8,8 +8,8 @@ use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 enum NormalEncoding {
     /// Unchanged, in the first two channels.
     Signed,
-    /// As an integer from 0 to twice `steps` in the first two channels, where the value 1 is the integer `largest`. Twice `steps` is
-    /// even, so that a coordinate of 0 is exact, and so are the normals of floors and walls.
+    /// As an integer from 0 to twice `steps` in the first two channels, where the value 1 is the integer `largest`.
+    /// Twice `steps` is even, so that a coordinate of 0 is exact, and so are the normals of floors and walls.
     Steps { steps: f64, largest: f64 },
     /// As an integer from 0 to 65,534: the high bytes in the first two channels, the low bytes in the others.
     TwoBytes,
@@ -58,7 +58,8 @@ impl GeometryFormats {
         format!("const NORMAL_ENCODING: u32 = {code}u;\n{steps}{}", include_str!("normal_encoding.wgsl"))
     }
 
-    /// The value that a shader writes to the target `normal`, for a normal of any length. A normal without direction is stored as +Z.
+    /// The value that a shader writes to the target `normal`, for a normal of any length. A normal without direction is
+    /// stored as +Z.
     pub fn encode_normal<R: Real>(&self, normal: Vector3<R>) -> Vector4<R> {
         let sum = normal[0].abs() + normal[1].abs() + normal[2].abs();
         let has_direction = sum > R::zero() && sum.is_finite();
@@ -134,8 +135,8 @@ mod tests {
         one.cross(other).length().atan2(one.dot(other)).to_degrees()
     }
 
-    /// Directions spread evenly (a Fibonacci spiral); those halfway between the steps of each format, on every face of the
-    /// octahedron; and its edges and corners.
+    /// Directions spread evenly (a Fibonacci spiral); those halfway between the steps of each format, on every face of
+    /// the octahedron; and its edges and corners.
     fn directions() -> Vec<DVec3> {
         let spiral = (0..50_000).map(|index| {
             let z = 1.0 - (f64::from(index) + 0.5) / 25_000.0;

@@ -1,4 +1,5 @@
-// Encodes and decodes normals in the target `normal`. `NORMAL_ENCODING`, `NORMAL_STEPS` and `NORMAL_LARGEST` go before this.
+// Encodes and decodes normals in the target `normal`. `NORMAL_ENCODING`, `NORMAL_STEPS` and `NORMAL_LARGEST` go before
+// this.
 const SIGNED: u32 = 0u;
 const STEPS: u32 = 1u;
 const TWO_BYTES: u32 = 2u;

@@ -63,8 +63,8 @@ impl ShadowFilter {
         self.filtered_visibility(maps, layer, &moved)
     }
 
-    /// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are weighted by
-    /// how much of them is inside.
+    /// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are
+    /// weighted by how much of them is inside.
     fn filtered_visibility<R: Real>(self, maps: &dyn SampledTexture<R>, layer: usize, point: &ShadowMapPoint<R>) -> R {
         let side = maps.size()[0];
         let half = R::of(0.5);
@@ -141,8 +141,8 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
     }
 }
 
-/// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in pixel
-/// widths.
+/// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in
+/// pixel widths.
 fn shadow_slope<R: Real>(light: &ShaderLight<R>, normal: Vector3<R>, towards: Vector3<R>) -> R {
     let cosine = clamp(normal.dot(towards), R::of(1e-3), R::one());
     if light.kind == LightKind::Hemispherical {
@@ -193,8 +193,8 @@ mod tests {
         ShadowFilter::new(&ShadowMaps { bias, filter, ..ShadowMaps::default() })
     }
 
-    /// A position that a map sees, by its offset across from the centre to the border and its distance from the camera to the end,
-    /// each from 0 to 1.
+    /// A position that a map sees, by its offset across from the centre to the border and its distance from the camera
+    /// to the end, each from 0 to 1.
     fn position_in_map(map: &RenderView, across: [f64; 2], distance: f64) -> DVec3 {
         let [right, up, forward] = map.picture_axes().map(Vec3::as_dvec3);
         let across = right * across[0] + up * across[1];
@@ -222,8 +222,9 @@ mod tests {
             }
         }
 
-        /// A step of a pixel's width across the map leads to the next pixel. On a flat map that is exact; on a paraboloid, whose
-        /// scale changes by its own size from the middle to the rim, it is to the first order in the pixel's angle, 4/side.
+        /// A step of a pixel's width across the map leads to the next pixel. On a flat map that is exact; on a
+        /// paraboloid, whose scale changes by its own size from the middle to the rim, it is to the first order in the
+        /// pixel's angle, 4/side.
         #[test]
         fn a_step_of_a_pixels_width_leads_to_the_next_pixel(across in prop::array::uniform2(-0.6..0.6_f64), around in -3.0..3.0_f64) {
             for (light, map) in shadowed() {
@@ -241,7 +242,8 @@ mod tests {
             }
         }
 
-        /// Up to 100 weights of at most 1 are added up to 81 at most, so the sum is off by 100u of itself and each weight by 2u.
+        /// Up to 100 weights of at most 1 are added up to 81 at most, so the sum is off by 100u of itself and each
+        /// weight by 2u.
         #[test]
         fn a_map_of_one_depth_lights_all_or_nothing(
             across in prop::array::uniform2(-0.8..0.8_f64),
@@ -263,7 +265,8 @@ mod tests {
             }
         }
 
-        /// The filter is a box of 2·filter + 1 pixels: across a straight edge the visibility is how much of the box lies beyond the edge.
+        /// The filter is a box of 2·filter + 1 pixels: across a straight edge the visibility is how much of the box
+        /// lies beyond the edge.
         #[test]
         fn shadows_fade_over_the_width_of_the_filter(
             across in -0.6..0.6_f64,

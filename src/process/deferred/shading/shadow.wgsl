@@ -27,7 +27,8 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
     return filtered_visibility(light.shadow_layer, moved);
 }
 
-// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in pixel widths.
+// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in
+// pixel widths.
 fn shadow_slope(light: Light, normal: vec3<f32>, towards: vec3<f32>) -> f32 {
     let cosine = clamp(dot(normal, towards), 1e-3, 1.0);
     if light.kind == HEMISPHERICAL {
@@ -66,8 +67,8 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     }
 }
 
-// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are weighted by how much
-// of them is inside.
+// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are
+// weighted by how much of them is inside.
 fn filtered_visibility(layer: u32, point: ShadowMapPoint) -> f32 {
     let side = i32(textureDimensions(shadow_maps).x);
     let center = (point.clip * vec2<f32>(0.5, -0.5) + 0.5) * f32(side) - 0.5;

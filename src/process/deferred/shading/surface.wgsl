@@ -15,8 +15,8 @@ fn vertex(in: VertexInput) -> Surface {
     return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material);
 }
 
-// From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32, interpolation
-// and filtering would lead to NaN.
+// From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,
+// interpolation and filtering would lead to NaN.
 const MAX_UV: f32 = 0x1p23;
 
 // The normal of the visible side. Needs uniform control flow.

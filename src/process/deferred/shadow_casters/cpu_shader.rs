@@ -31,8 +31,8 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
         self.hemispheres
     }
 
-    /// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across the
-    /// picture.
+    /// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized
+    /// across the picture.
     fn fragment(&self, _pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
         let is_behind = pixel.varyings[0] < R::of(-RIM_MARGIN);
         !is_behind

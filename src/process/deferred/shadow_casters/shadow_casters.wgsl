@@ -14,7 +14,8 @@ fn vertex(in: VertexInput) -> Caster {
     return Caster(clip_position(relative), forward);
 }
 
-// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across the picture.
+// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across
+// the picture.
 @fragment
 fn fragment(in: Caster) {
     if in.forward < -RIM_MARGIN {

@@ -54,8 +54,8 @@ impl FxaaCpuShader {
 
         let covered = source.covered_fraction(pixel, along, other_side, middle, other);
         let neighbours = two * (above + below + left + right) + above_left + above_right + below_left + below_right;
-        // The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours as a fraction
-        // of the contrast. Beside a straight edge that is 1/3, which must not change.
+        // The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours
+        // as a fraction of the contrast. Beside a straight edge that is 1/3, which must not change.
         let deviation = (neighbours / R::of(12.0) - middle).abs() / contrast;
         let small = setting(self.sub_pixel) * smoothstep(R::of(1.0 / 3.0), R::one(), deviation);
         let factor = covered.max(small);
@@ -89,7 +89,8 @@ struct StepEnd<R> {
 }
 
 impl<R: Real> Source<'_, R> {
-    /// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at most one half.
+    /// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at
+    /// most one half.
     fn covered_fraction(
         &self,
         pixel: Coordinates,
@@ -104,15 +105,15 @@ impl<R: Real> Source<'_, R> {
         let forward = self.step_end(pixel, along, other_side, between, tolerance);
         let length = backward.distance + forward.distance;
         if backward.distance == forward.distance {
-            // In the middle of a step that leads from one side to the other, the edge cuts a triangle off the pixel: half a
-            // pixel along, and half a pixel's slope across. Without this, edges at 45 degrees, whose steps are one pixel long,
-            // would stay as they are.
+            // In the middle of a step that leads from one side to the other, the edge cuts a triangle off the pixel:
+            // half a pixel along, and half a pixel's slope across. Without this, edges at 45 degrees, whose steps are
+            // one pixel long, would stay as they are.
             let leads_across = backward.change * forward.change < R::zero();
             return if leads_across { R::of(0.125) / length } else { R::zero() };
         }
 
-        // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns away from
-        // it, and the pixels opposite are the ones that are partly covered.
+        // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns
+        // away from it, and the pixels opposite are the ones that are partly covered.
         let nearest = if backward.distance < forward.distance { backward } else { forward };
         let turns_away = (nearest.change < R::zero()) == (middle < between);
         if turns_away { R::zero() } else { R::of(0.5) - nearest.distance / length }
@@ -221,7 +222,8 @@ mod tests {
         }
     }
 
-    /// Along an edge that rises one pixel in `length` columns, the blend factor equals the covered area, in both orientations.
+    /// Along an edge that rises one pixel in `length` columns, the blend factor equals the covered area, in both
+    /// orientations.
     #[test]
     fn aliased_steps_become_the_coverage_of_the_straight_edge() {
         let settings = Fxaa { sub_pixel: 0.0, ..Fxaa::default() };

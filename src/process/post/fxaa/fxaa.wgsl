@@ -54,7 +54,8 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     return mix(color, color_at(pixel + other_side), factor);
 }
 
-// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at most one half.
+// The fraction of the pixel on the other side of a straight edge through the middles of the step's two ends; at most
+// one half.
 fn covered_fraction(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, middle: f32, other: f32) -> f32 {
     let between = (middle + other) / 2.0;
     let tolerance = abs(other - middle) / 4.0;
@@ -62,14 +63,14 @@ fn covered_fraction(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, m
     let forward = step_end(pixel, along, other_side, between, tolerance);
     let length = backward.distance + forward.distance;
     if backward.distance == forward.distance {
-        // In the middle of a step that leads from one side to the other, the edge cuts a triangle off the pixel: half a pixel
-        // along, and half a pixel's slope across. Without this, edges at 45 degrees, whose steps are one pixel long, would
-        // stay as they are.
+        // In the middle of a step that leads from one side to the other, the edge cuts a triangle off the pixel: half a
+        // pixel along, and half a pixel's slope across. Without this, edges at 45 degrees, whose steps are one pixel
+        // long, would stay as they are.
         return select(0.0, 0.125 / length, backward.change * forward.change < 0.0);
     }
 
-    // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns away from
-    // it, and the pixels opposite are the ones that are partly covered.
+    // Beyond the end, both sides have the brightness of one of the two. If that is the pixel's own, the edge turns away
+    // from it, and the pixels opposite are the ones that are partly covered.
     var nearest = forward;
     if backward.distance < forward.distance {
         nearest = backward;
@@ -98,8 +99,8 @@ fn step_end(pixel: vec2<i32>, along: vec2<i32>, other_side: vec2<i32>, between: 
     return StepEnd(f32(REACH), 0.0);
 }
 
-// The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours as a fraction of
-// the contrast. Beside a straight edge that is 1/3, which must not change.
+// The blend factor for details smaller than a pixel, from the pixel's deviation from the mean of its neighbours as a
+// fraction of the contrast. Beside a straight edge that is 1/3, which must not change.
 fn sub_pixel_factor(deviation: f32) -> f32 {
     return parameters.sub_pixel * smoothstep(1.0 / 3.0, 1.0, deviation);
 }

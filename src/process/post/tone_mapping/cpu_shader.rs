@@ -76,8 +76,9 @@ mod tests {
     }
 
     proptest! {
-        /// All of the curve's terms are positive, so nothing cancels: four roundings above the line, five below, one for the
-        /// quotient, one for the exposure's product, whose share the curve never enlarges, and five for constants, each u.
+        /// All of the curve's terms are positive, so nothing cancels: four roundings above the line, five below, one
+        /// for the quotient, one for the exposure's product, whose share the curve never enlarges, and five for
+        /// constants, each u.
         #[test]
         fn it_is_the_filmic_curve(exponents in prop::array::uniform3(-6.0..5.0_f64), exposure in 0.01..10.0_f32) {
             let radiance = exponents.map(|exponent| f64::from(10_f64.powf(exponent) as f32));
