@@ -82,9 +82,10 @@ pub mod backend;
 mod frame;
 pub mod report;
 
+pub use backend::ViewQueue;
 pub use frame::{
     BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
-    Submitted, Submitter, ViewQueue, ViewStatistics,
+    Submitted, Submitter, ViewStatistics,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
-use crate::process::Pass;
+use super::view_queue::ViewQueue;
 use crate::task::Worker;
 use crate::view::ObjectTable;
 
@@ -85,10 +85,16 @@ pub trait Backend: Send + Sync + 'static {
         parts: &mut Vec<Self::Part>,
     ) -> Result<Self::Commands, BackendError>;
 
-    /// Submits a frame's passes in this order. Called only on the device thread.
+    /// Submits a frame's queues one after the other. Called only on the device thread.
+    ///
+    /// A view has one queue, unless its plan has it submitted
+    /// [process by process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
     ///
     /// # Errors
     /// If the device refuses.
-    fn submit(&self, frame: Self::Frame, passes: Vec<(Pass, Self::Commands)>)
-    -> Result<Self::Submission, BackendError>;
+    fn submit(
+        &self,
+        frame: Self::Frame,
+        queues: Vec<ViewQueue<Self::Commands>>,
+    ) -> Result<Self::Submission, BackendError>;
 }

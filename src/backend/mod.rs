@@ -8,6 +8,7 @@ mod picture;
 mod requests;
 mod software;
 mod subdivision_cache;
+mod view_queue;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 
@@ -22,3 +23,4 @@ pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
 pub use requests::{FrameRequest, PassRequest};
 pub use software::{SoftwareBackend, SoftwareSubmission};
+pub use view_queue::ViewQueue;

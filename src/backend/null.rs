@@ -8,6 +8,7 @@ use parking_lot::Mutex;
 use super::backend_trait::Backend;
 use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
+use super::view_queue::ViewQueue;
 use crate::command::DrawList;
 use crate::process::{Draws, Pass};
 use crate::scene::Mesh;
@@ -159,7 +160,7 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
         bundles: &mut Vec<NullBundle>,
     ) -> Result<NullPass, BackendError> {
         ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
@@ -189,12 +190,14 @@ impl Backend for NullBackend {
         })
     }
 
-    fn submit(&self, frame: NullFrame, passes: Vec<(Pass, NullPass)>) -> Result<NullSubmission, BackendError> {
+    fn submit(&self, frame: NullFrame, queues: Vec<ViewQueue<NullPass>>) -> Result<NullSubmission, BackendError> {
         let uploaded = frame.uploaded.lock().len();
         ensure(uploaded == frame.object_count, || format!("{uploaded} of {} objects uploaded", frame.object_count))?;
-        let in_order = passes.iter().map(|(pass, _)| pass).eq(&frame.passes);
+        let passes = || queues.iter().flat_map(|queue| &queue.passes);
+        let in_order = passes().map(|(pass, _)| pass).eq(&frame.passes);
         ensure(in_order, || "passes were submitted in another order than planned".to_owned())?;
-        Ok(NullSubmission { passes: passes.into_iter().map(|(_, pass)| pass).collect() })
+        let passes = queues.into_iter().flat_map(|queue| queue.passes);
+        Ok(NullSubmission { passes: passes.map(|(_, pass)| pass).collect() })
     }
 }
 

@@ -34,6 +34,8 @@ pub struct FrameRequest<'a> {
 pub struct PassRequest<'a> {
     /// The frame.
     pub frame: &'a FrameRequest<'a>,
+    /// The index of the pass in [`FrameRequest::passes`].
+    pub index: usize,
     /// The render process and the view.
     pub pass: Pass,
     /// Its batches; empty for a pass without commands.

@@ -42,7 +42,7 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// What the backend records of a pass.
     pub(super) fn pass_request<'b>(&'b self, pass: usize, list: &'b DrawList) -> PassRequest<'b> {
-        PassRequest { frame: self.request, pass: self.request.passes[pass], list }
+        PassRequest { frame: self.request, index: pass, pass: self.request.passes[pass], list }
     }
 
     /// The number of parts that the backend records a pass in.

@@ -31,6 +31,6 @@ mod warnings;
 pub use builder::RendererBuilder;
 pub use error::{BuildError, FrameError, SubmitError};
 pub use granularity::Granularity;
-pub use recorded::{Recorded, Submitted, Submitter, ViewQueue};
+pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
 pub use statistics::{FrameStatistics, StageTimes, ViewStatistics};

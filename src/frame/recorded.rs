@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::shadow_cache::InFlight;
 use super::{FrameStatistics, SubmitError};
-use crate::backend::Backend;
+use crate::backend::{Backend, ViewQueue};
 use crate::process::Pass;
 use crate::timeline::Timeline;
 
@@ -14,7 +14,10 @@ use crate::timeline::Timeline;
 /// without being submitted, it leaves no trace.
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
+    /// By view index.
     pub(super) queues: Vec<ViewQueue<B::Commands>>,
+    /// The passes of all queues in the order of the plan.
+    pub(super) submission_order: Vec<Pass>,
     pub(super) frame: B::Frame,
     pub(super) statistics: FrameStatistics,
     pub(super) backend: Arc<B>,
@@ -40,15 +43,6 @@ impl<B: Backend> Recorded<B> {
     }
 }
 
-/// The queue of one view: its finished passes in order.
-#[derive(Debug)]
-pub struct ViewQueue<T> {
-    /// The view's index.
-    pub view: usize,
-    /// Its passes, each finished and ready to submit.
-    pub passes: Vec<(Pass, T)>,
-}
-
 /// Submits frames. It cannot leave the thread that built it, the device thread: the assert of M 10.3 as a type.
 ///
 /// ```compile_fail
@@ -67,7 +61,8 @@ impl<B: Backend> Submitter<B> {
         Self { backend, timeline, not_send: PhantomData }
     }
 
-    /// Submits a frame: the views' queues, merged into the order of the plan. Frames are submitted in the order in which they were
+    /// Submits a frame: one view after the other, each with its whole queue, in the order of the plan's
+    /// [view groups](crate::process::FramePlan::view_groups) (M listing 10.7). Frames are submitted in the order in which they were
     /// recorded.
     ///
     /// # Errors
@@ -80,12 +75,8 @@ impl<B: Backend> Submitter<B> {
         }
         let _timeline_span = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
-        let Recorded { queues, frame, mut statistics, in_flight, .. } = recorded;
-        let mut passes = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
-        passes.extend(queues.into_iter().flat_map(|queue| queue.passes));
-        // Passes are ordered by process first, and processes are in an order that keeps every dependency.
-        passes.sort_unstable_by_key(|(pass, _)| *pass);
-        let submission = self.backend.submit(frame, passes)?;
+        let Recorded { queues, submission_order, frame, mut statistics, in_flight, .. } = recorded;
+        let submission = self.backend.submit(frame, in_submission_order(queues, &submission_order))?;
         in_flight.submitted();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })
@@ -95,6 +86,18 @@ impl<B: Backend> Submitter<B> {
     pub fn backend(&self) -> &B {
         &self.backend
     }
+}
+
+/// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes alternate with
+/// those of other views.
+fn in_submission_order<T>(queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
+    let mut remaining: Vec<_> = queues.into_iter().map(|queue| queue.passes.into_iter()).collect();
+    let of_one_view = order.chunk_by(|one, next| one.view_index == next.view_index);
+    let take = |passes: &[Pass]| {
+        let view = passes[0].view_index;
+        ViewQueue { view, passes: remaining[view].by_ref().take(passes.len()).collect() }
+    };
+    of_one_view.map(take).collect()
 }
 
 /// A frame that was submitted.

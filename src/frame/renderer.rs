@@ -8,7 +8,7 @@ use super::context::FrameContext;
 use super::occlusion_control::update_occlusion_tuners;
 use super::pass_recording::PassRecording;
 use super::plan_cache::PlanCache;
-use super::recorded::{Recorded, ViewQueue};
+use super::recorded::Recorded;
 use super::scene_check::check_scene;
 use super::shadow_cache::ShadowCache;
 use super::stage_clock::{StageClock, StageGroup};
@@ -18,7 +18,7 @@ use super::valid_lights::ValidLights;
 use super::views::FrameViews;
 use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
-use crate::backend::{Backend, BackendError, FrameRequest};
+use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
 use crate::command::DrawList;
 use crate::process::{Deferred, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
@@ -176,7 +176,9 @@ impl<B: Backend> Renderer<B> {
         let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times());
         self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
         let in_flight = self.shadow_cache.store(shadow_maps);
-        Ok(Recorded { queues, frame, statistics, backend: Arc::clone(&self.backend), frame_number, in_flight })
+        let submission_order = graph.passes.clone();
+        let backend = Arc::clone(&self.backend);
+        Ok(Recorded { queues, submission_order, frame, statistics, backend, frame_number, in_flight })
     }
 
     /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.

@@ -20,7 +20,7 @@ use crate::view::RenderView;
 pub(super) struct StageGraph<B: Backend> {
     pub(super) schedule: Schedule<StageNode<B>>,
     pub(super) costs: CostModel,
-    /// In submission order: by process, then by view.
+    /// In submission order.
     pub(super) passes: Vec<Pass>,
     pub(super) plan: Arc<FramePlan>,
     /// What else the graph was built for.
@@ -78,7 +78,7 @@ impl<B: Backend> StageGraph<B> {
         views: &[RenderView],
         key: GraphKey,
     ) -> Result<Self, FrameError> {
-        let passes = passes_of(plan, views);
+        let passes = plan.passes(views);
         for (index, view) in views.iter().enumerate() {
             if !view.is_cached && !passes.iter().any(|pass| pass.view_index == index) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
@@ -267,17 +267,6 @@ impl<B: Backend> StageGraphCache<B> {
     pub(super) fn latest(&self) -> Option<&StageGraph<B>> {
         self.latest_first.first()
     }
-}
-
-fn passes_of(plan: &FramePlan, views: &[RenderView]) -> Vec<Pass> {
-    let mut passes = Vec::new();
-    for (process, planned) in plan.processes().iter().enumerate() {
-        let is_drawn = |view: &RenderView| view.kind() == planned.declaration.views && !view.is_cached;
-        for (view, _) in views.iter().enumerate().filter(|(_, view)| is_drawn(view)) {
-            passes.push(Pass { process_index: process, view_index: view });
-        }
-    }
-    passes
 }
 
 #[cfg(all(test, not(drawloom_loom)))]

@@ -31,7 +31,9 @@ pub use deferred::{
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use format::Format;
-pub use plan::{ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError};
+pub use plan::{
+    ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup, ViewOrder,
+};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
 #[cfg(feature = "wgpu")]

@@ -54,7 +54,7 @@ fn broken_rule(
 }
 
 fn pass<'a>(frame: &'a FrameRequest<'a>, list: &'a DrawList) -> PassRequest<'a> {
-    PassRequest { frame, pass: PASS, list }
+    PassRequest { frame, index: 0, pass: PASS, list }
 }
 
 fn record(

@@ -10,8 +10,7 @@ use super::executor::Executor;
 use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
-use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
-use crate::process::Pass;
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::{Scheduler, Worker};
 use crate::view::ObjectTable;
 
@@ -134,8 +133,8 @@ impl Backend for SoftwareBackend {
     fn submit(
         &self,
         frame: SoftwareFrame,
-        passes: Vec<(Pass, SoftwareCommands)>,
+        queues: Vec<ViewQueue<SoftwareCommands>>,
     ) -> Result<SoftwareSubmission, BackendError> {
-        frame.recording.submit(passes)
+        frame.recording.submit(queues)
     }
 }

@@ -20,9 +20,8 @@ use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
-use crate::backend::{BackendError, PassRequest};
+use crate::backend::{BackendError, PassRequest, ViewQueue};
 use crate::command::Batch;
-use crate::process::Pass;
 use crate::quality::VertexFormat;
 use crate::scene::Mesh;
 use crate::view::ObjectTable;
@@ -55,9 +54,9 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         })
     }
 
-    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError> {
+    fn submit(self: Box<Self>, queues: Vec<ViewQueue<SoftwareCommands>>) -> Result<SoftwareSubmission, BackendError> {
         let _one_at_a_time = self.context.drawing.lock();
-        for (pass, commands) in &passes {
+        for (pass, commands) in queues.iter().flat_map(|queue| &queue.passes) {
             let known = self.passes.iter().find(|known| known.pass == *pass);
             let unknown = || BackendError::BrokenRule { rule: format!("{pass:?} is of this frame") };
             self.draw(known.ok_or_else(unknown)?, commands)?;

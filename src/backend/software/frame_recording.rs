@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::SoftwareSubmission;
 use super::commands::SoftwareCommands;
-use crate::backend::{BackendError, FrameRequest, PassRequest};
-use crate::process::{CpuShader, Pass};
+use crate::backend::{BackendError, FrameRequest, PassRequest, ViewQueue};
+use crate::process::CpuShader;
 use crate::view::ObjectTable;
 
 /// A rasterizer in either precision.
@@ -35,5 +35,5 @@ pub(super) trait FrameRecording: Send + Sync {
     ///
     /// # Errors
     /// If a CPU shader panics.
-    fn submit(self: Box<Self>, passes: Vec<(Pass, SoftwareCommands)>) -> Result<SoftwareSubmission, BackendError>;
+    fn submit(self: Box<Self>, queues: Vec<ViewQueue<SoftwareCommands>>) -> Result<SoftwareSubmission, BackendError>;
 }

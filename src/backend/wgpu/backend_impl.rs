@@ -9,8 +9,7 @@ use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart
 use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
-use crate::backend::{Backend, BackendError, FrameRequest, PassRequest};
-use crate::process::Pass;
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::Worker;
 use crate::view::ObjectTable;
 
@@ -48,9 +47,8 @@ impl Backend for WgpuBackend {
         &self,
         _worker: &Worker,
         frame: &WgpuFrame,
-        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        &PassRequest { frame: request, index, pass, list }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
-        let index = frame.pass_index(pass);
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.batches.len(), list.bundle_count(), pass.strategy.part_count(list));
         let created = with_error_scope(&self.device, &pass.label, || {
@@ -78,19 +76,18 @@ impl Backend for WgpuBackend {
     }
 
     fn part_count(&self, frame: &WgpuFrame, pass: &PassRequest<'_>) -> usize {
-        frame.pass(frame.pass_index(pass.pass)).strategy.part_count(pass.list)
+        frame.pass(pass.index).strategy.part_count(pass.list)
     }
 
     fn record(
         &self,
         worker: &Worker,
         frame: &WgpuFrame,
-        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
         mut parts: Range<usize>,
         emit: &mut dyn FnMut(WgpuPart),
     ) -> Result<(), BackendError> {
         self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
-        let index = frame.pass_index(pass);
         let pass = frame.pass(index);
         let encoders = pass.strategy.encoder_count(list.bundle_count());
         // Cached bundles need no error scope, which locks the device twice.
@@ -122,14 +119,13 @@ impl Backend for WgpuBackend {
         &self,
         worker: &Worker,
         frame: &WgpuFrame,
-        &PassRequest { frame: request, pass, list }: &PassRequest<'_>,
+        &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
         parts: &mut Vec<WgpuPart>,
     ) -> Result<WgpuCommands, BackendError> {
         self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         if matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_)))) {
             return Ok(WgpuCommands(PassCommands::Parts(std::mem::take(parts))));
         }
-        let index = frame.pass_index(pass);
         let pass = frame.pass(index);
         let finish = || {
             let encoder = encode_pass(&self.device, frame, request, index, list, parts)?;
@@ -142,8 +138,8 @@ impl Backend for WgpuBackend {
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
     }
 
-    fn submit(&self, frame: WgpuFrame, passes: Vec<(Pass, WgpuCommands)>) -> Result<WgpuSubmission, BackendError> {
-        self.submit_frame(&frame, passes).inspect_err(|_| {
+    fn submit(&self, frame: WgpuFrame, queues: Vec<ViewQueue<WgpuCommands>>) -> Result<WgpuSubmission, BackendError> {
+        self.submit_frame(&frame, queues).inspect_err(|_| {
             self.buffers.clear();
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();

@@ -8,8 +8,7 @@ use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::strategy::StrategyTuner;
 use super::submission::WgpuSubmission;
-use crate::backend::BackendError;
-use crate::process::Pass;
+use crate::backend::{BackendError, ViewQueue};
 
 impl WgpuBackend {
     /// Finishes open encoders, and submits the frame.
@@ -19,10 +18,10 @@ impl WgpuBackend {
     pub(super) fn submit_frame(
         &self,
         frame: &WgpuFrame,
-        passes: Vec<(Pass, WgpuCommands)>,
+        queues: Vec<ViewQueue<WgpuCommands>>,
     ) -> Result<WgpuSubmission, BackendError> {
-        let mut finished = Vec::with_capacity(passes.len());
-        for (pass, WgpuCommands(commands)) in passes {
+        let mut finished = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
+        for (index, (_, WgpuCommands(commands))) in queues.into_iter().flat_map(|queue| queue.passes).enumerate() {
             match commands {
                 PassCommands::Finished(commands) => finished.push(commands),
                 PassCommands::Parts(parts) => {
@@ -32,7 +31,7 @@ impl WgpuBackend {
                     }));
                 }
                 PassCommands::Open(encoder) => {
-                    let pass = frame.pass(frame.pass_index(pass));
+                    let pass = frame.pass(index);
                     // This thread runs no job, so no scheduler would catch a panic of wgpu.
                     let finish = || catch_wgpu_panic(&pass.label, || encoder.finish());
                     let finish = || with_error_scope(&self.device, &pass.label, finish);

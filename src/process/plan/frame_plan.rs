@@ -7,10 +7,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::order::{AddedProcess, order_constraints};
 use super::planned_target::targets_of;
-use super::{ChainSlot, PlanError, PlannedProcess, PlannedTarget, ProcessError};
+use super::view_group::view_groups;
+use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
 use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters};
 use crate::scene::ViewKind;
+use crate::view::RenderView;
 
 /// What every frame does: its processes in the order they are submitted, and the targets that they use.
 pub struct FramePlan {
@@ -18,6 +20,7 @@ pub struct FramePlan {
     #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend caches something for a plan"))]
     alive: Arc<()>,
     processes: Vec<PlannedProcess>,
+    view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
     dropped: Vec<String>,
     dot: String,
@@ -90,15 +93,18 @@ impl FramePlan {
         let dot =
             schedule.to_labelled_dot(|before, after| passed_on_targets(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
+        let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
+        let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
         let processes: Vec<_> = schedule.into_nodes().map(|(_, process)| process).collect();
         if processes.is_empty() {
             return Err(PlanError::Empty);
         }
+        let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { identity, alive: Arc::default(), processes, targets, dropped, dot })
+        Ok(Self { identity, alive: Arc::default(), processes, view_groups, targets, dropped, dot })
     }
 
     /// A number that no other plan of this program has.
@@ -112,9 +118,21 @@ impl FramePlan {
         Arc::downgrade(&self.alive)
     }
 
-    /// The processes in the order they are submitted.
+    /// The processes in the order in which a view's queue has their passes.
     pub fn processes(&self) -> &[PlannedProcess] {
         &self.processes
+    }
+
+    /// The order in which views are submitted: the groups one after the other. Each view is submitted with its whole queue,
+    /// except in groups that are submitted [process by process](super::ViewOrder::ProcessByProcess).
+    pub fn view_groups(&self) -> &[ViewGroup] {
+        &self.view_groups
+    }
+
+    /// The passes of a frame with these views, in submission order: each process in each view of its kind whose picture is not
+    /// cached.
+    pub(crate) fn passes(&self, views: &[RenderView]) -> Vec<Pass> {
+        self.view_groups.iter().flat_map(|group| group.passes(&self.processes, views)).collect()
     }
 
     /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
@@ -196,11 +214,14 @@ fn resource_name(kind: ViewKind, target: &str) -> String {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
+    use glam::DVec3;
+
+    use super::super::ViewOrder;
     use super::*;
     use crate::process::{
         ClearColor, CommandDraws, Declare, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, ToneMapping,
     };
-    use crate::scene::LightKind;
+    use crate::scene::{Camera, LightKind};
 
     struct TestProcess<F>(&'static str, F);
 
@@ -289,5 +310,81 @@ mod tests {
         let error = FramePlan::new(Vec::new(), shipped(), &["unknown".to_owned()]).err().unwrap().to_string();
         assert!(error.contains("unknown"), "{error}");
         assert!(plan(Vec::new()).is_err());
+    }
+
+    /// A process of some kind of view that writes and reads these targets; layered ones are written by clearing, and read as
+    /// layers of the kind that is given.
+    fn view_process(
+        name: &'static str,
+        kind: ViewKind,
+        writes: Option<&'static str>,
+        reads: Option<(&'static str, ViewKind)>,
+    ) -> Arc<dyn RenderProcess> {
+        Arc::new(TestProcess(name, move |declare: &mut Declare| {
+            declare.views(kind);
+            if let Some(target) = writes {
+                declare.clears_depth_layer(target, Format::Depth32Float);
+            }
+            if let Some((target, kind)) = reads {
+                declare.samples_layers(kind, target);
+            }
+            declare.keep();
+        }))
+    }
+
+    fn groups_of(processes: Vec<Arc<dyn RenderProcess>>) -> Vec<(Vec<ViewKind>, ViewOrder)> {
+        let plan = FramePlan::new(Vec::new(), processes, &[]).unwrap();
+        plan.view_groups().iter().map(|group| (group.kinds.clone(), group.order)).collect()
+    }
+
+    #[test]
+    fn views_are_submitted_after_the_views_that_they_read() {
+        use ViewKind::{Main, Reflection, Shadow};
+        use ViewOrder::ViewByView;
+        let processes = || {
+            vec![
+                view_process("reflection", Reflection, Some("mirrors"), Some(("portals", Main))),
+                view_process("picture", Main, Some("portals"), Some(("maps", Shadow))),
+                view_process("casters", Shadow, Some("maps"), None),
+            ]
+        };
+        let one_by_one = [Shadow, Main, Reflection].map(|kind| (vec![kind], ViewByView));
+        assert_eq!(groups_of(processes()), one_by_one);
+
+        let plan = FramePlan::new(Vec::new(), processes(), &[]).unwrap();
+        let view = |kind| RenderView::new(&Camera { kind, ..Camera::looking_at("", DVec3::Z, DVec3::ZERO) });
+        let views = [view(Main), view(Main), view(Reflection), view(Shadow)];
+        let order: Vec<_> = plan.passes(&views).iter().map(|pass| pass.view_index).collect();
+        assert_eq!(order, [3, 0, 1, 2]);
+    }
+
+    #[test]
+    fn views_that_read_each_other_are_submitted_process_by_process() {
+        use ViewKind::{Main, Reflection, Shadow};
+        use ViewOrder::{ProcessByProcess, ViewByView};
+        let mutual = vec![
+            view_process("first", Main, Some("a"), None),
+            view_process("mirror", Reflection, Some("b"), Some(("a", Main))),
+            view_process("second", Main, Some("c"), Some(("b", Reflection))),
+            view_process("casters", Shadow, Some("maps"), None),
+        ];
+        let plan = FramePlan::new(Vec::new(), mutual, &[]).unwrap();
+        let groups = plan.view_groups();
+        assert_eq!((groups[0].kinds.as_slice(), groups[0].order), ([Shadow].as_slice(), ViewByView));
+        assert_eq!((groups[1].kinds.as_slice(), groups[1].order), ([Reflection, Main].as_slice(), ProcessByProcess));
+        let view = |kind| RenderView::new(&Camera { kind, ..Camera::looking_at("", DVec3::Z, DVec3::ZERO) });
+        let views = [view(Main), view(Main), view(Reflection)];
+        let names: Vec<_> = plan
+            .passes(&views)
+            .iter()
+            .map(|pass| (plan.processes()[pass.process_index].process.name(), pass.view_index))
+            .collect();
+        assert_eq!(names, [("first", 0), ("first", 1), ("mirror", 2), ("second", 0), ("second", 1)]);
+
+        let own_layers = vec![
+            view_process("write", Main, Some("layers"), None),
+            view_process("read", Main, None, Some(("layers", Main))),
+        ];
+        assert_eq!(groups_of(own_layers), [(vec![Main], ProcessByProcess)]);
     }
 }

@@ -7,6 +7,7 @@ mod order;
 mod pass;
 mod planned_process;
 mod planned_target;
+mod view_group;
 
 pub use chain::ChainSlot;
 pub use error::{PlanError, ProcessError};
@@ -14,3 +15,4 @@ pub use frame_plan::FramePlan;
 pub use pass::Pass;
 pub use planned_process::PlannedProcess;
 pub use planned_target::PlannedTarget;
+pub use view_group::{ViewGroup, ViewOrder};

@@ -23,12 +23,7 @@ pub struct WgpuFrame {
 }
 
 impl WgpuFrame {
-    /// The index of a pass in the frame.
-    pub(crate) fn pass_index(&self, pass: Pass) -> usize {
-        // Passes are sorted by process, then by view, which is the order of `Pass`.
-        self.buffers.passes().partition_point(|other| other.pass < pass)
-    }
-
+    /// The state of a pass, by index in the frame.
     pub(crate) fn pass(&self, index: usize) -> &WgpuPassState {
         &self.buffers.passes()[index]
     }
