@@ -131,9 +131,9 @@ impl TargetCache {
         size: [u32; 2],
     ) -> Result<ViewTarget, BackendError> {
         let extent = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
-        let kept = self.current.find(view, &planned.name);
-        if let Some(kept) = kept.filter(|kept| *kept.planned == *planned && kept.texture.size() == extent) {
-            return Ok(kept.clone());
+        let cached = self.current.find(view, &planned.name);
+        if let Some(cached) = cached.filter(|cached| *cached.planned == *planned && cached.texture.size() == extent) {
+            return Ok(cached.clone());
         }
         let texture = new_texture(device, planned, extent)?;
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
@@ -141,9 +141,9 @@ impl TargetCache {
     }
 
     fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {
-        let kept = self.current.find(view, &shared.planned.name);
-        if let Some(kept) = kept.filter(|kept| kept.texture == shared.texture && kept.layer == layer) {
-            return kept.clone();
+        let cached = self.current.find(view, &shared.planned.name);
+        if let Some(cached) = cached.filter(|cached| cached.texture == shared.texture && cached.layer == layer) {
+            return cached.clone();
         }
         let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2),
@@ -171,9 +171,9 @@ impl TargetCache {
             wgpu::Extent3d { depth_or_array_layers: extent.depth_or_array_layers, ..size } == extent
                 && layers.contains(&size.depth_or_array_layers)
         };
-        let mut kept = self.current.layered.iter().filter(|kept| *kept.planned == *planned);
-        if let Some(kept) = kept.find(|kept| fits(kept.texture.size())) {
-            return Ok(kept.clone());
+        let mut cached = self.current.layered.iter().filter(|cached| *cached.planned == *planned);
+        if let Some(cached) = cached.find(|cached| fits(cached.texture.size())) {
+            return Ok(cached.clone());
         }
         let texture = new_texture(device, planned, extent)?;
         let dimension = Some(wgpu::TextureViewDimension::D2Array);
