@@ -153,6 +153,11 @@ proptest! {
 }
 
 #[test]
+fn the_checksum_of_no_commands_is_the_crc_of_eight_zeros() {
+    assert_eq!(DeltaCommands::new().bytes(), b"DLC2\x69\xdf\x22\x65\0\0\0\0\0\0\0\0");
+}
+
+#[test]
 fn a_huge_count_takes_no_memory_and_no_time() {
     let mut bytes = DeltaCommands::encode(&[RenderCommand::EMPTY; 3]).into_bytes();
     bytes[8..HEADER].fill(0xff);
