@@ -17,18 +17,7 @@ use drawloom::{
     graph::{FrameGraph, Node, NodeError, NodeId, RunError, Schedule},
     task::{Scheduler, Worker},
 };
-
-/// The random number generator SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % count as u64) as usize
-    }
-}
+use fastrand::Rng;
 
 /// A node of a random graph. It depends on nodes with lower indices.
 #[derive(Clone)]
@@ -40,16 +29,18 @@ struct Plan {
 }
 
 fn plans(seed: u64) -> Vec<Plan> {
-    let mut random = Random(seed);
+    let mut random = Rng::with_seed(seed);
     // Mostly small graphs, so that many can be tested.
-    let max = [4, 20, 100, 400, 2_000][[0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 4][random.below(16)]];
-    let reach = 1 + random.below(max);
-    (0..1 + random.below(max))
+    let max = [4, 20, 100, 400, 2_000][[0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 4][random.usize(..16)]];
+    let reach = 1 + random.usize(..max);
+    (0..1 + random.usize(..max))
         .map(|index| Plan {
-            dependencies: (0..random.below(4).min(index)).map(|_| index - 1 - random.below(reach.min(index))).collect(),
-            width: [1, 1, 1, random.below(51)][random.below(4)],
-            chunk: random.below(8),
-            is_pinned: random.below(10) == 0,
+            dependencies: (0..random.usize(..4).min(index))
+                .map(|_| index - 1 - random.usize(..reach.min(index)))
+                .collect(),
+            width: [1, 1, 1, random.usize(..51)][random.usize(..4)],
+            chunk: random.usize(..8),
+            is_pinned: random.usize(..10) == 0,
         })
         .collect()
 }
@@ -141,15 +132,15 @@ fn cancelled(plans: &[Plan], failing: usize) -> Vec<bool> {
 
 fn check(seed: u64, schedulers: &[Scheduler]) {
     let plans = plans(seed);
-    let mut random = Random(!seed);
+    let mut random = Rng::with_seed(!seed);
     let expected = serial_counts(&plans);
     for scheduler in schedulers {
         let case = format!("seed {seed}, {scheduler:?}");
         let mut schedule = compiled(&plans);
         for always_parallel in [true, false, false, true] {
             schedule.always_parallel(always_parallel);
-            let chosen = random.below(plans.len());
-            let failing = (random.below(3) == 0 && plans[chosen].width > 0).then_some(chosen);
+            let chosen = random.usize(..plans.len());
+            let failing = (random.usize(..3) == 0 && plans[chosen].width > 0).then_some(chosen);
             let context = RunContext::new(&plans, failing);
             let outcome = schedule.run(scheduler, &context);
             let counts = context.counts();

@@ -7,25 +7,16 @@ use drawloom::{
     task::Scheduler,
     timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
 };
+use fastrand::Rng;
 use libtest_mimic::Failed;
-
-/// A linear congruential generator, of which only the upper bits are used.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % bound
-    }
-}
 
 /// Five runs of a random graph on two workers.
 pub fn real_runs() -> Result<Log, Failed> {
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     let mut graph = FrameGraph::new();
     let mut nodes = Vec::new();
     for index in 0..40 {
-        let width = random.below(400);
+        let width = random.usize(..400);
         let body = Closure::new(|_: &(), range, _worker| {
             range.for_each(|item| _ = black_box((0..200).fold(item, |sum, step| black_box(sum ^ step))));
             Ok(())
@@ -33,8 +24,8 @@ pub fn real_runs() -> Result<Log, Failed> {
         let node = graph.add(format!("node {index}"), body.with_width(move |_| width).with_chunk(16));
         let stage = Some(["cull", "fill", "sort"][index % 3].to_owned());
         graph.label(node, Labels { stage, ..Labels::default() });
-        for _ in 0..random.below(3).min(nodes.len()) {
-            graph.order(nodes[random.below(nodes.len())], node);
+        for _ in 0..random.usize(..3).min(nodes.len()) {
+            graph.order(nodes[random.usize(..nodes.len())], node);
         }
         graph.keep(node);
         nodes.push(node);
@@ -62,7 +53,7 @@ pub fn many_chunks(count: usize, frames: usize) -> Log {
         ..NodeInfo::default()
     };
     let graph = Arc::new(Graph { nodes: (0..nodes).map(node).collect() });
-    let mut random = Random(1);
+    let mut random = Rng::with_seed(1);
     let mut log = Log::default();
     log.workers.resize(WORKERS, WorkerLog { name: "worker".to_owned(), ..WorkerLog::default() });
     let mut now = Duration::from_secs(5);
@@ -75,7 +66,7 @@ pub fn many_chunks(count: usize, frames: usize) -> Log {
             for chunk in 0..CHUNKS {
                 let worker = (0..WORKERS).min_by_key(|&worker| free_at[worker]).unwrap_or_default();
                 let started = free_at[worker];
-                let ended = started + Duration::from_nanos(500 + random.below(9_000) as u64);
+                let ended = started + Duration::from_nanos(500 + random.u64(..9_000));
                 let items = chunk * 16..chunk * 16 + 16;
                 chunks.push(Chunk { node, items, worker, opened, started, ended, stolen: worker > 0 });
                 free_at[worker] = ended;

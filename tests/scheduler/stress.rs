@@ -6,6 +6,7 @@ use std::{
 };
 
 use drawloom::task::{Scheduler, Scope, Worker};
+use fastrand::Rng;
 
 /// A branch of a random tree of jobs. A subtree has a seed and a height.
 #[derive(Clone, Copy)]
@@ -16,22 +17,14 @@ enum Branch {
     Loop(usize, usize),
 }
 
-/// The branches of a seed, by the generator SplitMix64.
+/// The branches of a seed.
 fn branches(seed: u64) -> impl Iterator<Item = Branch> {
-    let random = move |step: u64| {
-        let mixed = seed.wrapping_add(step.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    };
-    (1..=random(1) % 5).map(move |branch| {
-        let [kind, child, size] = [2, 3, 4].map(|step| random(5 * branch + step));
-        match kind % 5 {
-            0 | 1 => Branch::Spawn(child),
-            2 => Branch::Pinned(child),
-            3 => Branch::Scope(child),
-            _ => Branch::Loop((size % 300) as usize, (size / 300 % 20) as usize),
-        }
+    let mut random = Rng::with_seed(seed);
+    (0..random.usize(..5)).map(move |_branch| match random.usize(..5) {
+        0 | 1 => Branch::Spawn(random.u64(..)),
+        2 => Branch::Pinned(random.u64(..)),
+        3 => Branch::Scope(random.u64(..)),
+        _ => Branch::Loop(random.usize(..300), random.usize(..20)),
     })
 }
 

@@ -12,10 +12,10 @@ use drawloom::{
     graph::{FrameGraph, Node, NodeError, RunError, Schedule},
     task::Worker,
 };
+use fastrand::Rng;
 
 use crate::{
     program::{World, items, panic_as_planned, run_items},
-    random::Random,
     watchdog::{Activity, during},
 };
 
@@ -32,14 +32,14 @@ struct Plan {
 }
 
 fn plans(seed: u64) -> Vec<Plan> {
-    let mut random = Random(!seed);
-    (0..1 + random.below(9))
+    let mut random = Rng::with_seed(!seed);
+    (0..1 + random.usize(..9))
         .map(|index| Plan {
-            seed: random.next(),
-            depends_on: (0..random.below(3).min(index)).map(|_| random.below(index)).collect(),
-            width: [1, 1, random.below(MAX_WIDTH)][random.below(3)],
-            chunk: random.below(4),
-            is_pinned: random.one_in(6),
+            seed: random.u64(..),
+            depends_on: (0..random.usize(..3).min(index)).map(|_| random.usize(..index)).collect(),
+            width: [1, 1, random.usize(..MAX_WIDTH)][random.usize(..3)],
+            chunk: random.usize(..4),
+            is_pinned: random.u8(..6) == 0,
         })
         .collect()
 }
@@ -121,12 +121,12 @@ pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
         ids.push(id);
     }
     let mut schedule = graph.compile().expect("each node depends on nodes before it");
-    let mut random = Random(seed);
-    for _run in 0..random.below(4) {
-        schedule.always_parallel(random.one_in(2));
-        let node = random.below(widths.len());
-        let failure = [Failure::Error, Failure::Panic][random.below(2)];
-        let failing = (widths[node] > 0 && random.one_in(2)).then_some((node, failure));
+    let mut random = Rng::with_seed(seed);
+    for _run in 0..random.usize(..4) {
+        schedule.always_parallel(random.bool());
+        let node = random.usize(..widths.len());
+        let failure = [Failure::Error, Failure::Panic][random.usize(..2)];
+        let failing = (widths[node] > 0 && random.bool()).then_some((node, failure));
         run_once(world, &mut schedule, &widths, seed, height, failing);
     }
     run_once(world, &mut schedule, &widths, seed, height, None).expect("no node fails")

@@ -13,7 +13,6 @@
 mod graphs;
 mod program;
 mod race;
-mod random;
 mod rounds;
 mod watchdog;
 

@@ -15,10 +15,10 @@ use std::{
 };
 
 use drawloom::task::{BackgroundJob, JobPanic, Scheduler, Scope, Worker};
+use fastrand::Rng;
 
 use crate::{
     graphs,
-    random::Random,
     watchdog::{Activity, during, progress},
 };
 
@@ -81,24 +81,24 @@ enum Wait {
 }
 
 fn pieces(seed: u64, height: usize) -> Vec<Piece> {
-    let mut random = Random(seed ^ (height as u64) << 56);
+    let mut random = Rng::with_seed(seed ^ (height as u64) << 56);
     let max = [1, 2, 3, 4, 5, 6][height.min(5)];
-    (0..1 + random.below(max))
+    (0..1 + random.usize(..max))
         .map(|_| {
-            let panics = random.one_in(12);
-            let seed = random.next();
-            match random.below(16) {
+            let panics = random.u8(..12) == 0;
+            let seed = random.u64(..);
+            match random.usize(..16) {
                 0 => Piece::Leaf(seed),
                 1..4 => Piece::Spawn(seed),
                 4 => Piece::SpawnPinned(seed),
                 5 => Piece::SpawnOutside(seed),
                 6..8 => Piece::Scope { seed, panics },
-                8..10 => Piece::Loop { seed, length: random.below(MAX_LOOP), chunk: random.below(6), panics },
+                8..10 => Piece::Loop { seed, length: random.usize(..MAX_LOOP), chunk: random.usize(..6), panics },
                 10 => Piece::Graph(seed),
                 11..14 => {
-                    let wait = match random.below(6) {
+                    let wait = match random.usize(..6) {
                         0 => Wait::AtOnce,
-                        1 | 2 => Wait::AfterAScope(random.next()),
+                        1 | 2 => Wait::AfterAScope(random.u64(..)),
                         3 => Wait::InAJob,
                         4 => Wait::InAPinnedJob,
                         _ => Wait::Never,
@@ -114,12 +114,12 @@ fn pieces(seed: u64, height: usize) -> Vec<Piece> {
 
 /// The value of a seed at the end of a branch.
 pub fn leaf(seed: u64) -> u64 {
-    Random(seed).next() >> 8
+    Rng::with_seed(seed).u64(..) >> 8
 }
 
 /// Whether an index of a loop, or an item of a graph, is a part of its own.
 pub fn branches(seed: u64, index: usize) -> bool {
-    Random(seed ^ index as u64).one_in(23)
+    Rng::with_seed(seed ^ index as u64).u8(..23) == 0
 }
 
 /// How many jobs a thread that is no worker spawns.

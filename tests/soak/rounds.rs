@@ -15,10 +15,10 @@ use drawloom::{
     task::{Scheduler, SchedulerBuilder},
     timeline::Log,
 };
+use fastrand::Rng;
 
 use crate::{
     program::{MAX_HEIGHT, World, panic_as_planned, run as run_program, value},
-    random::Random,
     watchdog::{self, Activity, during},
 };
 
@@ -63,23 +63,23 @@ const MAX_WORKERS: usize = if cfg!(miri) { 3 } else { 8 };
 
 /// Runs the round of a seed.
 pub fn run(seed: u64) -> Totals {
-    let mut random = Random(seed);
-    let workers = 1 + random.below(MAX_WORKERS);
-    let builder = Scheduler::builder().workers(workers).timeline_capacity(CAPACITIES[random.below(2)]);
-    let shuffle = random.one_in(4).then(|| random.next());
+    let mut random = Rng::with_seed(seed);
+    let workers = 1 + random.usize(..MAX_WORKERS);
+    let builder = Scheduler::builder().workers(workers).timeline_capacity(CAPACITIES[random.usize(..2)]);
+    let shuffle = (random.u8(..4) == 0).then(|| random.u64(..));
     let builder = shuffle.into_iter().fold(builder, SchedulerBuilder::shuffle);
     // Measuring it would take longer than the programs, and different costs make different decisions.
-    let cost = Duration::from_micros([0, 1, 20, 1_000][random.below(4)]);
-    let builder = match random.below(6) {
+    let cost = Duration::from_micros([0, 1, 20, 1_000][random.usize(..4)]);
+    let builder = match random.usize(..6) {
         0..3 => builder,
         3..5 => builder.timeline_clock(clock(u64::MAX)),
-        _ => builder.timeline_clock(clock(random.next() % 500)),
+        _ => builder.timeline_clock(clock(random.u64(..500))),
     };
     let scheduler = builder.wake_up_cost(cost).build().expect("threads can be started");
     let world = World::new(format!("seed {seed}, {workers} workers, shuffled by {shuffle:?}"), scheduler);
     watchdog::watch(&world);
     let done_before = watchdog::done();
-    let seeds: Vec<u64> = (0..1 + random.below(3)).map(|_| random.next()).collect();
+    let seeds: Vec<u64> = (0..1 + random.usize(..3)).map(|_| random.u64(..)).collect();
     let totals = thread::scope(|threads| {
         let threads: Vec<_> = seeds
             .iter()
@@ -125,22 +125,22 @@ fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
 
 /// Runs programs one after another, as an engine runs frames, and uses the timeline and runs background jobs in between.
 fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
-    let mut random = Random(seed);
+    let mut random = Rng::with_seed(seed);
     let mut totals = Totals::default();
     let timeline = world.scheduler.timeline();
-    for _program in 0..1 + random.below(MAX_PROGRAMS) {
-        match random.below(5) {
+    for _program in 0..1 + random.usize(..MAX_PROGRAMS) {
+        match random.usize(..5) {
             0 => timeline.start(),
             1 => timeline.stop(),
             2 => check_log(&timeline.take(), &mut totals),
             3 => timeline.mark_frame(),
             _ => {}
         }
-        let (seed, height) = (random.next(), 1 + random.below(MAX_HEIGHT));
+        let (seed, height) = (random.u64(..), 1 + random.usize(..MAX_HEIGHT));
         assert_eq!(run_program(world, seed, height), value(seed, height), "{}: program {seed:x}", world.name);
         totals.programs += 1;
-        if random.one_in(2) {
-            let budget = Duration::from_micros(random.next() % 200);
+        if random.bool() {
+            let budget = Duration::from_micros(random.u64(..200));
             during(Activity::RunBackground, seed, || world.scheduler.run_background(budget));
         }
     }

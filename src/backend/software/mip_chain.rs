@@ -71,6 +71,7 @@ impl MipChain {
 
 #[cfg(all(test, not(drawloom_loom)))]
 pub(super) mod tests {
+    use fastrand::Rng;
     use proptest::prelude::*;
 
     use super::*;
@@ -79,12 +80,9 @@ pub(super) mod tests {
     const UNIT: f64 = 1.0 / 16_777_216.0;
 
     pub(in crate::backend::software) fn noise(side: u32) -> Texture {
-        let mut state = 1_u32;
-        let byte = |_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
-        };
-        Texture::new("noise", side, side, (0..side * side * 4).map(byte).collect()).unwrap()
+        let mut pixels = vec![0; side as usize * side as usize * 4];
+        Rng::with_seed(1).fill(&mut pixels);
+        Texture::new("noise", side, side, pixels).unwrap()
     }
 
     fn texel<R: Real>(chain: &MipChain, uv: [f64; 2], gradients: [[f64; 2]; 2]) -> [f64; 4] {

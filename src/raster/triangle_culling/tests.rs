@@ -1,3 +1,4 @@
+use fastrand::Rng;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
@@ -52,10 +53,10 @@ proptest! {
 #[test]
 fn no_sliver_that_a_device_may_draw_is_culled() {
     let slivers = if cfg!(debug_assertions) { 100_000 } else { 2_000_000 };
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     let mut counts = CulledTriangles::default();
     for _ in 0..slivers {
-        let points = random.sliver();
+        let points = sliver(&mut random);
         let clip = points.map(corner_at);
         let (kept, count) = cull(&clip, &[[0, 1, 2]], Some(Winding::Clockwise));
         counts += count;
@@ -194,26 +195,13 @@ fn any_corner() -> impl Strategy<Value = Vector4<f64>> {
     })
 }
 
-/// A pseudo-random generator (Vigna's SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: i64) -> i64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ mixed >> 31) % end as u64) as i64
-    }
-
-    /// Two corners up to 2000 or up to 6 steps apart, and one within a few steps of the line between them.
-    fn sliver(&mut self) -> [GridPoint; 3] {
-        let reach = if self.below(2) == 0 { 2000 } else { 6 };
-        let from = [0, 1].map(|axis| self.below(PICTURE[axis] as i64 * STEPS_PER_PIXEL));
-        let to = from.map(|along| along + self.below(2 * reach + 1) - reach);
-        let share = self.below(1001);
-        let off = 1 + self.below(8);
-        let third =
-            [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share / 1000 + self.below(2 * off + 1) - off);
-        [from, to, third]
-    }
+/// Two corners up to 2000 or up to 6 steps apart, and one within a few steps of the line between them.
+fn sliver(random: &mut Rng) -> [GridPoint; 3] {
+    let reach = if random.bool() { 2000 } else { 6 };
+    let from = PICTURE.map(|length| random.i64(0..length as i64 * STEPS_PER_PIXEL));
+    let to = from.map(|along| along + random.i64(-reach..=reach));
+    let share = random.i64(0..=1000);
+    let off = random.i64(1..=8);
+    let third = [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share / 1000 + random.i64(-off..=off));
+    [from, to, third]
 }

@@ -227,6 +227,8 @@ impl Samples {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
+    use fastrand::Rng;
+
     use super::*;
     use crate::backend::wgpu::strategy::{RecordingStrategy, StrategySet};
 
@@ -235,7 +237,7 @@ mod tests {
         set: StrategySet,
         tuner: StrategyTuner,
         frame: u64,
-        noise: u64,
+        random: Rng,
         used: Vec<usize>,
     }
 
@@ -243,18 +245,15 @@ mod tests {
         fn new() -> Self {
             let set = StrategySet::new(true, true);
             let tuner = StrategyTuner::new(set.strategies().len());
-            Self { set, tuner, frame: 0, noise: 0x9E37_79B9_7F4A_7C15, used: Vec::new() }
+            Self { set, tuner, frame: 0, random: Rng::with_seed(1), used: Vec::new() }
         }
 
         /// Runs frames whose samples are off by up to `noise`, and one in ten of them by a factor of six.
         fn run(&mut self, frames: usize, batches: usize, noise: f64, cost: impl Fn(PassStrategy) -> f64) {
             self.used.clear();
             for _ in 0..frames {
-                self.noise ^= self.noise << 13;
-                self.noise ^= self.noise >> 7;
-                self.noise ^= self.noise << 17;
-                let uniform = (self.noise >> 11) as f64 / (1_u64 << 53) as f64;
-                let factor = if noise > 0.0 && self.noise.is_multiple_of(10) { 6.0 } else { 1.0 + noise * uniform };
+                let is_outlier = noise > 0.0 && self.random.u8(..10) == 0;
+                let factor = if is_outlier { 6.0 } else { 1.0 + noise * self.random.f64() };
                 let (strategy, _) = self.tuner.choose(self.set.strategies(), self.frame, &mut true);
                 let cost = cost(self.set.strategies()[strategy]) * factor * batches as f64;
                 self.tuner.report(self.frame, strategy, CostSample { cost, batches, is_warm: true });
