@@ -7,7 +7,7 @@
 //! any frame. So the test first fills each queue with more jobs than the frames could put there.
 
 use std::{
-    alloc::{GlobalAlloc, Layout, System},
+    alloc::System,
     hint::black_box,
     ops::Range,
     sync::{
@@ -22,46 +22,22 @@ use drawloom::{
     graph::{Closure, FrameGraph, NodeId, Schedule},
     task::{Scheduler, Worker, catch},
 };
-
-/// The system's allocator, which also counts the allocations of all threads.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-/// How many bytes are allocated.
-static BYTES: AtomicUsize = AtomicUsize::new(0);
+use fastrand::Rng;
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-// SAFETY: The methods must behave as an allocator. They pass every call on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        BYTES.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: The caller guarantees the same conditions.
-        unsafe { System.alloc(layout) }
-    }
+/// The number of allocations so far, of all threads.
+fn allocation_count() -> usize {
+    let stats = ALLOCATOR.stats();
+    stats.allocations + stats.reallocations
+}
 
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        BYTES.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: The caller guarantees the same conditions.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        BYTES.fetch_add(size.wrapping_sub(layout.size()), Ordering::Relaxed);
-        // SAFETY: The caller guarantees the same conditions, and the memory is from the system's allocator.
-        unsafe { System.realloc(memory, layout, size) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        BYTES.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: The caller guarantees the same conditions, and the memory is from the system's allocator.
-        unsafe { System.dealloc(memory, layout) }
-    }
+/// How many bytes are allocated.
+fn allocated_bytes() -> usize {
+    let stats = ALLOCATOR.stats();
+    stats.bytes_allocated - stats.bytes_deallocated
 }
 
 /// More jobs than any frame of this test has at once.
@@ -75,9 +51,9 @@ const ROUNDS: usize = 3;
 fn allocations_of(mut frame: impl FnMut(usize)) -> usize {
     (0..WARM_UP).for_each(&mut frame);
     let rounds = (0..ROUNDS).map(|_| {
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocation_count();
         (0..COUNTED).for_each(&mut frame);
-        ALLOCATIONS.load(Ordering::Relaxed) - before
+        allocation_count() - before
     });
     rounds.min().expect("at least one round")
 }
@@ -103,26 +79,22 @@ fn process() -> Process {
 
 /// A layered graph of narrow, wide and pinned nodes, each of which depends on some nodes of the layer before.
 fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
-    let mut state = seed;
-    let mut below = |count: usize| {
-        state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
-        (state >> 33) as usize % count
-    };
+    let mut random = Rng::with_seed(seed);
     let mut graph = FrameGraph::new();
     let mut before: Vec<NodeId> = Vec::new();
     for (layer, &width) in layers.iter().enumerate() {
         let processes: Vec<NodeId> = (0..width)
             .map(|index| {
-                let (items, chunk) = (2 + below(100), 1 + below(4));
-                let payload = match below(8) {
+                let (items, chunk) = (2 + random.usize(..100), 1 + random.usize(..4));
+                let payload = match random.usize(..8) {
                     0 => process().on_calling_thread(),
                     1 | 2 => process().with_width(move |_| items).with_chunk(chunk),
                     _ => process(),
                 };
                 let added = graph.add(format!("{layer} {index}"), payload);
                 graph.keep(added);
-                for _ in 0..before.len().min(1 + below(3)) {
-                    graph.order(before[below(before.len())], added);
+                for _ in 0..before.len().min(1 + random.usize(..3)) {
+                    graph.order(before[random.usize(..before.len())], added);
                 }
                 added
             })
@@ -233,9 +205,9 @@ fn check_that_waiting_frees_memory(workers: usize) {
         }
     };
     wait_for_all();
-    let before = BYTES.load(Ordering::Relaxed);
+    let before = allocated_bytes();
     wait_for_all();
-    let left = BYTES.load(Ordering::Relaxed).saturating_sub(before);
+    let left = allocated_bytes().saturating_sub(before);
     assert!(left < 2 * RESULT, "{workers} workers: {JOBS} jobs that were waited for leave {left} bytes allocated");
 }
 
@@ -244,9 +216,9 @@ fn a_steady_frame_allocates_nothing() {
     [1, 2].into_iter().for_each(check_that_waiting_frees_memory);
 
     // The allocator counts on every thread.
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocation_count();
     thread::spawn(|| drop(black_box(Box::new(7)))).join().unwrap();
-    assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);
+    assert!(allocation_count() > before);
 
     let scheduler = Scheduler::builder().workers(2).build().unwrap();
     grow_queues(&scheduler);
