@@ -1,4 +1,4 @@
-//! A whole trace, compared byte by byte.
+//! A whole trace, compared byte by byte. `UPDATE_EXPECT=1` renews the golden file.
 
 use std::{
     sync::atomic::{AtomicU64, Ordering},
@@ -11,13 +11,13 @@ use drawloom::{
     report::write_chrome_trace,
     task::Scheduler,
 };
+use expect_test::expect_file;
 
 #[test]
 fn a_frame_makes_the_golden_trace() {
     // The calling thread gets a name, because the test harness decides how a test's own thread is called.
     let trace = thread::Builder::new().name("engine".to_owned()).spawn(trace_of_a_frame).unwrap().join().unwrap();
-    let golden = include_str!("golden_trace.json");
-    assert!(trace == golden, "the trace differs from golden_trace.json:\n{trace}");
+    expect_file!["golden_trace.json"].assert_eq(&trace);
 }
 
 /// Four nodes, one of them without items, in a span. The clock advances by about a microsecond with each reading.

@@ -6,6 +6,7 @@ use drawloom::{
     report::{FrameReport, HeldBy, ReportError, SchedulerCosts},
     timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
 };
+use expect_test::expect_file;
 
 fn micros(count: u64) -> Duration {
     Duration::from_micros(count)
@@ -144,8 +145,7 @@ fn the_report_of_a_frame_made_by_hand_is_as_calculated() {
 
 #[test]
 fn the_text_is_as_expected() {
-    let text = report_of(&log()).to_string();
-    assert_eq!(text, include_str!("report.txt"));
+    expect_file!["report.txt"].assert_eq(&report_of(&log()).to_string());
 }
 
 #[test]
