@@ -61,7 +61,7 @@
 //! Workers are threads of their own. A subscriber that is to hear of all of them is the global default, or is set on each by
 //! [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the run fails.
 
-// The rooms, each using only those above it; `tests/architecture.rs` sees to that.
+// Each module uses only modules above it; `tests/architecture` fails otherwise.
 mod sync;
 mod unwind;
 pub mod timeline;

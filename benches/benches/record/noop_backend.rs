@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use drawloom::backend::{Backend, BackendError, FrameRequest, PassRequest};
-use drawloom::process::Pass;
+use drawloom::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use drawloom::task::Worker;
 use drawloom::view::ObjectTable;
 
@@ -63,7 +62,7 @@ impl Backend for NoopBackend {
         Ok(())
     }
 
-    fn submit(&self, _frame: (), _passes: Vec<(Pass, ())>) -> Result<(), BackendError> {
+    fn submit(&self, _frame: (), _queues: Vec<ViewQueue<()>>) -> Result<(), BackendError> {
         Ok(())
     }
 }
