@@ -26,7 +26,7 @@
 //! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
-//! - [`timeline`] tells what ran where and when, and [`report`] why a frame took as long as it did.
+//! - [`timeline`] tells what ran where and when; `report`, behind its feature, why a frame took as long as it did.
 //! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
 //!
 //! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded Rendering"),
@@ -35,9 +35,15 @@
 //!
 //! # Features
 //!
-//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, with a
-//!   backend that counts and checks, and one that draws on the processor.
-//! - `obj` (default): OBJ files and their textures.
+//! By default the crate is what an engine needs in order to draw with wgpu. Each feature adds one part:
+//!
+//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, and
+//!   [`NullBackend`](backend::NullBackend), which counts and checks.
+//! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL. A process
+//!   supplies one with `RenderProcess::cpu_shader`.
+//! - `obj`: OBJ files and their textures.
+//! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page or a
+//!   Chrome trace.
 //! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.
 //!
 //! # Spans
@@ -80,6 +86,7 @@ pub mod view;
 pub mod process;
 pub mod backend;
 mod frame;
+#[cfg(feature = "report")]
 pub mod report;
 
 pub use backend::ViewQueue;
@@ -92,6 +99,6 @@ pub use glam;
 pub use wgpu;
 
 /// The README's Rust is compiled with the documentation's tests.
-#[cfg(all(doctest, feature = "wgpu", feature = "obj"))]
+#[cfg(all(doctest, feature = "wgpu"))]
 #[doc = include_str!("../README.md")]
 pub struct Readme;

@@ -2,11 +2,14 @@
 
 mod backend_trait;
 mod error;
+#[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
 mod null;
 mod picture;
 mod requests;
+#[cfg(feature = "software")]
 mod software;
+#[cfg(any(feature = "wgpu", feature = "software"))]
 mod subdivision_cache;
 mod view_queue;
 #[cfg(feature = "wgpu")]
@@ -22,5 +25,6 @@ pub use error::BackendError;
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
 pub use requests::{FrameRequest, PassRequest};
+#[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
 pub use view_queue::ViewQueue;

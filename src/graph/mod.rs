@@ -153,6 +153,7 @@ pub use self::{
     schedule::Schedule,
 };
 
+#[cfg(feature = "report")]
 pub(crate) use self::{
     adjacency::RankedAdjacency,
     execution_policy::{ExecutionPolicy, RunMode},

@@ -3,11 +3,12 @@
 //! A process says which views it draws in, which targets it reads and writes, and what it draws. All of that is data; a
 //! backend turns it into pipelines, bundles and passes.
 //!
-//! - the interface: [`RenderProcess`], [`Declare`], [`Draws`], and [`CpuShader`] for the software backend;
+//! - the interface: [`RenderProcess`], [`Declare`], [`Draws`], and, with the feature `software`, `CpuShader`;
 //! - the plan: [`FramePlan`] orders a frame's processes and lists their targets;
 //! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
 //!   post-processing.
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 mod declaration;
 mod deferred;
@@ -20,6 +21,7 @@ mod prelude;
 mod raw_pass;
 mod render_process;
 
+#[cfg(feature = "software")]
 pub use cpu_shader::{
     CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, Materials, ObjectCpuShader, ObjectPixel,
     PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput,
@@ -40,6 +42,7 @@ pub use prelude::SHADER_PRELUDE;
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
 
+#[cfg(feature = "software")]
 pub(crate) use cpu_shader::TypedCpuShader;
 #[cfg(feature = "wgpu")]
 pub(crate) use prelude::LightVolume;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{CpuShader, Declare, Draws};
+use super::{Declare, Draws};
 
 /// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
@@ -53,7 +53,8 @@ pub trait RenderProcess: Send + Sync {
 
     /// What the software backend runs in place of the process' WGSL. Without one, frames with this process return an
     /// error on that backend. Called once per frame, by the software backend only.
-    fn cpu_shader(&self) -> Option<CpuShader> {
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<super::CpuShader> {
         None
     }
 }
@@ -72,7 +73,8 @@ impl<P: RenderProcess + ?Sized> RenderProcess for Arc<P> {
         (**self).draws()
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<super::CpuShader> {
         (**self).cpu_shader()
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{PixelBounds, Real, Vector4};
+use super::{Real, Vector4};
 
 /// The maximum width and height of a picture in pixels. In a larger picture, triangles cover nothing.
 pub const MAX_PICTURE_SIZE: usize = 1 << 14;
@@ -64,14 +64,4 @@ pub(super) fn doubled_area([a, b, c]: [GridPoint; 3]) -> i64 {
 /// The pixels whose centres are in `low..=high`, in steps.
 pub(super) fn pixel_centers(low: i64, high: i64) -> Range<i64> {
     (low + HALF_PIXEL - 1).div_euclid(STEPS_PER_PIXEL)..(high - HALF_PIXEL).div_euclid(STEPS_PER_PIXEL) + 1
-}
-
-/// The pixels of a picture whose centres are in the bounding rectangle of three points, edges included.
-pub(super) fn bounds(points: [GridPoint; 3], picture: [usize; 2]) -> PixelBounds {
-    let [columns, rows] = [0, 1].map(|axis| {
-        let [a, b, c] = points.map(|point| point[axis]);
-        let range = pixel_centers(a.min(b).min(c), a.max(b).max(c));
-        [range.start, range.end].map(|end| end.clamp(0, picture[axis] as i64) as usize)
-    });
-    PixelBounds { left: columns[0], top: rows[0], right: columns[1], bottom: rows[1] }
 }

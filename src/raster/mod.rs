@@ -8,19 +8,21 @@ mod convex;
 mod real;
 mod silhouettes;
 mod vector;
+#[cfg(feature = "software")]
 mod pixel_bounds;
 mod grid;
-mod clip;
-mod edge;
+#[cfg(feature = "software")]
 mod triangle;
 mod triangle_culling;
 
 pub(crate) use coarse_depth::CoarseDepth;
 pub(crate) use convex::{ConvexPart, Plane};
 pub(crate) use grid::Winding;
+#[cfg(feature = "software")]
 pub(crate) use pixel_bounds::PixelBounds;
 pub use real::Real;
 pub(crate) use silhouettes::Silhouettes;
+#[cfg(feature = "software")]
 pub(crate) use triangle::Triangle;
 pub use triangle_culling::CulledTriangles;
 pub(crate) use triangle_culling::{CullVertex, cull_triangles};

@@ -1,5 +1,7 @@
 //! Rectangles of pixels.
 
+use super::grid::{GridPoint, pixel_centers};
+
 /// A half-open rectangle of pixels: the columns `left..right` and the rows `top..bottom`, counted from the picture's
 /// top left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +20,16 @@ impl PixelBounds {
     /// The bounds of a whole picture, given its width and height in pixels.
     pub fn of_picture([width, height]: [usize; 2]) -> Self {
         Self { left: 0, top: 0, right: width, bottom: height }
+    }
+
+    /// The pixels of a picture whose centres are in the bounding rectangle of three points, edges included.
+    pub(super) fn of_points(points: [GridPoint; 3], picture: [usize; 2]) -> Self {
+        let [columns, rows] = [0, 1].map(|axis| {
+            let [a, b, c] = points.map(|point| point[axis]);
+            let range = pixel_centers(a.min(b).min(c), a.max(b).max(c));
+            [range.start, range.end].map(|end| end.clamp(0, picture[axis] as i64) as usize)
+        });
+        Self { left: columns[0], top: rows[0], right: columns[1], bottom: rows[1] }
     }
 
     /// Whether the rectangle contains no pixel.

@@ -1,9 +1,12 @@
 //! Triangle setup, rasterisation and interpolation.
 
+mod clip;
+mod edge;
+
 use std::array::from_fn;
 
-use super::clip::{self, ClipCorner, Overlap};
-use super::edge::Edge;
+use self::clip::{ClipCorner, Overlap};
+use self::edge::Edge;
 use super::grid::{self, MAX_PICTURE_SIZE, Winding};
 use super::{PixelBounds, Real, Vector4};
 
@@ -117,7 +120,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
         let points = corners.map(|(clip, _)| grid::snap(clip, picture));
         let area = grid::doubled_area(points);
         let winding = Winding::of_area(area)?;
-        let bounds = grid::bounds(points, picture);
+        let bounds = PixelBounds::of_points(points, picture);
         if culled == Some(winding) || bounds.is_empty() {
             return None;
         }

@@ -53,6 +53,7 @@ impl Mesh {
     }
 
     /// The mesh with vertices as a shader sees them after packing.
+    #[cfg(feature = "software")]
     pub(crate) fn as_packed(&self) -> Self {
         let vertices = self.packed_vertices().iter().map(PackedVertex::unpacked).collect();
         Self::from_valid_parts(self.name().to_owned(), self.topology(), vertices, self.indices().to_vec())

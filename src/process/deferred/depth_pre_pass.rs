@@ -1,9 +1,9 @@
 //! The depth pre-pass (L 4.1 advises it).
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
-use self::cpu_shader::DepthPrePassCpuShader;
-use crate::process::{CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
 
 /// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once
 /// instead of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more
@@ -27,7 +27,8 @@ impl RenderProcess for DepthPrePass {
         Draws::Commands(CommandDraws { shader, fragment: None, ..CommandDraws::default() })
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
-        Some(CpuShader::objects(DepthPrePassCpuShader))
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        Some(crate::process::CpuShader::objects(cpu_shader::DepthPrePassCpuShader))
     }
 }

@@ -1,13 +1,13 @@
 //! The geometry buffer (L 4.1).
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
 use std::borrow::Cow;
 
-use self::cpu_shader::GeometryBufferCpuShader;
 use super::GeometryFormats;
 use crate::command::{Blending, MaterialShare, Selection};
-use crate::process::{ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
+use crate::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
 /// radiance:
@@ -96,7 +96,8 @@ impl RenderProcess for GeometryBuffer {
         })
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
-        Some(CpuShader::objects(GeometryBufferCpuShader { formats: self.formats }))
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        Some(crate::process::CpuShader::objects(cpu_shader::GeometryBufferCpuShader { formats: self.formats }))
     }
 }

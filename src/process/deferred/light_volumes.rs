@@ -1,13 +1,13 @@
 //! Lighting (L 4.2).
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
 use std::borrow::Cow;
 
-use self::cpu_shader::LightVolumesCpuShader;
-use super::shading::shadow::{ShadowFilter, shadow_shader};
+use super::shading::shadow_shader;
 use super::{GeometryFormats, ShadowCasters};
-use crate::process::{CpuShader, Declare, Draws, LightDraws, RenderProcess};
+use crate::process::{Declare, Draws, LightDraws, RenderProcess};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
@@ -27,7 +27,9 @@ pub struct LightVolumes {
     name: String,
     shader: String,
     class: LightClass,
-    cpu_shader: LightVolumesCpuShader,
+    #[cfg_attr(not(feature = "software"), expect(dead_code, reason = "the WGSL is generated for them"))]
+    formats: GeometryFormats,
+    maps: Option<ShadowMaps>,
 }
 
 impl LightVolumes {
@@ -49,9 +51,7 @@ impl LightVolumes {
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
             include_str!("light_volumes/light_volumes.wgsl"),
         ];
-        let shadows = maps.map(ShadowFilter::new);
-        let cpu_shader = LightVolumesCpuShader { formats, shadows };
-        Self { name: Self::name_of(class), shader: shader.concat(), class, cpu_shader }
+        Self { name: Self::name_of(class), shader: shader.concat(), class, formats, maps: maps.copied() }
     }
 
     /// The name of a class' process, such as "point lights" or "shadowed spot lights".
@@ -72,7 +72,7 @@ impl RenderProcess for LightVolumes {
         declare.samples("depth");
         declare.samples("normal");
         declare.samples("diffuse");
-        if self.class.shadowed {
+        if self.maps.is_some() {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
         declare.tests_depth("depth");
@@ -83,7 +83,11 @@ impl RenderProcess for LightVolumes {
         Draws::Lights(LightDraws { shader: &self.shader, class: self.class, parameters: Cow::Borrowed(&[]) })
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
-        Some(CpuShader::lights(self.cpu_shader))
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        Some(crate::process::CpuShader::lights(cpu_shader::LightVolumesCpuShader::new(
+            self.formats,
+            self.maps.as_ref(),
+        )))
     }
 }

@@ -1,9 +1,9 @@
 //! Shadow maps (L 4.2.2, steps 1 to 6).
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
-use self::cpu_shader::ShadowCastersCpuShader;
-use crate::process::{CommandDraws, CpuShader, Declare, Draws, Format, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
 use crate::scene::ViewKind;
 
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
@@ -50,7 +50,8 @@ impl RenderProcess for ShadowCasters {
         })
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
-        Some(CpuShader::objects(ShadowCastersCpuShader { hemispheres: self.hemispheres }))
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        Some(crate::process::CpuShader::objects(cpu_shader::ShadowCastersCpuShader { hemispheres: self.hemispheres }))
     }
 }

@@ -1,12 +1,12 @@
 //! Transparency: blended objects, which the geometry buffer cannot hold.
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
-use self::cpu_shader::TransparencyCpuShader;
 use super::ShadowCasters;
-use super::shading::shadow::{ShadowFilter, shadow_shader};
+use super::shading::shadow_shader;
 use crate::command::Selection;
-use crate::process::{CommandDraws, CpuShader, Declare, Draws, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
 
@@ -22,7 +22,7 @@ use crate::view::ShadowMaps;
 #[derive(Clone, Debug)]
 pub struct Transparency {
     shader: String,
-    cpu_shader: TransparencyCpuShader,
+    maps: Option<ShadowMaps>,
 }
 
 impl Transparency {
@@ -34,7 +34,7 @@ impl Transparency {
             &shadow_shader(maps.map(|maps| (1, maps))),
             include_str!("transparency/transparency.wgsl"),
         ];
-        Self { shader: shader.concat(), cpu_shader: TransparencyCpuShader { shadows: maps.map(ShadowFilter::new) } }
+        Self { shader: shader.concat(), maps: maps.copied() }
     }
 }
 
@@ -44,7 +44,7 @@ impl RenderProcess for Transparency {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        if self.cpu_shader.shadows.is_some() {
+        if self.maps.is_some() {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
         declare.tests_depth("depth");
@@ -60,7 +60,8 @@ impl RenderProcess for Transparency {
         })
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
-        Some(CpuShader::objects(self.cpu_shader))
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        Some(crate::process::CpuShader::objects(cpu_shader::TransparencyCpuShader::new(self.maps.as_ref())))
     }
 }

@@ -1,13 +1,13 @@
 //! Fast approximate anti-aliasing (FXAA) of the finished picture.
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
 use std::sync::Arc;
 
-use self::cpu_shader::FxaaCpuShader;
 use super::PostStep;
 use super::shipped_step::{BoundStep, ShippedStep};
-use crate::process::{CpuShader, FullScreen, RenderProcess};
+use crate::process::{FullScreen, RenderProcess};
 
 /// Smooths aliased edges, from the picture alone (Lottes, "FXAA", NVIDIA 2009, in its last version, 3.11).
 ///
@@ -66,8 +66,13 @@ impl ShippedStep for Fxaa {
         }
     }
 
-    fn cpu_shader(&self) -> CpuShader {
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> crate::process::CpuShader {
         let [contrast_threshold, dark_threshold, sub_pixel] = self.clamped_settings();
-        CpuShader::full_screen(FxaaCpuShader { contrast_threshold, dark_threshold, sub_pixel })
+        crate::process::CpuShader::full_screen(cpu_shader::FxaaCpuShader {
+            contrast_threshold,
+            dark_threshold,
+            sub_pixel,
+        })
     }
 }

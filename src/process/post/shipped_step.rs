@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::process::{ClearColor, CpuShader, Declare, Draws, Format, FullScreen, RenderProcess};
+use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
 
 /// A step that comes with the crate.
 pub(super) trait ShippedStep: Send + Sync + 'static {
@@ -10,7 +10,8 @@ pub(super) trait ShippedStep: Send + Sync + 'static {
 
     fn full_screen(&self) -> FullScreen<'static>;
 
-    fn cpu_shader(&self) -> CpuShader;
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> crate::process::CpuShader;
 }
 
 /// A shipped step with its source and its target.
@@ -39,7 +40,8 @@ impl<S: ShippedStep> RenderProcess for BoundStep<S> {
         Draws::FullScreen(self.step.full_screen())
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
         Some(self.step.cpu_shader())
     }
 }

@@ -1,14 +1,14 @@
 //! Tone mapping, which every picture needs.
 
+#[cfg(feature = "software")]
 mod cpu_shader;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use self::cpu_shader::ToneMappingCpuShader;
 use super::PostStep;
 use super::shipped_step::{BoundStep, ShippedStep, declare_step};
-use crate::process::{CpuShader, Declare, Draws, FullScreen, RenderProcess};
+use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::quality::{Quality, ToneCurve};
 
 /// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from
@@ -97,7 +97,8 @@ impl RenderProcess for ToneMapping {
         Draws::FullScreen(self.full_screen())
     }
 
-    fn cpu_shader(&self) -> Option<CpuShader> {
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
         Some(ShippedStep::cpu_shader(self))
     }
 }
@@ -124,7 +125,11 @@ impl ShippedStep for ToneMapping {
         }
     }
 
-    fn cpu_shader(&self) -> CpuShader {
-        CpuShader::full_screen(ToneMappingCpuShader { exposure: self.clamped_exposure(), curve: self.curve })
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> crate::process::CpuShader {
+        crate::process::CpuShader::full_screen(cpu_shader::ToneMappingCpuShader {
+            exposure: self.clamped_exposure(),
+            curve: self.curve,
+        })
     }
 }

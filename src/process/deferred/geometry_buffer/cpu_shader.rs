@@ -1,8 +1,8 @@
 //! `geometry_buffer.wgsl` on the CPU.
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
-use crate::process::deferred::shading::illumination::MAX_STORED_RADIANCE;
-use crate::process::deferred::shading::surface::{shading_normal, surface_diffuse, surface_vertex};
+use crate::process::deferred::shading::cpu_shader::illumination::MAX_STORED_RADIANCE;
+use crate::process::deferred::shading::cpu_shader::surface::{shading_normal, surface_diffuse, surface_vertex};
 use crate::process::{
     GeometryFormats, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VertexInput, VertexOutput,
 };

@@ -3,18 +3,25 @@
 use std::f64::consts::PI;
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
-use crate::process::deferred::shading::illumination::{MAX_STORED_RADIANCE, illuminance_from};
-use crate::process::deferred::shading::shadow::ShadowFilter;
+use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
+use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
 use crate::process::{FullScreenPixel, GeometryFormats, LightCpuShader, PassInputs, ShaderLight};
 use crate::raster::{Real, Vector3, Vector4};
+use crate::view::ShadowMaps;
 
 /// Adds the light that a surface of the geometry buffer reflects.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightVolumesCpuShader {
     /// The formats of the geometry buffer.
-    pub(super) formats: GeometryFormats,
+    formats: GeometryFormats,
     /// `None` if the lights have no shadow maps.
-    pub(super) shadows: Option<ShadowFilter>,
+    shadows: Option<ShadowFilter>,
+}
+
+impl LightVolumesCpuShader {
+    pub(super) fn new(formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
+        Self { formats, shadows: maps.map(ShadowFilter::new) }
+    }
 }
 
 impl<R: Real> LightCpuShader<R> for LightVolumesCpuShader {
@@ -65,7 +72,7 @@ mod tests {
     };
     use crate::raster::Vector;
     use crate::scene::{Blend, Light, LightKind};
-    use crate::view::{RenderView, ShadowMaps};
+    use crate::view::RenderView;
 
     fn cpu_shader<R: Real>(shadows: Option<ShadowFilter>) -> impl LightCpuShader<R> {
         LightVolumesCpuShader { formats: GeometryFormats::default(), shadows }

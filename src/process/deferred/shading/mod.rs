@@ -1,6 +1,9 @@
-//! What the shaders of several processes share, in WGSL and in Rust: surfaces, normals, illumination and shadows.
+//! What the shaders of several processes share: surfaces, normals, illumination and shadows. WGSL, and the same in Rust in
+//! `cpu_shader`.
 
-pub(super) mod illumination;
+#[cfg(feature = "software")]
+pub(super) mod cpu_shader;
 mod normal_encoding;
-pub(super) mod shadow;
-pub(super) mod surface;
+mod shadow;
+
+pub(super) use shadow::shadow_shader;

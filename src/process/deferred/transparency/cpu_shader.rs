@@ -3,18 +3,27 @@
 use std::f64::consts::PI;
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
-use crate::process::deferred::shading::illumination::{MAX_STORED_RADIANCE, illuminance_from};
-use crate::process::deferred::shading::shadow::ShadowFilter;
-use crate::process::deferred::shading::surface::{relative_of, shading_normal, surface_diffuse, surface_vertex};
+use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
+use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
+use crate::process::deferred::shading::cpu_shader::surface::{
+    relative_of, shading_normal, surface_diffuse, surface_vertex,
+};
 use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 use crate::scene::Blend;
+use crate::view::ShadowMaps;
 
 /// Lights blended objects.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TransparencyCpuShader {
     /// `None` if no light has a shadow map.
-    pub(super) shadows: Option<ShadowFilter>,
+    shadows: Option<ShadowFilter>,
+}
+
+impl TransparencyCpuShader {
+    pub(super) fn new(maps: Option<&ShadowMaps>) -> Self {
+        Self { shadows: maps.map(ShadowFilter::new) }
+    }
 }
 
 impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
@@ -60,7 +69,7 @@ mod tests {
     use crate::process::{RenderProcess, SampledTexture, ShaderLight, Transparency, VARYINGS};
     use crate::raster::Vector;
     use crate::scene::{Camera, Light};
-    use crate::view::{RenderView, ShadowMaps};
+    use crate::view::RenderView;
 
     /// A pixel of a surface 4 m in front of the camera that faces it, whose texture is (0.5, 1, 0.25) there.
     fn drawn(

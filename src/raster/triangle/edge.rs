@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::grid::{GridPoint, HALF_PIXEL, STEPS_PER_PIXEL};
+use crate::raster::grid::{GridPoint, HALF_PIXEL, STEPS_PER_PIXEL};
 
 /// The edge function of a triangle's edge: at a pixel's centre, twice the signed area, in square steps, of the triangle
 /// between the edge and that centre. It is not negative on the inner side.

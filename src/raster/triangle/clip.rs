@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use super::{Real, Vector4};
+use crate::raster::{Real, Vector4};
 
 /// A corner: its clip-space position, and the varyings to interpolate.
 pub(super) type ClipCorner<R, const V: usize> = (Vector4<R>, [R; V]);

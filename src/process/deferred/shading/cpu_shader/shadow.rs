@@ -1,0 +1,355 @@
+//! `shadow.wgsl` in Rust: how CPU shaders read shadow maps.
+
+use crate::process::cpu_shader::built_in::{clamp, fract, normalize};
+use crate::process::{SampledTexture, ShaderLight};
+use crate::raster::{Real, Vector, Vector2, Vector3};
+use crate::scene::LightKind;
+use crate::view::ShadowMaps;
+
+/// Reads shadow maps in CPU shaders: `shadow.wgsl`.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::process::deferred) struct ShadowFilter {
+    bias: f32,
+    filter: u32,
+}
+
+impl ShadowFilter {
+    /// With the settings of these maps.
+    pub(in crate::process::deferred) fn new(maps: &ShadowMaps) -> Self {
+        Self { bias: maps.bias, filter: maps.filter }
+    }
+
+    /// The fraction of a light that reaches a position, from 0 to 1.
+    pub(in crate::process::deferred) fn light_visibility<R: Real>(
+        self,
+        maps: &dyn SampledTexture<R>,
+        light: &ShaderLight<R>,
+        position: Vector3<R>,
+        normal: Vector3<R>,
+    ) -> R {
+        let Some(layer) = light.shadow_layer else { return R::one() };
+        let towards = match light.kind {
+            LightKind::Directional => -light.direction,
+            _ => normalize(light.position - position),
+        };
+        let side = maps.size()[0];
+        // Within the filter's pixels, the surface comes nearer to the light by up to the slope times this.
+        let reach = R::of(f64::from(self.filter + 1));
+        let offset = R::of(f64::from(self.bias))
+            * shadow_map_point(side, light, position).pixel
+            * (R::of(0.1) + reach * shadow_slope(light, normal, towards));
+
+        // An offset towards the light does not change where in the map the position is.
+        let moved =
+            shadow_map_point(side, light, position + towards * offset.min((light.position - position).length()));
+        if moved.clip.0.iter().any(|value| value.abs() >= R::one()) || moved.depth <= R::zero() {
+            return R::one();
+        }
+        self.filtered_visibility(maps, layer, &moved)
+    }
+
+    /// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are
+    /// weighted by how much of them is inside.
+    fn filtered_visibility<R: Real>(self, maps: &dyn SampledTexture<R>, layer: usize, point: &ShadowMapPoint<R>) -> R {
+        let side = maps.size()[0];
+        let half = R::of(0.5);
+        let center = Vector([point.clip[0] * half + half, point.clip[1] * -half + half])
+            .map(|value| value * R::of(side as f64) - half);
+        let first = |value: R| value.floor().as_f64() as i64 - i64::from(self.filter);
+        let [left, top] = center.0.map(first);
+        let inside = center.map(fract);
+        let last = 2 * i64::from(self.filter) + 1;
+        let weight_of = |index: i64, inside: R| match index {
+            0 => R::one() - inside,
+            _ if index == last => inside,
+            _ => R::one(),
+        };
+        let within = |index: i64| index.clamp(0, side as i64 - 1) as usize;
+        let (mut lit, mut is_shadowed) = (R::zero(), false);
+        for row in 0..=last {
+            let weight_of_row = weight_of(row, inside[1]);
+            for column in 0..=last {
+                // Depth is reversed: nearer to the light is greater.
+                let [depth, ..] = maps.load([within(left + column), within(top + row)], layer).0;
+                if depth <= point.depth {
+                    lit += weight_of_row * weight_of(column, inside[0]);
+                } else {
+                    is_shadowed = true;
+                }
+            }
+        }
+        // Without an occluder the result is exactly 1, as without a map, although the sum of the weights is rounded.
+        if is_shadowed { lit / R::of((last * last) as f64) } else { R::one() }
+    }
+}
+
+/// A point of a light's shadow map.
+struct ShadowMapPoint<R> {
+    /// From (-1, -1) at the map's lower left to (1, 1) at its upper right.
+    clip: Vector2<R>,
+    depth: R,
+    /// The width of a pixel of the map there, in metres.
+    pixel: R,
+}
+
+fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vector3<R>) -> ShadowMapPoint<R> {
+    let side = R::of(side as f64);
+    let two = R::of(2.0);
+    let Vector([x, y, z]) = along_map_axes(light, position - light.position);
+    let reach = light.range - light.shadow_near;
+    match light.kind {
+        LightKind::Spot => {
+            let distance = (-z).max(light.shadow_near);
+            let half = light.shadow_half * distance;
+            ShadowMapPoint {
+                clip: Vector([x / half, y / half]),
+                depth: light.shadow_near / distance,
+                pixel: two * half / side,
+            }
+        }
+        LightKind::Hemispherical => {
+            let distance = Vector([x, y, z]).length().max(R::of(1e-30));
+            let widened = distance * (R::one() - z / distance).max(R::of(1e-3));
+            let clip = Vector([x / widened, y / widened]);
+            // Coarsest in the middle (Brabec et al. 2002).
+            let pixel = R::of(4.0) * distance / (side * (R::one() + clip.dot(clip)));
+            ShadowMapPoint { clip, depth: (light.range - distance) / reach, pixel }
+        }
+        _ => {
+            let half = light.shadow_half;
+            ShadowMapPoint {
+                clip: Vector([x / half, y / half]),
+                depth: (light.range + z) / reach,
+                pixel: two * half / side,
+            }
+        }
+    }
+}
+
+/// The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in
+/// pixel widths.
+fn shadow_slope<R: Real>(light: &ShaderLight<R>, normal: Vector3<R>, towards: Vector3<R>) -> R {
+    let cosine = clamp(normal.dot(towards), R::of(1e-3), R::one());
+    if light.kind == LightKind::Hemispherical {
+        // A pixel's diagonal, and a little more because pixels differ in size.
+        return R::of(1.5) * (R::one() - cosine * cosine).sqrt() / cosine;
+    }
+    // The map is flat, so a surface that faces the light off the map's axis has a slope too.
+    let local = along_map_axes(light, normal);
+    (local[0].abs() + local[1].abs()) / cosine
+}
+
+/// From the world's axes to those of the light's shadow map.
+fn along_map_axes<R: Real>(light: &ShaderLight<R>, direction: Vector3<R>) -> Vector3<R> {
+    light.shadow_orientation.inverse().rotate(direction)
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::process::cpu_shader::test_inputs::{FunctionTexture, UNIT, direction, light_values, plain, view_values};
+    use crate::scene::{Camera, Light, Projection};
+    use crate::view::RenderView;
+
+    const SIDE: usize = 64;
+
+    /// A light of each kind that casts shadows, with the view that draws its map.
+    fn shadowed() -> [(Light, RenderView); 3] {
+        let (position, direction) = (DVec3::new(1.0, 2.0, -3.0), Vec3::new(0.48, -0.6, 0.64));
+        let (intensity, range, casts_shadow) = (Vec3::ONE, 8.0, true);
+        let [inner_angle, outer_angle] = [0.3, 0.7];
+        let maps = ShadowMaps { side: SIDE as u32, max_distance: 10.0, ..ShadowMaps::default() };
+        let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
+        [
+            Light::Directional { direction, illuminance: intensity, casts_shadow },
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
+            Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+        ]
+        .map(|light| {
+            let camera = maps.camera("map".into(), &light, std::slice::from_ref(&main)).unwrap();
+            (light, RenderView { layer: 2, ..RenderView::new(&camera) })
+        })
+    }
+
+    fn shadow_filter(bias: f32, filter: u32) -> ShadowFilter {
+        ShadowFilter::new(&ShadowMaps { bias, filter, ..ShadowMaps::default() })
+    }
+
+    /// A position that a map sees, by its offset across from the centre to the border and its distance from the camera
+    /// to the end, each from 0 to 1.
+    fn position_in_map(map: &RenderView, across: [f64; 2], distance: f64) -> DVec3 {
+        let [right, up, forward] = map.picture_axes().map(Vec3::as_dvec3);
+        let across = right * across[0] + up * across[1];
+        let distance = distance * f64::from(map.camera.far);
+        let way = match map.camera.projection {
+            Projection::Paraboloid => (across * 3.0 + forward).normalize() * distance,
+            Projection::Perspective { .. } => (across + forward) * distance,
+            Projection::Orthographic { .. } => across + forward * distance,
+        };
+        map.camera.position + way
+    }
+
+    proptest! {
+        /// Drawing a map and reading it project a position to the same point. The matrix is f32.
+        #[test]
+        fn a_position_is_read_where_it_was_drawn(across in prop::array::uniform2(-0.9..0.9_f64), distance in 0.1..0.9_f64) {
+            for (light, map) in shadowed() {
+                let position = position_in_map(&map, across, distance);
+                let view = view_values::<f64>(&map);
+                let [x, y, z, w] = view.clip_position(Vector3::of(position - map.camera.position)).0;
+                let found = shadow_map_point(SIDE, &light_values(&light, Some(&map)), Vector3::<f64>::of(position));
+                let [found_x, found_y] = found.clip.0;
+                prop_assert!((found_x - x / w).abs() + (found_y - y / w).abs() < 1e-4, "{light:?} {:?} {x} {y} {w}", found.clip);
+                prop_assert!((found.depth - z / w).abs() < 1e-4, "{light:?} {} {}", found.depth, z / w);
+            }
+        }
+
+        /// A step of a pixel's width across the map leads to the next pixel. On a flat map that is exact; on a
+        /// paraboloid, whose scale changes by its own size from the middle to the rim, it is to the first order in the
+        /// pixel's angle, 4/side.
+        #[test]
+        fn a_step_of_a_pixels_width_leads_to_the_next_pixel(across in prop::array::uniform2(-0.6..0.6_f64), around in -3.0..3.0_f64) {
+            for (light, map) in shadowed() {
+                let light = light_values::<f64>(&light, Some(&map));
+                let position = position_in_map(&map, across, 0.5);
+                let is_hemisphere = light.kind == LightKind::Hemispherical;
+                let [right, up, forward] = map.picture_axes().map(|axis| axis.as_dvec3().normalize());
+                let axis = if is_hemisphere { (position - map.camera.position).normalize() } else { forward };
+                let step = (right * around.cos() + up * around.sin()).reject_from_normalized(axis).normalize();
+                let side = 1 << 14;
+                let here = shadow_map_point(side, &light, Vector3::of(position));
+                let there = shadow_map_point(side, &light, Vector3::of(position + step * here.pixel));
+                let pixels = (there.clip - here.clip).length() * side as f64 / 2.0;
+                prop_assert!((pixels - 1.0).abs() < 1e-3, "{:?} {pixels}", light.kind);
+            }
+        }
+
+        /// Up to 100 weights of at most 1 are added up to 81 at most, so the sum is off by 100u of itself and each
+        /// weight by 2u.
+        #[test]
+        fn a_map_of_one_depth_lights_all_or_nothing(
+            across in prop::array::uniform2(-0.8..0.8_f64),
+            distance in 0.2..0.8_f64,
+            normal in direction(),
+            filter in 0..=ShadowMaps::MAX_FILTER,
+        ) {
+            for (light, map) in shadowed() {
+                let light = light_values::<f32>(&light, Some(&map));
+                let position = Vector3::of(position_in_map(&map, across, distance));
+                let share = |depth: f64| shadow_filter(1.0, filter).light_visibility(&plain::<f32>([depth, 0.0, 0.0, 0.0]), &light, position, Vector3::of(normal));
+                prop_assert!((f64::from(share(0.0)) - 1.0).abs() <= 102.0 * UNIT);
+                let moved = share(1.0);
+                // A position that the offset moves to the light itself, or out of the map, is lit.
+                prop_assert!(moved == 0.0 || (moved - 1.0).abs() < 1e-5);
+                let mut without = light;
+                without.shadow_layer = None;
+                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, position, Vector3::of(normal)), 1.0);
+            }
+        }
+
+        /// The filter is a box of 2·filter + 1 pixels: across a straight edge the visibility is how much of the box
+        /// lies beyond the edge.
+        #[test]
+        fn shadows_fade_over_the_width_of_the_filter(
+            across in -0.6..0.6_f64,
+            row in -0.6..0.6_f64,
+            edge in 20..44_usize,
+            filter in 0..=ShadowMaps::MAX_FILTER,
+        ) {
+            let (light, map) = &shadowed()[1];
+            let light = light_values::<f64>(light, Some(map));
+            let position = Vector3::of(position_in_map(map, [across, row], 0.5));
+            let facing = Vector3::<f64>::of_single(-map.picture_axes()[2]);
+            let shade = |[column, _]: [usize; 2], layer| {
+                assert_eq!(layer, 2);
+                Vector::splat(if column < edge { 1.0 } else { 0.0 })
+            };
+            let share = shadow_filter(0.0, filter).light_visibility(&FunctionTexture { size: [SIDE; 2], color: shade }, &light, position, facing);
+            let column = (shadow_map_point(SIDE, &light, position).clip[0] + 1.0) / 2.0 * SIDE as f64;
+            let wide = f64::from(2 * filter + 1);
+            let beyond = (column + wide / 2.0 - edge as f64).clamp(0.0, wide) / wide;
+            prop_assert!((share - beyond).abs() < 1e-9, "{share} {beyond}");
+        }
+
+        /// A wall that is fully visible to its light casts no shadow on itself at the documented bias.
+        #[test]
+        fn a_surface_does_not_shadow_itself(
+            across in prop::array::uniform2(-0.5..0.5_f64),
+            tilt in prop::array::uniform2(-0.7..0.7_f64),
+            filter in 0..=2_u32,
+        ) {
+            for (light, map) in shadowed() {
+                let values = light_values::<f64>(&light, Some(&map));
+                let [right, up, forward] = map.picture_axes().map(|axis| axis.as_dvec3().normalize());
+                let normal = (right * tilt[0] + up * tilt[1] - forward).normalize();
+                let middle = position_in_map(&map, [0.0; 2], 0.5);
+                let from = map.camera.position;
+                // The depth of the wall as the map's pixel sees it, along the pixel's ray.
+                let view = view_values::<f64>(&map);
+                let depth_of = |[column, row]: [usize; 2], _: usize| {
+                    let x = (column as f64 + 0.5) / SIDE as f64 * 2.0 - 1.0;
+                    let y = 1.0 - (row as f64 + 0.5) / SIDE as f64 * 2.0;
+                    let [right, up, forward] = map.picture_axes().map(Vec3::as_dvec3);
+                    let across = right * x + up * y;
+                    let (start, way) = match map.camera.projection {
+                        Projection::Paraboloid => {
+                            (from, across * 2.0 + forward * (1.0 - x * x - y * y))
+                        }
+                        Projection::Perspective { .. } => (from, across + forward),
+                        Projection::Orthographic { .. } => (from + across, forward),
+                    };
+                    let distance = (middle - start).dot(normal) / way.dot(normal);
+                    let [.., z, w] = view.clip_position(Vector3::of(start + way * distance - from)).0;
+                    Vector::splat(if distance > 0.0 { z / w } else { 0.0 })
+                };
+                let seen = position_in_map(&map, across, 0.5);
+                let position = {
+                    let (start, way) = match map.camera.projection {
+                        Projection::Orthographic { .. } => (seen, forward),
+                        _ => (from, seen - from),
+                    };
+                    start + way * ((middle - start).dot(normal) / way.dot(normal))
+                };
+                let share = shadow_filter(1.0, filter)
+                    .light_visibility(&FunctionTexture { size: [SIDE; 2], color: depth_of }, &values, Vector3::of(position), Vector3::of(normal));
+                prop_assert!(share > 1.0 - 1e-9, "{:?} {share} {tilt:?} {across:?}", values.kind);
+            }
+        }
+    }
+
+    #[test]
+    fn an_occluder_blocks_the_light() {
+        for (light, map) in shadowed() {
+            let light = light_values::<f64>(&light, Some(&map));
+            let towards = Vector3::of_single(-map.picture_axes()[2]);
+            let share = |distance: f64, wall: f64| {
+                let depth = shadow_map_point(SIDE, &light, Vector3::of(position_in_map(&map, [0.0; 2], wall))).depth;
+                let position = Vector3::of(position_in_map(&map, [0.0; 2], distance));
+                shadow_filter(1.0, 1).light_visibility(&plain([depth, 0.0, 0.0, 0.0]), &light, position, towards)
+            };
+            assert!((share(0.4, 0.5) - 1.0).abs() < 1e-12, "before the wall");
+            assert_eq!(share(0.6, 0.5), 0.0, "behind it");
+        }
+    }
+
+    #[test]
+    fn positions_outside_of_a_map_are_lit() {
+        let shade = plain::<f64>([1.0; 4]);
+        for (light, map) in shadowed() {
+            let light = light_values::<f64>(&light, Some(&map));
+            let [right, _, forward] = map.picture_axes().map(Vec3::as_dvec3);
+            let far = f64::from(map.camera.far);
+            let share = |way: DVec3| {
+                let is_sun = light.kind == LightKind::Directional;
+                let facing = if is_sun { -forward } else { -way.normalize() };
+                let position = Vector3::of(map.camera.position + way);
+                shadow_filter(1.0, 1).light_visibility(&shade, &light, position, Vector3::of(facing))
+            };
+            assert_eq!(share(forward * far * 1.1), if light.kind == LightKind::Spot { 0.0 } else { 1.0 });
+            assert_eq!(share(right.normalize() * far * 1.1 + forward * 0.1), 1.0);
+        }
+    }
+}
