@@ -32,7 +32,7 @@ impl SortKey {
     pub const LAST: Self = Self(u64::MAX);
 
     /// The key of an opaque command: by state and mesh, then front to back. `depth` is a
-    /// [`DepthKey::code`](crate::quality::DepthKey::code).
+    /// [quantised](crate::quality::DepthKey::quantize) depth.
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
         let state = (state.index() as u64 & 0xff) << 54;
         let mesh = u64::from(mesh) << 20;
@@ -40,7 +40,7 @@ impl SortKey {
     }
 
     /// The key of a blended command: back to front, exact to the last bit of `depth`, a
-    /// [`DepthKey::code`](crate::quality::DepthKey::code).
+    /// [quantised](crate::quality::DepthKey::quantize) depth.
     pub fn blended(depth: u32) -> Self {
         Self(1 << 62 | u64::from(!depth) << 30)
     }

@@ -3,7 +3,7 @@
 use crate::raster::ConvexPart;
 use crate::scene::Assets;
 
-/// The [convex parts](ConvexPart) of a collection's meshes, computed when a mesh is added or changes.
+/// The convex parts of a collection's meshes, computed when a mesh is added or changes.
 #[derive(Debug, Default)]
 pub struct OccluderMeshes {
     /// The identity and the revision of the collection at the last [`OccluderMeshes::sync`].

@@ -12,7 +12,7 @@ use crate::view::{ObjectBlock, ObjectDraw, ObjectTable, RenderView, VisibleSet, 
 
 /// Finds the objects that a view's larger objects hide, in three steps: [`OcclusionCuller::select_occluders`] selects
 /// those with the largest projections and projects their convex parts, [`OcclusionCuller::draw_occluders`] draws them
-/// into a [`CoarseDepth`], and [`OcclusionCuller::hidden`] tests every object against that.
+/// into a coarse depth buffer, and [`OcclusionCuller::hidden`] tests every object against that.
 ///
 /// It is conservative: an object that it reports as hidden is hidden. An occluder counts only in tiles of the picture
 /// that it covers entirely, at its farthest depth there; an object is tested as a rectangle around its box, at the
