@@ -37,13 +37,13 @@
 //!
 //! By default the crate is what an engine needs in order to draw with wgpu. Each feature adds one part:
 //!
-//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is there, and
-//!   [`NullBackend`](backend::NullBackend), which counts and checks.
-//! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL. A process
-//!   supplies one with `RenderProcess::cpu_shader`.
+//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is
+//!   there, and [`NullBackend`](backend::NullBackend), which counts and checks.
+//! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
+//!   A process supplies one with `RenderProcess::cpu_shader`.
 //! - `obj`: OBJ files and their textures.
-//! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page or a
-//!   Chrome trace.
+//! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
+//!   or a Chrome trace.
 //! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.
 //!
 //! # Spans

@@ -1,5 +1,5 @@
-//! What the shaders of several processes share: surfaces, normals, illumination and shadows. WGSL, and the same in Rust in
-//! `cpu_shader`.
+//! What the shaders of several processes share: surfaces, normals, illumination and shadows. In WGSL, and the same in
+//! Rust in `cpu_shader`.
 
 #[cfg(feature = "software")]
 pub(super) mod cpu_shader;
