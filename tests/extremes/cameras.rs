@@ -17,8 +17,8 @@ pub const CASES: &[Case] = &[
     ("objects_across_the_edge_of_the_picture_are_drawn", at_the_edges),
     ("near_planes_from_a_hundredth_of_a_millimetre_and_far_ones_to_infinity", near_and_far),
     ("near_planes_at_the_limits_of_f32_are_correct_or_refused", nearest),
-    ("objects_before_the_near_plane_are_not_drawn", before_the_near_plane),
-    ("an_empty_range_of_near_and_far_plane_is_refused", nothing_between),
+    ("objects_in_front_of_the_near_plane_are_not_drawn", in_front_of_the_near_plane),
+    ("an_empty_range_of_near_and_far_plane_is_refused", empty_range),
     ("orthographic_pictures_from_a_micrometre_to_ten_thousand_kilometres", orthographic),
     ("orthographic_pictures_at_the_limits_of_f32_are_correct_or_refused", smallest_picture),
     ("pictures_without_pixels_are_refused", no_pixels),
@@ -85,8 +85,8 @@ fn at_the_edges(harness: &mut Harness) -> Result<(), Failed> {
         let narrow = up.min(right);
         // The centres are outside the picture, and a quarter of each marker is inside.
         let outside = |half: f64| half + narrow * 0.1;
-        let ways = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-1.0, -1.0], [1.0, 1.0]];
-        let markers = ways.map(|[x, y]| {
+        let directions = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-1.0, -1.0], [1.0, 1.0]];
+        let markers = directions.map(|[x, y]| {
             let marker = Marker::before(&camera, 5.0, narrow * 0.8);
             marker.moved(&camera, x * outside(right), y * outside(up))
         });
@@ -139,7 +139,7 @@ fn correct_or_refused(harness: &mut Harness, markers: &MarkerScene, what: &str) 
     }
 }
 
-fn before_the_near_plane(harness: &mut Harness) -> Result<(), Failed> {
+fn in_front_of_the_near_plane(harness: &mut Harness) -> Result<(), Failed> {
     for near in [1e-5_f32, 0.05, 1e5] {
         let camera = Camera { near, ..camera(SIZE) };
         let [small, large] = two_markers(&camera, f64::from(near) * 0.9, 4.0);
@@ -153,7 +153,7 @@ fn before_the_near_plane(harness: &mut Harness) -> Result<(), Failed> {
     Ok(())
 }
 
-fn nothing_between(harness: &mut Harness) -> Result<(), Failed> {
+fn empty_range(harness: &mut Harness) -> Result<(), Failed> {
     let whole = MarkerScene::new(camera(SIZE), two_markers(&camera(SIZE), 5.0, 2.0))?;
     for [near, far] in [[1.0, 1.0], [2.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-2.0, -1.0], [f32::INFINITY, f32::INFINITY]] {
         for projection in [camera(SIZE).projection, Projection::Orthographic { height: 5.0 }] {
@@ -247,7 +247,7 @@ fn too_many_pixels(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 fn inside(harness: &mut Harness) -> Result<(), Failed> {
-    for (double_sided, seen) in [(false, 0), (true, 1)] {
+    for (double_sided, min_visible) in [(false, 0), (true, 1)] {
         for scale in [1e-3_f32, 1.0, 1e6] {
             let camera = Camera { near: scale * 0.1, ..camera(SIZE) };
             let around = Marker {
@@ -258,7 +258,7 @@ fn inside(harness: &mut Harness) -> Result<(), Failed> {
                 double_sided,
             };
             let what = format!("in a box of {scale} m, double-sided {double_sided}");
-            MarkerScene::of(cube(), camera, [around])?.expect(harness, &what, seen)?;
+            MarkerScene::of(cube(), camera, [around])?.expect(harness, &what, min_visible)?;
         }
     }
     Ok(())

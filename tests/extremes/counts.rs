@@ -14,8 +14,8 @@ use crate::markers::{Marker, MarkerScene, RED, camera};
 pub const CASES: &[Case] = &[
     ("a_scene_without_a_camera_is_refused", no_camera),
     ("an_empty_scene_is_background", empty),
-    ("zero_to_65537_instances", instances),
-    ("instances_at_one_position_look_like_one", at_one_position),
+    ("zero_to_65537_instances_are_drawn", instances),
+    ("instances_at_one_position_draw_the_same_picture_as_one", at_one_position),
     ("lights_without_objects_and_objects_without_lights", lights_alone),
 ];
 

@@ -14,7 +14,7 @@ use crate::markers::with_context;
 
 pub const CASES: &[Case] = &[
     ("lights_in_a_surface_and_very_close_to_it", at_a_surface),
-    ("lights_as_bright_as_f32_allows_cause_no_nan", blinding),
+    ("the_brightest_lights_of_f32_cause_no_nan", blinding),
     ("an_opaque_pane_hides_radiance_beyond_half_floats", pane),
     ("lights_of_every_range", ranges),
     ("cones_from_almost_nothing_to_a_half_space", cones),
@@ -24,7 +24,7 @@ pub const CASES: &[Case] = &[
 
 const SIZE: [u32; 2] = [33, 33];
 
-/// A wall of 20 m at the origin that faces +Z, seen from 5 m.
+/// A wall of 20 m at the origin that faces +Z, and a camera 5 m in front of it.
 fn wall(diffuse: f32) -> Result<Scene, Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), SIZE)];
@@ -49,7 +49,7 @@ fn drawn(harness: &mut Harness, what: &str, scene: &Scene) -> Result<Option<Capt
     Ok(harness.draw(scene).map_err(|failed| with_context(what, failed))?.capture)
 }
 
-/// Fails if a channel is lit in which no light shines: clamping may have turned NaN into any number.
+/// Fails if a channel without light is lit: clamping may have turned NaN into any number.
 fn assert_lit_only_in(capture: &Capture, color: Vec3) -> Result<(), Failed> {
     let greatest = capture.greatest();
     let is_dark = |(greatest, color): (f64, f32)| color > 0.0 || greatest == 0.0;
@@ -207,7 +207,7 @@ fn camera_at_light(harness: &mut Harness) -> Result<(), Failed> {
             let position = DVec3::Z * 5.0 + offset;
             for lamp in lamps(position, Vec3::splat(100.0), range, Vec3::NEG_Z) {
                 let mut scene = wall(0.5)?;
-                // A box behind the camera, and the camera in another that has no inside.
+                // A box behind the camera.
                 let block = scene.add(cube())?;
                 let material = scene.as_scene_ref().materials[0];
                 let around = RenderObject::new(block, material, position + DVec3::Z * 2.5);

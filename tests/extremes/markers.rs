@@ -7,7 +7,7 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::harness::{Drawn, Harness};
-use crate::oracle::{Oracle, Seen};
+use crate::oracle::{Oracle, Prediction};
 
 /// A square of 2 m before scaling that faces its own +Z.
 #[derive(Clone, Copy, Debug)]
@@ -90,25 +90,25 @@ impl MarkerScene {
     }
 
     /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and unless at
-    /// least `seen_at_least` markers have such pixels.
-    pub fn expect(&self, harness: &mut Harness, what: &str, seen_at_least: usize) -> Result<(), Failed> {
+    /// least `min_visible` markers have such pixels.
+    pub fn expect(&self, harness: &mut Harness, what: &str, min_visible: usize) -> Result<(), Failed> {
         let drawn = harness.draw_whole(&self.scene).map_err(|failed| with_context(what, failed))?;
-        self.compare(&drawn, seen_at_least).map_err(|failed| with_context(what, failed))
+        self.compare(&drawn, min_visible).map_err(|failed| with_context(what, failed))
     }
 
     /// Checks the same of a frame that has been drawn already.
-    pub fn compare(&self, drawn: &Drawn, seen_at_least: usize) -> Result<(), Failed> {
+    pub fn compare(&self, drawn: &Drawn, min_visible: usize) -> Result<(), Failed> {
         let camera = &self.scene.cameras[0];
         let mesh = self.scene.assets().get(self.mesh)?;
         let oracle = Oracle::new(camera, mesh, &self.markers);
         let [width, height] = camera.size.map(|side| side as usize);
-        let mut seen = vec![0; self.markers.len()];
+        let mut visible_pixels = vec![0; self.markers.len()];
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let expected = match oracle.seen(x, y) {
-                Seen::Unsure => continue,
-                Seen::Background => self.scene.background,
-                Seen::Marker(marker) => {
-                    seen[marker] += 1;
+            let expected = match oracle.predict(x, y) {
+                Prediction::Unsure => continue,
+                Prediction::Background => self.scene.background,
+                Prediction::Marker(marker) => {
+                    visible_pixels[marker] += 1;
                     self.markers[marker].color
                 }
             };
@@ -119,12 +119,12 @@ impl MarkerScene {
                 return Err(format!("({x}, {y}) is {found:?}, not {expected}").into());
             }
         }
-        let seen = seen.into_iter().filter(|pixels| *pixels > 0).count();
-        if seen < seen_at_least {
-            return Err(format!("the case is invalid: the oracle sees {seen} of {seen_at_least} markers").into());
+        let visible = visible_pixels.into_iter().filter(|pixels| *pixels > 0).count();
+        if visible < min_visible {
+            return Err(format!("the case is invalid: the oracle sees {visible} of {min_visible} markers").into());
         }
-        if drawn.visible < seen {
-            return Err(format!("{seen} markers are seen, and {} were drawn", drawn.visible).into());
+        if drawn.visible < visible {
+            return Err(format!("{visible} markers are visible, and {} were drawn", drawn.visible).into());
         }
         Ok(())
     }

@@ -41,7 +41,7 @@ enum Expected {
 /// A name, a function that sets a number in a scene, and one that returns the expected outcome.
 type Rule<T> = (&'static str, fn(&mut TestScene, T), fn(T) -> Expected);
 
-/// A control object on the left, which must be visible whatever the subject on the right is like, and every kind of light on
+/// A control object on the left, which must be visible for every subject on the right, and every kind of light on
 /// the subject.
 struct TestScene {
     scene: Scene,
@@ -104,7 +104,7 @@ impl TestScene {
         &mut self.scene.cameras[0]
     }
 
-    /// Draws it as an engine with its own storage for objects.
+    /// Draws the scene from separate columns, as an engine with its own storage does.
     fn outcome(&self, harness: &mut Harness) -> Result<Outcome, Failed> {
         let Self { scene, positions, orientations, scales, bounds } = self;
         harness.outcome(&drawloom::scene::SceneRef { positions, orientations, scales, bounds, ..scene.as_scene_ref() })
@@ -122,10 +122,10 @@ impl TestScene {
 
 /// Draws the scene with each number by each rule, and the unchanged scene after each rule.
 fn check<T: Copy + std::fmt::Debug>(harness: &mut Harness, numbers: &[T], rules: &[Rule<T>]) -> Result<(), Failed> {
-    for (name, put, expected) in rules {
+    for (name, set, expected) in rules {
         for &number in numbers {
             let mut test = TestScene::new()?;
-            put(&mut test, number);
+            set(&mut test, number);
             // A changed camera may not see the control.
             let has_control = !name.starts_with("camera");
             check_one(harness, &test, expected(number), has_control)
@@ -191,8 +191,8 @@ fn objects(harness: &mut Harness) -> Result<(), Failed> {
         _ => Expected::Drawn,
     };
     let radius = |number: f32| {
-        let is_fine = (0.0..1.0).contains(&number);
-        if is_fine { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
+        let is_valid = (0.0..1.0).contains(&number);
+        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
     };
     let center = |number: f32| {
         if number.abs() < 1.0 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
@@ -262,10 +262,10 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 /// Changes a light that has a position.
-fn change(test: &mut TestScene, one: usize, by: impl Fn(&mut DVec3, &mut Vec3, &mut f32)) {
+fn change(test: &mut TestScene, light: usize, by: impl Fn(&mut DVec3, &mut Vec3, &mut f32)) {
     if let Light::Point { position, intensity, range }
     | Light::Spot { position, intensity, range, .. }
-    | Light::Hemispherical { position, intensity, range, .. } = &mut test.scene.lights[one]
+    | Light::Hemispherical { position, intensity, range, .. } = &mut test.scene.lights[light]
     {
         by(position, intensity, range);
     }
@@ -302,8 +302,8 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
         ],
     )?;
     let color = |number: f32| {
-        let is_fine = number >= 0.0 && number.is_finite();
-        if is_fine { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
+        let is_valid = number >= 0.0 && number.is_finite();
+        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
     };
     let whole_color = |number: f32| match number {
         0.0 => Expected::Without(RejectionReason::DarkLight),
@@ -311,8 +311,8 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
         _ => Expected::Without(RejectionReason::InvalidLight),
     };
     let range = |number: f32| {
-        let is_fine = number > 0.0 && number.is_finite();
-        if is_fine { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
+        let is_valid = number > 0.0 && number.is_finite();
+        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
     };
     let direction = |number: f32| {
         if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
@@ -411,17 +411,17 @@ fn surroundings(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 /// Sets a number in a material.
-type Put = fn(&mut Material, f32);
+type SetMaterial = fn(&mut Material, f32);
 
 fn materials(harness: &mut Harness) -> Result<(), Failed> {
-    let puts: [(&str, Put); 5] = [
+    let setters: [(&str, SetMaterial); 5] = [
         ("diffuse.x", |material, number| material.diffuse.x = number),
         ("diffuse", |material, number| material.diffuse = Vec3::splat(number)),
         ("emission.y", |material, number| material.emission.y = number),
         ("emission", |material, number| material.emission = Vec3::splat(number)),
         ("opacity", |material, number| material.opacity = number),
     ];
-    for (name, put) in puts {
+    for (name, set) in setters {
         for blend in [
             drawloom::scene::Blend::None,
             drawloom::scene::Blend::Alpha,
@@ -431,11 +431,11 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
             for number in SPECIAL {
                 let what = format!("{name} = {number:e}, {blend:?}");
                 let mut material = Material { blend, ..Material::default() };
-                put(&mut material, number);
-                let most = if name == "opacity" { 1.0 } else { f32::MAX };
-                let is_fine = (0.0..=most).contains(&number);
+                set(&mut material, number);
+                let max = if name == "opacity" { 1.0 } else { f32::MAX };
+                let is_valid = (0.0..=max).contains(&number);
                 let test = TestScene::with(square(Topology::TriangleList), material.clone(), None);
-                match (test, is_fine) {
+                match (test, is_valid) {
                     (Ok(test), true) => {
                         check_one(harness, &test, Expected::Drawn, true)
                             .map_err(|failed| with_context(&what, failed))?;
@@ -446,7 +446,7 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
                             return Err(format!("{what}: {error:?}").into());
                         }
                     }
-                    (Ok(_), false) => return Err(format!("{what}: it was taken").into()),
+                    (Ok(_), false) => return Err(format!("{what}: it was accepted").into()),
                     (Err(failed), true) => return Err(with_context(&what, failed)),
                 }
             }
@@ -456,11 +456,11 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 /// Sets a number in a vertex.
-type PutVertex = fn(&mut Vertex, f32);
+type SetVertex = fn(&mut Vertex, f32);
 
 fn vertices(harness: &mut Harness) -> Result<(), Failed> {
     let red = || Texture::new("red", 4, 4, [255, 0, 0, 255].repeat(16));
-    let puts: [(&str, PutVertex); 7] = [
+    let setters: [(&str, SetVertex); 7] = [
         ("uv.u", |vertex, number| vertex.uv[0] = number),
         ("uv", |vertex, number| vertex.uv = [number; 2]),
         ("uv, all but one", |vertex, number| vertex.uv = if vertex.uv == [0.0; 2] { [0.5; 2] } else { [number; 2] }),
@@ -469,18 +469,18 @@ fn vertices(harness: &mut Harness) -> Result<(), Failed> {
         ("normal, all", |vertex, number| vertex.normal = [number, number, number]),
         ("position.z", |vertex, number| vertex.position[2] = number),
     ];
-    for (name, put) in puts {
+    for (name, set) in setters {
         for number in SPECIAL {
             let what = format!("{name} = {number:e}");
             let plain = square(Topology::TriangleList);
             let mut changed = plain.vertices().to_vec();
-            changed.iter_mut().for_each(|vertex| put(vertex, number));
+            changed.iter_mut().for_each(|vertex| set(vertex, number));
             let mesh = Mesh::new("changed", plain.topology(), changed, plain.indices().to_vec());
             let mesh = match mesh {
                 Err(SceneError::NonFiniteVertex { vertex: 0, .. }) if !number.is_finite() => continue,
                 Err(SceneError::NonFiniteVertex { vertex: 1, .. }) if !number.is_finite() => continue,
                 Err(error) => return Err(format!("{what}: {error}").into()),
-                Ok(_) if !number.is_finite() => return Err(format!("{what}: it was taken").into()),
+                Ok(_) if !number.is_finite() => return Err(format!("{what}: it was accepted").into()),
                 Ok(mesh) => mesh,
             };
             let is_far = name.starts_with("position") && number.abs() == f32::MAX;

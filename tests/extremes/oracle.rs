@@ -7,15 +7,15 @@ use crate::markers::Marker;
 
 /// The prediction for a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
+pub enum Prediction {
     Background,
     /// A marker, by its index.
     Marker(usize),
-    /// An edge is close to the pixel.
+    /// An edge is too close to the pixel to predict it.
     Unsure,
 }
 
-/// Predicts what a camera sees of markers.
+/// Predicts which marker each pixel of a camera shows.
 pub struct Oracle<'a> {
     camera: &'a Camera,
     /// Front-facing triangles: corners relative to the camera, and the index of the marker.
@@ -52,15 +52,15 @@ impl<'a> Oracle<'a> {
     }
 
     /// The prediction for the pixel in column `x` and row `y`.
-    pub fn seen(&self, x: usize, y: usize) -> Seen {
+    pub fn predict(&self, x: usize, y: usize) -> Prediction {
         let at = |across: f64, down: f64| self.hit(x as f64 + 0.5 + across * MARGIN, y as f64 + 0.5 + down * MARGIN);
         let middle = at(0.0, 0.0);
         let around =
             [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [-1.0, 0.0], [1.0, 0.0], [-1.0, 1.0], [0.0, 1.0], [1.0, 1.0]];
         if around.iter().any(|&[across, down]| at(across, down) != middle) {
-            return Seen::Unsure;
+            return Prediction::Unsure;
         }
-        middle.map_or(Seen::Background, Seen::Marker)
+        middle.map_or(Prediction::Background, Prediction::Marker)
     }
 
     /// The marker that a ray through a point of the picture hits first, behind the near plane.
@@ -85,8 +85,8 @@ impl<'a> Oracle<'a> {
             .iter()
             .filter_map(|(corners, marker)| Some((intersect(origin, direction, corners)?, *marker)));
         // The direction has length 1 along the camera's axis, so the ray parameter is the depth.
-        let seen = hits.filter(|(depth, _)| *depth >= f64::from(camera.near));
-        seen.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, marker)| marker)
+        let visible = hits.filter(|(depth, _)| *depth >= f64::from(camera.near));
+        visible.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, marker)| marker)
     }
 }
 

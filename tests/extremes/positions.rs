@@ -18,10 +18,10 @@ pub const CASES: &[Case] = &[
     ("a_scene_looks_the_same_anywhere_up_to_four_million_kilometres", anywhere),
     ("markers_appear_at_their_positions_anywhere", markers_anywhere),
     ("cameras_out_of_reach_are_refused_and_objects_and_lights_counted", out_of_reach),
-    ("a_scaled_scene_looks_the_same", similar),
+    ("a_scaled_scene_looks_the_same", scaled_scenes),
     ("meshes_from_a_micrometre_to_ten_thousand_kilometres", sizes),
     ("scales_of_zero_mirrored_and_at_the_limits_of_f32", scales),
-    ("objects_much_larger_than_their_distance_cause_no_other_colours", larger_than_far),
+    ("objects_much_larger_than_their_distance_cause_no_wrong_colours", larger_than_far),
     ("a_mirrored_box_looks_the_same", mirrored),
     ("objects_too_large_for_f32_are_counted", too_large),
     ("everything_in_one_plane", coplanar),
@@ -79,14 +79,14 @@ fn anywhere(harness: &mut Harness) -> Result<(), Failed> {
         };
         let here = harness.draw_whole(&make())?;
         for distance in [1e3, 1e5, 1e6, 1e7, 1e8, 1e9, 4.2e9] {
-            let ways = [DVec3::X, DVec3::NEG_Z, DVec3::new(-1.0, 0.7, 0.4), DVec3::new(0.5, -1.0, 1.0)];
-            for way in ways.into_iter().skip(if is_slow { 3 } else { 0 }) {
+            let directions = [DVec3::X, DVec3::NEG_Z, DVec3::new(-1.0, 0.7, 0.4), DVec3::new(0.5, -1.0, 1.0)];
+            for direction in directions.into_iter().skip(if is_slow { 3 } else { 0 }) {
                 let mut scene = make();
-                shift(&mut scene, way * distance)?;
-                let what = format!("at {distance:e} m along {way}");
+                shift(&mut scene, direction * distance)?;
+                let what = format!("at {distance:e} m along {direction}");
                 let there = harness.draw_whole(&scene).map_err(|failed| with_context(&what, failed))?;
                 if there.visible != here.visible {
-                    return Err(format!("{what}: {} objects are seen, not {}", there.visible, here.visible).into());
+                    return Err(format!("{what}: {} objects are visible, not {}", there.visible, here.visible).into());
                 }
                 assert_alike(&what, there.capture.as_ref(), here.capture.as_ref())?;
             }
@@ -97,15 +97,19 @@ fn anywhere(harness: &mut Harness) -> Result<(), Failed> {
 
 fn markers_anywhere(harness: &mut Harness) -> Result<(), Failed> {
     for distance in [0.0, 1.0, 1e3, 1e6, 1e9, 4.2e9] {
-        for way in [DVec3::X, DVec3::NEG_ONE, DVec3::new(0.2, -1.0, 0.6)] {
+        for direction in [DVec3::X, DVec3::NEG_ONE, DVec3::new(0.2, -1.0, 0.6)] {
             for projection in [camera(SIZE).projection, drawloom::scene::Projection::Orthographic { height: 6.0 }] {
-                let camera = Camera { position: way * distance, projection, far: 1e3, ..camera(SIZE) };
+                let camera = Camera { position: direction * distance, projection, far: 1e3, ..camera(SIZE) };
                 let markers = [
                     Marker::before(&camera, 5.0, 1.0).moved(&camera, 1.5, 1.0),
                     Marker::before(&camera, 5.001, 2.4).moved(&camera, 1.5, 1.0).colored(RED),
                     Marker::before(&camera, 9.0, 3.0).moved(&camera, -1.0, 0.0).colored(BLUE),
                 ];
-                MarkerScene::new(camera, markers)?.expect(harness, &format!("at {distance:e} m along {way}"), 3)?;
+                MarkerScene::new(camera, markers)?.expect(
+                    harness,
+                    &format!("at {distance:e} m along {direction}"),
+                    3,
+                )?;
             }
         }
     }
@@ -169,7 +173,7 @@ fn enlarged(factor: f64) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-fn similar(harness: &mut Harness) -> Result<(), Failed> {
+fn scaled_scenes(harness: &mut Harness) -> Result<(), Failed> {
     let usual = harness.draw_whole(&enlarged(1.0)?)?;
     for factor in [1e-6, 1e-3, 0.1, 30.0, 1e3, 1e6, 1e7] {
         let what = format!("{factor:e} times as large");
@@ -201,7 +205,7 @@ fn sizes(harness: &mut Harness) -> Result<(), Failed> {
             for marker in &mut markers {
                 marker.scale *= 2.0 / of_mesh;
             }
-            let what = format!("{size:e} m, of which {of_mesh:e} by the mesh");
+            let what = format!("{size:e} m, {of_mesh:e} of it by the mesh");
             let mut all = MarkerScene::of(sized_square(of_mesh)?, near, markers)?;
             all.scene.background = Vec3::ZERO;
             all.expect(harness, &what, 2)?;
@@ -214,7 +218,7 @@ fn scales(harness: &mut Harness) -> Result<(), Failed> {
     let camera = camera(SIZE);
     let control = Marker::before(&camera, 5.0, 1.0).moved(&camera, -2.0, 1.0).colored(BLUE);
     let tilt = camera.orientation * Quat::from_rotation_x(0.3);
-    for (scale, seen) in [
+    for (scale, min_visible) in [
         (Vec3::ZERO, 1),
         (Vec3::NEG_ONE, 1),
         (Vec3::new(-1.0, 1.0, 1.0), 2),
@@ -239,7 +243,7 @@ fn scales(harness: &mut Harness) -> Result<(), Failed> {
             for orientation in [camera.orientation, tilt] {
                 let marker = Marker { scale, double_sided, orientation, ..Marker::before(&camera, 6.0, 1.0) };
                 let what = format!("scale {scale}, double-sided {double_sided}, tilted {}", orientation == tilt);
-                MarkerScene::new(camera.clone(), [control, marker])?.expect(harness, &what, seen)?;
+                MarkerScene::new(camera.clone(), [control, marker])?.expect(harness, &what, min_visible)?;
             }
         }
     }
@@ -247,7 +251,7 @@ fn scales(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 /// The error of a vertex is a millionth of its distance, so an object much larger than its distance appears elsewhere. It
-/// still is drawn, and causes no other colours.
+/// still is drawn, and causes no wrong colours.
 fn larger_than_far(harness: &mut Harness) -> Result<(), Failed> {
     let camera = camera(SIZE);
     let control = Marker::before(&camera, 5.0, 1.0).moved(&camera, -2.0, 1.0).colored(BLUE);

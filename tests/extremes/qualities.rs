@@ -16,8 +16,8 @@ use crate::markers::{Marker, MarkerScene, RED, camera, with_context};
 
 pub const CASES: &[Case] = &[
     ("presets_draw_every_scene", presets),
-    ("every_setting_at_its_limits_draws_every_scene", ends),
-    ("an_invalid_quality_is_refused_by_the_name_of_the_setting", invalid),
+    ("every_setting_at_its_limits_draws_every_scene", limits),
+    ("the_error_names_an_invalid_setting", invalid),
 ];
 
 /// A scene with every feature, and with the largest finite brightness.
@@ -73,7 +73,7 @@ fn presets(harness: &mut Harness) -> Result<(), Failed> {
     Ok(())
 }
 
-fn ends(harness: &mut Harness) -> Result<(), Failed> {
+fn limits(harness: &mut Harness) -> Result<(), Failed> {
     let usual = harness.name().affordable(Quality::balanced());
     let shadows = usual.shadows;
     let key = |bits, curve| DepthKey { bits, curve };
@@ -136,13 +136,13 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
             Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { knob: named, .. })))
                 if named == knob => {}
             Some(error) => return Err(format!("{knob}: {error}").into()),
-            None => return Err(format!("{knob}: it was taken").into()),
+            None => return Err(format!("{knob}: it was accepted").into()),
         }
     }
-    let blind = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };
-    match harness.with_quality(blind).err() {
+    let without_volume = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };
+    match harness.with_quality(without_volume).err() {
         Some(OpenError::Build(BuildError::Quality(QualityError::OcclusionWithoutVolume))) => Ok(()),
         Some(error) => Err(error.to_string().into()),
-        None => Err("occlusion without a volume was taken".into()),
+        None => Err("occlusion without a volume was accepted".into()),
     }
 }

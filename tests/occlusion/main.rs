@@ -39,7 +39,7 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     let hidden = visible.remove_hidden(0..count, |first, mask| culler.hidden(scene, &table, first, mask));
     let visible_after: Vec<bool> = bits(&visible);
     let is_hidden: Vec<bool> =
-        visible_before.iter().zip(&visible_after).map(|(&visible_before, &after)| visible_before && !after).collect();
+        visible_before.iter().zip(&visible_after).map(|(&before, &after)| before && !after).collect();
     assert_eq!(hidden, is_hidden.iter().filter(|&&hidden| hidden).count());
     (visible_before, is_hidden)
 }

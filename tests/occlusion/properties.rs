@@ -13,7 +13,7 @@ use crate::occlusion;
 type ObjectSpec = (usize, usize, [f64; 3], [f32; 3], [f32; 4]);
 
 /// A wedge with a sharp end, whose vertices are rotated, and a tray: a box without its lid.
-fn others() -> [Mesh; 2] {
+fn wedge_and_tray() -> [Mesh; 2] {
     let rotation = Quat::from_rotation_y(0.7) * Quat::from_rotation_z(0.3);
     let vertex = |point: Vec3| Vertex { position: (rotation * point).to_array(), ..Vertex::default() };
     let at = |x: f32, y: f32, z: f32| vertex(Vec3::new(x, y, z));
@@ -33,7 +33,7 @@ fn others() -> [Mesh; 2] {
 
 fn scene_of(specs: &[ObjectSpec], camera: Camera) -> Scene {
     let mut scene = Scene::new();
-    let [wedge, tray] = others();
+    let [wedge, tray] = wedge_and_tray();
     let meshes = [cube(), square(Topology::TriangleStrip), wedge, tray].map(|mesh| scene.add(mesh).unwrap());
     let materials = [(Blend::None, false), (Blend::None, true), (Blend::Alpha, false)].map(|(blend, double_sided)| {
         scene.add(Material { blend, double_sided, opacity: 0.5, ..Material::default() }).unwrap()

@@ -108,7 +108,7 @@ fn frames_in_flight() -> Result<(), Failed> {
     let second = fixture.record(&scene)?;
     let after = draw(&scene)?;
     if fixture.submit(first)?.read(0, "picture")? != before {
-        return Err("the first frame shows what came after it".into());
+        return Err("the first frame shows later changes".into());
     }
     if fixture.submit(second)?.read(0, "picture")? != after { Err("the second frame differs".into()) } else { Ok(()) }
 }
@@ -146,10 +146,10 @@ fn removed_texture() -> Result<(), Failed> {
     scene.remove(textures[1])?;
     for _ in 0..2 {
         let recorded = fixture.record(&scene)?;
-        let told = recorded.statistics().rejections.iter();
-        let told: Vec<_> = told.map(|rejection| (rejection.reason, rejection.count)).collect();
-        if told != [(RejectionReason::StaleTexture, 1)] {
-            return Err(format!("{told:?}").into());
+        let rejections = recorded.statistics().rejections.iter();
+        let rejections: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count)).collect();
+        if rejections != [(RejectionReason::StaleTexture, 1)] {
+            return Err(format!("{rejections:?}").into());
         }
     }
     Ok(())

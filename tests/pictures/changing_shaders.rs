@@ -17,7 +17,7 @@ use crate::strategies::{counts, device, expect, many_batches};
 pub const CASES: &[Case] =
     &[("cached_bundles_are_recorded_again_when_a_shader_or_its_parameters_change", changing_shader)];
 
-/// Paints everything in one colour: a constant of its shader, or one of its parameters, whose number changes.
+/// Draws everything in one colour: a constant of its shader, or one of a varying number of parameters.
 struct Painted {
     step: Arc<AtomicU32>,
 }

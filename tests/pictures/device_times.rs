@@ -1,4 +1,4 @@
-//! When the device drew each pass, on the timeline's axis.
+//! The device's times of each pass, on the timeline's clock.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -24,8 +24,8 @@ use crate::fixture::Fixture;
 use crate::strategies::{device, drawn_by_a_new_renderer, expect, fixture_of, many_batches, pictures, strategies};
 
 pub const CASES: &[Case] = &[
-    ("every_pass_is_timed_once_however_it_is_recorded", however_recorded),
-    ("times_of_frames_in_flight_stay_apart", frames_in_flight),
+    ("every_pass_is_timed_once_with_every_strategy", all_strategies),
+    ("frames_in_flight_have_their_own_times", frames_in_flight),
     ("more_passes_than_a_query_set_holds_are_timed", many_passes),
     ("raw_passes_are_timed_if_the_device_supports_it", raw_passes),
     ("reading_times_of_untimed_or_lost_frames_is_an_error", no_times),
@@ -97,7 +97,7 @@ fn timed(fixture: &mut Fixture, scene: &Scene) -> Result<(WgpuSubmission, Device
     Ok((submission, log))
 }
 
-fn however_recorded() -> Result<(), Failed> {
+fn all_strategies() -> Result<(), Failed> {
     let scene = many_batches();
     let expected = drawn_by_a_new_renderer(&scene)?;
     for (recording, encoding) in strategies()? {
@@ -122,7 +122,7 @@ fn however_recorded() -> Result<(), Failed> {
 fn frames_in_flight() -> Result<(), Failed> {
     let Some(backend) = timing()? else { return Ok(()) };
     let mut fixture = fixture_of(backend)?;
-    // Each with other passes: one more view, no lights.
+    // Each scene has other passes: one has another view, one no lights.
     let mut scenes = vec![everything(), everything(), everything()];
     let another = Camera { name: "another".to_owned(), ..scenes[1].cameras[0].clone() };
     scenes[1].cameras.push(another);
@@ -170,12 +170,12 @@ fn many_passes() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A raw pass, or one that is not.
-struct Own {
+/// A process with a raw pass, or with a drawn one.
+struct OwnPass {
     is_raw: bool,
 }
 
-impl RenderProcess for Own {
+impl RenderProcess for OwnPass {
     fn name(&self) -> &str {
         if self.is_raw { "raw" } else { "drawn" }
     }
@@ -203,7 +203,7 @@ impl RenderProcess for Own {
     }
 }
 
-impl RawPass for Own {
+impl RawPass for OwnPass {
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -231,8 +231,8 @@ fn raw_passes() -> Result<(), Failed> {
     for features in [wgpu::Features::TIMESTAMP_QUERY, all] {
         let (device, queue) = device_with(features)?;
         let builder = Renderer::builder(WgpuBackend::new(device, queue)?.time_passes()?)
-            .process(Own { is_raw: true })
-            .process(Own { is_raw: false })
+            .process(OwnPass { is_raw: true })
+            .process(OwnPass { is_raw: false })
             .output("drawn");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };

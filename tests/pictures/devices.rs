@@ -1,4 +1,4 @@
-//! Devices that draw nothing, or lack features or limits.
+//! Devices that draw nothing, lack features, or have low limits.
 
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ fn no_timestamps() -> Result<(), Failed> {
     Ok(())
 }
 
-/// On wgpu's noop backend, its validation of indirect draws panics when a pass is finished, on whichever thread does that.
+/// On its noop backend, wgpu's validation of indirect draws panics when a pass is finished, on the thread that finishes it.
 fn indirect_draws_on_noop() -> Result<(), Failed> {
     for encoding in [EncodingStrategy::PerPass, EncodingStrategy::OnSubmit] {
         let (device, queue) = noop_device(WgpuBackend::REQUIRED_LIMITS, WgpuBackend::OPTIONAL_FEATURES)?;
@@ -96,7 +96,7 @@ fn indirect_draws_on_noop() -> Result<(), Failed> {
         let scene = field(500);
         for _ in 0..2 {
             if renderer.record(scene.as_scene_ref()).is_ok_and(|frame| submitter.submit(frame).is_ok()) {
-                return Err(format!("{encoding:?}: wgpu accepts them by now").into());
+                return Err(format!("{encoding:?}: wgpu accepts them now").into());
             }
         }
     }
@@ -188,13 +188,14 @@ fn many_textures() -> Result<(), Failed> {
 fn lost_device() -> Result<(), Failed> {
     for recording in [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles] {
         for encoding in [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit] {
-            lost_while(recording, encoding).map_err(|failed| format!("{recording:?} {encoding:?}: {failed:?}"))?;
+            lost_device_with(recording, encoding)
+                .map_err(|failed| format!("{recording:?} {encoding:?}: {failed:?}"))?;
         }
     }
     Ok(())
 }
 
-fn lost_while(recording: RecordingStrategy, encoding: EncodingStrategy) -> Result<(), Failed> {
+fn lost_device_with(recording: RecordingStrategy, encoding: EncodingStrategy) -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(recording)?.encoding_strategy(encoding);

@@ -16,7 +16,7 @@ pub const CASES: &[Case] = &[
     ("edges_too_long_for_a_paraboloid_are_counted_once_per_object", coarse),
 ];
 
-/// A wall of 2 m at the origin that faces +Z, seen from 5 m.
+/// A wall of 2 m at the origin that faces +Z, and a camera 5 m in front of it.
 fn wall(diffuse: f32) -> Result<Scene, Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [31, 31])];
@@ -69,8 +69,8 @@ fn coarse() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for _ in 0..2 {
         let recorded = fixture.record(&scene)?;
-        let told: Vec<_> = recorded.statistics().rejections.clone();
-        let counts: Vec<_> = told.iter().map(|told| (told.reason, told.count, told.first)).collect();
+        let rejections = recorded.statistics().rejections.iter();
+        let counts: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
         if counts != [(RejectionReason::CoarseEdges, 1, 1)] {
             return Err(format!("{counts:?}").into());
         }

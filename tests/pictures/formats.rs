@@ -21,8 +21,8 @@ pub const CASES: &[Case] = &[
     ("normals_read_back_are_within_their_bound", normals),
     ("packed_normals_read_back_are_within_their_bound", packed_normals),
     ("vertices_that_pack_losslessly_change_no_byte", packed_without_loss),
-    ("packed_vertices_change_the_picture_within_their_bound", packed_alike),
-    ("formats_of_normals_and_diffuse_colours_change_the_picture_within_their_bounds", targets_alike),
+    ("packed_vertices_change_the_picture_within_their_bound", packed_within_bound),
+    ("formats_of_normals_and_diffuse_colours_change_the_picture_within_their_bounds", targets_within_bound),
     ("frames_after_a_change_of_formats_are_those_of_a_new_renderer", changes),
     ("a_frame_in_flight_keeps_its_vertices", frame_in_flight),
     ("diffuse_colours_read_back_are_within_their_bound", diffuse),
@@ -41,9 +41,9 @@ fn fixture(quality: Quality) -> Result<Fixture, Failed> {
 const SIDE: usize = 128;
 
 /// A scene with one quad per pixel, row by row. Each faces the camera and has one of these normals and texture coordinates.
-fn one_quad_per_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
+fn one_quad_per_pixel(quads: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for (number, (normal, uv)) in shown.iter().enumerate() {
+    for (number, (normal, uv)) in quads.iter().enumerate() {
         let left_top = [(number % SIDE) as f32 - SIDE as f32 / 2.0, SIDE as f32 / 2.0 - (number / SIDE) as f32];
         let first = vertices.len() as u32;
         for (right, down) in [(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)] {
@@ -66,7 +66,7 @@ fn one_quad_per_pixel(shown: &[(Vec3, Vec2)], material: Material, textures: Vec<
     Ok(scene)
 }
 
-/// One normal per pixel: the axes, some beside the fold of the octahedron, those midway between the steps of each format where
+/// One normal per pixel: the axes, some beside the fold of the octahedron, some midway between the steps of each format where
 /// the steps are largest, and the rest distributed evenly (a Fibonacci spiral).
 fn directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
@@ -123,8 +123,8 @@ fn angle(one: DVec3, other: DVec3) -> f64 {
 
 /// The target `normal` of a scene of these normals.
 fn normals_of(directions: &[Vec3], quality: Quality) -> Result<Vec<DVec3>, Failed> {
-    let shown: Vec<_> = directions.iter().map(|&normal| (normal, Vec2::ZERO)).collect();
-    let scene = one_quad_per_pixel(&shown, Material::default(), Vec::new())?;
+    let quads: Vec<_> = directions.iter().map(|&normal| (normal, Vec2::ZERO)).collect();
+    let scene = one_quad_per_pixel(&quads, Material::default(), Vec::new())?;
     let mut fixture = fixture(quality)?;
     let recorded = fixture.record(&scene)?;
     decoded(&fixture.submit(recorded)?.read(0, "normal")?)
@@ -219,7 +219,7 @@ fn packed() -> Quality {
     Quality { vertices: VertexFormat::Packed, ..Quality::balanced() }
 }
 
-/// A scene with a texture. Each pixel shows another texel, by texture coordinates that half floats hold exactly.
+/// A scene with a texture. Each pixel shows a different texel, with texture coordinates that half floats hold exactly.
 fn texels() -> Result<Scene, Failed> {
     let pixels = (0..=255_u8).flat_map(|row| (0..=255_u8).flat_map(move |column| [column, row, column ^ row, 255]));
     let texture = Texture::new("numbers", 256, 256, pixels.collect())?;
@@ -227,8 +227,8 @@ fn texels() -> Result<Scene, Failed> {
         let (column, row) = (number % SIDE * 2, number / SIDE * 2 + 1);
         (Vec3::Z, Vec2::new(5.0 + (column as f32 + 0.5) / 256.0, -9.0 + (row as f32 + 0.5) / 256.0))
     };
-    let shown: Vec<_> = (0..SIDE * SIDE).map(texel).collect();
-    one_quad_per_pixel(&shown, Material { diffuse: Vec3::ONE, ..Material::default() }, vec![texture])
+    let quads: Vec<_> = (0..SIDE * SIDE).map(texel).collect();
+    one_quad_per_pixel(&quads, Material { diffuse: Vec3::ONE, ..Material::default() }, vec![texture])
 }
 
 fn packed_without_loss() -> Result<(), Failed> {
@@ -269,7 +269,7 @@ fn small_colonnade() -> Result<Scene, Failed> {
 }
 
 /// Fails if the distance between the pictures of this quality and of the balanced one exceeds `max`.
-fn expect_alike(name: &str, scene: &Scene, quality: Quality, max: Distance) -> Result<(), Failed> {
+fn expect_within(name: &str, scene: &Scene, quality: Quality, max: Distance) -> Result<(), Failed> {
     let distance = Distance::between(&as_image(&fixture(quality)?.draw(scene)?)?, &as_image(&draw(scene)?)?)?;
     println!("{name}: {distance:?}");
     if distance.root_mean_square > max.root_mean_square || distance.worst_tile > max.worst_tile {
@@ -280,23 +280,23 @@ fn expect_alike(name: &str, scene: &Scene, quality: Quality, max: Distance) -> R
 
 /// The error of a cosine is at most the angle, 0.0068. The error of a picture is at most as much, because the tone curve is
 /// flatter than sRGB's inverse where it matters, plus half a step of 255. One tile may also differ in a few pixels of a texture.
-fn packed_alike() -> Result<(), Failed> {
+fn packed_within_bound() -> Result<(), Failed> {
     let max = Distance { root_mean_square: 0.0068 + 0.002, worst_tile: 0.03 };
-    expect_alike("colonnade", &small_colonnade()?, packed(), max)
+    expect_within("colonnade", &small_colonnade()?, packed(), max)
 }
 
-fn targets_alike() -> Result<(), Failed> {
+fn targets_within_bound() -> Result<(), Failed> {
     let balanced = Quality::balanced();
     for (name, scene) in [("everything", everything()), ("colonnade", small_colonnade()?)] {
         for normals in NORMALS {
             // As above, for the sum of both errors.
             let angle = (normals.max_error_degrees() + NormalFormat::HalfFloat.max_error_degrees()).to_radians();
             let max = Distance { root_mean_square: angle + 0.002, worst_tile: 2.0 * angle + 0.004 };
-            expect_alike(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, max)?;
+            expect_within(&format!("{name}, {normals:?}"), &scene, Quality { normals, ..balanced }, max)?;
         }
         let quality = Quality { diffuse: DiffuseFormat::HalfFloat, ..balanced };
         let max = Distance { root_mean_square: 0.003, worst_tile: 0.005 };
-        expect_alike(&format!("{name}, diffuse as half floats"), &scene, quality, max)?;
+        expect_within(&format!("{name}, diffuse as half floats"), &scene, quality, max)?;
     }
     Ok(())
 }
@@ -385,7 +385,7 @@ fn clipped() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Removes red.
+/// A post-processing step that removes red.
 struct WithoutRed(String, String);
 
 impl RenderProcess for WithoutRed {

@@ -17,7 +17,7 @@ pub const CASES: &[Case] = &[
     ("shares_of_the_materials_change_no_byte", shares),
     ("shares_are_recorded_as_processes_of_their_own", shares_are_processes),
     ("normals_diffuse_and_radiance_can_have_other_formats", formats),
-    ("formats_that_lack_channels_are_refused_by_name", misfits),
+    ("formats_that_lack_channels_are_refused_by_name", unsuitable),
 ];
 
 /// Scenes with mirrored objects and strips, perspective and orthographic, and one with pairs of objects at one
@@ -119,7 +119,7 @@ fn shares_are_processes() -> Result<(), Failed> {
     Ok(())
 }
 
-/// How far from the default's a picture may be: the root mean square error, and the greatest error.
+/// The allowed distance from the default's picture: the root mean square error over the picture, and in the worst tile.
 type Bound = (GeometryFormats, f64, f64);
 
 fn formats() -> Result<(), Failed> {
@@ -147,19 +147,19 @@ fn formats() -> Result<(), Failed> {
     Ok(())
 }
 
-fn misfits() -> Result<(), Failed> {
+fn unsuitable() -> Result<(), Failed> {
     let usual = GeometryFormats::default();
     let with = |target, format| match target {
         "normal" => GeometryFormats { normal: format, ..usual },
         "diffuse" => GeometryFormats { diffuse: format, ..usual },
         _ => GeometryFormats { radiance: format, ..usual },
     };
-    for (target, misfits) in [
+    for (target, unsuitable) in [
         ("normal", &[Format::R32Float, Format::Depth32Float][..]),
         ("diffuse", &[Format::R32Float, Format::Rg16Float, Format::Depth32Float]),
         ("radiance", &[Format::R32Float, Format::Rg16Float, Format::Depth32Float]),
     ] {
-        for &format in misfits {
+        for &format in unsuitable {
             let deferred = Deferred::to_picture().formats(with(target, format));
             let error = Fixture::with(1, |builder| builder.deferred(deferred)).err().ok_or("it should be refused")?;
             let text = error.message().unwrap_or_default();

@@ -9,11 +9,13 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, radiance};
-use crate::rays::{Panel, Stage};
+use crate::rays::{Panel, PanelScene};
 use crate::shadows::{MAPS, camera, hemisphere, spot};
 
-pub const CASES: &[Case] =
-    &[("no_light_that_ends_early_takes_more_away_than_stated", bound), ("a_light_that_ends_early_reaches_less", reach)];
+pub const CASES: &[Case] = &[
+    ("a_cut_off_removes_at_most_the_documented_illuminance", bound),
+    ("a_cut_off_shortens_the_reach_of_lights", reach),
+];
 
 fn with_cut_off(light_cut_off: f32) -> Result<Fixture, Failed> {
     let quality = Quality { light_cut_off, ..Quality::balanced() };
@@ -29,10 +31,10 @@ fn radiance_of(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<[f64; 3]>, Fa
 fn scene() -> Scene {
     let mut scene = field(300);
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
-    let place = DVec3::new(0.0, 6.0, 12.0);
+    let position = DVec3::new(0.0, 6.0, 12.0);
     let point =
         Light::Point { position: DVec3::new(0.0, 3.0, -5.0), intensity: Vec3::new(30.0, 10.0, 5.0), range: 1e3 };
-    scene.lights = vec![point, spot(place, down, 60.0), hemisphere(DVec3::new(-3.0, 5.0, 10.0), down)];
+    scene.lights = vec![point, spot(position, down, 60.0), hemisphere(DVec3::new(-3.0, 5.0, 10.0), down)];
     for light in &mut scene.lights {
         if let Light::Spot { range, .. } | Light::Hemispherical { range, .. } = light {
             *range = 1e3;
@@ -60,8 +62,8 @@ fn bound() -> Result<(), Failed> {
                 *direction = Vec3::NEG_Y;
             }
             let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 2.0);
-            let stage = Stage { panels: vec![floor], lights: vec![light], maps: MAPS };
-            let scene = stage.scene(&[camera(DVec3::new(0.5, 2.0, 1.0), DVec3::ZERO, 60.0)])?;
+            let panel_scene = PanelScene { panels: vec![floor], lights: vec![light], maps: MAPS };
+            let scene = panel_scene.scene(&[camera(DVec3::new(0.5, 2.0, 1.0), DVec3::ZERO, 60.0)])?;
             let (expected, found) = (radiance_of(&mut whole, &scene)?, radiance_of(&mut ending, &scene)?);
             for (expected, found) in expected.iter().flatten().zip(found.iter().flatten()) {
                 // Both are half floats.
@@ -72,7 +74,7 @@ fn bound() -> Result<(), Failed> {
                 worst = worst.max(expected - found);
             }
         }
-        // So no lower bound holds.
+        // The bound is tight.
         if worst < 0.95 * bound {
             return Err(format!("{worst} of {bound} in light {kind}").into());
         }

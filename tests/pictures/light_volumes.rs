@@ -8,13 +8,13 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, radiance};
-use crate::rays::{Counts, Panel, Stage};
+use crate::rays::{Counts, Panel, PanelScene};
 
 pub const CASES: &[Case] = &[
     ("lights_reach_to_the_end_of_their_range", end_of_range),
-    ("cones_of_every_width_light_all_they_reach", cones),
-    ("hemispheres_light_all_they_reach", hemispheres),
-    ("spheres_light_all_they_reach", spheres),
+    ("cones_of_every_width_light_everything_in_reach", cones),
+    ("hemispheres_light_everything_in_reach", hemispheres),
+    ("spheres_light_everything_in_reach", spheres),
     ("lights_are_drawn_from_within", from_within),
     ("the_near_plane_may_clip_a_light_volume", near_plane),
     ("a_hundred_lights_add_up", hundred),
@@ -67,33 +67,33 @@ fn directions() -> impl Iterator<Item = DVec3> {
 
 fn end_of_range() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
-    let place = DVec3::new(0.3, -0.2, 0.5);
-    for light in [point(place), spot(place, DVec3::NEG_Z, 45.0), hemisphere(place, DVec3::NEG_Z)] {
+    let position = DVec3::new(0.3, -0.2, 0.5);
+    for light in [point(position), spot(position, DVec3::NEG_Z, 45.0), hemisphere(position, DVec3::NEG_Z)] {
         for (share, is_lit) in [(0.02, true), (0.5, true), (0.97, true), (0.999, true), (1.0, false), (1.2, false)] {
-            let wall = Panel::facing(place + DVec3::NEG_Z * (share * RANGE), DVec3::Z, 40.0);
-            let stage = Stage::new(vec![wall], vec![light]);
+            let wall = Panel::facing(position + DVec3::NEG_Z * (share * RANGE), DVec3::Z, 40.0);
+            let panel_scene = PanelScene::new(vec![wall], vec![light]);
             // A light close to the wall lights little of it.
             let target = wall.center;
             let views = [
-                camera(place + DVec3::new(0.01, 0.02, 1.0), target, 90.0),
-                camera(place + DVec3::new(1.5, 0.3, 0.3), target, 3.0),
-                camera(place + DVec3::new(1.5, 0.3, 0.3), target, 120.0),
+                camera(position + DVec3::new(0.01, 0.02, 1.0), target, 90.0),
+                camera(position + DVec3::new(1.5, 0.3, 0.3), target, 3.0),
+                camera(position + DVec3::new(1.5, 0.3, 0.3), target, 120.0),
             ];
-            let counts = stage.expect(&mut fixture, &views)?;
+            let counts = panel_scene.expect(&mut fixture, &views)?;
             if (counts.lit > 0) != is_lit {
                 return Err(format!("{light:?} at {share} of its range: {counts:?}").into());
             }
         }
     }
-    // A directional light lights what is as far away as possible.
+    // A directional light has no range.
     for distance in [1.0, 1e3, 1e6] {
         let sun = Light::Directional {
             direction: Vec3::new(0.48, -0.6, -0.64),
             illuminance: Vec3::new(3.0, 2.0, 1.0),
             casts_shadow: false,
         };
-        let stage = Stage::new(vec![Panel::facing(DVec3::NEG_Z * distance, DVec3::Z, distance)], vec![sun]);
-        let counts = stage.expect(&mut fixture, &[camera(DVec3::ZERO, DVec3::NEG_Z, 80.0)])?;
+        let panel_scene = PanelScene::new(vec![Panel::facing(DVec3::NEG_Z * distance, DVec3::Z, distance)], vec![sun]);
+        let counts = panel_scene.expect(&mut fixture, &[camera(DVec3::ZERO, DVec3::NEG_Z, 80.0)])?;
         expect_lit(counts, 1.0)?;
     }
     Ok(())
@@ -103,13 +103,17 @@ fn end_of_range() -> Result<(), Failed> {
 fn expect_lit(counts: Counts, least: f64) -> Result<(), Failed> {
     let Counts { lit, dark, fading, edges } = counts;
     let all = (lit + dark + fading + edges) as f64;
-    let sure = fading as f64 <= 0.05 * all && edges as f64 <= 0.05 * all;
-    if sure && lit as f64 >= least * all { Ok(()) } else { Err(format!("too little to judge: {counts:?}").into()) }
+    let certain = fading as f64 <= 0.05 * all && edges as f64 <= 0.05 * all;
+    if certain && lit as f64 >= least * all {
+        Ok(())
+    } else {
+        Err(format!("too few pixels to compare: {counts:?}").into())
+    }
 }
 
 /// A room around a light, which reaches the centres of the walls but not the corners.
-fn room(light: Light) -> Stage {
-    Stage::new(Panel::room(DVec3::ZERO, 0.8 * RANGE), vec![light])
+fn room(light: Light) -> PanelScene {
+    PanelScene::new(Panel::room(DVec3::ZERO, 0.8 * RANGE), vec![light])
 }
 
 fn cones() -> Result<(), Failed> {
@@ -117,39 +121,41 @@ fn cones() -> Result<(), Failed> {
     for degrees in [1.0_f32, 10.0, 45.0, 80.0, 90.0] {
         for direction in directions() {
             // Tilted, so that the axis meets no corner.
-            let place = DVec3::new(0.11, -0.23, 0.17);
-            let stage = room(spot(place, direction, degrees));
+            let position = DVec3::new(0.11, -0.23, 0.17);
+            let panel_scene = room(spot(position, direction, degrees));
             let aside = direction.any_orthonormal_vector();
-            let ahead = place + direction * (0.6 * RANGE);
+            let ahead = position + direction * (0.6 * RANGE);
             let wide = (f64::from(degrees) * 2.6).min(110.0);
             let views = [
-                camera(place - direction * 0.2 + aside * 0.3, place + direction * RANGE, wide),
-                camera(place + aside * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
-                camera(place + (direction + aside) * 0.4, place - direction, 100.0),
+                camera(position - direction * 0.2 + aside * 0.3, position + direction * RANGE, wide),
+                camera(position + aside * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
+                camera(position + (direction + aside) * 0.4, position - direction, 100.0),
             ];
-            let counts = stage.expect(&mut fixture, &views).map_err(|failed| told(failed, degrees, direction))?;
-            expect_lit(counts, 0.05).map_err(|failed| told(failed, degrees, direction))?;
+            let counts = panel_scene
+                .expect(&mut fixture, &views)
+                .map_err(|failed| with_direction(failed, degrees, direction))?;
+            expect_lit(counts, 0.05).map_err(|failed| with_direction(failed, degrees, direction))?;
         }
     }
     Ok(())
 }
 
-fn told(failed: Failed, degrees: f32, direction: DVec3) -> Failed {
+fn with_direction(failed: Failed, degrees: f32, direction: DVec3) -> Failed {
     format!("{degrees} degrees around {direction}: {}", failed.message().unwrap_or("")).into()
 }
 
 fn hemispheres() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for direction in directions() {
-        let place = DVec3::new(0.11, -0.23, 0.17);
+        let position = DVec3::new(0.11, -0.23, 0.17);
         let aside = direction.any_orthonormal_vector();
         let views = [
-            camera(place - direction * 0.3, place + direction, 110.0),
-            camera(place + direction * 2.0, place + aside, 100.0),
-            camera(place - aside, place - direction + aside * 4.0, 100.0),
+            camera(position - direction * 0.3, position + direction, 110.0),
+            camera(position + direction * 2.0, position + aside, 100.0),
+            camera(position - aside, position - direction + aside * 4.0, 100.0),
         ];
-        let counts = room(hemisphere(place, direction)).expect(&mut fixture, &views)?;
-        expect_lit(counts, 0.15).map_err(|failed| told(failed, 90.0, direction))?;
+        let counts = room(hemisphere(position, direction)).expect(&mut fixture, &views)?;
+        expect_lit(counts, 0.15).map_err(|failed| with_direction(failed, 90.0, direction))?;
     }
     Ok(())
 }
@@ -158,30 +164,30 @@ fn spheres() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     // Walls through the centre of a sphere, seen from all sides: the lit discs have the sphere's outline.
     for direction in directions() {
-        let place = DVec3::new(0.3, 0.1, -0.2);
-        let wall = Panel::facing(place - direction * 0.05, direction, 3.0 * RANGE);
-        let stage = Stage::new(vec![wall], vec![point(place)]);
+        let position = DVec3::new(0.3, 0.1, -0.2);
+        let wall = Panel::facing(position - direction * 0.05, direction, 3.0 * RANGE);
+        let panel_scene = PanelScene::new(vec![wall], vec![point(position)]);
         let aside = direction.any_orthonormal_vector();
         let views = [
-            camera(place + direction * 12.0, place, 45.0),
-            camera(place + (direction + aside * 2.0) * 3.0, place, 70.0),
-            camera(place + (direction * 0.1 - aside) * 3.0, place, 100.0),
+            camera(position + direction * 12.0, position, 45.0),
+            camera(position + (direction + aside * 2.0) * 3.0, position, 70.0),
+            camera(position + (direction * 0.1 - aside) * 3.0, position, 100.0),
         ];
-        expect_lit(stage.expect(&mut fixture, &views)?, 0.2)?;
+        expect_lit(panel_scene.expect(&mut fixture, &views)?, 0.2)?;
     }
     Ok(())
 }
 
 fn from_within() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
-    let place = DVec3::new(0.11, -0.23, 0.17);
+    let position = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.6, 0.0, -0.8);
     let half_angle = 30.0_f32;
     // On the cone's surface at half of its height.
     let turn = DQuat::from_rotation_y(f64::from(half_angle).to_radians());
     let edge = turn * direction * (0.5 * RANGE);
-    for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
-        let stage = Stage::new(Panel::room(DVec3::ZERO, 1.5 * RANGE), vec![light]);
+    for light in [point(position), spot(position, direction, half_angle), hemisphere(position, direction)] {
+        let panel_scene = PanelScene::new(Panel::room(DVec3::ZERO, 1.5 * RANGE), vec![light]);
         let eyes = [
             DVec3::ZERO,
             direction * 1e-3,
@@ -198,18 +204,19 @@ fn from_within() -> Result<(), Failed> {
             DVec3::Y * 0.05,
             DVec3::Y * (RANGE * 0.9999),
         ];
-        let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
+        let directions = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
         for eye in eyes {
-            let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
-            stage.expect(&mut fixture, &views).map_err(|failed| told(failed, half_angle, eye))?;
+            let views = directions.map(|ahead| sized(camera(position + eye, position + eye + ahead, 100.0), [40, 40]));
+            panel_scene.expect(&mut fixture, &views).map_err(|failed| with_direction(failed, half_angle, eye))?;
         }
     }
     // In the room above, much of the walls is out of range; in this one all walls are lit.
-    for light in [point(place), spot(place, direction, half_angle), hemisphere(place, direction)] {
+    for light in [point(position), spot(position, direction, half_angle), hemisphere(position, direction)] {
         for eye in [DVec3::ZERO, direction * 1.5, -direction, edge] {
-            let looks = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
-            let views = looks.map(|look| sized(camera(place + eye, place + eye + look, 100.0), [40, 40]));
-            let counts = room(light).expect(&mut fixture, &views).map_err(|failed| told(failed, half_angle, eye))?;
+            let directions = [direction, -direction, DVec3::new(-0.8, 0.05, -0.6), DVec3::new(0.1, -1.0, 0.1)];
+            let views = directions.map(|ahead| sized(camera(position + eye, position + eye + ahead, 100.0), [40, 40]));
+            let counts =
+                room(light).expect(&mut fixture, &views).map_err(|failed| with_direction(failed, half_angle, eye))?;
             expect_lit(counts, 0.01)?;
         }
     }
@@ -218,26 +225,29 @@ fn from_within() -> Result<(), Failed> {
 
 fn near_plane() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
-    let place = DVec3::new(0.11, -0.23, 0.17);
+    let position = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.0, 0.6, -0.8);
-    for light in [point(place), spot(place, direction, 40.0), hemisphere(place, direction)] {
+    for light in [point(position), spot(position, direction, 40.0), hemisphere(position, direction)] {
         for near in [0.5, 2.0, 3.0, 3.9] {
-            let eyes = [place, place - direction, place + DVec3::new(1.5, 0.2, 1.0), place + DVec3::X * 1.2];
+            let eyes =
+                [position, position - direction, position + DVec3::new(1.5, 0.2, 1.0), position + DVec3::X * 1.2];
             let views = eyes.map(|eye| {
-                let view = camera(eye, place + direction * 2.0 + DVec3::X * 0.1, 90.0);
+                let view = camera(eye, position + direction * 2.0 + DVec3::X * 0.1, 90.0);
                 Camera { near, ..view }
             });
-            stage_of_near_plane(light).expect(&mut fixture, &views).map_err(|failed| told(failed, near, direction))?;
+            near_plane_scene(light)
+                .expect(&mut fixture, &views)
+                .map_err(|failed| with_direction(failed, near, direction))?;
         }
     }
     Ok(())
 }
 
-fn stage_of_near_plane(light: Light) -> Stage {
-    let mut stage = room(light);
+fn near_plane_scene(light: Light) -> PanelScene {
+    let mut panel_scene = room(light);
     // An object within the light, partly in front of the near plane.
-    stage.panels.extend(Panel::closed_box(DVec3::new(0.3, 0.9, -1.6), DVec3::new(0.5, 0.1, 0.4)));
-    stage
+    panel_scene.panels.extend(Panel::closed_box(DVec3::new(0.3, 0.9, -1.6), DVec3::new(0.5, 0.1, 0.4)));
+    panel_scene
 }
 
 fn hundred() -> Result<(), Failed> {
@@ -249,11 +259,11 @@ fn hundred() -> Result<(), Failed> {
         let intensity = Vec3::new(1.0 + (index % 3) as f32, (index % 5) as f32, 0.25 * (index % 7) as f32);
         Light::Point { position, intensity, range: 1.0 + 0.5 * (index % 4) as f32 }
     };
-    let stage = Stage::new(vec![wall], (0..100).map(light).collect());
+    let panel_scene = PanelScene::new(vec![wall], (0..100).map(light).collect());
     let view = camera(DVec3::new(0.5, -1.0, 9.0), DVec3::ZERO, 65.0);
-    expect_lit(stage.expect(&mut fixture, std::slice::from_ref(&view))?, 0.7)?;
+    expect_lit(panel_scene.expect(&mut fixture, std::slice::from_ref(&view))?, 0.7)?;
 
-    let recorded = fixture.record(&stage.scene(&[view])?)?;
+    let recorded = fixture.record(&panel_scene.scene(&[view])?)?;
     let processes = fixture.renderer.plan().processes().iter();
     let names: Vec<_> = processes.map(|planned| planned.process.name().to_owned()).collect();
     if names != ["geometry buffer", "point lights", "tone mapping"] || recorded.statistics().views[0].lights != 100 {
@@ -276,9 +286,9 @@ fn depth_is_left_alone() -> Result<(), Failed> {
     // Behind the wall; on both of its sides; in front of it.
     let before = lights.map(|light| shifted(light, DVec3::Z * 2.0));
     for lights in [vec![], lights.to_vec(), lights.into_iter().chain(before).collect(), before.to_vec()] {
-        let stage = Stage::new(vec![wall, Panel::facing(DVec3::NEG_Z * 2.5, DVec3::Z, 1.0)], lights);
-        stage.expect(&mut fixture, std::slice::from_ref(&view))?;
-        let recorded = fixture.record(&stage.scene(std::slice::from_ref(&view))?)?;
+        let panel_scene = PanelScene::new(vec![wall, Panel::facing(DVec3::NEG_Z * 2.5, DVec3::Z, 1.0)], lights);
+        panel_scene.expect(&mut fixture, std::slice::from_ref(&view))?;
+        let recorded = fixture.record(&panel_scene.scene(std::slice::from_ref(&view))?)?;
         depths.push(fixture.submit(recorded)?.read(0, "depth")?);
     }
     if depths.iter().any(|depth| *depth != depths[0]) {
@@ -299,14 +309,14 @@ fn shifted(light: Light, shift: DVec3) -> Light {
 
 fn orthographic() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
-    let place = DVec3::new(0.11, -0.23, 0.17);
+    let position = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
     let sun = Light::Directional {
         direction: Vec3::new(0.48, -0.6, -0.64),
         illuminance: Vec3::new(3.0, 2.0, 1.0),
         casts_shadow: false,
     };
-    for light in [point(place), spot(place, direction, 35.0), hemisphere(place, direction), sun] {
+    for light in [point(position), spot(position, direction, 35.0), hemisphere(position, direction), sun] {
         for (from, near, far) in [
             (DVec3::new(1.0, 2.0, 2.5), 0.1, 50.0),
             // The light reaches beyond the far plane and in front of the near plane.
@@ -318,7 +328,8 @@ fn orthographic() -> Result<(), Failed> {
             let looking = Camera::looking_at("plan", from, from + DVec3::new(-0.1, -0.1, -1.0));
             let projection = Projection::Orthographic { height: 5.0 };
             let view = sized(Camera { projection, near, far, ..looking }, [64, 64]);
-            let counts = room(light).expect(&mut fixture, &[view]).map_err(|failed| told(failed, far, from))?;
+            let counts =
+                room(light).expect(&mut fixture, &[view]).map_err(|failed| with_direction(failed, far, from))?;
             if counts.lit == 0 {
                 return Err(format!("{light:?} from {from}: {counts:?}").into());
             }
@@ -330,19 +341,19 @@ fn orthographic() -> Result<(), Failed> {
 fn far_away() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     let shift = DVec3::new(1e6, -5e5, 2.5e5);
-    let place = DVec3::new(0.11, -0.23, 0.17);
+    let position = DVec3::new(0.11, -0.23, 0.17);
     let direction = DVec3::new(0.3, -0.5, -0.8).normalize();
-    for light in [point(place), spot(place, direction, 35.0), hemisphere(place, direction)] {
-        let mut stage = room(shifted(light, shift));
-        stage.panels.iter_mut().for_each(|panel| panel.center += shift);
+    for light in [point(position), spot(position, direction, 35.0), hemisphere(position, direction)] {
+        let mut panel_scene = room(shifted(light, shift));
+        panel_scene.panels.iter_mut().for_each(|panel| panel.center += shift);
         let eye = shift + DVec3::new(-1.0, 0.5, 2.0);
         let view = camera(eye, eye + direction, 100.0);
-        expect_lit(stage.expect(&mut fixture, std::slice::from_ref(&view))?, 0.04)?;
+        expect_lit(panel_scene.expect(&mut fixture, std::slice::from_ref(&view))?, 0.04)?;
 
         // To the precision of half floats, it equals the picture that is drawn near the origin.
         let near = Camera { position: view.position - shift, ..view.clone() };
-        let pictures = [(room(light), near), (stage, view)].map(|(stage, view)| {
-            let recorded = fixture.record(&stage.scene(&[view])?)?;
+        let pictures = [(room(light), near), (panel_scene, view)].map(|(panel_scene, view)| {
+            let recorded = fixture.record(&panel_scene.scene(&[view])?)?;
             radiance(&fixture.submit(recorded)?, 0)
         });
         let [one, other] = pictures;

@@ -12,8 +12,8 @@ use crate::fixture::{draw, pixel};
 use crate::image_distance::{assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
-    ("a_directional_light_by_its_angle", directional),
-    ("a_point_light_falls_off_with_the_square", point),
+    ("a_directional_light_depends_on_its_angle", directional),
+    ("a_point_light_falls_off_with_the_square_of_the_distance", point),
     ("a_spot_light_ends_at_its_cone", spot),
     ("a_hemispherical_light_falls_off_with_the_cosine", hemispherical),
     ("ambient_light_and_emission_add_up", ambient_and_emission),
@@ -23,7 +23,7 @@ pub const CASES: &[Case] = &[
 
 const DIFFUSE: f64 = 0.5;
 
-/// A wall of 2 m at the origin that faces +Z, seen from 5 m, in one light; and the colour of its centre.
+/// The colour at the centre of a wall of 2 m at the origin, which faces +Z, in one light, from 5 m away.
 fn middle_of_wall(light: Option<Light>, change: impl FnOnce(&mut Scene)) -> Result<[u8; 3], Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [91, 91])];

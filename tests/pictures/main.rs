@@ -1,7 +1,7 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
 //! Without an adapter, or without the scenes beside the repository, the cases that need them are reported as ignored. With
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: look at
+//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check
 //! each of them before you commit it.
 
 mod changes;

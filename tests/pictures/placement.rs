@@ -11,26 +11,26 @@ use crate::fixture::{Fixture, draw, pixel};
 use crate::image_distance::{assert_alike, assert_different};
 
 pub const CASES: &[Case] = &[
-    ("up_is_up_and_right_is_right", up_is_up),
-    ("a_texture_has_the_right_orientation", a_texture_has_the_right_orientation),
+    ("objects_above_and_to_the_right_appear_there", directions),
+    ("a_texture_has_the_correct_orientation", a_texture_has_the_correct_orientation),
     ("textures_of_every_size_class_keep_their_colour", every_size_class),
-    ("a_strip_draws_what_a_list_draws", a_strip_is_a_list),
+    ("a_strip_draws_what_a_list_draws", strip_equals_list),
     ("the_nearer_object_hides_the_farther_in_any_order", nearer_hides),
     ("a_mirrored_object_shows_its_outside", mirrored),
     ("back_faces_are_culled_unless_double_sided", culled),
-    ("no_scale_leads_to_nan", extreme_scales),
-    ("a_normal_of_zero_is_replaced_by_the_triangles", zero_normals),
+    ("extreme_scales_cause_no_nan", extreme_scales),
+    ("a_zero_normal_is_replaced_by_the_triangles_normal", zero_normals),
     ("pictures_far_from_the_origin_equal_those_near_it", far_away),
     ("each_view_has_its_own_picture", two_views),
 ];
 
 /// A scene of unlit surfaces that emit their own colour, with a camera 5 m in front of the origin.
-struct Signs {
+struct UnlitScene {
     scene: Scene,
     mesh: drawloom::handle::Handle<Mesh>,
 }
 
-impl Signs {
+impl UnlitScene {
     fn new(mesh: Mesh) -> Result<Self, Failed> {
         let mut scene = Scene::new();
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [90, 90])];
@@ -67,8 +67,8 @@ fn hue(picture: &Picture, x: u32, y: u32) -> Hue {
     }
 }
 
-fn expect(picture: &Picture, places: &[(u32, u32, Hue)]) -> Result<(), Failed> {
-    for (x, y, expected) in places {
+fn expect(picture: &Picture, points: &[(u32, u32, Hue)]) -> Result<(), Failed> {
+    for (x, y, expected) in points {
         let found = hue(picture, *x, *y);
         if found != *expected {
             return Err(format!("({x}, {y}) is {found:?}, not {expected:?}").into());
@@ -77,14 +77,14 @@ fn expect(picture: &Picture, places: &[(u32, u32, Hue)]) -> Result<(), Failed> {
     Ok(())
 }
 
-fn up_is_up() -> Result<(), Failed> {
-    let mut signs = Signs::new(square(Topology::TriangleList))?;
-    signs.add(Vec3::X, |object| object.position.y = 2.0)?;
-    signs.add(Vec3::Y, |object| object.position.x = 2.0)?;
-    signs.add(Vec3::Z, |object| object.position.x = -2.0)?;
-    let places =
+fn directions() -> Result<(), Failed> {
+    let mut unlit = UnlitScene::new(square(Topology::TriangleList))?;
+    unlit.add(Vec3::X, |object| object.position.y = 2.0)?;
+    unlit.add(Vec3::Y, |object| object.position.x = 2.0)?;
+    unlit.add(Vec3::Z, |object| object.position.x = -2.0)?;
+    let points =
         [(45, 14, Hue::Red), (76, 45, Hue::Green), (14, 45, Hue::Blue), (45, 76, Hue::Black), (45, 45, Hue::Black)];
-    expect(&draw(&signs.scene)?, &places)
+    expect(&draw(&unlit.scene)?, &points)
 }
 
 fn textured(texture: Texture) -> Result<Scene, Failed> {
@@ -98,7 +98,7 @@ fn textured(texture: Texture) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-fn a_texture_has_the_right_orientation() -> Result<(), Failed> {
+fn a_texture_has_the_correct_orientation() -> Result<(), Failed> {
     // Four quarters, wide enough that filtering affects only their edges.
     let mut pixels = Vec::new();
     for y in 0..64 {
@@ -124,12 +124,12 @@ fn every_size_class() -> Result<(), Failed> {
     Ok(())
 }
 
-fn a_strip_is_a_list() -> Result<(), Failed> {
+fn strip_equals_list() -> Result<(), Failed> {
     let with = |topology| -> Result<Picture, Failed> {
-        let mut signs = Signs::new(square(topology))?;
-        signs.add(Vec3::X, |object| object.orientation = Quat::from_rotation_y(0.5))?;
-        signs.add(Vec3::Y, |object| object.position = DVec3::new(0.6, 0.6, 0.3))?;
-        draw(&signs.scene)
+        let mut unlit = UnlitScene::new(square(topology))?;
+        unlit.add(Vec3::X, |object| object.orientation = Quat::from_rotation_y(0.5))?;
+        unlit.add(Vec3::Y, |object| object.position = DVec3::new(0.6, 0.6, 0.3))?;
+        draw(&unlit.scene)
     };
     let strip = with(Topology::TriangleStrip)?;
     expect(&strip, &[(45, 45, Hue::Red)])?;
@@ -138,15 +138,15 @@ fn a_strip_is_a_list() -> Result<(), Failed> {
 
 fn nearer_hides() -> Result<(), Failed> {
     for near_first in [true, false] {
-        let mut signs = Signs::new(square(Topology::TriangleList))?;
+        let mut unlit = UnlitScene::new(square(Topology::TriangleList))?;
         let mut order = [(Vec3::X, 1.0), (Vec3::Z, -1.0)];
         if !near_first {
             order.reverse();
         }
         for (color, z) in order {
-            signs.add(color, |object| object.position.z = z)?;
+            unlit.add(color, |object| object.position.z = z)?;
         }
-        expect(&draw(&signs.scene)?, &[(45, 45, Hue::Red)])?;
+        expect(&draw(&unlit.scene)?, &[(45, 45, Hue::Red)])?;
     }
     Ok(())
 }
@@ -172,14 +172,14 @@ fn mirrored() -> Result<(), Failed> {
 
 fn culled() -> Result<(), Failed> {
     let turned = Quat::from_rotation_y(std::f32::consts::PI);
-    let mut signs = Signs::new(square(Topology::TriangleList))?;
-    signs.add(Vec3::X, |object| object.orientation = turned)?;
-    expect(&draw(&signs.scene)?, &[(45, 45, Hue::Black)])?;
-    let handle = signs.scene.objects().next().ok_or("there is an object")?;
-    let material = signs.scene.object(handle)?.material;
-    let both = Material { double_sided: true, ..signs.scene.assets().get(material)?.clone() };
-    signs.scene.replace(material, both)?;
-    expect(&draw(&signs.scene)?, &[(45, 45, Hue::Red)])
+    let mut unlit = UnlitScene::new(square(Topology::TriangleList))?;
+    unlit.add(Vec3::X, |object| object.orientation = turned)?;
+    expect(&draw(&unlit.scene)?, &[(45, 45, Hue::Black)])?;
+    let handle = unlit.scene.objects().next().ok_or("there is an object")?;
+    let material = unlit.scene.object(handle)?.material;
+    let both = Material { double_sided: true, ..unlit.scene.assets().get(material)?.clone() };
+    unlit.scene.replace(material, both)?;
+    expect(&draw(&unlit.scene)?, &[(45, 45, Hue::Red)])
 }
 
 fn extreme_scales() -> Result<(), Failed> {

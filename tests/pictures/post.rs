@@ -16,9 +16,9 @@ use crate::fixture::{Fixture, pixel};
 use crate::image_distance::{Distance, as_image, assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
-    ("a_slanted_edge_comes_nearer_to_its_coverage", slanted_edge),
+    ("fxaa_moves_a_slanted_edge_closer_to_its_coverage", slanted_edge),
     ("edges_along_rows_and_columns_stay_sharp", straight_edges),
-    ("pictures_without_contrast_stay_byte_for_byte", no_contrast),
+    ("pictures_without_contrast_are_unchanged", no_contrast),
     ("the_dark_threshold_applies_to_dark_areas", dark),
     ("sub_pixel_detail_is_blended_by_the_setting", sub_pixel),
     ("a_picture_is_clamped_at_its_border", borders),
@@ -27,8 +27,8 @@ pub const CASES: &[Case] = &[
     ("negative_radiance_is_black_and_infinite_radiance_white", extreme_radiance),
 ];
 
-/// An engine's full-screen process. Its WGSL is the body of a function from `pixel`, the pixel's centre, and `source`,
-/// the colour there before, to a colour.
+/// An engine's full-screen process. Its WGSL is a function body that returns a colour, computed from `pixel`, the pixel's
+/// centre, and `source`, the colour of the source target there.
 struct Step {
     name: &'static str,
     source: Option<String>,
@@ -53,7 +53,7 @@ impl Step {
         Self { name: "pattern", source: None, target: target.to_owned(), format, shader, numbers }
     }
 
-    /// Changes every pixel by itself.
+    /// Changes every pixel independently of its neighbours.
     fn between(source: &str, target: &str, name: &'static str, body: &str) -> Self {
         let shader = format!(
             "@group(2) @binding(0) var<uniform> numbers: vec4<f32>;
@@ -116,9 +116,9 @@ const HALF_PLANE: &str = "return vec4(vec3(select(0.0, 1.0, dot(vec3(pixel, 1.0)
 fn half_plane_truth(size: [u32; 2], [across, down, offset, _]: [f32; 4]) -> RgbImage {
     const SIDE: u32 = 16;
     RgbImage::from_fn(size[0], size[1], |x, y| {
-        let place = |pixel: u32, sample: u32| f64::from(pixel) + (f64::from(sample) + 0.5) / f64::from(SIDE);
+        let coordinate = |pixel: u32, sample: u32| f64::from(pixel) + (f64::from(sample) + 0.5) / f64::from(SIDE);
         let is_white = |sample: u32| {
-            let (x, y) = (place(x, sample % SIDE), place(y, sample / SIDE));
+            let (x, y) = (coordinate(x, sample % SIDE), coordinate(y, sample / SIDE));
             f64::from(across) * x + f64::from(down) * y + f64::from(offset) > 0.0
         };
         let white = (0..SIDE * SIDE).filter(|&sample| is_white(sample)).count();
@@ -148,7 +148,7 @@ fn slanted_edge() -> Result<(), Failed> {
         let rises = if is_flat { down > 0.0 } else { across > 0.0 };
         let mut smoothed_lines = 0;
         for line in 0..64 {
-            let value = |place| if is_flat { pixel(&after, line, place)[0] } else { pixel(&after, place, line)[0] };
+            let value = |index| if is_flat { pixel(&after, line, index)[0] } else { pixel(&after, index, line)[0] };
             let mut values: Vec<_> = (0..64).map(value).collect();
             if !rises {
                 values.reverse();
@@ -167,7 +167,7 @@ fn slanted_edge() -> Result<(), Failed> {
 
 fn unchanged(what: &str, (before, after): (Picture, Picture)) -> Result<(), Failed> {
     let changed = before.bytes.chunks(4).zip(after.bytes.chunks(4)).position(|(before, after)| before != after);
-    changed.map_or(Ok(()), |first| Err(format!("{what}: pixel {first} is not what it was").into()))
+    changed.map_or(Ok(()), |first| Err(format!("{what}: pixel {first} changed").into()))
 }
 
 fn straight_edges() -> Result<(), Failed> {
@@ -200,7 +200,7 @@ const TWO_GREYS: &str = "
 ";
 
 fn dark() -> Result<(), Failed> {
-    // Perceived, 0.03 and 0.08: a large share, but only a twentieth of the range.
+    // Perceived, 0.03 and 0.08: a large relative difference, but only a twentieth of the range.
     let numbers = [0.0009, 0.0064, 0.0, 0.0];
     unchanged("in the dark", smoothed([40, 40], Fxaa::default(), TWO_GREYS, numbers)?)?;
     let lower = Fxaa { dark_threshold: 0.03, ..Fxaa::default() };
@@ -208,7 +208,7 @@ fn dark() -> Result<(), Failed> {
     if before == after {
         return Err("a lower threshold should find the edge".into());
     }
-    // Perceived, 0.9 and 1: more than the dark threshold, but only a tenth of the brighter.
+    // Perceived, 0.9 and 1: a difference above the dark threshold, but only a tenth of the brighter value.
     let numbers = [0.81, 1.0, 0.0, 0.0];
     unchanged("in the light", smoothed([40, 40], Fxaa::default(), TWO_GREYS, numbers)?)?;
     let lower = Fxaa { contrast_threshold: 0.08, ..Fxaa::default() };
@@ -220,10 +220,10 @@ fn sub_pixel() -> Result<(), Failed> {
     let dot = "return vec4(vec3(select(0.0, 1.0, all(vec2<i32>(pixel) == vec2(4, 4)))), 1.0);";
     let line = "return vec4(vec3(select(0.0, 1.0, i32(pixel.x) == 4)), 1.0);";
     // A single pixel differs from all its neighbours; a pixel of a line differs from two thirds of them by weight.
-    for (body, share_of_most) in [(dot, 1.0), (line, 0.5)] {
+    for (body, max_share) in [(dot, 1.0), (line, 0.5)] {
         for sub_pixel in [0.0, 0.25, 1.0] {
             let (_, after) = smoothed([9, 9], Fxaa { sub_pixel, ..Fxaa::default() }, body, [0.0; 4])?;
-            let left = 1.0 - f64::from(sub_pixel) * share_of_most;
+            let left = 1.0 - f64::from(sub_pixel) * max_share;
             assert_color(pixel(&after, 4, 4), [encoded(left); 3])?;
             assert_color(pixel(&after, 3, 4), [0; 3])?;
         }
@@ -234,15 +234,15 @@ fn sub_pixel() -> Result<(), Failed> {
 /// Half planes and stripes in colour, on a picture of size `numbers.zw` that begins at `numbers.xy` and continues
 /// beyond its border.
 const BUSY: &str = "
-    let place = clamp(floor(pixel - numbers.xy), vec2(0.0), numbers.zw - 1.0);
-    let slanted = select(0.1, 0.9, place.x * 0.3 + place.y * 1.1 > 6.0);
-    let steep = select(0.0, 1.0, place.x * 1.2 - place.y * 0.2 > 7.0);
-    let stripes = select(0.2, 0.8, (i32(place.x) * 3 + i32(place.y) * 5) % 7 < 3);
+    let texel = clamp(floor(pixel - numbers.xy), vec2(0.0), numbers.zw - 1.0);
+    let slanted = select(0.1, 0.9, texel.x * 0.3 + texel.y * 1.1 > 6.0);
+    let steep = select(0.0, 1.0, texel.x * 1.2 - texel.y * 0.2 > 7.0);
+    let stripes = select(0.2, 0.8, (i32(texel.x) * 3 + i32(texel.y) * 5) % 7 < 3);
     return vec4(slanted, steep, stripes, 1.0);
 ";
 
 fn borders() -> Result<(), Failed> {
-    // Wider than the search of the step.
+    // Wider than the distance that FXAA searches.
     const MARGIN: u32 = 20;
     for [width, height] in [[1, 1], [2, 1], [1, 2], [3, 2], [1, 40], [17, 13], [40, 40]] {
         let size = [width as f32, height as f32];
@@ -276,8 +276,8 @@ fn settings() -> Result<(), Failed> {
     if highest == lowest || draw(0.0, 0.0, f32::INFINITY)? != highest {
         return Err("infinity should be as 1".into());
     }
-    unchanged("nothing has so much contrast", draw(f32::INFINITY, 0.0, 1.0)?)?;
-    unchanged("nothing has so much contrast", draw(0.0, f32::INFINITY, 1.0)?)
+    unchanged("no edge exceeds an infinite threshold", draw(f32::INFINITY, 0.0, 1.0)?)?;
+    unchanged("no edge exceeds an infinite threshold", draw(0.0, f32::INFINITY, 1.0)?)
 }
 
 /// A scene's background after the steps, in order.
@@ -306,7 +306,7 @@ fn own_step() -> Result<(), Failed> {
         Step::between(source, target, "redden", "return vec4(source.r, 0.5 * source.gb, source.a);")
     };
     let background = [0.02, 0.2, 0.6];
-    let seen = Vec3::from_array(background.map(|radiance| radiance as f32));
+    let radiance_before = Vec3::from_array(background.map(|radiance| radiance as f32));
     let (tone_mapping, fxaa) = (ToneMapping::new(2.0), Fxaa::default());
 
     let mapped = background
@@ -314,15 +314,15 @@ fn own_step() -> Result<(), Failed> {
         .map(|radiance: f64| (radiance * (2.51 * radiance + 0.03)) / (radiance * (2.43 * radiance + 0.59) + 0.14));
     let negated = mapped.map(|mapped| 1.0 - mapped);
     let [red, green, blue] = negated;
-    assert_color(after_steps(seen, &[&tone_mapping])?, mapped.map(encoded))?;
-    assert_color(after_steps(seen, &[&tone_mapping, &negative, &fxaa])?, negated.map(encoded))?;
-    assert_color(after_steps(seen, &[&tone_mapping, &fxaa, &negative])?, negated.map(encoded))?;
+    assert_color(after_steps(radiance_before, &[&tone_mapping])?, mapped.map(encoded))?;
+    assert_color(after_steps(radiance_before, &[&tone_mapping, &negative, &fxaa])?, negated.map(encoded))?;
+    assert_color(after_steps(radiance_before, &[&tone_mapping, &fxaa, &negative])?, negated.map(encoded))?;
     let both: [&dyn PostStep; 4] = [&tone_mapping, &negative, &redden, &fxaa];
-    assert_color(after_steps(seen, &both)?, [red, green / 2.0, blue / 2.0].map(encoded))?;
+    assert_color(after_steps(radiance_before, &both)?, [red, green / 2.0, blue / 2.0].map(encoded))?;
     // The reverse order gives another picture: green and blue are halved before the negative.
     let swapped: [&dyn PostStep; 4] = [&tone_mapping, &redden, &negative, &fxaa];
     let [_, green, blue] = mapped;
-    assert_color(after_steps(seen, &swapped)?, [red, 1.0 - green / 2.0, 1.0 - blue / 2.0].map(encoded))
+    assert_color(after_steps(radiance_before, &swapped)?, [red, 1.0 - green / 2.0, 1.0 - blue / 2.0].map(encoded))
 }
 
 fn extreme_radiance() -> Result<(), Failed> {
@@ -343,7 +343,7 @@ fn extreme_radiance() -> Result<(), Failed> {
         (-1.0, -1.0, 0),
     ]);
     for (radiance, exposure, expected) in expected {
-        // Next to an ordinary colour, which must not change.
+        // Green is an ordinary value, which must not be affected.
         let numbers = [radiance, 0.25, radiance, 1.0];
         let pattern = Step::pattern("radiance", Format::Rgba16Float, "return numbers;", numbers);
         let tone_mapping = ToneMapping::new(exposure);

@@ -28,7 +28,7 @@ pub const CASES: &[Case] = &[
     ("the_draws_of_a_process_may_change_from_frame_to_frame", other_draws),
     ("a_full_screen_pass_that_tests_depth_fills_the_background", behind_everything),
     ("blended_objects_hide_nothing_behind_them", blended_leaves_depth),
-    ("exposure_brightens", exposure),
+    ("exposure_scales_radiance", exposure),
     ("a_shader_that_does_not_compile_is_named", broken_shader),
     ("a_shader_without_its_entry_point_is_named_in_every_frame", missing_entry_point),
     ("too_few_parameters_are_named", short_parameters),
@@ -36,14 +36,14 @@ pub const CASES: &[Case] = &[
     ("a_raw_pass_that_fails_or_panics_is_named", failing_raw_pass),
 ];
 
-/// A process whose declaration and draws are data.
-struct Made {
+/// A process defined by its fields.
+struct DataProcess {
     name: &'static str,
     declare: fn(&mut Declare),
     draws: fn() -> Draws<'static>,
 }
 
-impl RenderProcess for Made {
+impl RenderProcess for DataProcess {
     fn name(&self) -> &str {
         self.name
     }
@@ -80,7 +80,7 @@ fn plain_color(selection: Selection) -> Draws<'static> {
     Draws::Commands(CommandDraws { shader: PLAIN_COLOR, selection, ..CommandDraws::default() })
 }
 
-const PLAIN: Made = Made {
+const PLAIN: DataProcess = DataProcess {
     name: "plain colour",
     declare: |declare| {
         declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0, 0.0, 1.0, 1.0]));
@@ -129,7 +129,7 @@ fn back_to_front() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Fills a target with a grey that changes.
+/// Fills a target with a grey value that changes.
 struct Grey {
     percent: Arc<AtomicU32>,
 }
@@ -174,17 +174,17 @@ fn parameters() -> Result<(), Failed> {
     Ok(())
 }
 
-/// What a raw pass does in `encode`.
+/// The action of a raw pass in `encode`.
 #[derive(Clone, Copy)]
-enum Deed {
+enum Action {
     ClearYellow,
     Fail,
     Panic,
-    CopyNonsense,
+    InvalidCopy,
 }
 
 struct RawProcess {
-    deed: Deed,
+    action: Action,
 }
 
 impl RenderProcess for RawProcess {
@@ -208,8 +208,8 @@ impl RawPass for RawProcess {
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         let target = resources.target("raw").ok_or("the target is missing")?;
-        match self.deed {
-            Deed::ClearYellow => {
+        match self.action {
+            Action::ClearYellow => {
                 let view = target.create_view(&wgpu::TextureViewDescriptor::default());
                 let load = wgpu::LoadOp::Clear(wgpu::Color { r: 1.0, g: 1.0, b: 0.0, a: 1.0 });
                 encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -222,10 +222,10 @@ impl RawPass for RawProcess {
                     ..wgpu::RenderPassDescriptor::default()
                 });
             }
-            Deed::Fail => return Err("the well is dry".into()),
-            Deed::Panic => panic!("the well is poisoned"),
-            // From itself into itself.
-            Deed::CopyNonsense => {
+            Action::Fail => return Err("the well is dry".into()),
+            Action::Panic => panic!("the well is poisoned"),
+            // Source and destination are the same texture.
+            Action::InvalidCopy => {
                 encoder.copy_texture_to_texture(target.as_image_copy(), target.as_image_copy(), target.size());
             }
         }
@@ -235,13 +235,13 @@ impl RawPass for RawProcess {
 
 fn raw_pass() -> Result<(), Failed> {
     let mut fixture =
-        Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::ClearYellow }).output("raw"))?;
+        Fixture::with(2, |builder| builder.process(RawProcess { action: Action::ClearYellow }).output("raw"))?;
     let recorded = fixture.record(&panes(&[])?)?;
     let picture = fixture.submit(recorded)?.read(0, "raw")?;
     assert_color(pixel(&picture, 5, 5), [255, 255, 0])
 }
 
-/// Draws first one thing, then another.
+/// Changes the kind of its draws from frame to frame.
 struct Changing {
     step: Arc<AtomicU32>,
 }
@@ -293,7 +293,7 @@ fn other_draws() -> Result<(), Failed> {
 }
 
 fn behind_everything() -> Result<(), Failed> {
-    let sky = Made {
+    let sky = DataProcess {
         name: "sky",
         declare: |declare| {
             declare.draws_over("plain");
@@ -330,12 +330,12 @@ fn exposure() -> Result<(), Failed> {
         builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
     })?;
     let step = ToneMapping::new(exposure.clone());
-    let mut placed = Fixture::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
+    let mut deferred = Fixture::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
     for value in [0.5, 1.0, 4.0] {
         exposure.set(value);
         let expected = tone_mapped([0.1 * f64::from(value); 3]);
         assert_color(pixel(&alone.draw(&scene)?, 3, 3), expected)?;
-        assert_color(pixel(&placed.draw(&scene)?, 3, 3), expected)?;
+        assert_color(pixel(&deferred.draw(&scene)?, 3, 3), expected)?;
     }
     Ok(())
 }
@@ -347,19 +347,19 @@ fn missing_entry_point() -> Result<(), Failed> {
             Draws::Commands(CommandDraws { shader, fragment: Some("fragmnet"), ..CommandDraws::default() })
         }]
     {
-        let nameless = Made {
+        let no_entry_point = DataProcess {
             name: "nameless",
             declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
             draws,
         };
-        let error = error_of(Fixture::with(2, |builder| builder.process(nameless).output("picture"))?)?;
+        let error = error_of(Fixture::with(2, |builder| builder.process(no_entry_point).output("picture"))?)?;
         expect_named(&error, "nameless", "entry point")?;
     }
     Ok(())
 }
 
 fn short_parameters() -> Result<(), Failed> {
-    let short = Made {
+    let short = DataProcess {
         name: "short",
         declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
         draws: || {
@@ -402,7 +402,7 @@ fn expect_named(error: &FrameError, process: &str, detail: &str) -> Result<(), F
 }
 
 fn broken_shader() -> Result<(), Failed> {
-    let broken = Made {
+    let broken = DataProcess {
         name: "broken shader",
         declare: |declare| declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background),
         draws: || Draws::FullScreen(FullScreen { shader: "fn fragment( {", ..FullScreen::default() }),
@@ -413,7 +413,7 @@ fn broken_shader() -> Result<(), Failed> {
 
 fn refused_pass() -> Result<(), Failed> {
     // It reads the target that it draws into.
-    let refused = Made {
+    let refused = DataProcess {
         name: "ouroboros",
         declare: |declare| {
             declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background);
@@ -433,7 +433,7 @@ fn refused_pass() -> Result<(), Failed> {
             })
         },
     };
-    let first_writer = Made {
+    let first_writer = DataProcess {
         name: "head",
         declare: |declare| declare.clears_color("tail", Format::Rgba8Unorm, ClearColor::Background),
         draws: || plain_color(Selection::OPAQUE),
@@ -441,19 +441,19 @@ fn refused_pass() -> Result<(), Failed> {
     let fixture = Fixture::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
     expect_named(&error_of(fixture)?, "ouroboros", "finish")?;
 
-    let nonsense = RawProcess { deed: Deed::CopyNonsense };
+    let nonsense = RawProcess { action: Action::InvalidCopy };
     let fixture = Fixture::with(2, |builder| builder.process(nonsense).output("raw"))?;
     expect_named(&error_of(fixture)?, "raw process", "refused")
 }
 
 fn failing_raw_pass() -> Result<(), Failed> {
-    let fail = Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::Fail }).output("raw"))?;
+    let fail = Fixture::with(2, |builder| builder.process(RawProcess { action: Action::Fail }).output("raw"))?;
     let error = error_of(fail)?;
     expect_named(&error, "raw process", "the well is dry")?;
     let FrameError::Failed { source, .. } = &error else { return Err(format!("{error:?}").into()) };
     if source.downcast_ref::<BackendError>().is_none() {
         return Err("the backend's error is lost".into());
     }
-    let panics = Fixture::with(2, |builder| builder.process(RawProcess { deed: Deed::Panic }).output("raw"))?;
+    let panics = Fixture::with(2, |builder| builder.process(RawProcess { action: Action::Panic }).output("raw"))?;
     expect_named(&error_of(panics)?, "raw process", "the well is poisoned")
 }

@@ -74,7 +74,7 @@ impl Panel {
     }
 }
 
-/// A panel for ray intersection.
+/// A panel, prepared for ray intersection.
 struct Face {
     center: DVec3,
     normal: DVec3,
@@ -93,8 +93,8 @@ impl Face {
         Self { center, normal, right, up, double_sided: panel.double_sided }
     }
 
-    /// Where a ray meets its plane, as a multiple of `along`; infinite if it is parallel.
-    fn plane_share(&self, from: DVec3, along: DVec3) -> f64 {
+    /// Where a ray meets its plane, as a multiple of `along`; infinite if they are parallel.
+    fn plane_distance(&self, from: DVec3, along: DVec3) -> f64 {
         (self.center - from).dot(self.normal) / along.dot(self.normal)
     }
 
@@ -114,7 +114,7 @@ impl Face {
 
 /// Panels, and the lights that shine on them.
 #[derive(Clone, Debug, Default)]
-pub struct Stage {
+pub struct PanelScene {
     pub panels: Vec<Panel>,
     pub lights: Vec<Light>,
     /// How shadows are drawn.
@@ -127,12 +127,12 @@ struct Bounds {
     high: DVec3,
 }
 
-impl Stage {
+impl PanelScene {
     pub fn new(panels: Vec<Panel>, lights: Vec<Light>) -> Self {
         Self { panels, lights, maps: ShadowMaps::default() }
     }
 
-    /// What the renderer draws of it.
+    /// The scene that the renderer draws.
     pub fn scene(&self, cameras: &[Camera]) -> Result<Scene, Failed> {
         let mut scene = Scene::new();
         scene.cameras = cameras.to_vec();
@@ -148,18 +148,18 @@ impl Stage {
     }
 }
 
-/// How many pixels of a picture have which expectation.
+/// The number of pixels by expected result.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     pub lit: usize,
     pub dark: usize,
-    /// Anything between the two, where a shadow fades.
+    /// Pixels in a shadow's penumbra, which may have any value between the two.
     pub fading: usize,
-    /// Anything, at the edges of panels.
+    /// Pixels at the edges of panels, which may have any value.
     pub edges: usize,
 }
 
-impl Stage {
+impl PanelScene {
     /// Draws the panels, and fails if a pixel of any camera differs from the ray cast result.
     pub fn expect(&self, fixture: &mut Fixture, cameras: &[Camera]) -> Result<Counts, Failed> {
         self.expect_of(fixture, &self.scene(cameras)?)
@@ -178,7 +178,7 @@ impl Stage {
         Ok(counts)
     }
 
-    /// The distance to the nearest panel that a ray meets, in lengths of `along`, and which it is.
+    /// The distance to the nearest panel on a ray, in lengths of `along`, and the panel's index.
     pub fn nearest(&self, from: DVec3, along: DVec3) -> Option<(f64, usize)> {
         let faces = self.panels.iter().map(Face::new).enumerate();
         let hits = faces.filter_map(|(index, face)| Some((face.hit(from, along)?, index)));
@@ -193,7 +193,7 @@ impl Stage {
         counts: &mut Counts,
     ) -> Result<(), String> {
         let rays = Rays {
-            eye: Eye::new(camera),
+            ray_camera: RayCamera::new(camera),
             camera,
             faces: self.panels.iter().map(Face::new).collect(),
             lights: &self.lights,
@@ -236,7 +236,7 @@ impl Stage {
 
 /// Casts the rays of one camera.
 struct Rays<'a> {
-    eye: Eye,
+    ray_camera: RayCamera,
     camera: &'a Camera,
     faces: Vec<Face>,
     lights: &'a [Light],
@@ -247,7 +247,7 @@ struct Rays<'a> {
 
 impl Rays<'_> {
     /// The nearest face that the camera sees along a ray.
-    fn met(&self, from: DVec3, along: DVec3) -> Option<usize> {
+    fn nearest_face(&self, from: DVec3, along: DVec3) -> Option<usize> {
         let mut nearest = (f64::from(self.camera.far), None);
         for (index, face) in self.faces.iter().enumerate() {
             if let Some(share) = face.hit(from, along)
@@ -262,30 +262,30 @@ impl Rays<'_> {
 
     /// The bounds of a pixel; `None` if it is so close to an edge that rounding decides.
     fn radiance(&self, x: u32, y: u32) -> Option<Bounds> {
-        let ray = |right: f64, down: f64| self.eye.ray(f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down);
-        let met = |right: f64, down: f64| {
+        let ray = |right: f64, down: f64| self.ray_camera.ray(f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down);
+        let face_at = |right: f64, down: f64| {
             let (from, along) = ray(right, down);
-            self.met(from, along)
+            self.nearest_face(from, along)
         };
-        let index = met(0.0, 0.0);
+        let index = face_at(0.0, 0.0);
         let offset = 0.02;
         let around = [(offset, offset), (-offset, offset), (offset, -offset), (-offset, -offset)];
-        if around.iter().any(|&(right, down)| met(right, down) != index) {
+        if around.iter().any(|&(right, down)| face_at(right, down) != index) {
             return None;
         }
         let Some(index) = index else {
             return Some(Bounds { low: DVec3::ZERO, high: DVec3::ZERO });
         };
         let face = &self.faces[index];
-        let place = |right: f64, down: f64| {
+        let point_at = |right: f64, down: f64| {
             let (from, along) = ray(right, down);
-            from + along * face.plane_share(from, along)
+            from + along * face.plane_distance(from, along)
         };
         let (from, along) = ray(0.0, 0.0);
         let normal = if along.dot(face.normal) > 0.0 { -face.normal } else { face.normal };
-        let center = place(0.0, 0.0);
+        let center = point_at(0.0, 0.0);
         // A rasterizer snaps corners to a grid of 1/256 of a pixel, and the surface moves as much.
-        let footprint = center.distance(place(1.0, 0.0)).max(center.distance(place(0.0, 1.0)));
+        let footprint = center.distance(point_at(1.0, 0.0)).max(center.distance(point_at(0.0, 1.0)));
         let error = footprint / 256.0 + from.distance(center) * 1e-5;
         let mut sum = Bounds { low: DVec3::ZERO, high: DVec3::ZERO };
         for (light, &pixel) in self.lights.iter().zip(&self.map_pixels) {
@@ -303,22 +303,22 @@ impl Rays<'_> {
 
     /// The least and the greatest fraction of a light after shadowing: 0 or 1, but anything in between where the filter
     /// meets an edge, and so close behind the shadow caster that the bias may reach past it.
-    fn lit(&self, light: &Light, pixel: f64, index: usize, place: DVec3, normal: DVec3) -> [f64; 2] {
+    fn lit(&self, light: &Light, pixel: f64, index: usize, point: DVec3, normal: DVec3) -> [f64; 2] {
         if !light.casts_shadow() {
             return [1.0; 2];
         }
-        let width = edge_width(light, pixel, self.filter, place, normal);
+        let width = edge_width(light, pixel, self.filter, point, normal);
         let right = normal.any_orthonormal_vector();
         let up = normal.cross(right);
         let ring = |corners: u32, radius: f64| {
             (0..corners).map(move |corner| {
                 let (sine, cosine) = (TAU * f64::from(corner) / f64::from(corners)).sin_cos();
-                place + (right * cosine + up * sine) * radius
+                point + (right * cosine + up * sine) * radius
             })
         };
         let [mut least, mut most] = [1.0, 0.0];
-        for place in ring(24, width * 1.02).chain(ring(6, width * 0.5)).chain([place]) {
-            match self.distance_behind(light, index, place) {
+        for point in ring(24, width * 1.02).chain(ring(6, width * 0.5)).chain([point]) {
+            match self.distance_behind(light, index, point) {
                 None => most = 1.0,
                 Some(distance) if distance < width * 1.5 => (least, most) = (0.0, 1.0),
                 Some(_) => least = 0.0,
@@ -332,14 +332,14 @@ impl Rays<'_> {
 
     /// The distance from a point to the face that blocks a light from it, if one does; the point lies on the face at
     /// `index`.
-    fn distance_behind(&self, light: &Light, index: usize, place: DVec3) -> Option<f64> {
+    fn distance_behind(&self, light: &Light, index: usize, point: DVec3) -> Option<f64> {
         let (from, along) = match *light {
             Light::Directional { direction, .. } => {
                 let along = direction.as_dvec3().normalize() * 1e4;
-                (place - along, along)
+                (point - along, along)
             }
             Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
-                (position, place - position)
+                (position, point - position)
             }
             _ => return None,
         };
@@ -371,11 +371,11 @@ fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
 /// How far from its geometric edge a shadow may fade, in metres on the surface: half of the filter's width and half a
 /// pixel of the map, along a diagonal of the map's pixels, and more on a surface that is inclined to the light. A pixel
 /// is that of [`map_pixel`].
-fn edge_width(light: &Light, pixel: f64, filter: u32, place: DVec3, normal: DVec3) -> f64 {
+fn edge_width(light: &Light, pixel: f64, filter: u32, point: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
         Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
-            (pixel * place.distance(position), (position - place).normalize())
+            (pixel * point.distance(position), (position - point).normalize())
         }
         _ => (pixel, normal),
     };
@@ -394,7 +394,7 @@ fn color(light: &Light) -> DVec3 {
 }
 
 /// The least and the greatest illuminance of a light of intensity 1 at a point that is known to within `error` metres.
-fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
+fn illuminance(light: &Light, point: DVec3, normal: DVec3, error: f64) -> [f64; 2] {
     // An octahedral normal of half floats is up to 0.12° off if a device truncates them. Those along an axis are exact,
     // except for the rounding of f32.
     let of_normal = if normal.abs().max_element() > 1.0 - 1e-9 { 1e-6 } else { 2.1e-3 };
@@ -408,7 +408,7 @@ fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 
         | Light::Hemispherical { position, range, .. } => (position, f64::from(range)),
         _ => return [0.0; 2],
     };
-    let away = position - place;
+    let away = position - point;
     let distance = away.length();
     if distance <= error {
         return [0.0, f64::INFINITY];
@@ -425,7 +425,7 @@ fn illuminance(light: &Light, place: DVec3, normal: DVec3, error: f64) -> [f64; 
     [ends[0] * shape[0], ends[1] * shape[1]]
 }
 
-/// How much of a light goes along a direction whose cosine from its axis is greater by this.
+/// The fraction of a light's intensity in a direction. `more` is added to the cosine of the angle from the light's axis.
 fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
     match *light {
         Light::Spot { direction, inner_angle, outer_angle, .. } => {
@@ -439,8 +439,8 @@ fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
     }
 }
 
-/// The rays of the pixels of a camera's picture.
-struct Eye {
+/// Computes the rays of a camera's pixels.
+struct RayCamera {
     position: DVec3,
     axes: [DVec3; 3],
     size: [f64; 2],
@@ -449,7 +449,7 @@ struct Eye {
     perspective: bool,
 }
 
-impl Eye {
+impl RayCamera {
     fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
         let (half, perspective) = match camera.projection {

@@ -1,4 +1,4 @@
-//! Pictures against stored references; and typical mistakes exceed the bound.
+//! Pictures are compared with stored references. Typical mistakes exceed the bound of the comparison.
 
 use std::path::PathBuf;
 

@@ -15,13 +15,13 @@ pub const CASES: &[Case] = &[
     ("a_class_without_shadowed_lights_costs_nothing", || no_light_of_a_class(true)),
     ("lights_that_are_switched_off_cost_nothing", dark_lights),
     ("without_a_light_that_casts_shadows_there_is_no_shadow_map", no_casters),
-    ("without_glass_there_is_no_transparency", no_glass),
-    ("without_a_light_nothing_is_lit", no_light),
-    ("an_empty_scene_is_cleared_and_tone_mapped", nothing_at_all),
-    ("without_a_step_of_post_processing_there_is_none", no_post),
+    ("without_glass_there_is_no_transparency_process", no_glass),
+    ("without_lights_there_is_no_light_process", no_light),
+    ("an_empty_scene_is_cleared_and_tone_mapped", empty_scene),
+    ("without_post_processing_steps_there_is_none", no_post),
     ("without_a_depth_pre_pass_there_is_none", no_depth_pre_pass),
-    ("every_process_is_needed_by_another_or_changes_the_picture", every_process_counts),
-    ("processes_change_with_the_requirements_and_are_cached", processes_follow),
+    ("every_process_is_needed_by_another_or_changes_the_picture", every_process_is_needed),
+    ("processes_change_with_the_requirements_and_are_cached", cached_plans),
 ];
 
 const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1 };
@@ -77,17 +77,11 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     Ok((cost, picture))
 }
 
-/// Fails unless a scene without a feature costs as much, and has the same picture byte for byte, as with a pipeline
-/// that has no process for it; and costs less than the scene with everything by the expected savings.
-fn expect_saved(
-    full: &(Cost, Picture),
-    what: &str,
-    scene: &Scene,
-    never_had: Deferred,
-    saved: Cost,
-) -> Result<(), Failed> {
+/// Checks a scene without a feature. Its cost and its picture must equal those of a bare pipeline without a process for the
+/// feature, and its cost must be lower than that of the scene with everything, by `saved`.
+fn expect_saved(full: &(Cost, Picture), what: &str, scene: &Scene, bare: Deferred, saved: Cost) -> Result<(), Failed> {
     let (cost, picture) = drawn(deferred(), scene)?;
-    let (bare_cost, bare_picture) = drawn(never_had, scene)?;
+    let (bare_cost, bare_picture) = drawn(bare, scene)?;
     if cost != bare_cost {
         return Err(format!("{what}: {cost:?}, where a pipeline without it has {bare_cost:?}").into());
     }
@@ -112,7 +106,7 @@ fn expect_same(what: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Re
     if one.0 != other.0 {
         return Err(format!("{what}: {:?} should be {:?}", one.0, other.0).into());
     }
-    if one.1 == other.1 { Ok(()) } else { Err(format!("{what}: the picture is another").into()) }
+    if one.1 == other.1 { Ok(()) } else { Err(format!("{what}: the picture differs").into()) }
 }
 
 /// Every class of lights.
@@ -171,14 +165,14 @@ fn no_casters() -> Result<(), Failed> {
         shadow_views: casters,
         lights: 0,
     };
-    let never_had = || Deferred::to_picture().shadow_maps(None);
-    expect_saved(&full()?, "shadows", &scene, never_had(), saved)?;
+    let bare = || Deferred::to_picture().shadow_maps(None);
+    expect_saved(&full()?, "shadows", &scene, bare(), saved)?;
     // With `None` no light casts shadows.
-    expect_same("no shadow maps", &drawn(never_had(), &everything())?, &drawn(deferred(), &scene)?)?;
+    expect_same("no shadow maps", &drawn(bare(), &everything())?, &drawn(deferred(), &scene)?)?;
     let mut casting = everything();
     casting.lights.retain(Light::casts_shadow);
     scene.lights = casting.lights.iter().copied().map(without_shadow).collect();
-    expect_same("no shadow maps, shadowed lights alone", &drawn(never_had(), &casting)?, &drawn(deferred(), &scene)?)
+    expect_same("no shadow maps, shadowed lights alone", &drawn(bare(), &casting)?, &drawn(deferred(), &scene)?)
 }
 
 fn no_glass() -> Result<(), Failed> {
@@ -211,11 +205,11 @@ fn no_light() -> Result<(), Failed> {
         lights,
     };
     let kinds = LightKind::ALL.map(|kind| LightVolumes::name_of(LightClass { kind, shadowed: false }));
-    let never_had = kinds.into_iter().fold(Deferred::to_picture().shadow_maps(None), Deferred::leave_out);
-    expect_saved(&full()?, "lights", &scene, never_had, saved)
+    let bare = kinds.into_iter().fold(Deferred::to_picture().shadow_maps(None), Deferred::leave_out);
+    expect_saved(&full()?, "lights", &scene, bare, saved)
 }
 
-fn nothing_at_all() -> Result<(), Failed> {
+fn empty_scene() -> Result<(), Failed> {
     let mut scene = Scene::new();
     scene.cameras = everything().cameras;
     let (cost, _) = drawn(deferred(), &scene)?;
@@ -240,7 +234,7 @@ fn no_post() -> Result<(), Failed> {
     let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
     let recorded = fixture.record(&everything())?;
     let radiance = fixture.submit(recorded)?.read(0, "radiance")?;
-    if radiance == without.1 { Ok(()) } else { Err("without tone mapping, radiance is another".into()) }
+    if radiance == without.1 { Ok(()) } else { Err("without tone mapping, radiance differs".into()) }
 }
 
 fn no_depth_pre_pass() -> Result<(), Failed> {
@@ -253,7 +247,7 @@ fn no_depth_pre_pass() -> Result<(), Failed> {
     if with_picture == picture { Ok(()) } else { Err("it changes the picture".into()) }
 }
 
-fn every_process_counts() -> Result<(), Failed> {
+fn every_process_is_needed() -> Result<(), Failed> {
     let all = || deferred().depth_pre_pass(true).post(Fxaa::default());
     let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
     let picture = fixture.draw(&everything())?;
@@ -288,41 +282,41 @@ type Step = (&'static str, usize, usize, fn(&mut Scene) -> Result<(), Failed>);
 const STEPS: &[Step] = &[
     // The plan of an empty scene always exists.
     ("everything", 2, EVERY_PIPELINE, |_| Ok(())),
-    ("the last spot light with a shadow goes", 3, 0, |scene| {
+    ("the last spot light with a shadow is removed", 3, 0, |scene| {
         scene.lights.retain(|light| light.kind() != LightKind::Spot || !light.casts_shadow());
         Ok(())
     }),
-    ("it comes back", 3, 0, |scene| {
+    ("it is added again", 3, 0, |scene| {
         scene.lights = everything().lights;
         Ok(())
     }),
-    // The shader of glass reads no maps then.
-    ("all shadows go", 4, GLASS_STATES as usize, |scene| {
+    // Without shadows the shader of glass reads no maps.
+    ("all shadows are disabled", 4, GLASS_STATES as usize, |scene| {
         scene.lights = everything().lights.into_iter().map(without_shadow).collect();
         Ok(())
     }),
-    ("they come back", 4, 0, |scene| {
+    ("they are enabled again", 4, 0, |scene| {
         scene.lights = everything().lights;
         Ok(())
     }),
-    ("most glass goes", 4, 0, |scene| make_opaque(scene, 2)),
-    ("the last glass goes", 5, 0, |scene| make_opaque(scene, 3)),
-    ("most lights go", 6, 0, |scene| {
+    ("most glass is removed", 4, 0, |scene| make_opaque(scene, 2)),
+    ("the last glass is removed", 5, 0, |scene| make_opaque(scene, 3)),
+    ("most lights are removed", 6, 0, |scene| {
         scene.lights.retain(|light| matches!(light, Light::Directional { casts_shadow: false, .. }));
         Ok(())
     }),
     // The rest requires no more than an empty scene.
-    ("all lights go", 6, 0, |scene| {
+    ("all lights are removed", 6, 0, |scene| {
         scene.lights.clear();
         Ok(())
     }),
-    ("everything comes back", 6, 0, |scene| {
+    ("everything is added again", 6, 0, |scene| {
         scene.lights = everything().lights;
         make_opaque(scene, 0)
     }),
 ];
 
-/// Those of objects in maps, of opaque objects and of glass; of seven classes of lights, and of tone mapping.
+/// The pipelines for objects in maps, for opaque objects and for glass, for seven classes of lights, and for tone mapping.
 const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 7 + 1;
 
 /// Makes this many of the glass materials opaque.
@@ -338,7 +332,7 @@ fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
     Ok(())
 }
 
-fn processes_follow() -> Result<(), Failed> {
+fn cached_plans() -> Result<(), Failed> {
     let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
     let mut scene = everything();
     let mut pictures = Vec::new();
@@ -358,9 +352,11 @@ fn processes_follow() -> Result<(), Failed> {
         if picture != fresh_picture {
             return Err(format!("{what}: a new renderer draws another picture").into());
         }
-        // Up to twice as many shadow maps are kept as are drawn.
-        let most = fresh.target_bytes + fresh.shadow_views * BYTES_OF_A_MAP;
-        if kept.targets as i64 != fresh.targets || !(fresh.target_bytes..=most).contains(&(kept.target_bytes as i64)) {
+        // The backend keeps up to twice as many shadow maps as are drawn.
+        let max_bytes = fresh.target_bytes + fresh.shadow_views * BYTES_OF_A_MAP;
+        if kept.targets as i64 != fresh.targets
+            || !(fresh.target_bytes..=max_bytes).contains(&(kept.target_bytes as i64))
+        {
             return Err(format!("{what}: {kept:?}, where a new renderer has {fresh:?}").into());
         }
         pictures.push(picture);
@@ -370,7 +366,7 @@ fn processes_follow() -> Result<(), Failed> {
     for ((what, .., change), before) in STEPS.iter().zip(&pictures) {
         change(&mut scene)?;
         if fixture.draw(&scene)? != *before {
-            return Err(format!("{what}: the second time, the picture is another").into());
+            return Err(format!("{what}: the second time, the picture differs").into());
         }
     }
     if kept(&fixture) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&fixture)).into()) }

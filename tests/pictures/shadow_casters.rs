@@ -7,22 +7,22 @@ use drawloom_testing::scenes::{cube, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::rays::{Panel, Stage};
-use crate::shadows::{MAPS, camera, hemisphere, spot, studio_with, sun, told};
+use crate::rays::{Panel, PanelScene};
+use crate::shadows::{MAPS, camera, fixture_with, hemisphere, spot, sun, with_context};
 
 pub const CASES: &[Case] = &[
     ("boxes_cast_their_shadow_mirrored_or_not", boxes),
     ("squares_cast_their_shadow_as_lists_and_as_strips", squares),
     ("blended_objects_cast_no_shadow", blended_casts_none),
     ("blended_objects_are_darker_in_shadow", blended_receives),
-    ("no_scale_spoils_a_shadow_map", extreme_scales),
+    ("extreme_scales_do_not_corrupt_a_shadow_map", extreme_scales),
     ("a_shadow_map_holds_the_nearest_depth", depths),
 ];
 
 fn lights() -> [Light; 3] {
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
-    let place = DVec3::new(-0.4, 3.0, 0.9);
-    [sun(down), spot(place, down, 45.0), hemisphere(place, down)]
+    let position = DVec3::new(-0.4, 3.0, 0.9);
+    [sun(down), spot(position, down, 45.0), hemisphere(position, down)]
 }
 
 fn floor() -> Panel {
@@ -30,18 +30,18 @@ fn floor() -> Panel {
 }
 
 /// A floor in one light, seen from above, and from just over it; and the panels of the scene.
-struct Set {
-    floor: Stage,
+struct FloorScene {
+    floor: PanelScene,
     scene: Scene,
 }
 
-impl Set {
+impl FloorScene {
     fn new(light: Light) -> Result<Self, Failed> {
         let views = [
             camera(DVec3::new(2.0, 3.5, 3.0), DVec3::new(0.3, 0.5, -0.2), 50.0),
             camera(DVec3::new(1.2, 0.6, 0.8), DVec3::new(0.2, 0.0, -0.2), 80.0),
         ];
-        let floor = Stage { panels: vec![floor()], lights: vec![light], maps: MAPS };
+        let floor = PanelScene { panels: vec![floor()], lights: vec![light], maps: MAPS };
         let scene = floor.scene(&views)?;
         Ok(Self { floor, scene })
     }
@@ -60,10 +60,10 @@ impl Set {
     }
 
     /// The expected result with these panels on top.
-    fn with(&self, panels: Vec<Panel>) -> Stage {
-        let mut stage = self.floor.clone();
-        stage.panels.extend(panels);
-        stage
+    fn with(&self, panels: Vec<Panel>) -> PanelScene {
+        let mut panel_scene = self.floor.clone();
+        panel_scene.panels.extend(panels);
+        panel_scene
     }
 }
 
@@ -72,17 +72,19 @@ fn white() -> Material {
 }
 
 fn boxes() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         for signs in [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, -1.0), Vec3::NEG_ONE] {
             let half = Vec3::new(0.5, 0.15, 0.3);
-            let mut set = Set::new(light)?;
-            let mesh = set.scene.add(cube())?;
-            set.add(mesh, white(), |object| object.scale = half * signs)?;
-            let stage = set.with(Panel::closed_box(DVec3::Y, half.as_dvec3()));
-            let counts = stage.expect_of(&mut fixture, &set.scene).map_err(|failed| told(failed, signs))?;
+            let mut floor_scene = FloorScene::new(light)?;
+            let mesh = floor_scene.scene.add(cube())?;
+            floor_scene.add(mesh, white(), |object| object.scale = half * signs)?;
+            let panel_scene = floor_scene.with(Panel::closed_box(DVec3::Y, half.as_dvec3()));
+            let counts = panel_scene
+                .expect_of(&mut fixture, &floor_scene.scene)
+                .map_err(|failed| with_context(failed, signs))?;
             if counts.dark < 50 {
-                return Err(format!("too little to judge: {counts:?}").into());
+                return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -90,7 +92,7 @@ fn boxes() -> Result<(), Failed> {
 }
 
 fn squares() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         for (topology, mirrored) in
             [(Topology::TriangleList, 1.0), (Topology::TriangleStrip, 1.0), (Topology::TriangleStrip, -1.0)]
@@ -98,17 +100,17 @@ fn squares() -> Result<(), Failed> {
             // Visible from both sides; from the light's side only; from the other side only, and then it casts no
             // shadow.
             for (double_sided, turn) in [(true, -90.0_f32), (true, 90.0), (false, -90.0), (false, 90.0)] {
-                let mut set = Set::new(light)?;
-                let mesh = set.scene.add(square(topology))?;
-                set.add(mesh, Material { double_sided, ..white() }, |object| {
+                let mut floor_scene = FloorScene::new(light)?;
+                let mesh = floor_scene.scene.add(square(topology))?;
+                floor_scene.add(mesh, Material { double_sided, ..white() }, |object| {
                     object.orientation = Quat::from_rotation_x(turn.to_radians());
                     object.scale = Vec3::new(0.5 * mirrored, 0.4, 0.7);
                 })?;
                 let up = -f64::from(turn).signum();
                 let panel = Panel { double_sided, ..Panel::new(DVec3::Y, DVec3::X * 0.5, DVec3::NEG_Z * (0.4 * up)) };
-                let counts = set.with(vec![panel]).expect_of(&mut fixture, &set.scene);
-                let counts =
-                    counts.map_err(|failed| told(failed, format!("{topology:?} {mirrored} {double_sided} {turn}")))?;
+                let counts = floor_scene.with(vec![panel]).expect_of(&mut fixture, &floor_scene.scene);
+                let counts = counts
+                    .map_err(|failed| with_context(failed, format!("{topology:?} {mirrored} {double_sided} {turn}")))?;
                 if (counts.fading > 20) != (double_sided || up > 0.0) {
                     return Err(format!("{double_sided} {turn}: {counts:?}").into());
                 }
@@ -119,19 +121,19 @@ fn squares() -> Result<(), Failed> {
 }
 
 fn blended_casts_none() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         for blend in [Blend::Alpha, Blend::Additive, Blend::Subtractive] {
-            let mut set = Set::new(light)?;
+            let mut floor_scene = FloorScene::new(light)?;
             // From below, the glass is not visible.
-            set.scene.cameras.remove(0);
-            let mesh = set.scene.add(cube())?;
-            set.add(mesh, Material { blend, opacity: 0.9, ..white() }, |object| {
+            floor_scene.scene.cameras.remove(0);
+            let mesh = floor_scene.scene.add(cube())?;
+            floor_scene.add(mesh, Material { blend, opacity: 0.9, ..white() }, |object| {
                 object.scale = Vec3::new(0.6, 0.1, 0.6)
             })?;
-            let counts = set.floor.expect_of(&mut fixture, &set.scene)?;
+            let counts = floor_scene.floor.expect_of(&mut fixture, &floor_scene.scene)?;
             if counts.lit < 2500 {
-                return Err(format!("too little to judge: {counts:?}").into());
+                return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -140,25 +142,27 @@ fn blended_casts_none() -> Result<(), Failed> {
 
 /// A floor of glass that reflects half of the light, with nothing behind it.
 fn blended_receives() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         for blend in [Blend::Alpha, Blend::Additive] {
             let shade = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
-            let mut set = Set::new(light)?;
-            let mut scene = Stage { panels: vec![shade], ..set.floor.clone() }.scene(&set.scene.cameras[1..])?;
-            std::mem::swap(&mut set.scene, &mut scene);
-            let mesh = set.scene.add(square(Topology::TriangleList))?;
-            set.add(mesh, Material { blend, opacity: 0.5, ..white() }, |object| {
+            let mut floor_scene = FloorScene::new(light)?;
+            let mut scene = PanelScene { panels: vec![shade], ..floor_scene.floor.clone() }
+                .scene(&floor_scene.scene.cameras[1..])?;
+            std::mem::swap(&mut floor_scene.scene, &mut scene);
+            let mesh = floor_scene.scene.add(square(Topology::TriangleList))?;
+            floor_scene.add(mesh, Material { blend, opacity: 0.5, ..white() }, |object| {
                 object.position = DVec3::ZERO;
                 object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
                 object.scale = Vec3::splat(6.0);
             })?;
-            let mut stage = set.with(vec![shade]);
-            stage.lights = vec![halved(light)];
-            let counts =
-                stage.expect_of(&mut fixture, &set.scene).map_err(|failed| told(failed, format!("{light:?}")))?;
+            let mut panel_scene = floor_scene.with(vec![shade]);
+            panel_scene.lights = vec![halved(light)];
+            let counts = panel_scene
+                .expect_of(&mut fixture, &floor_scene.scene)
+                .map_err(|failed| with_context(failed, format!("{light:?}")))?;
             if counts.lit < 1000 || counts.dark < 50 {
-                return Err(format!("too little to judge: {counts:?}").into());
+                return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -177,7 +181,7 @@ fn halved(light: Light) -> Light {
 }
 
 fn extreme_scales() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         for scale in [
             Vec3::ZERO,
@@ -186,19 +190,21 @@ fn extreme_scales() -> Result<(), Failed> {
             Vec3::new(-1e6, 1e3, 1e5),
             Vec3::splat(1e20),
         ] {
-            let mut set = Set::new(light)?;
-            let [mesh, flat] = [set.scene.add(cube())?, set.scene.add(square(Topology::TriangleStrip))?];
+            let mut floor_scene = FloorScene::new(light)?;
+            let [mesh, flat] =
+                [floor_scene.scene.add(cube())?, floor_scene.scene.add(square(Topology::TriangleStrip))?];
             // At a lamp, and near the centre of the scene.
-            set.add(mesh, white(), |object| (object.scale, object.position) = (scale, DVec3::new(-0.4, 3.0, 0.9)))?;
-            set.add(flat, Material { double_sided: true, ..white() }, |object| {
+            floor_scene
+                .add(mesh, white(), |object| (object.scale, object.position) = (scale, DVec3::new(-0.4, 3.0, 0.9)))?;
+            floor_scene.add(flat, Material { double_sided: true, ..white() }, |object| {
                 object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
                 object.scale = Vec3::splat(0.4);
             })?;
             let square = Panel::facing(DVec3::Y, DVec3::Y, 0.4).double_sided();
-            let counts = set.with(vec![square]).expect_of(&mut fixture, &set.scene);
-            let counts = counts.map_err(|failed| told(failed, format!("{scale} {light:?}")))?;
+            let counts = floor_scene.with(vec![square]).expect_of(&mut fixture, &floor_scene.scene);
+            let counts = counts.map_err(|failed| with_context(failed, format!("{scale} {light:?}")))?;
             if counts.dark < 50 {
-                return Err(format!("too little to judge: {counts:?}").into());
+                return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -206,14 +212,14 @@ fn extreme_scales() -> Result<(), Failed> {
 }
 
 fn depths() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for light in lights() {
         let mut panels = Panel::room(DVec3::Y * 3.5, 3.5);
         panels.extend(Panel::closed_box(DVec3::new(0.3, 1.2, -0.2), DVec3::new(0.5, 0.2, 0.6)));
-        let stage = Stage { panels, lights: vec![light], maps: MAPS };
+        let panel_scene = PanelScene { panels, lights: vec![light], maps: MAPS };
         let view = camera(DVec3::new(2.0, 3.0, 2.0), DVec3::ZERO, 60.0);
         let map = MAPS.camera(String::new(), &light, std::slice::from_ref(&view)).ok_or("there is no map")?;
-        let recorded = fixture.record(&stage.scene(&[view])?)?;
+        let recorded = fixture.record(&panel_scene.scene(&[view])?)?;
         let picture = fixture.submit(recorded)?.read(1, "shadow map")?;
         if [picture.width, picture.height] != [MAPS.side; 2] {
             return Err(format!("it is {} by {}", picture.width, picture.height).into());
@@ -223,13 +229,13 @@ fn depths() -> Result<(), Failed> {
             let bytes = [0, 1, 2, 3].map(|byte| picture.bytes[start + byte]);
             f64::from(f32::from_le_bytes(bytes))
         };
-        compare_depths(&stage, &map, depth).map_err(|problem| format!("{light:?}: {problem}"))?;
+        compare_depths(&panel_scene, &map, depth).map_err(|problem| format!("{light:?}: {problem}"))?;
     }
     Ok(())
 }
 
 /// The ray of a map's pixel, with `along` in the unit of depth; `None` outside of the disc.
-fn look(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
+fn map_ray(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
     let side = f64::from(map.size[0]);
     let clip = DVec2::new(x / side * 2.0 - 1.0, 1.0 - y / side * 2.0);
     let orientation = map.orientation.as_dquat().normalize();
@@ -248,13 +254,13 @@ fn look(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
     Some((map.position + orientation * from, orientation * along))
 }
 
-fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) -> Result<(), String> {
+fn compare_depths(panel_scene: &PanelScene, map: &Camera, depth: impl Fn(u32, u32) -> f64) -> Result<(), String> {
     let [near, far] = [map.near, map.far].map(f64::from);
     let mut compared = 0;
     for (x, y) in (0..map.size[1]).step_by(5).flat_map(|y| (0..map.size[0]).step_by(3).map(move |x| (x, y))) {
         let nearest = |right: f64, down: f64| {
-            let (from, along) = look(map, f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down)?;
-            stage.nearest(from, along)
+            let (from, along) = map_ray(map, f64::from(x) + 0.5 + right, f64::from(y) + 0.5 + down)?;
+            panel_scene.nearest(from, along)
         };
         let around = [(0.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
         let Some(hits) = around.iter().map(|&(right, down)| nearest(right, down)).collect::<Option<Vec<_>>>() else {
@@ -275,5 +281,5 @@ fn compare_depths(stage: &Stage, map: &Camera, depth: impl Fn(u32, u32) -> f64) 
         }
         compared += 1;
     }
-    if compared > 2000 { Ok(()) } else { Err(format!("only {compared} pixels could be judged")) }
+    if compared > 2000 { Ok(()) } else { Err(format!("only {compared} pixels could be compared")) }
 }

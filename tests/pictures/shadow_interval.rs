@@ -18,10 +18,11 @@ pub const CASES: &[Case] = &[
     ("a_moved_light_lags_together_with_its_shadow", moved_light),
     ("shadows_stay_in_the_world_when_the_camera_moves", moved_camera),
     ("a_dropped_frame_loses_no_shadow_map", dropped),
-    ("another_number_of_lights_or_views_leaves_no_old_shadow", other_lists),
+    ("no_old_shadow_remains_when_lights_or_views_are_added_or_removed", other_lists),
 ];
 
-fn every(interval: u32) -> Result<Fixture, Failed> {
+/// A fixture whose shadow maps are drawn every `interval` frames.
+fn fixture_every(interval: u32) -> Result<Fixture, Failed> {
     let quality = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { interval, side: 512, ..quality.shadows }, ..quality };
     Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
@@ -46,10 +47,10 @@ fn scene() -> Scene {
 }
 
 /// Moves all objects.
-fn shift(scene: &mut Scene, way: DVec3) -> Result<(), SceneError> {
+fn shift(scene: &mut Scene, by: DVec3) -> Result<(), SceneError> {
     for handle in scene.objects().collect::<Vec<_>>() {
         let mut object = scene.object(handle)?;
-        object.position += way;
+        object.position += by;
         scene.replace_object(handle, object)?;
     }
     Ok(())
@@ -57,12 +58,12 @@ fn shift(scene: &mut Scene, way: DVec3) -> Result<(), SceneError> {
 
 fn nothing_moves() -> Result<(), Failed> {
     let scene = scene();
-    let expected = every(1)?.draw(&scene)?;
+    let expected = fixture_every(1)?.draw(&scene)?;
     let mut unlit = field(300);
     unlit.lights.clear();
-    assert_different(&expected, &every(1)?.draw(&unlit)?)?;
+    assert_different(&expected, &fixture_every(1)?.draw(&unlit)?)?;
     for interval in [2, 3] {
-        let mut fixture = every(interval)?;
+        let mut fixture = fixture_every(interval)?;
         for frame in 0..5 {
             if fixture.draw(&scene)? != expected {
                 return Err(format!("frame {frame} of {interval}").into());
@@ -74,10 +75,10 @@ fn nothing_moves() -> Result<(), Failed> {
 
 fn moved_casters() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut fixture = every(3)?;
+    let mut fixture = fixture_every(3)?;
     fixture.draw(&scene)?;
     shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
-    let expected = every(1)?.draw(&scene)?;
+    let expected = fixture_every(1)?.draw(&scene)?;
     let late = [fixture.draw(&scene)?, fixture.draw(&scene)?];
     if late[0] == expected || late[0] != late[1] {
         return Err("the shadows are not those of the frame before".into());
@@ -89,14 +90,14 @@ fn moved_light() -> Result<(), Failed> {
     for index in 0..3 {
         let mut scene = field(300);
         scene.lights = vec![lights()[index]];
-        let mut fixture = every(2)?;
+        let mut fixture = fixture_every(2)?;
         let before = fixture.draw(&scene)?;
         match &mut scene.lights[0] {
             Light::Spot { position, .. } | Light::Hemispherical { position, .. } => position.x += 1.0,
             Light::Directional { direction, .. } => *direction = Vec3::new(0.5, -0.8, 0.1).normalize(),
             other => return Err(format!("{other:?}").into()),
         }
-        let expected = every(1)?.draw(&scene)?;
+        let expected = fixture_every(1)?.draw(&scene)?;
         assert_different(&before, &expected)?;
         if fixture.draw(&scene)? != before {
             return Err(format!("light {index} moved without its map").into());
@@ -110,28 +111,28 @@ fn moved_light() -> Result<(), Failed> {
 
 fn moved_camera() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut fixture = every(2)?;
+    let mut fixture = fixture_every(2)?;
     fixture.draw(&scene)?;
     for camera in &mut scene.cameras {
         camera.position += DVec3::new(2.0, 0.5, -3.0);
     }
     // The sun's new map has its pixels at other positions.
-    assert_alike(&fixture.draw(&scene)?, &every(1)?.draw(&scene)?)
+    assert_alike(&fixture.draw(&scene)?, &fixture_every(1)?.draw(&scene)?)
 }
 
 fn dropped() -> Result<(), Failed> {
     let mut scene = scene();
-    let mut fixture = every(2)?;
+    let mut fixture = fixture_every(2)?;
     fixture.draw(&scene)?;
     fixture.draw(&scene)?;
     shift(&mut scene, DVec3::new(0.5, 0.0, 0.8))?;
     drop(fixture.record(&scene)?);
-    let expected = every(1)?.draw(&scene)?;
+    let expected = fixture_every(1)?.draw(&scene)?;
     if fixture.draw(&scene)? == expected { Ok(()) } else { Err("the dropped frame's maps are missing".into()) }
 }
 
 fn other_lists() -> Result<(), Failed> {
-    let mut fixture = every(100)?;
+    let mut fixture = fixture_every(100)?;
     let mut scene = scene();
     let changes: [&dyn Fn(&mut Scene); 6] = [
         &|_| {},
@@ -143,7 +144,7 @@ fn other_lists() -> Result<(), Failed> {
     ];
     for (step, change) in changes.into_iter().enumerate() {
         change(&mut scene);
-        let expected = every(1)?.draw(&scene)?;
+        let expected = fixture_every(1)?.draw(&scene)?;
         for frame in 0..2 {
             if fixture.draw(&scene)? != expected {
                 return Err(format!("frame {frame} of step {step}").into());

@@ -9,19 +9,19 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, radiance};
-use crate::rays::{Counts, Panel, Stage};
+use crate::rays::{Counts, Panel, PanelScene};
 
 pub const CASES: &[Case] = &[
     ("a_square_casts_the_shadow_of_its_geometry", square_occluder),
-    ("shadows_are_right_in_the_middle_of_a_hemisphere_and_at_its_rim", around_a_hemisphere),
+    ("shadows_are_correct_in_the_middle_of_a_hemisphere_and_at_its_rim", around_a_hemisphere),
     ("a_long_beam_casts_a_straight_shadow", long_beam),
     ("an_object_across_a_hemispheres_plane_casts_no_shadow_in_front_of_it", across_the_rim),
     ("a_wall_close_behind_a_hemisphere_casts_no_shadow_in_front_of_it", close_behind),
     ("a_distant_object_blocks_a_directional_light", far_towards_the_sun),
     ("a_tower_shadows_what_is_close_behind_it", tower),
-    ("beyond_the_distance_of_a_map_all_is_lit", beyond_the_reach),
+    ("surfaces_beyond_a_maps_distance_are_lit", beyond_the_reach),
     ("each_light_has_its_own_shadow", several_lights),
-    ("maps_of_one_and_two_pixels_are_harmless", smallest_maps),
+    ("maps_of_one_and_two_pixels_only_darken", smallest_maps),
     ("a_spot_light_of_180_degrees_casts_shadows", widest_spot),
     ("an_orthographic_camera_sees_the_same_shadows", orthographic),
     ("shadows_far_from_the_origin_equal_those_near_it", far_away),
@@ -30,7 +30,7 @@ pub const CASES: &[Case] = &[
 pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1 };
 
 /// The shipped processes with these shadow maps.
-pub fn studio_with(maps: ShadowMaps) -> Result<Fixture, Failed> {
+pub fn fixture_with(maps: ShadowMaps) -> Result<Fixture, Failed> {
     Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
 }
 
@@ -78,20 +78,20 @@ pub fn without_shadow(light: Light) -> Light {
     light
 }
 
-fn stage(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> Stage {
-    Stage { panels, lights, maps }
+fn panel_scene(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> PanelScene {
+    PanelScene { panels, lights, maps }
 }
 
-/// Fails unless at least these fractions of the pixels are surely lit and surely dark, and at most a fifth is
+/// Fails unless at least these fractions of the pixels are certainly lit and certainly dark, and at most a fifth is
 /// uncertain.
 fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
     let all = (counts.lit + counts.dark + counts.fading + counts.edges) as f64;
     let enough = counts.lit as f64 >= lit * all && counts.dark as f64 >= dark * all;
     let sure = (counts.fading + counts.edges) as f64 <= 0.2 * all;
-    if enough && sure { Ok(()) } else { Err(format!("too little to judge: {counts:?}").into()) }
+    if enough && sure { Ok(()) } else { Err(format!("too few pixels to compare: {counts:?}").into()) }
 }
 
-pub fn told(failed: Failed, what: impl std::fmt::Display) -> Failed {
+pub fn with_context(failed: Failed, what: impl std::fmt::Display) -> Failed {
     format!("{what}: {}", failed.message().unwrap_or("")).into()
 }
 
@@ -104,7 +104,7 @@ fn directions() -> impl Iterator<Item = DVec3> {
 fn square_occluder() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, ..MAPS };
-        let mut fixture = studio_with(maps)?;
+        let mut fixture = fixture_with(maps)?;
         // The filter does not depend on the direction.
         for up in directions().skip(if filter == 1 { 0 } else { 7 }) {
             let aside = up.any_orthonormal_vector();
@@ -113,15 +113,15 @@ fn square_occluder() -> Result<(), Failed> {
             let mut square = Panel::facing(up * 1.2, up, 0.7).double_sided();
             // Neither along the map's axes nor across them.
             (square.right, square.up) = (square.right + square.up * 0.3, square.up - square.right * 0.3);
-            let place = up * 3.0 + aside * 0.7 + across * 0.4;
+            let position = up * 3.0 + aside * 0.7 + across * 0.4;
             let down = (-up - aside * 0.2).normalize();
             let eye = up * 4.0 - aside * 3.0 + across * 2.0;
-            for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
-                let stage = stage(vec![floor, square], vec![light], maps);
+            for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
+                let panel_scene = panel_scene(vec![floor, square], vec![light], maps);
                 let view = camera(eye, aside * -0.5, 50.0);
-                let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, up))?;
+                let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, up))?;
                 if filter == 1 {
-                    expect(counts, 0.4, 0.01).map_err(|failed| told(failed, format!("{light:?}")))?;
+                    expect(counts, 0.4, 0.01).map_err(|failed| with_context(failed, format!("{light:?}")))?;
                 }
             }
         }
@@ -129,27 +129,27 @@ fn square_occluder() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A direction at an angle from an axis.
-fn leaving(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
+/// A direction at an angle from `axis`, rotated by `around` about it.
+fn tilted(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
     let right = axis.any_orthonormal_vector();
     let aside = right * around.cos() + axis.cross(right) * around.sin();
     axis * degrees.to_radians().cos() + aside * degrees.to_radians().sin()
 }
 
 fn around_a_hemisphere() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
-    let place = DVec3::new(0.3, 1.0, -2.0);
+    let mut fixture = fixture_with(MAPS)?;
+    let position = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions() {
         for degrees in [5.0, 45.0, 75.0, 85.0] {
-            let way = leaving(axis, degrees, degrees + axis.x);
-            let wall = Panel::facing(place + way * 2.5, -way, 1.5);
-            let square = Panel::facing(place + way, -way, 0.2).double_sided();
-            let stage = stage(vec![wall, square], vec![hemisphere(place, axis)], MAPS);
-            let aside = way.cross(axis).normalize_or(way.any_orthonormal_vector());
-            let view = camera(place + aside * 0.8, wall.center, 40.0);
+            let direction = tilted(axis, degrees, degrees + axis.x);
+            let wall = Panel::facing(position + direction * 2.5, -direction, 1.5);
+            let square = Panel::facing(position + direction, -direction, 0.2).double_sided();
+            let panel_scene = panel_scene(vec![wall, square], vec![hemisphere(position, axis)], MAPS);
+            let aside = direction.cross(axis).normalize_or(direction.any_orthonormal_vector());
+            let view = camera(position + aside * 0.8, wall.center, 40.0);
             let what = format!("{degrees} degrees from {axis}");
-            let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, &what))?;
-            expect(counts, 0.3, 0.05).map_err(|failed| told(failed, &what))?;
+            let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &what))?;
+            expect(counts, 0.3, 0.05).map_err(|failed| with_context(failed, &what))?;
         }
     }
     Ok(())
@@ -157,7 +157,7 @@ fn around_a_hemisphere() -> Result<(), Failed> {
 
 fn long_beam() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 1024, ..MAPS };
-    let mut fixture = studio_with(maps)?;
+    let mut fixture = fixture_with(maps)?;
     let floor = Panel::facing(DVec3::Y * -4.0, DVec3::Y, 12.0);
     let wall = Panel::facing(DVec3::Z * -6.0, DVec3::Z, 12.0);
     // Below the light; to its side; near its plane. All are about 2.2 m away, and extend 10 m to either side.
@@ -171,19 +171,19 @@ fn long_beam() -> Result<(), Failed> {
             } else {
                 maps
             };
-            let stage = stage(vec![floor, wall, beam], vec![light], maps);
+            let panel_scene = panel_scene(vec![floor, wall, beam], vec![light], maps);
             let views = [
                 camera(DVec3::new(0.5, 1.0, 3.0), DVec3::new(0.0, -3.0, -3.0), 70.0),
                 camera(DVec3::new(1.0, 0.5, 1.0), DVec3::new(7.0, -3.0, -4.0), 80.0),
             ];
             let counts = if maps.max_distance == 20.0 {
-                stage.expect(&mut studio_with(maps)?, &views)
+                panel_scene.expect(&mut fixture_with(maps)?, &views)
             } else {
-                stage.expect(&mut fixture, &views)
+                panel_scene.expect(&mut fixture, &views)
             };
-            let counts = counts.map_err(|failed| told(failed, format!("({y}, {z}) {light:?}")))?;
+            let counts = counts.map_err(|failed| with_context(failed, format!("({y}, {z}) {light:?}")))?;
             if counts.lit < 3000 {
-                return Err(format!("too little to judge: {counts:?}").into());
+                return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -191,30 +191,30 @@ fn long_beam() -> Result<(), Failed> {
 }
 
 /// A square in front of the light, and the wall that its shadow falls on.
-fn before(place: DVec3, axis: DVec3) -> [Panel; 2] {
-    let wall = Panel::facing(place + axis * 3.0, -axis, 3.5);
-    [wall, Panel::facing(place + leaving(axis, 20.0, 0.7) * 1.2, -axis, 0.3).double_sided()]
+fn wall_and_square(position: DVec3, axis: DVec3) -> [Panel; 2] {
+    let wall = Panel::facing(position + axis * 3.0, -axis, 3.5);
+    [wall, Panel::facing(position + tilted(axis, 20.0, 0.7) * 1.2, -axis, 0.3).double_sided()]
 }
 
 fn across_the_rim() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
-    let place = DVec3::new(0.3, 1.0, -2.0);
+    let mut fixture = fixture_with(MAPS)?;
+    let position = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions().skip(4) {
         for (turn, distance) in [(40.0, 1.0), (80.0, 0.5), (100.0, 1.0), (150.0, 0.6)] {
             // From in front of the light to behind it, 12 m in either direction.
-            let away = leaving(axis, turn, turn);
-            let slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
-            let mut panels = before(place, axis).to_vec();
+            let away = tilted(axis, turn, turn);
+            let slab = Panel::facing(position + away * distance, -away, 12.0).double_sided();
+            let mut panels = wall_and_square(position, axis).to_vec();
             panels.push(slab);
-            let stage = stage(panels, vec![hemisphere(place, axis)], MAPS);
+            let panel_scene = panel_scene(panels, vec![hemisphere(position, axis)], MAPS);
             let views = [
-                camera(place - away * 0.2, place + axis * 3.0, 90.0),
-                camera(place - away * 2.0, place + axis + away, 90.0),
+                camera(position - away * 0.2, position + axis * 3.0, 90.0),
+                camera(position - away * 2.0, position + axis + away, 90.0),
             ];
             let what = format!("{turn} degrees from {axis}, {distance} m away");
-            let counts = stage.expect(&mut fixture, &views).map_err(|failed| told(failed, &what))?;
+            let counts = panel_scene.expect(&mut fixture, &views).map_err(|failed| with_context(failed, &what))?;
             if counts.lit < 500 {
-                return Err(format!("{what}: too little to judge: {counts:?}").into());
+                return Err(format!("{what}: too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -222,23 +222,23 @@ fn across_the_rim() -> Result<(), Failed> {
 }
 
 fn close_behind() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
-    let place = DVec3::new(0.3, 1.0, -2.0);
+    let mut fixture = fixture_with(MAPS)?;
+    let position = DVec3::new(0.3, 1.0, -2.0);
     for axis in directions().skip(5) {
         for turn in [170.0, 175.0, 180.0] {
             for distance in [0.1, 0.02] {
-                let away = leaving(axis, turn, turn);
-                let mut slab = Panel::facing(place + away * distance, -away, 12.0).double_sided();
+                let away = tilted(axis, turn, turn);
+                let mut slab = Panel::facing(position + away * distance, -away, 12.0).double_sided();
                 // No corner of the triangles that it is split into may be straight behind the light.
                 slab.center += slab.right.normalize() * 0.05 + slab.up.normalize() * 0.12;
-                let mut panels = before(place, axis).to_vec();
+                let mut panels = wall_and_square(position, axis).to_vec();
                 panels.push(slab);
-                let stage = stage(panels, vec![hemisphere(place, axis)], MAPS);
-                let view = camera(place + axis * 0.5, place + axis * 3.0, 90.0);
+                let panel_scene = panel_scene(panels, vec![hemisphere(position, axis)], MAPS);
+                let view = camera(position + axis * 0.5, position + axis * 3.0, 90.0);
                 let what = format!("{turn} degrees from {axis}, {distance} m away");
-                let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, &what))?;
+                let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &what))?;
                 if counts.lit < 500 {
-                    return Err(format!("{what}: too little to judge: {counts:?}").into());
+                    return Err(format!("{what}: too few pixels to compare: {counts:?}").into());
                 }
             }
         }
@@ -247,38 +247,38 @@ fn close_behind() -> Result<(), Failed> {
 }
 
 fn far_towards_the_sun() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     for height in [5.0, 50.0, 500.0, 5000.0] {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let kite = Panel::facing(-down * height, DVec3::Y, 1.0).double_sided();
-        let stage = stage(vec![floor, kite], vec![sun(down)], MAPS);
+        let panel_scene = panel_scene(vec![floor, kite], vec![sun(down)], MAPS);
         let view = camera(DVec3::new(2.0, 3.0, 4.0), DVec3::ZERO, 50.0);
-        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, height))?;
-        expect(counts, 0.4, 0.1).map_err(|failed| told(failed, height))?;
+        let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, height))?;
+        expect(counts, 0.4, 0.1).map_err(|failed| with_context(failed, height))?;
     }
     Ok(())
 }
 
-/// Each of its triangles extends from the ground to far above everything that the camera sees.
+/// Each triangle of the tower extends from the ground to far above everything that the camera sees.
 fn tower() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     for (height, lean) in [(20.0, 0.0), (100.0, 0.3), (200.0, 0.0)] {
         let up = DVec3::new(0.0, height / 2.0, lean * height);
         let tower = Panel::new(up, DVec3::Z * 3.0, up).double_sided();
         let wall = Panel::new(DVec3::new(1.5, 3.0, 0.0), DVec3::Z * 4.0, DVec3::Y * 3.0).double_sided();
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
-        let stage = stage(vec![tower, wall, floor], vec![sun(DVec3::new(0.6, -0.8, 0.0))], MAPS);
+        let panel_scene = panel_scene(vec![tower, wall, floor], vec![sun(DVec3::new(0.6, -0.8, 0.0))], MAPS);
         let view = camera(DVec3::new(0.3, 2.0, 5.0), DVec3::new(1.5, 3.0, -0.5), 70.0);
-        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, height))?;
-        expect(counts, 0.05, 0.1).map_err(|failed| told(failed, height))?;
+        let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, height))?;
+        expect(counts, 0.05, 0.1).map_err(|failed| with_context(failed, height))?;
     }
     Ok(())
 }
 
 fn beyond_the_reach() -> Result<(), Failed> {
     let maps = ShadowMaps { max_distance: 5.0, ..MAPS };
-    let mut fixture = studio_with(maps)?;
+    let mut fixture = fixture_with(maps)?;
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     // The surface that its shadow would fall on is too far away, so all of it is lit.
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
@@ -287,7 +287,7 @@ fn beyond_the_reach() -> Result<(), Failed> {
     let lit =
         Light::Directional { direction: down.as_vec3(), illuminance: Vec3::new(3.0, 2.0, 1.0), casts_shadow: false };
     let found = [sun(down), lit].map(|light| {
-        let scene = stage(vec![floor, square], vec![light], maps).scene(std::slice::from_ref(&view))?;
+        let scene = panel_scene(vec![floor, square], vec![light], maps).scene(std::slice::from_ref(&view))?;
         fixture.draw(&scene)
     });
     let [shadowed, lit] = found;
@@ -296,11 +296,11 @@ fn beyond_the_reach() -> Result<(), Failed> {
     }
     // At this distance there are shadows.
     let near = camera(DVec3::new(1.0, 2.0, 2.0), DVec3::ZERO, 50.0);
-    expect(stage(vec![floor, square], vec![sun(down)], maps).expect(&mut fixture, &[near])?, 0.3, 0.02)
+    expect(panel_scene(vec![floor, square], vec![sun(down)], maps).expect(&mut fixture, &[near])?, 0.3, 0.02)
 }
 
 fn several_lights() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
     let square = Panel::facing(DVec3::new(0.1, 1.0, 0.2), DVec3::Y, 0.5).double_sided();
     let tinted = |light: Light, tint: Vec3| match light {
@@ -343,7 +343,7 @@ fn several_lights() -> Result<(), Failed> {
             // Not every light reaches what this camera sees.
             camera(DVec3::new(-4.0, 1.0, 1.0), DVec3::new(-1.0, 0.0, 0.0), 50.0),
         ];
-        stage(vec![floor, square], lights, MAPS).expect(&mut fixture, &views)?;
+        panel_scene(vec![floor, square], lights, MAPS).expect(&mut fixture, &views)?;
     }
     Ok(())
 }
@@ -351,11 +351,11 @@ fn several_lights() -> Result<(), Failed> {
 fn smallest_maps() -> Result<(), Failed> {
     for side in [1, 2] {
         let maps = ShadowMaps { side, ..MAPS };
-        let mut fixture = studio_with(maps)?;
+        let mut fixture = fixture_with(maps)?;
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
         let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
-        let place = DVec3::Y * 3.0;
-        for light in [sun(DVec3::NEG_Y), spot(place, DVec3::NEG_Y, 50.0), hemisphere(place, DVec3::NEG_Y)] {
+        let position = DVec3::Y * 3.0;
+        for light in [sun(DVec3::NEG_Y), spot(position, DVec3::NEG_Y, 50.0), hemisphere(position, DVec3::NEG_Y)] {
             let view = camera(DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO, 60.0);
             // The positions of shadows are undefined, but nothing is brighter than its light, and nothing is shadowed
             // without a caster.
@@ -366,7 +366,8 @@ fn smallest_maps() -> Result<(), Failed> {
                 (vec![floor], without_shadow(light)),
                 (vec![floor], light),
             ] {
-                let recorded = fixture.record(&stage(panels, vec![light], maps).scene(std::slice::from_ref(&view))?)?;
+                let recorded =
+                    fixture.record(&panel_scene(panels, vec![light], maps).scene(std::slice::from_ref(&view))?)?;
                 shots.push(radiance(&fixture.submit(recorded)?, 0)?.into_flattened());
             }
             let [lit, shadowed, bare_lit, bare] = &shots[..] else { return Err("a picture is missing".into()) };
@@ -382,33 +383,33 @@ fn smallest_maps() -> Result<(), Failed> {
 
 fn widest_spot() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 2048, ..MAPS };
-    let mut fixture = studio_with(maps)?;
-    let place = DVec3::Y * 2.0;
+    let mut fixture = fixture_with(maps)?;
+    let position = DVec3::Y * 2.0;
     for degrees in [80.0, 84.9, 90.0] {
         let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
         let square = Panel::facing(DVec3::new(0.3, 1.0, 0.0), DVec3::Y, 0.6).double_sided();
-        let stage = stage(vec![floor, square], vec![spot(place, DVec3::NEG_Y, degrees)], maps);
+        let panel_scene = panel_scene(vec![floor, square], vec![spot(position, DVec3::NEG_Y, degrees)], maps);
         let view = camera(DVec3::new(1.0, 4.0, 5.0), DVec3::ZERO, 60.0);
-        let counts = stage.expect(&mut fixture, &[view]).map_err(|failed| told(failed, degrees))?;
+        let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, degrees))?;
         if counts.dark < 10 || counts.lit < 1200 {
-            return Err(format!("{degrees}: too little to judge: {counts:?}").into());
+            return Err(format!("{degrees}: too few pixels to compare: {counts:?}").into());
         }
     }
     Ok(())
 }
 
 fn orthographic() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 6.0);
     let square = Panel::facing(DVec3::Y, DVec3::Y, 0.6).double_sided();
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
-    let place = DVec3::new(0.5, 3.0, 0.2);
-    for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
+    let position = DVec3::new(0.5, 3.0, 0.2);
+    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
         for far in [8.0, 40.0] {
             let looking = Camera::looking_at("plan", DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO);
             let projection = Projection::Orthographic { height: 4.0 };
             let view = sized(Camera { projection, far, ..looking }, [80, 80]);
-            let counts = stage(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?;
+            let counts = panel_scene(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?;
             expect(counts, 0.4, 0.02)?;
         }
     }
@@ -416,15 +417,15 @@ fn orthographic() -> Result<(), Failed> {
 }
 
 fn far_away() -> Result<(), Failed> {
-    let mut fixture = studio_with(MAPS)?;
+    let mut fixture = fixture_with(MAPS)?;
     let shift = DVec3::new(1e6, -5e5, 2.5e5);
     let floor = Panel::facing(shift, DVec3::Y, 6.0);
     let square = Panel::facing(shift + DVec3::Y, DVec3::Y, 0.6).double_sided();
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
-    let place = shift + DVec3::new(0.5, 3.0, 0.2);
-    for light in [sun(down), spot(place, down, 50.0), hemisphere(place, down)] {
+    let position = shift + DVec3::new(0.5, 3.0, 0.2);
+    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
         let view = camera(shift + DVec3::new(1.0, 4.0, 4.0), shift, 45.0);
-        expect(stage(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?, 0.4, 0.01)?;
+        expect(panel_scene(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?, 0.4, 0.01)?;
     }
     Ok(())
 }

@@ -17,18 +17,18 @@ use crate::fixture::draw;
 use crate::references::shared;
 
 pub const CASES: &[Case] = &[
-    ("software_draws_the_demo_scene_as_wgpu_does", || judge(demo::colonnade()?)),
-    ("software_draws_everything_as_wgpu_does", || judge(everything())),
-    ("software_draws_a_field_of_boxes_as_wgpu_does", || judge(field(400))),
+    ("software_draws_the_demo_scene_as_wgpu_does", || compare(demo::colonnade()?)),
+    ("software_draws_everything_as_wgpu_does", || compare(everything())),
+    ("software_draws_a_field_of_boxes_as_wgpu_does", || compare(field(400))),
 ];
 
 pub const CASES_OF_SHARED_SCENES: &[Case] = &[
-    ("software_draws_cornell_as_wgpu_does", || judge(shared("cornell/CornellBox-Original.obj")?)),
-    ("software_draws_sponza_as_wgpu_does", || judge(shared("sponza/sponza_part.obj")?)),
+    ("software_draws_cornell_as_wgpu_does", || compare(shared("cornell/CornellBox-Original.obj")?)),
+    ("software_draws_sponza_as_wgpu_does", || compare(shared("sponza/sponza_part.obj")?)),
 ];
 
-/// wgpu against the reference, and against the software backend in f32.
-fn judge(mut scene: Scene) -> Result<(), Failed> {
+/// Compares wgpu's picture with those of the software backend in f32 and in f64.
+fn compare(mut scene: Scene) -> Result<(), Failed> {
     for camera in &mut scene.cameras {
         // Without optimisation the software backend takes about thirty times as long.
         camera.size = if cfg!(debug_assertions) { [240, 135] } else { [960, 540] };
@@ -43,7 +43,7 @@ fn judge(mut scene: Scene) -> Result<(), Failed> {
     if differences.iter().all(|(_, difference)| difference.is_within_bound()) {
         return Ok(());
     }
-    Err(format!("wgpu's picture and that of the processor differ: {differences:?}").into())
+    Err(format!("wgpu's picture and the CPU's differ: {differences:?}").into())
 }
 
 fn draw_on(backend: SoftwareBackend, scheduler: Arc<Scheduler>, scene: &Scene) -> Result<Picture, Failed> {
@@ -65,9 +65,9 @@ impl Difference {
         let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
         let (mut squares, mut near, mut count) = (0.0, 0.0, 0.0);
         for (one, other) in pixels {
-            let apart = [0, 1, 2].map(|channel| one[channel].abs_diff(other[channel]));
-            squares += apart.iter().map(|apart| f64::from(*apart).powi(2)).sum::<f64>() / 3.0;
-            near += f64::from(u8::from(apart.iter().all(|apart| *apart <= 3)));
+            let distances = [0, 1, 2].map(|channel| one[channel].abs_diff(other[channel]));
+            squares += distances.iter().map(|distance| f64::from(*distance).powi(2)).sum::<f64>() / 3.0;
+            near += f64::from(u8::from(distances.iter().all(|distance| *distance <= 3)));
             count += 1.0;
         }
         Self { root_mean_square: (squares / count).sqrt(), near: near / count }

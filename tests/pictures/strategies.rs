@@ -1,5 +1,5 @@
-//! Every recording and encoding strategy draws the same bytes while scenes change; and cached bundles are replayed exactly when
-//! nothing that they depend on changed.
+//! Every recording and encoding strategy draws the same bytes while scenes change. Cached bundles are replayed if and only
+//! if nothing that they depend on has changed.
 
 use std::sync::{Arc, OnceLock};
 
@@ -20,7 +20,7 @@ use crate::references::colonnade;
 
 pub const CASES: &[Case] = &[
     ("every_strategy_draws_the_same_bytes", same_bytes),
-    ("every_strategy_keeps_frames_in_flight_apart", frames_in_flight),
+    ("frames_in_flight_are_independent_with_every_strategy", frames_in_flight),
     ("trials_of_the_tuner_draw_the_same_bytes", tuned),
     ("cached_bundles_are_replayed_while_objects_move", moving),
     ("cached_bundles_are_recorded_again_when_their_inputs_change", recorded_again),
@@ -96,7 +96,7 @@ fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
     pictures(fixture, recorded, scene)
 }
 
-/// What a new renderer draws.
+/// The pictures of a new renderer.
 pub fn drawn_by_a_new_renderer(scene: &Scene) -> Result<Vec<Picture>, Failed> {
     draw(&mut fixture_with(RecordingStrategy::Bundles, EncodingStrategy::PerPass)?, scene)
 }
@@ -114,7 +114,7 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Many meshes and panes of glass of which nearly none merge: several bundles of opaque and of blended batches per view.
+/// Many meshes and panes of glass that hardly merge: several bundles of opaque and of blended batches per view.
 pub fn many_batches() -> Scene {
     let mut scene = field(3200);
     let meshes: Vec<_> = (0..1600).map(|_| scene.add(cube()).unwrap()).collect();
@@ -300,7 +300,7 @@ fn moving() -> Result<(), Failed> {
             expect((again, replayed) == (0, recorded), || format!("{encoding:?}, {frame}: {again} and {replayed}"))?;
         }
         if draw(&mut fixture, &scene)? != drawn_by_a_new_renderer(&scene)? {
-            return Err("replayed bundles draw objects where they were".into());
+            return Err("replayed bundles draw objects at their old positions".into());
         }
     }
     Ok(())
@@ -317,23 +317,23 @@ fn recorded_again() -> Result<(), Failed> {
     draw(&mut fixture, &scene)?;
     steady(&mut fixture, &scene, "the first frame")?;
 
-    // This changes one bundle and those after it; earlier ones stay.
-    let in_sight = scene.objects().nth(700).ok_or("there are objects")?;
-    let object = scene.remove_object(in_sight)?;
+    // This changes one bundle and those after it; earlier ones are replayed.
+    let visible = scene.objects().nth(700).ok_or("there are objects")?;
+    let object = scene.remove_object(visible)?;
     draw(&mut fixture, &scene)?;
     let (recorded, replayed) = counts(&fixture, |_| true);
     expect(recorded > 0 && replayed > 0, || format!("without an object {recorded} and {replayed}"))?;
-    steady(&mut fixture, &scene, "an object went")?;
+    steady(&mut fixture, &scene, "an object was removed")?;
     scene.add_object(object)?;
     draw(&mut fixture, &scene)?;
-    expect(counts(&fixture, |_| true).0 > 0, || "an object came back, and nothing was recorded".to_owned())?;
-    steady(&mut fixture, &scene, "an object came back")?;
+    expect(counts(&fixture, |_| true).0 > 0, || "an object was added again, and nothing was recorded".to_owned())?;
+    steady(&mut fixture, &scene, "an object was added again")?;
 
     // An input of every bundle.
     scene.add(Material::default())?;
     draw(&mut fixture, &scene)?;
     expect(counts(&fixture, |_| true).1 == 0, || "bundles of other materials were replayed".to_owned())?;
-    steady(&mut fixture, &scene, "a material came")?;
+    steady(&mut fixture, &scene, "a material was added")?;
 
     // A picture of the same aspect ratio shows the same objects, and bundles do not depend on the size.
     scene.cameras[0].size = [48, 27];
@@ -360,7 +360,7 @@ fn recorded_again() -> Result<(), Failed> {
     }
 }
 
-/// When the lamp of `everything` comes closer, subdivision levels rise; and when meshes change, so do their subdivisions.
+/// Subdivision levels rise when objects are closer to the lamp of `everything`. Subdivisions change when meshes change.
 fn subdivided_again() -> Result<(), Failed> {
     let (mut scene, mut fixture) =
         (everything(), fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?);
@@ -413,7 +413,7 @@ impl RenderProcess for Ouroboros {
     }
 }
 
-/// Draws the target that the other one samples.
+/// Draws the target that [`Ouroboros`] samples.
 struct Head;
 
 impl RenderProcess for Head {

@@ -20,7 +20,7 @@ fn quality(transforms: TransformPrecision) -> Quality {
     Quality { transforms, ..Quality::balanced() }
 }
 
-/// The field, moved this far from the world's origin.
+/// The field, moved by `shift` from the world's origin.
 fn field_at(shift: DVec3) -> Result<Scene, SceneError> {
     let mut scene = field(300);
     scene.cameras.iter_mut().for_each(|camera| camera.position += shift);
@@ -45,8 +45,8 @@ fn absolute() -> Result<(), Failed> {
     for (distance, is_near) in [(0.0, true), (100.0, true), (1e6, false), (1e7, false)] {
         let scene = field_at(DVec3::new(distance, -distance * 0.5, distance * 0.25))?;
         let pictures = (exact.draw(&scene)?, absolute.draw(&scene)?);
-        let judge = if is_near { assert_alike } else { assert_different };
-        judge(&pictures.0, &pictures.1)
+        let assertion = if is_near { assert_alike } else { assert_different };
+        assertion(&pictures.0, &pictures.1)
             .map_err(|failed| format!("at {distance} m: {}", failed.message().unwrap_or("")))?;
     }
     Ok(())

@@ -18,11 +18,11 @@ use crate::image_distance::{assert_color, tone_mapped};
 pub const CASES: &[Case] = &[
     ("the_order_of_submission_does_not_change_the_picture", every_order),
     ("opaque_objects_hide_glass_behind_them", behind_a_wall),
-    ("glass_of_opacity_one_looks_opaque_in_every_light", lit_like_opaque),
+    ("glass_of_opacity_one_equals_an_opaque_surface_in_every_light", lit_like_opaque),
     ("additive_and_subtractive_blending_scale_with_opacity", scales_with_opacity),
     ("panes_at_one_depth_keep_the_order_of_objects", equal_depths),
-    ("subtractive_blending_leaves_black_at_least", black_at_worst),
-    ("a_double_sided_pane_is_lit_on_the_visible_side", lit_on_the_seen_side),
+    ("subtractive_blending_leaves_at_least_black", at_least_black),
+    ("a_double_sided_pane_is_lit_on_the_visible_side", lit_on_the_visible_side),
     ("more_panes_than_a_bundle_holds_stay_in_order", many_batches),
 ];
 
@@ -30,7 +30,7 @@ const BACKGROUND: Vec3 = Vec3::new(0.5, 0.3, 0.2);
 const AMBIENT: Vec3 = Vec3::new(0.4, 0.6, 0.8);
 const SIDE: u32 = 9;
 
-/// Squares that face the camera at +Z, which sees nothing else, in the order in which they are submitted.
+/// Squares that face the camera at +Z and fill its picture, in the order in which they are submitted.
 fn panes(panes: &[(f64, Material)]) -> Result<Scene, Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO), [SIDE; 2])];
@@ -48,7 +48,7 @@ fn glass(blend: Blend, diffuse: Vec3, opacity: f32) -> Material {
     Material { blend, diffuse, opacity, ..Material::default() }
 }
 
-/// The radiance of a pane over what is behind it, by its definition, in ambient light only.
+/// The radiance of a pane in front of `radiance`, by the definition of its blend mode, in ambient light only.
 fn behind(radiance: [f64; 3], pane: &Material) -> [f64; 3] {
     let opacity = f64::from(pane.opacity);
     let own = (pane.emission.as_dvec3() + pane.diffuse.as_dvec3() * AMBIENT.as_dvec3()).to_array();
@@ -79,7 +79,7 @@ fn middle(radiance: &Picture) -> [f64; 3] {
 
 /// Fails if the picture's centre is not the tone-mapped radiance, computed in f64.
 fn expect(what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
-    // A half float is off by 2⁻¹⁰ of itself at most, and the last of a few count.
+    // The relative error of a half float is at most 2⁻¹⁰, and those of the last few blends add up.
     expect_within(2e-3, what, drawn, expected)
 }
 
@@ -124,7 +124,7 @@ fn every_order() -> Result<(), Failed> {
     colors.sort_unstable();
     colors.dedup();
     // Additive and subtractive blending commute, so only the position of the alpha-blended pane matters.
-    if colors.len() >= 3 { Ok(()) } else { Err("the order of the panes should be seen".into()) }
+    if colors.len() >= 3 { Ok(()) } else { Err("the order of the panes should be visible".into()) }
 }
 
 fn behind_a_wall() -> Result<(), Failed> {
@@ -136,7 +136,7 @@ fn behind_a_wall() -> Result<(), Failed> {
         let alone = drawn(&mut fixture, &panes(&[(0.0, wall.clone())])?)?;
         expect("the wall", &alone, of_wall)?;
         if drawn(&mut fixture, &panes(&[(-1.0, pane.clone()), (0.0, wall.clone())])?)? != alone {
-            return Err(format!("{blend:?} is seen through a wall").into());
+            return Err(format!("{blend:?} is visible through a wall").into());
         }
         let before = drawn(&mut fixture, &panes(&[(1.0, pane.clone()), (0.0, wall.clone())])?)?;
         expect(&format!("{blend:?} before a wall"), &before, behind(of_wall, &pane))?;
@@ -178,8 +178,8 @@ fn lit_like_opaque() -> Result<(), Failed> {
             scale: Vec3::splat(6.0),
             ..RenderObject::new(plane, pane, DVec3::ZERO)
         })?;
-        let place = DVec3::new(0.0, 0.4, 1.0);
-        scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..RenderObject::new(block, stone, place) })?;
+        let position = DVec3::new(0.0, 0.4, 1.0);
+        scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..RenderObject::new(block, stone, position) })?;
         Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
     };
     let mut before = Vec::new();
@@ -191,7 +191,7 @@ fn lit_like_opaque() -> Result<(), Failed> {
             return Err(format!("{light:?}: glass is off by {farthest:?}").into());
         }
         if before.contains(&opaque.bytes) {
-            return Err(format!("{light:?}: it gives the light of another, or no shadow").into());
+            return Err(format!("{light:?}: it equals another light's picture, or has no shadow").into());
         }
         before.push(opaque.bytes);
     }
@@ -223,7 +223,7 @@ fn equal_depths() -> Result<(), Failed> {
     Ok(())
 }
 
-fn black_at_worst() -> Result<(), Failed> {
+fn at_least_black() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for taken in [0.6, 3.0, 60_000.0, 1e30] {
         let pane = Material { emission: Vec3::splat(taken), ..glass(Blend::Subtractive, Vec3::ONE, 1.0) };
@@ -233,14 +233,14 @@ fn black_at_worst() -> Result<(), Failed> {
         }
         assert_color(pixel(&found.1, SIDE / 2, SIDE / 2), [0; 3])?;
     }
-    // Negative radiance is missing from what is drawn over it.
+    // Negative radiance reduces what is drawn over it.
     let taken = glass(Blend::Subtractive, Vec3::ONE, 1.0);
     let added = Material { emission: Vec3::ONE, ..glass(Blend::Additive, Vec3::ZERO, 1.0) };
     let expected = behind(behind(BACKGROUND.as_dvec3().to_array(), &taken), &added);
-    expect("added to what lacks", &drawn(&mut fixture, &panes(&[(0.0, taken), (1.0, added)])?)?, expected)
+    expect("added to negative radiance", &drawn(&mut fixture, &panes(&[(0.0, taken), (1.0, added)])?)?, expected)
 }
 
-fn lit_on_the_seen_side() -> Result<(), Failed> {
+fn lit_on_the_visible_side() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     // The diffuse colour is not stored anywhere, so it is exact.
     let lit = 4.0 * (1.0 - (2.0_f64 / 8.0).powi(4)).powi(2) / 4.0 * 0.5 / PI;
@@ -258,7 +258,7 @@ fn lit_on_the_seen_side() -> Result<(), Failed> {
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0 * eye, DVec3::ZERO), [SIDE; 2])];
         scene.lights = vec![Light::Point { position: DVec3::Z * 2.0 * lamp, intensity: Vec3::splat(4.0), range: 8.0 }];
         let expected = expected.map_or(BACKGROUND.as_dvec3().to_array(), |radiance| [radiance; 3]);
-        let what = format!("seen from {eye}, lit from {lamp}, double-sided: {double_sided}");
+        let what = format!("viewed from {eye}, lit from {lamp}, double-sided: {double_sided}");
         expect(&what, &drawn(&mut fixture, &scene)?, expected)?;
     }
     Ok(())
@@ -276,11 +276,11 @@ fn many_batches() -> Result<(), Failed> {
             (0..meshes).map(|_| scene.add(square(Topology::TriangleList))).collect::<Result<_, _>>()?;
         let materials = colors.each_ref().map(|color| scene.add(color.clone()));
         for submitted in 0..COUNT {
-            // 699 and 251 have no divisor in common, so each depth comes once.
+            // 699 and 251 have no divisor in common, so each depth occurs once.
             let pane = submitted * 251 % COUNT;
             let material = materials[pane % 3].clone()?;
-            let place = DVec3::Z * (-2.0 + pane as f64 * 0.004);
-            scene.add_object(RenderObject::new(meshes[pane % meshes.len()], material, place))?;
+            let position = DVec3::Z * (-2.0 + pane as f64 * 0.004);
+            scene.add_object(RenderObject::new(meshes[pane % meshes.len()], material, position))?;
         }
         let recorded = fixture.record(&scene)?;
         let (batches, bundles) = (recorded.statistics().views[0].batches, recorded.statistics().views[0].bundles);

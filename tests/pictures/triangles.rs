@@ -18,9 +18,9 @@ use crate::strategies::{
 };
 
 pub const CASES: &[Case] = &[
-    ("triangle_culling_changes_no_byte_with_any_technique", any_technique),
+    ("triangle_culling_changes_no_byte_with_any_strategy", all_strategies),
     ("triangle_culling_changes_no_byte_while_strategies_are_measured", measured),
-    ("triangle_culling_changes_no_byte_whatever_else_changes", whatever_else_changes),
+    ("triangle_culling_changes_no_byte_while_other_things_change", other_changes),
 ];
 
 type Make = fn() -> Result<Scene, Failed>;
@@ -35,9 +35,9 @@ fn small_colonnade() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// The scene with the triangles of every n-th mesh culled, and of lists only: a strip's triangles are rounded
-/// differently than a list's.
-fn asking(scene: Scene, every: usize) -> Scene {
+/// The scene with triangle culling enabled for every n-th mesh. Strips become lists, because a strip's triangles are
+/// rounded differently.
+fn cullable(scene: Scene, every: usize) -> Scene {
     let number = Cell::new(0_usize);
     with_meshes(scene, |mesh| {
         number.set(number.get() + 1);
@@ -56,7 +56,7 @@ fn change(scene: &mut Scene) -> Result<(), Failed> {
     Ok(())
 }
 
-fn any_technique() -> Result<(), Failed> {
+fn all_strategies() -> Result<(), Failed> {
     for (scene, every) in SCENES {
         let mut whole = with_meshes(scene()?, as_list);
         let mut expected = Vec::new();
@@ -65,14 +65,14 @@ fn any_technique() -> Result<(), Failed> {
             change(&mut whole)?;
         }
         for (record, encode) in strategies()? {
-            let (mut fixture, mut asking) = (fixture_with(record, encode)?, asking(scene()?, every));
+            let (mut fixture, mut cullable) = (fixture_with(record, encode)?, cullable(scene()?, every));
             for (frame, expected) in expected.iter().enumerate() {
-                let recorded = fixture.record(&asking)?;
+                let recorded = fixture.record(&cullable)?;
                 let culled = culled_in(&recorded);
-                if culled == 0 || pictures(&fixture, recorded, &asking)? != *expected {
+                if culled == 0 || pictures(&fixture, recorded, &cullable)? != *expected {
                     return Err(format!("frame {frame} differs with {record:?}, {encode:?}; {culled} culled").into());
                 }
-                change(&mut asking)?;
+                change(&mut cullable)?;
             }
             let is_split = fixture.renderer.backend().pass_statistics().iter().any(|pass| pass.encoders > 1);
             let has_to_be = encode == EncodingStrategy::Split && every > 1;
@@ -88,7 +88,7 @@ fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
 
 /// With other causes of change: a depth pre-pass, several frames in flight, another quality and back, and meshes that
 /// stop being cullable.
-fn whatever_else_changes() -> Result<(), Failed> {
+fn other_changes() -> Result<(), Failed> {
     let expected = |scene: &Scene| drawn_by_a_new_renderer(scene);
     let mut whole = with_meshes(everything(), as_list);
     let first = expected(&whole)?;
@@ -97,20 +97,20 @@ fn whatever_else_changes() -> Result<(), Failed> {
 
     let mut fixture = fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?;
     fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
-    let mut scene = asking(everything(), 1);
+    let mut scene = cullable(everything(), 1);
     for _ in 0..2 {
-        let on_its_way = fixture.record(&scene)?;
-        let is_culled = culled_in(&on_its_way) > 0;
+        let in_flight = fixture.record(&scene)?;
+        let is_culled = culled_in(&in_flight) > 0;
         change(&mut scene)?;
         drop(fixture.record(&scene)?);
         let later = fixture.record(&scene)?;
-        let drawn = [pictures(&fixture, on_its_way, &scene)?, pictures(&fixture, later, &scene)?];
-        expect(is_culled && drawn == [first.clone(), second.clone()], || "a frame on its way differs".to_owned())?;
+        let drawn = [pictures(&fixture, in_flight, &scene)?, pictures(&fixture, later, &scene)?];
+        expect(is_culled && drawn == [first.clone(), second.clone()], || "a frame in flight differs".to_owned())?;
 
         // Absolute transforms disable culling.
         fixture.renderer.set_quality(Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() })?;
         let recorded = fixture.record(&scene)?;
-        expect(culled_in(&recorded) == 0, || "absolute places were culled".to_owned())?;
+        expect(culled_in(&recorded) == 0, || "triangles with absolute transforms were culled".to_owned())?;
         drop(fixture.submit(recorded)?);
         fixture.renderer.set_quality(Quality::balanced())?;
         fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
@@ -119,8 +119,8 @@ fn whatever_else_changes() -> Result<(), Failed> {
         let recorded = fixture.record(&scene)?;
         let is_culled = culled_in(&recorded) > 0;
         let same = pictures(&fixture, recorded, &scene)? == second;
-        expect(same && !is_culled, || "what no longer asks differs".to_owned())?;
-        scene = asking(everything(), 1);
+        expect(same && !is_culled, || "a scene without cullable meshes differs".to_owned())?;
+        scene = cullable(everything(), 1);
     }
     Ok(())
 }
@@ -130,7 +130,7 @@ const FRAMES: usize = 3;
 fn measured() -> Result<(), Failed> {
     let (device, queue) = device()?;
     let mut fixture = fixture_of(WgpuBackend::new(device, queue)?)?;
-    let scene = asking(everything(), 3);
+    let scene = cullable(everything(), 3);
     let expected = drawn_by_a_new_renderer(&with_meshes(everything(), as_list))?;
     for frame in 0..40 {
         let recorded = fixture.record(&scene)?;

@@ -10,7 +10,7 @@ use drawloom::scene::{Camera, Light, Material, Projection, RenderObject, Scene, 
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{cube, field, sized, square};
 
-use crate::{Studio, deferred, pixel};
+use crate::{Fixture, deferred, pixel};
 
 /// A square of 2 m, 5 m in front of the camera, that emits this radiance and reflects nothing.
 fn lit_square(radiance: Vec3) -> Scene {
@@ -29,8 +29,8 @@ fn lit_square(radiance: Vec3) -> Scene {
 #[test]
 fn a_square_covers_its_pixels_and_the_background_the_others() {
     let scene = lit_square(Vec3::new(1.0, 0.5, 0.25));
-    for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
-        let submission = studio.draw(&scene);
+    for mut fixture in [Fixture::with_granularity(2, Granularity::Adaptive), Fixture::reference()] {
+        let submission = fixture.draw(&scene);
         let radiance = submission.numbers(0, "radiance").unwrap();
         // 2 of 4 m in 40 rows, and as many columns in the middle of 80: half floats hold these numbers exactly.
         for (index, found) in radiance.iter().enumerate() {
@@ -51,9 +51,9 @@ fn nearer_objects_hide_farther_ones_in_either_order() {
         let mut scene = lit_square(Vec3::X);
         let near = scene.add(Material { diffuse: Vec3::ZERO, emission: Vec3::Y, ..Material::default() }).unwrap();
         let mesh = scene.add(square(Topology::TriangleList)).unwrap();
-        let place = if turned { DVec3::NEG_Z } else { DVec3::Z };
-        scene.add_object(RenderObject::new(mesh, near, place)).unwrap();
-        let radiance = Studio::cut(1, Granularity::Adaptive).draw(&scene).numbers(0, "radiance").unwrap();
+        let position = if turned { DVec3::NEG_Z } else { DVec3::Z };
+        scene.add_object(RenderObject::new(mesh, near, position)).unwrap();
+        let radiance = Fixture::with_granularity(1, Granularity::Adaptive).draw(&scene).numbers(0, "radiance").unwrap();
         let expected = if turned { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0, 1.0] };
         assert_eq!(radiance[20 * 80 + 40], expected);
     }
@@ -63,7 +63,7 @@ fn nearer_objects_hide_farther_ones_in_either_order() {
 fn an_empty_scene_is_its_background() {
     let mut scene = field(0);
     scene.lights.clear();
-    let picture = Studio::cut(2, Granularity::Adaptive).picture(&scene);
+    let picture = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
     let first = pixel(&picture, 0, 0);
     assert!(first[2] > first[0] && (0..180).all(|y| (0..320).all(|x| pixel(&picture, x, y) == first)), "{first:?}");
 }
@@ -77,11 +77,11 @@ fn each_of_many_views_draws_what_it_draws_alone() {
     for (index, camera) in scene.cameras.iter_mut().enumerate() {
         (camera.name, camera.position.x) = (format!("view {index}"), index as f64 - 2.0);
     }
-    let together = Studio::cut(2, Granularity::Adaptive).draw(&scene);
+    let together = Fixture::with_granularity(2, Granularity::Adaptive).draw(&scene);
     for (view, camera) in scene.cameras.clone().into_iter().enumerate() {
         let mut alone = field(150);
         alone.cameras = vec![camera];
-        let expected = Studio::cut(2, Granularity::Adaptive).picture(&alone);
+        let expected = Fixture::with_granularity(2, Granularity::Adaptive).picture(&alone);
         assert!(together.read(view, "picture").unwrap() == expected, "{view}");
     }
 }
@@ -89,23 +89,23 @@ fn each_of_many_views_draws_what_it_draws_alone() {
 #[test]
 fn a_depth_pre_pass_changes_nothing() {
     let scene = everything();
-    let mut with = Studio::new(2, |builder| builder.deferred(deferred().depth_pre_pass(true)));
-    assert!(with.picture(&scene) == Studio::cut(2, Granularity::Adaptive).picture(&scene));
+    let mut with = Fixture::new(2, |builder| builder.deferred(deferred().depth_pre_pass(true)));
+    assert!(with.picture(&scene) == Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene));
 }
 
 #[test]
 fn splitting_the_geometry_buffer_changes_nothing() {
     let scene = everything();
-    let mut shared = Studio::new(2, |builder| builder.deferred(deferred().geometry_shares(3)));
-    assert!(shared.picture(&scene) == Studio::cut(2, Granularity::Adaptive).picture(&scene));
+    let mut shared = Fixture::new(2, |builder| builder.deferred(deferred().geometry_shares(3)));
+    assert!(shared.picture(&scene) == Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene));
 }
 
 /// Rounding may move a lookup across a shadow map's texel, so a few pixels on a shadow's edge differ.
 #[test]
 fn the_reference_draws_the_same_picture() {
     for scene in [everything(), field(120)] {
-        let single = Studio::cut(2, Granularity::Adaptive).picture(&scene);
-        let double = Studio::reference().picture(&scene);
+        let single = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
+        let double = Fixture::reference().picture(&scene);
         assert_eq!((double.format, double.bytes.len()), (Format::Rgba8Srgb, single.bytes.len()));
         let share = share_within(&single, &double, 3);
         assert!(share >= 0.99, "{share}");
@@ -116,7 +116,7 @@ fn the_reference_draws_the_same_picture() {
     }
 }
 
-/// Of 255.
+/// The root mean square difference, 0 to 255.
 fn rmse(one: &Picture, other: &Picture) -> f64 {
     let squares = one.bytes.iter().zip(&other.bytes).map(|(one, other)| f64::from(one.abs_diff(*other)).powi(2));
     (squares.sum::<f64>() / one.bytes.len() as f64).sqrt()
@@ -129,7 +129,7 @@ fn share_within(one: &Picture, other: &Picture, bound: u8) -> f64 {
     pixels.filter(is_near).count() as f64 / (one.bytes.len() / 4) as f64
 }
 
-/// The light's sphere touches every tile of the picture from one of the positions.
+/// Each tile of the picture is touched by the light's sphere from at least one of the positions.
 #[test]
 fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     let mut scene = Scene::new();
@@ -139,10 +139,10 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     scene.add_object(floor).unwrap();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 4.0, 12.0), DVec3::ZERO), [150, 100])];
     let light = |position| Light::Point { position, intensity: Vec3::splat(20.0), range: 3.0 };
-    let mut studio = Studio::new(2, |builder| builder.deferred(Deferred::to_picture()));
-    for place in [[0.0, 0.5, 0.0], [-9.0, 0.5, -6.0], [1.0, 4.0, 12.5], [0.0, 2.0, 9.0], [7.0, 1.0, 4.0]] {
-        scene.lights = vec![light(DVec3::from(place))];
-        let submission = studio.draw(&scene);
+    let mut fixture = Fixture::new(2, |builder| builder.deferred(Deferred::to_picture()));
+    for position in [[0.0, 0.5, 0.0], [-9.0, 0.5, -6.0], [1.0, 4.0, 12.5], [0.0, 2.0, 9.0], [7.0, 1.0, 4.0]] {
+        scene.lights = vec![light(DVec3::from(position))];
+        let submission = fixture.draw(&scene);
         let depth = submission.numbers(0, "depth").unwrap();
         let radiance = submission.numbers(0, "radiance").unwrap();
         let camera = &scene.cameras[0];
@@ -152,11 +152,11 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
             let ray = DVec3::new((x / 75.0 - 1.0) * tangent * 1.5, (1.0 - y / 50.0) * tangent, -1.0);
             let surface = camera.position + camera.orientation.as_dquat() * ray * (0.05 / depth[0]);
             // Well inside of the sphere, above the floor, pixels are lit; outside none is.
-            let distance = surface.distance(DVec3::from(place));
+            let distance = surface.distance(DVec3::from(position));
             if depth[0] > 0.0 && distance < 2.7 && surface.y > -0.95 {
-                assert!(radiance[0] > 1e-4, "{place:?}: {surface} at {distance} is dark");
+                assert!(radiance[0] > 1e-4, "{position:?}: {surface} at {distance} is dark");
             } else if depth[0] == 0.0 || distance > 3.01 {
-                assert_eq!(radiance[0], 0.0, "{place:?}: {surface} at {distance}");
+                assert_eq!(radiance[0], 0.0, "{position:?}: {surface} at {distance}");
             }
         }
     }

@@ -14,12 +14,12 @@ use drawloom::view::ShadowMaps;
 use drawloom::{Granularity, Renderer, RendererBuilder, Submitter};
 
 /// A renderer on the software backend.
-struct Studio {
+struct Fixture {
     renderer: Renderer<SoftwareBackend>,
     submitter: Submitter<SoftwareBackend>,
 }
 
-impl Studio {
+impl Fixture {
     /// In f32, with this number of workers.
     fn new(
         workers: usize,
@@ -32,7 +32,7 @@ impl Studio {
     }
 
     /// The shipped processes in f32.
-    fn cut(workers: usize, granularity: Granularity) -> Self {
+    fn with_granularity(workers: usize, granularity: Granularity) -> Self {
         Self::new(workers, |builder| builder.deferred(deferred()).granularity(granularity))
     }
 

@@ -13,7 +13,7 @@ use drawloom::raster::{Real, Vector4};
 use drawloom::{FrameError, SubmitError};
 use drawloom_testing::scenes::field;
 
-use crate::{Studio, deferred};
+use crate::{Fixture, deferred};
 
 /// The function of the CPU shader that panics.
 const NONE: usize = 0;
@@ -70,15 +70,15 @@ impl<R: Real> ObjectCpuShader<R> for PanickingProcess {
 fn a_panic_in_a_cpu_shader_names_the_process_and_the_next_frame_is_complete() {
     let panicking_function = Arc::new(AtomicUsize::new(NONE));
     let process = PanickingProcess(Arc::clone(&panicking_function));
-    let mut studio = Studio::new(3, |builder| builder.process(process).output("own"));
+    let mut fixture = Fixture::new(3, |builder| builder.process(process).output("own"));
     let scene = field(200);
-    let expected = studio.draw(&scene).read(0, "own").unwrap();
+    let expected = fixture.draw(&scene).read(0, "own").unwrap();
     assert!(expected.bytes.contains(&255) && expected.bytes.contains(&0));
     for function in [CPU_SHADER, VERTEX, FRAGMENT, CPU_SHADER, FRAGMENT] {
         panicking_function.store(function, Ordering::Relaxed);
-        let error = match studio.renderer.record(scene.as_scene_ref()) {
+        let error = match fixture.renderer.record(scene.as_scene_ref()) {
             Err(FrameError::Backend(error)) if function == CPU_SHADER => error,
-            Ok(recorded) if function != CPU_SHADER => match studio.submitter.submit(recorded) {
+            Ok(recorded) if function != CPU_SHADER => match fixture.submitter.submit(recorded) {
                 Err(SubmitError::Backend(error)) => error,
                 other => panic!("{function}: {:?}", other.err()),
             },
@@ -87,7 +87,7 @@ fn a_panic_in_a_cpu_shader_names_the_process_and_the_next_frame_is_complete() {
         let BackendError::CpuShaderPanicked { process, message } = error else { panic!("{function}: {error}") };
         assert_eq!((process.as_str(), message.as_str()), ("panicking", "a deliberate panic"));
         panicking_function.store(NONE, Ordering::Relaxed);
-        assert!(studio.draw(&scene).read(0, "own").unwrap() == expected);
+        assert!(fixture.draw(&scene).read(0, "own").unwrap() == expected);
     }
 }
 
@@ -128,8 +128,8 @@ impl<R: Real> FullScreenCpuShader<R> for DiscardAll {
 }
 
 fn error_of(process: impl RenderProcess + 'static) -> BackendError {
-    let mut studio = Studio::new(2, |builder| builder.deferred(deferred()).process(process));
-    match studio.renderer.record(field(10).as_scene_ref()) {
+    let mut fixture = Fixture::new(2, |builder| builder.deferred(deferred()).process(process));
+    match fixture.renderer.record(field(10).as_scene_ref()) {
         Err(FrameError::Backend(error)) => error,
         other => panic!("{:?}", other.err()),
     }
@@ -157,26 +157,26 @@ fn a_process_that_samples_a_target_that_it_writes_is_refused() {
 
 #[test]
 fn picture_sizes_and_camera_positions_have_limits() {
-    let mut studio = Studio::new(2, |builder| builder.deferred(deferred()));
-    let expected = studio.picture(&field(10));
+    let mut fixture = Fixture::new(2, |builder| builder.deferred(deferred()));
+    let expected = fixture.picture(&field(10));
     let mut large = field(10);
     large.cameras[1].size = [16_385, 1];
-    match studio.renderer.record(large.as_scene_ref()) {
+    match fixture.renderer.record(large.as_scene_ref()) {
         Err(FrameError::Backend(BackendError::Limit { allowed: 16_384, needed: 16_385, .. })) => {}
         other => panic!("{:?}", other.err()),
     }
     let mut far = field(10);
     far.cameras[1].position = DVec3::X * 5e9;
-    match studio.renderer.record(far.as_scene_ref()) {
+    match fixture.renderer.record(far.as_scene_ref()) {
         Err(FrameError::Backend(BackendError::ViewOutOfReach { view })) => assert_eq!(view, "side"),
         other => panic!("{:?}", other.err()),
     }
-    assert!(studio.picture(&field(10)) == expected);
+    assert!(fixture.picture(&field(10)) == expected);
 }
 
 #[test]
 fn the_error_names_a_missing_target() {
-    let submission = Studio::new(2, |builder| builder.deferred(deferred())).draw(&field(10));
+    let submission = Fixture::new(2, |builder| builder.deferred(deferred())).draw(&field(10));
     for (view, target) in [(0, "pictures"), (2, "picture")] {
         match submission.read(view, target) {
             Err(BackendError::UnknownTarget { view: named, target: name }) => {

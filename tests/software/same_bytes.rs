@@ -7,7 +7,7 @@ use drawloom::{Granularity, RendererBuilder};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{as_list, culled, field, with_meshes};
 
-use crate::{Studio, deferred};
+use crate::{Fixture, deferred};
 
 /// A field in pictures whose sizes are no multiples of a tile.
 fn odd_field() -> Scene {
@@ -23,7 +23,7 @@ fn workers_and_granularity_change_nothing() {
         let mut expected = Vec::new();
         let whole = Granularity::PerCamera;
         for (workers, granularity) in [(1, whole), (2, whole), (2, Granularity::Chunk(7)), (4, Granularity::Adaptive)] {
-            let submission = Studio::cut(workers, granularity).draw(&scene);
+            let submission = Fixture::with_granularity(workers, granularity).draw(&scene);
             let found: Vec<_> = (0..scene.cameras.len())
                 .flat_map(|view| ["depth", "normal", "radiance", "picture"].map(|target| (view, target)))
                 .map(|(view, target)| submission.read(view, target).unwrap())
@@ -41,25 +41,25 @@ fn workers_and_granularity_change_nothing() {
 fn a_frame_does_not_depend_on_those_before_it() {
     let (small, mut large) = (odd_field(), everything());
     large.cameras[0].size = [140, 90];
-    let expected = [&small, &large].map(|scene| Studio::cut(2, Granularity::Adaptive).picture(scene));
-    let mut studio = Studio::cut(2, Granularity::Adaptive);
+    let expected = [&small, &large].map(|scene| Fixture::with_granularity(2, Granularity::Adaptive).picture(scene));
+    let mut fixture = Fixture::with_granularity(2, Granularity::Adaptive);
     for turn in [0, 0, 1, 0, 1, 1] {
-        assert!(studio.picture([&small, &large][turn]) == expected[turn], "{turn}");
+        assert!(fixture.picture([&small, &large][turn]) == expected[turn], "{turn}");
     }
 }
 
 #[test]
 fn a_recorded_frame_draws_the_scene_as_it_was() {
     let scene = everything();
-    let expected = Studio::cut(2, Granularity::Adaptive).picture(&scene);
-    let mut studio = Studio::cut(2, Granularity::Adaptive);
+    let expected = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
+    let mut fixture = Fixture::with_granularity(2, Granularity::Adaptive);
     let mut changed = everything();
-    let recorded = studio.renderer.record(changed.as_scene_ref()).unwrap();
+    let recorded = fixture.renderer.record(changed.as_scene_ref()).unwrap();
     changed.lights.clear();
     let objects: Vec<_> = changed.objects().collect();
     objects.into_iter().for_each(|object| _ = changed.remove_object(object).unwrap());
     drop(changed);
-    let submitted = studio.submitter.submit(recorded).unwrap();
+    let submitted = fixture.submitter.submit(recorded).unwrap();
     assert!(submitted.submission.read(0, "picture").unwrap() == expected);
 }
 
@@ -70,11 +70,11 @@ fn occlusion_culling_changes_nothing() {
         let draw = |occlusion| {
             let quality = Quality { occlusion, ..quality };
             let maps = |builder: RendererBuilder<SoftwareBackend>| builder.deferred(deferred()).quality(quality);
-            Studio::new(2, maps).picture(&scene)
+            Fixture::new(2, maps).picture(&scene)
         };
         let whole = draw(None);
-        for square in Quality::OCCLUSION_TILE_SIZES {
-            assert!(draw(Some(square)) == whole, "squares of {square}");
+        for tile_size in Quality::OCCLUSION_TILE_SIZES {
+            assert!(draw(Some(tile_size)) == whole, "tiles of {tile_size}");
         }
     }
 }
@@ -83,12 +83,12 @@ fn occlusion_culling_changes_nothing() {
 fn triangle_culling_changes_nothing() {
     for scene in [odd_field, everything] {
         let list = with_meshes(scene(), as_list);
-        let asking = with_meshes(scene(), culled);
-        for mut studio in [Studio::cut(2, Granularity::Adaptive), Studio::reference()] {
-            let expected = studio.picture(&list);
-            let recorded = studio.renderer.record(asking.as_scene_ref()).unwrap();
+        let cullable = with_meshes(scene(), culled);
+        for mut fixture in [Fixture::with_granularity(2, Granularity::Adaptive), Fixture::reference()] {
+            let expected = fixture.picture(&list);
+            let recorded = fixture.renderer.record(cullable.as_scene_ref()).unwrap();
             assert!(recorded.statistics().views[0].culled_triangles.culled() > 0);
-            let submission = studio.submitter.submit(recorded).unwrap().submission;
+            let submission = fixture.submitter.submit(recorded).unwrap().submission;
             assert!(submission.read(0, "picture").unwrap() == expected);
         }
     }
