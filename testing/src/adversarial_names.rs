@@ -1,11 +1,11 @@
-//! Names that break careless writers, and a log full of them.
+//! Names with special characters of HTML, JSON and Unicode, which break writers that do not escape, and a log of them.
 
 use std::{sync::Arc, time::Duration};
 
 use drawloom::timeline::{Chunk, DeviceLog, DevicePass, Frame, Graph, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 
-/// Names that break careless writers.
-pub fn hostile_names() -> Vec<String> {
+/// Names that break writers that do not escape.
+pub fn adversarial_names() -> Vec<String> {
     let plain =
         ["", "</script>", "</SCRIPT >", "<!--<script>", "]]>", "\"", "\\", "\\\"", "'", "&lt;&amp;", "{data}{script}"];
     let mut names: Vec<String> = plain.map(str::to_owned).into();

@@ -2,9 +2,9 @@
 
 #[cfg(feature = "wgpu")]
 pub mod adapter;
+pub mod adversarial_names;
 pub mod culling;
 pub mod draw_lists;
-pub mod hostile;
 pub mod precision;
 pub mod random;
 pub mod samples;

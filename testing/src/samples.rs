@@ -1,5 +1,5 @@
-//! A reference rasteriser, which draws every triangle in f64 at every sample. It shares nothing with the crate except
-//! the scene.
+//! A reference rasteriser, which draws every triangle in f64 at every sample. It shares only the scene types
+//! with the crate.
 
 use drawloom::glam::{DMat3, DVec2, DVec3, Vec3};
 use drawloom::scene::{Blend, Camera, Projection, SceneRef, Topology};

@@ -8,7 +8,7 @@ use drawloom::scene::{
     Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, Texture, Topology, Vertex,
 };
 
-/// A cube with sides of 2 m, whose front faces are outside.
+/// A cube with sides of 2 m and front faces on the outside.
 pub fn cube() -> Mesh {
     cube_facing(1.0)
 }
@@ -46,7 +46,7 @@ pub fn square(topology: Topology) -> Mesh {
     Mesh::new("square", topology, corners, indices).unwrap()
 }
 
-/// The scene with every mesh replaced by `change` of it.
+/// The scene with `change` applied to every mesh.
 pub fn with_meshes(mut scene: Scene, change: impl Fn(&Mesh) -> Mesh) -> Scene {
     let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, change(mesh))).collect();
     meshes.into_iter().for_each(|(handle, mesh)| scene.replace(handle, mesh).unwrap());
@@ -135,7 +135,7 @@ pub fn textured(count: u32) -> (Scene, Vec<Handle<Texture>>) {
     (scene, textures)
 }
 
-/// The camera with a picture of that size.
+/// The camera with a picture of this size.
 pub fn sized(mut camera: Camera, size: [u32; 2]) -> Camera {
     camera.size = size;
     camera

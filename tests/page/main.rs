@@ -8,7 +8,7 @@ mod logs;
 use std::{env, process::ExitCode};
 
 use drawloom::timeline::Log;
-use drawloom_testing::hostile;
+use drawloom_testing::adversarial_names;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
 use self::browser::{Browser, LoadedPage};
@@ -28,10 +28,10 @@ fn main() -> ExitCode {
             let page = browser.open("real", &log, "")?;
             shows_the_longest_frame(&page, &log)
         }),
-        trial("hostile_names", |browser| {
-            let mut log = hostile::log_of(&hostile::hostile_names());
+        trial("adversarial_names", |browser| {
+            let mut log = adversarial_names::log_of(&adversarial_names::adversarial_names());
             log.dropped = 3;
-            let page = browser.open("hostile", &log, "")?;
+            let page = browser.open("adversarial_names", &log, "")?;
             expect("frame", page.value("frame"), "0")?;
             expect("jobs", page.value("jobs"), &log.runs[0].chunks.len().to_string())
         }),
@@ -63,7 +63,7 @@ fn trial(name: &str, test: impl FnOnce(&Browser) -> Result<(), Failed> + Send + 
 }
 
 fn shows_the_longest_frame(page: &LoadedPage, log: &Log) -> Result<(), Failed> {
-    // Of equally long frames the first.
+    // The first of the longest frames.
     let longest = log.frames.iter().rev().max_by_key(|frame| frame.ended - frame.began).ok_or("no frame")?;
     let jobs: usize = log.runs_of(longest.number).map(|run| run.chunks.len()).sum();
     if jobs == 0 {

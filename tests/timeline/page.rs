@@ -1,4 +1,4 @@
-//! Pages: all data of a log can be read back from its page, and no name in it ends a script element early.
+//! All data of a log can be read back from its page, and no name in it ends a script element early.
 
 use std::{sync::Arc, time::Duration};
 
@@ -6,7 +6,7 @@ use drawloom::{
     report::{SchedulerCosts, write_page},
     timeline::{Chunk, Idle, IdleKind, Log},
 };
-use drawloom_testing::hostile::{hostile_names, log_of};
+use drawloom_testing::adversarial_names::{adversarial_names, log_of};
 use proptest::{collection::vec, prelude::*};
 use serde_json::Value;
 
@@ -35,8 +35,8 @@ fn assert_is_closed(page: &str) {
 }
 
 #[test]
-fn hostile_names_stay_names() {
-    let names = hostile_names();
+fn adversarial_names_are_escaped() {
+    let names = adversarial_names();
     let log = log_of(&names);
     let page = page_of(&log);
     assert_is_closed(&page);
@@ -74,7 +74,7 @@ fn an_empty_log_makes_a_page() {
 }
 
 #[test]
-fn a_frame_without_a_report_says_why() {
+fn a_frame_without_a_report_has_the_reason() {
     let mut log = log_of(&["a".to_owned()]);
     log.runs[0].complete = false;
     let data = data_of(&page_of(&log));
@@ -106,7 +106,7 @@ fn a_writer_that_fails_is_an_error() {
     assert!(write_page(&log, &SchedulerCosts::ZERO, &mut buffer[..]).is_err());
 }
 
-/// Node, first item, number of items, worker, whether it was stolen, when it was opened, how long it waited, its duration.
+/// Node, first item, number of items, worker, whether it was stolen, opening time, waiting time, duration.
 type ChunkNumbers = (usize, usize, usize, usize, bool, u64, u64, u64);
 
 fn any_chunk() -> impl Strategy<Value = ChunkNumbers> {

@@ -19,7 +19,7 @@ use clap::Parser;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_testing::precision::cases::Kind;
-use drawloom_testing::precision::measure::{HELD, MAGNIFYING, Origin, measure};
+use drawloom_testing::precision::measure::{BOUNDED, MAGNIFYING, Origin, measure};
 use drawloom_testing::random::Random;
 
 use report::{Report, Row};
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let [by_distance, by_view] = if quick { [500, 1_000] } else { [200_000, 100_000] };
     let distances: Vec<_> = (0..10).map(|power| 10_f64.powi(power)).collect();
-    let steps = distances.len() + HELD.len() + MAGNIFYING.len();
+    let steps = distances.len() + BOUNDED.len() + MAGNIFYING.len();
     let progress = progress_bar("views");
     progress.set_length(steps as u64);
     let mut random = Random::new();
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         report.rows.push(Row::new(TYPICAL, Some(distance), true, found));
         progress.inc(1);
     }
-    for (kind, is_held) in HELD.map(|kind| (kind, true)).into_iter().chain(MAGNIFYING.map(|kind| (kind, false))) {
+    for (kind, is_held) in BOUNDED.map(|kind| (kind, true)).into_iter().chain(MAGNIFYING.map(|kind| (kind, false))) {
         progress.set_message(kind.name());
         report.rows.push(Row::new(kind, None, is_held, measure(kind, Origin::Anywhere, by_view, &mut random)?));
         progress.inc(1);

@@ -6,7 +6,7 @@ use drawloom_benches::chart::{self, Lines, Panel};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
 use drawloom_testing::precision::cases::Kind;
-use drawloom_testing::precision::measure::{BOUND, Found, UNIT_ROUNDOFF, WORST_ANGLE};
+use drawloom_testing::precision::measure::{BOUND, Errors, UNIT_ROUNDOFF, WORST_ANGLE};
 use serde::Serialize;
 
 /// The results.
@@ -34,7 +34,7 @@ pub struct Row {
 }
 
 impl Row {
-    pub fn new(kind: Kind, distance: Option<f64>, is_held: bool, found: Found) -> Self {
+    pub fn new(kind: Kind, distance: Option<f64>, is_held: bool, found: Errors) -> Self {
         Self {
             view: kind.name(),
             distance,

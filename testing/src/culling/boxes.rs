@@ -1,4 +1,4 @@
-//! Objects whose boxes almost touch a frustum, and objects anywhere, tested from the scene to the result.
+//! Objects whose boxes almost touch a frustum, and objects anywhere, culled through the whole path from scene to result.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -44,7 +44,7 @@ impl Shapes {
     /// Boxes of all proportions, some of them flat, thin or points, around the origin of object space and far from it.
     ///
     /// # Errors
-    /// If the scene cannot be.
+    /// Returns an error if the scene refuses a mesh or the material.
     pub fn new() -> Result<Self, SceneError> {
         let (mut random, mut scene, mut meshes) = (Random::new(), Scene::new(), Vec::new());
         for number in 0..64 {
@@ -73,7 +73,7 @@ impl Shapes {
     }
 }
 
-/// The objects that one camera is asked about.
+/// The objects that are tested with one camera.
 #[derive(Default)]
 struct Objects {
     positions: Vec<DVec3>,
@@ -98,17 +98,17 @@ impl Objects {
     }
 }
 
-/// Where an object is, by its volumes, and whether it was made to touch a plane.
+/// The oracle's verdicts on an object and its volumes, and whether the object was placed to touch a plane.
 #[derive(Clone, Copy)]
 struct Case {
     is_tangent: bool,
-    /// Of what is there: its mesh's box.
+    /// The verdict on the object itself: its mesh's box.
     object: Verdict,
-    /// Of what is asked: the object must be inside of it, so it is never `Outside` where the object is not.
+    /// The verdicts on the tested volumes. A volume contains the object, so it is `Outside` only if the object is.
     volumes: [Verdict; 3],
 }
 
-/// Tries one camera with [`ObjectTable::BLOCK_SIZE`] objects for each number of `batches`.
+/// Tests one camera with [`ObjectTable::BLOCK_SIZE`] objects for each number of `batches`.
 pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
     let mut tallies = BoxTallies::default();
     let mut tables = VOLUMES.map(|volume| {
@@ -130,15 +130,15 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
             tallies.rejected += table.rejections().list().iter().map(|rejection| rejection.count as u64).sum::<u64>();
             let block = table.block(0);
             for first in (0..ObjectTable::BLOCK_SIZE).step_by(Frustum::WORD) {
-                let seen = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);
-                for (place, case) in cases[first..][..Frustum::WORD].iter().enumerate() {
-                    // It must be seen where the object is inside, and need not be where its volume is outside.
+                let visible = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);
+                for (bit, case) in cases[first..][..Frustum::WORD].iter().enumerate() {
+                    // It must be visible if the object is inside, and may be culled if its volume is outside.
                     let verdict = match (case.object, case.volumes[volume]) {
                         (Verdict::Inside, _) => Verdict::Inside,
                         (_, Verdict::Outside) => Verdict::Outside,
                         _ => Verdict::Touching,
                     };
-                    tallies.volumes[volume].of(case.is_tangent).count(verdict, seen >> place & 1 == 1);
+                    tallies.volumes[volume].of(case.is_tangent).count(verdict, visible >> bit & 1 == 1);
                 }
             }
         }
@@ -159,38 +159,39 @@ impl Objects {
         let normals = oracle.normals();
         let reaches = normals.map(|normal| solid.reach(normal));
         let step = f64::from(random.below(9) as i32 - 4) * f64::from(f32::EPSILON);
-        let aimed = is_tangent.then(|| {
-            // What is as far from the camera as the others are is the object's origin, or its middle, which may be elsewhere.
+        let touching_position = is_tangent.then(|| {
+            // The point at the random distance is the object's origin, or the centre of its bounding sphere.
             let anchor = if random.below(2) == 0 { solid.center } else { DVec3::ZERO };
-            // As many steps of f32 nearer or farther than where it would touch.
+            // Up to four steps of f32 nearer or farther than the position at which it touches.
             let reaches = normals.map(|normal| {
                 let reach = solid.reach(normal) - normal.dot(anchor);
                 reach + step * reach.abs()
             });
-            let place = oracle.touching(any_planes(random), reaches, any_along(random), any_aside(random));
-            oracle.world(place * (1.0 + if random.below(2) == 0 { step } else { 0.0 }) - anchor)
+            let touching = oracle.touching(any_planes(random), reaches, any_along(random), any_aside(random));
+            oracle.world(touching * (1.0 + if random.below(2) == 0 { step } else { 0.0 }) - anchor)
         });
         // A large object that touches may have to be out of reach.
-        let aimed = aimed.filter(|&position| FixedPosition::new(position).is_some());
-        let position = aimed.unwrap_or_else(|| oracle.world(random.direction() * magnitude(random, -2.0, 7.0)));
+        let touching_position = touching_position.filter(|&position| FixedPosition::new(position).is_some());
+        let position =
+            touching_position.unwrap_or_else(|| oracle.world(random.direction() * magnitude(random, -2.0, 7.0)));
 
         let bounds = mesh.bounds();
         let has_own_bounds = random.below(8) == 0;
-        let place = oracle.relative(position);
+        let relative = oracle.relative(position);
         let size =
             solid.center.abs().element_sum() + solid.half_axes.iter().map(|axis| axis.abs().element_sum()).sum::<f64>();
-        let object = oracle.classify(place, reaches, size);
+        let object = oracle.classify(relative, reaches, size);
         let radius = f64::from(bounds.radius) * scale.abs().as_dvec3().max_element();
-        let center = place + solid.center;
+        let center = relative + solid.center;
         let around = |reach: &dyn Fn(DVec3) -> f64| oracle.classify(center, normals.map(reach), size + radius);
         let sphere = around(&|_| radius);
         let half = solid.half_axes.iter().fold(DVec3::ZERO, |half, axis| half + axis.abs());
-        // The sphere is asked as well: what is outside of a plane by either of them is outside.
+        // The sphere is tested first: an object is outside of a plane if either volume is.
         let either = |verdict| if sphere == Verdict::Outside { sphere } else { verdict };
         let world = either(around(&|normal| normal.abs().dot(half)));
         let mut volumes = [sphere, world, either(object)];
         if has_own_bounds {
-            // How much larger they are is the engine's business.
+            // The oracle does not know how much larger the engine's bounds are.
             volumes = [Verdict::Touching; 3];
         }
 
@@ -200,14 +201,14 @@ impl Objects {
         self.bounds.push(if has_own_bounds { Bounds { radius: bounds.radius * 1.5, ..bounds } } else { bounds });
         self.meshes.push(handle);
         self.materials.push(shapes.material);
-        Case { is_tangent: aimed.is_some(), object, volumes }
+        Case { is_tangent: touching_position.is_some(), object, volumes }
     }
 }
 
 /// A mesh's box, turned and scaled, relative to the object's position.
 struct Solid {
     corners: [DVec3; 8],
-    /// Of the sphere around the mesh.
+    /// The centre of the sphere around the mesh.
     center: DVec3,
     half_axes: [DVec3; 3],
 }
@@ -226,13 +227,13 @@ impl Solid {
         Self { corners, center: turn * (scale * mesh.bounds().center.as_dvec3()), half_axes }
     }
 
-    /// How far it reaches in a direction: as far as the corner that is farthest there.
+    /// The extent in a direction: that of the farthest corner.
     fn reach(&self, normal: DVec3) -> f64 {
         self.corners.iter().map(|corner| corner.dot(normal)).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
-/// From a millionth to ten million, mirrored or not; nothing, next to nothing, and out of all proportion.
+/// A scale from a millionth to ten million, mirrored or not, or a degenerate one: zero, subnormal, very small or very uneven.
 fn any_scale(random: &mut Random) -> Vec3 {
     let even = magnitude(random, -6.0, 7.0) as f32;
     let signs = Vec3::from_array([(); 3].map(|()| if random.below(4) == 0 { -1.0 } else { 1.0 }));

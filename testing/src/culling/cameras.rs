@@ -5,15 +5,15 @@ use drawloom::scene::{Camera, Projection, ViewKind};
 
 use crate::random::Random;
 
-/// One whose numbers are anywhere within what a camera can be, and often at an end of it: fields of view from 0.1° to 179°,
-/// pictures a hundred times as wide as high and the other way round, near planes from 1e-5 m, far planes up to 1e9 m and
-/// infinitely far, places up to 4e9 m from the world's origin, with and without perspective, and what lights see.
+/// A camera with random parameters from the whole range of valid values, often at its limits: fields of view from 0.1° to
+/// 179°, pictures a hundred times as wide as high and the other way round, near planes from 1e-5 m, far planes up to 1e9 m
+/// and at infinity, positions up to 4e9 m from the world's origin, perspective and orthographic, and shadow views.
 pub fn any_camera(random: &mut Random) -> Camera {
-    let place = match random.below(4) {
+    let position = match random.below(4) {
         0 => DVec3::ZERO,
         _ => random.direction() * magnitude(random, 0.0, 9.6),
     };
-    let mut camera = Camera::looking_at("any", place, DVec3::ZERO);
+    let mut camera = Camera::looking_at("any", position, DVec3::ZERO);
     camera.orientation = match random.below(8) {
         0 => Quat::IDENTITY,
         _ => Quat::from_axis_angle(random.direction().as_vec3().normalize(), random.between(-3.2, 3.2) as f32),

@@ -5,8 +5,8 @@ use drawloom::scene::{Camera, Projection, ViewKind};
 
 /// The six planes of a camera in f64.
 ///
-/// Its own error is that of some thirty operations with relative errors of 2⁻⁵³: 1e-14 of the sum of the operands exceeds it, and is a
-/// ten-millionth of the error of f32. Bounds that close to a plane are not classified.
+/// Its error is that of some thirty operations with a relative error of 2⁻⁵³ each: less than 1e-14 of the sum of the
+/// operands, which is a ten-millionth of the error of f32. Bounds that close to a plane are not classified.
 pub struct Oracle {
     position: DVec3,
     /// Right, up and forward.
@@ -23,7 +23,7 @@ struct Edge {
     offset: f64,
 }
 
-/// Where a bounding volume is.
+/// The position of a bounding volume relative to the frustum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// A part of it is inside of every plane.
@@ -73,7 +73,7 @@ impl Oracle {
         [right, left, upper, lower, z_axis, -z_axis]
     }
 
-    /// How far a point relative to the camera is inside of each plane.
+    /// The distance of a point relative to the camera from each plane, positive inside.
     pub fn depths(&self, point: DVec3) -> [f64; 6] {
         let local = self.axes.transpose() * point;
         let depth = |edge: &Edge, aside: f64| edge.sine * local.z - edge.cosine * aside + edge.offset;
@@ -87,18 +87,18 @@ impl Oracle {
     pub fn classify(&self, center: DVec3, reaches: [f64; 6], size: f64) -> Verdict {
         let offsets = [self.edges[0].offset, self.edges[1].offset, self.near, self.far];
         let known = offsets.map(|offset| if offset.is_finite() { offset.abs() } else { 0.0 });
-        let error = 1e-14 * (center.abs().element_sum() + size + known.iter().fold(0.0, |most, &one| one.max(most)));
+        let error = 1e-14 * (center.abs().element_sum() + size + known.iter().fold(0.0, |max, &one| one.max(max)));
         let depths = self.depths(center);
-        let least = depths.iter().zip(reaches).map(|(depth, reach)| depth + reach).fold(f64::INFINITY, f64::min);
-        match least {
-            _ if least > error => Verdict::Inside,
-            _ if least < -error => Verdict::Outside,
+        let min = depths.iter().zip(reaches).map(|(depth, reach)| depth + reach).fold(f64::INFINITY, f64::min);
+        match min {
+            _ if min > error => Verdict::Inside,
+            _ if min < -error => Verdict::Outside,
             _ => Verdict::Touching,
         }
     }
 
-    /// A point relative to the camera that is `reaches` outside of the selected planes, no two of which are opposite. Other coordinates are
-    /// given by `along` and `aside`, the latter as shares of the picture.
+    /// A point relative to the camera, at a distance of `reaches` outside of the selected planes. No two of them may be
+    /// opposite. `along` and `aside` give the other coordinates, the latter as fractions of the picture.
     pub fn touching(&self, selected: [bool; 6], reaches: [f64; 6], along: f64, aside: [f64; 2]) -> DVec3 {
         let along = match selected {
             [.., true, _] if self.near.is_finite() => self.near - reaches[4],

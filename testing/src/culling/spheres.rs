@@ -41,9 +41,9 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
             spheres.set(entry, bounds);
         }
         for first in (0..BoundingSpheres::COUNT).step_by(Frustum::WORD) {
-            let seen = frustum.intersects_spheres(&spheres, first);
-            for (place, &(is_tangent, verdict)) in cases[first..][..Frustum::WORD].iter().enumerate() {
-                tallies.drawloom.of(is_tangent).count(verdict, seen >> place & 1 == 1);
+            let visible = frustum.intersects_spheres(&spheres, first);
+            for (bit, &(is_tangent, verdict)) in cases[first..][..Frustum::WORD].iter().enumerate() {
+                tallies.drawloom.of(is_tangent).count(verdict, visible >> bit & 1 == 1);
             }
         }
         if let Some(naive) = naive {
@@ -59,8 +59,8 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
 /// A sphere that touches a plane, an edge or a corner, to within four f32 steps of its radius or its distance.
 fn tangent(oracle: &Oracle, random: &mut Random) -> BoundingSphere {
     let radius = if random.below(16) == 0 { 0.0 } else { magnitude(random, -6.0, 7.0) };
-    let place = oracle.touching(any_planes(random), [radius; 6], any_along(random), any_aside(random));
-    let center = oracle.world(place);
+    let touching = oracle.touching(any_planes(random), [radius; 6], any_along(random), any_aside(random));
+    let center = oracle.world(touching);
     let depth = |center| oracle.depths(oracle.relative(center)).into_iter().fold(f64::INFINITY, f64::min);
     let steps = random.below(9) as i32 - 4;
     if random.below(2) == 0 {
@@ -72,7 +72,7 @@ fn tangent(oracle: &Oracle, random: &mut Random) -> BoundingSphere {
         return BoundingSphere { center, radius };
     }
     let radius = (-depth(center)).max(0.0) as f32;
-    let center = oracle.world(place * (1.0 + f64::from(steps) * f64::from(f32::EPSILON)));
+    let center = oracle.world(touching * (1.0 + f64::from(steps) * f64::from(f32::EPSILON)));
     BoundingSphere { center, radius }
 }
 

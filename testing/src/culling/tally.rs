@@ -17,11 +17,11 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub fn count(&mut self, verdict: Verdict, seen: bool) {
+    pub fn count(&mut self, verdict: Verdict, is_visible: bool) {
         self.cases += 1;
-        self.false_culls += u64::from(verdict == Verdict::Inside && !seen);
+        self.false_culls += u64::from(verdict == Verdict::Inside && !is_visible);
         self.outside += u64::from(verdict == Verdict::Outside);
-        self.false_visibles += u64::from(verdict == Verdict::Outside && seen);
+        self.false_visibles += u64::from(verdict == Verdict::Outside && is_visible);
     }
 
     pub fn add(&mut self, other: &Self) {

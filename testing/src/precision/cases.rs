@@ -10,7 +10,7 @@ use drawloom::view::{GpuObject, ObjectTable, ShadowMaps};
 use super::vertex::Case;
 use crate::random::Random;
 
-/// A kind of view.
+/// The kinds of views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// A main camera's, with the vertical field of view in degrees and the picture size in pixels.
@@ -39,14 +39,14 @@ impl Kind {
         }
     }
 
-    /// A camera of this kind at `place`, with a random orientation.
-    pub fn camera(self, place: DVec3, random: &mut Random) -> Camera {
+    /// A camera of this kind at `position`, with a random orientation.
+    pub fn camera(self, position: DVec3, random: &mut Random) -> Camera {
         let orientation = rotation(random);
-        let main = Camera { orientation, ..Camera::looking_at("main", place, place + DVec3::X) };
+        let main = Camera { orientation, ..Camera::looking_at("main", position, position + DVec3::X) };
         let direction = random.direction().as_vec3().normalize();
         let (intensity, range, casts_shadow) = (Vec3::ONE, 1e5, true);
         let maps = ShadowMaps::default();
-        let seen_from = |maps: ShadowMaps, light: Light, cameras: &[Camera]| {
+        let map_camera = |maps: ShadowMaps, light: Light, cameras: &[Camera]| {
             maps.camera("map".to_owned(), &light, cameras).expect("a light that casts a shadow")
         };
         match self {
@@ -61,24 +61,17 @@ impl Kind {
             }
             Self::Spot { degrees } => {
                 let (inner_angle, outer_angle) = (0.0, degrees.to_radians() as f32);
-                let light = Light::Spot {
-                    position: place,
-                    direction,
-                    intensity,
-                    range,
-                    inner_angle,
-                    outer_angle,
-                    casts_shadow,
-                };
-                seen_from(maps, light, &[])
+                let light =
+                    Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow };
+                map_camera(maps, light, &[])
             }
             Self::Directional { reach } => {
                 let light = Light::Directional { direction, illuminance: intensity, casts_shadow };
-                seen_from(ShadowMaps { max_distance: reach, ..maps }, light, &[main])
+                map_camera(ShadowMaps { max_distance: reach, ..maps }, light, &[main])
             }
             Self::Hemispherical => {
-                let light = Light::Hemispherical { position: place, direction, intensity, range, casts_shadow };
-                seen_from(maps, light, &[])
+                let light = Light::Hemispherical { position, direction, intensity, range, casts_shadow };
+                map_camera(maps, light, &[])
             }
         }
     }
@@ -86,22 +79,22 @@ impl Kind {
 
 /// A vertex that `camera` sees, of a mesh that is at least as far from it as the mesh's radius around its own origin.
 pub fn vertex_of(camera: Camera, random: &mut Random) -> Case {
-    let (way, distance) = sight(&camera, random);
+    let (relative, distance) = visible_point(&camera, random);
     // In one case of four the camera is at the mesh's edge, where the error is greatest.
     let radius = if random.below(4) == 0 { distance } else { distance * log_between(random, 1e-4, 1.0) };
     let orientation = rotation(random);
     let scale = Vec3::from_array([(); 3].map(|()| log_between(random, 1e-2, 1e2) as f32));
-    // On the outside of the mesh, in whatever object space the scale leaves.
+    // On the outside of the mesh, in object space.
     let outside = random.direction() * radius * 0.999;
     let vertex = (outside / scale.as_dvec3()).as_vec3();
     let turned = orientation.as_dquat().normalize() * (scale.as_dvec3() * vertex.as_dvec3());
-    let position = camera.position + (way - turned);
+    let position = camera.position + (relative - turned);
     Case { camera, position, orientation, scale, vertex }
 }
 
 /// A random point in the picture, relative to the camera, and the distance that limits the mesh's radius. For orthographic views the
 /// limit is the size of the mesh in the picture.
-fn sight(camera: &Camera, random: &mut Random) -> (DVec3, f64) {
+fn visible_point(camera: &Camera, random: &mut Random) -> (DVec3, f64) {
     let (x, y) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
     let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
     let turn = camera.orientation.as_dquat().normalize();

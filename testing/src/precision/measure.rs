@@ -4,28 +4,28 @@ use drawloom::scene::SceneError;
 use drawloom::view::RenderView;
 
 use super::cases::{GpuObjects, Kind, log_between, vertex_of};
-use super::vertex::{gpu_view_of, is_seen, pixels_per_radian};
+use super::vertex::{gpu_view_of, is_visible, pixels_per_radian};
 use crate::random::Random;
 
 /// A distance from the world's origin, in metres.
 #[derive(Clone, Copy, Debug)]
 pub enum Origin {
-    /// Exactly this.
+    /// Exactly this distance.
     At(f64),
     /// Zero in one case of ten, and otherwise log-uniform up to 10⁹ m.
     Anywhere,
 }
 
-/// The errors.
+/// The measured errors.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Found {
+pub struct Errors {
     pub cases: usize,
-    /// Pixels, of the shaders' computation.
+    /// The greatest error of the shaders' computation, in pixels.
     pub greatest: f64,
     pub mean: f64,
     /// The greatest error as an angle, in units of 2⁻²⁴ radians: see [`pixels_per_radian`]. Meaningless for orthographic views.
     pub greatest_angle: f64,
-    /// Pixels, of absolute f32. A vertex that is lost counts as the picture's diagonal.
+    /// The greatest error of absolute f32 positions, in pixels. A lost vertex counts as the picture's diagonal.
     pub absolute_greatest: f64,
     pub absolute_mean: f64,
 }
@@ -34,9 +34,9 @@ pub struct Found {
 ///
 /// # Errors
 /// Returns an error if the scene rejects an object.
-pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) -> Result<Found, SceneError> {
+pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) -> Result<Errors, SceneError> {
     let mut gpu_objects = GpuObjects::new()?;
-    let mut found = Found::default();
+    let mut errors = Errors::default();
     let (mut sum, mut absolute_sum) = (0.0, 0.0);
     for start in (0..cases).step_by(BATCH) {
         let mut draw = || {
@@ -45,12 +45,12 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
                 Origin::Anywhere if random.below(10) == 0 => 0.0,
                 Origin::Anywhere => log_between(random, 1.0, 1e9),
             };
-            let place = random.direction() * distance;
-            vertex_of(kind.camera(place, random), random)
+            let position = random.direction() * distance;
+            vertex_of(kind.camera(position, random), random)
         };
         let some: Vec<_> = (start..cases.min(start + BATCH)).map(|_| draw()).collect();
         gpu_objects.visit(&some, |case, object| {
-            if !is_seen(case) {
+            if !is_visible(case) {
                 return;
             }
             let view = RenderView::new(&case.camera);
@@ -60,32 +60,32 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
             let diagonal = f64::from(case.camera.size[0]).hypot(f64::from(case.camera.size[1]));
             let bounded = |error: f64| if error <= diagonal { error } else { diagonal };
             let (error, absolute) = (bounded(error), bounded(case.absolute(&view).distance(truth)));
-            found.cases += 1;
-            found.greatest = found.greatest.max(error);
-            found.absolute_greatest = found.absolute_greatest.max(absolute);
+            errors.cases += 1;
+            errors.greatest = errors.greatest.max(error);
+            errors.absolute_greatest = errors.absolute_greatest.max(absolute);
             let angle = error / pixels_per_radian(&case.camera, case.eccentricity());
-            found.greatest_angle = found.greatest_angle.max(angle / UNIT_ROUNDOFF);
+            errors.greatest_angle = errors.greatest_angle.max(angle / UNIT_ROUNDOFF);
             sum += error;
             absolute_sum += absolute;
         })?;
     }
-    found.mean = sum / found.cases.max(1) as f64;
-    found.absolute_mean = absolute_sum / found.cases.max(1) as f64;
-    Ok(found)
+    errors.mean = sum / errors.cases.max(1) as f64;
+    errors.absolute_mean = absolute_sum / errors.cases.max(1) as f64;
+    Ok(errors)
 }
 
 /// 2⁻²⁴.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / (1_u32 << 24) as f64;
 
-/// The bound of a vertex's error in a [`HELD`] view, in pixels.
+/// The bound of a vertex's error in a [`BOUNDED`] view, in pixels.
 pub const BOUND: f64 = 1e-3;
 
 /// The angle of some thirty roundings in the worst case, all of one sign, in units of 2⁻²⁴ radians. See
 /// [`GpuView`](drawloom::view::GpuView).
 pub const WORST_ANGLE: f64 = 30.0;
 
-/// The views that keep within [`BOUND`].
-pub const HELD: [Kind; 11] = [
+/// The views with errors of at most [`BOUND`].
+pub const BOUNDED: [Kind; 11] = [
     Kind::Perspective { degrees: 27.0, size: Kind::FULL_HD },
     Kind::Perspective { degrees: 45.0, size: Kind::FULL_HD },
     Kind::Perspective { degrees: 60.0, size: Kind::FULL_HD },

@@ -12,7 +12,7 @@ pub struct Case {
     pub position: DVec3,
     pub orientation: Quat,
     pub scale: Vec3,
-    /// In object space.
+    /// Position of the vertex in object space.
     pub vertex: Vec3,
 }
 
@@ -46,15 +46,15 @@ impl Case {
         self.pixels(clip)
     }
 
-    /// Where the shaders put it: `vertex` of `surface.wgsl`, in f32 and in the same order.
+    /// The position that the shaders compute: `vertex` of `surface.wgsl`, in f32 and in the same order.
     pub fn shaded(&self, object: &GpuObject, view: &GpuView) -> DVec2 {
         let origin = fixed_difference(object, view);
         let turned = rotate(Quat::from_array(object.orientation), Vec3::from(object.scale) * self.vertex);
-        self.placed(times(&view.clip_from_relative, origin + turned))
+        self.projected(times(&view.clip_from_relative, origin + turned))
     }
 
-    /// Where it would be, were all places in the world f32: object to world, world to view and view to clip space, each with
-    /// a matrix of its own, as most engines have it.
+    /// The position computed from f32 world positions: object to world, world to view and view to clip space, each with a
+    /// matrix of its own, as in most engines.
     pub fn absolute(&self, view: &RenderView) -> DVec2 {
         let camera = &self.camera;
         let model = Mat4::from_scale_rotation_translation(self.scale, self.orientation, self.position.as_vec3());
@@ -62,24 +62,24 @@ impl Case {
         let upright = RenderView::new(&Camera { orientation: Quat::IDENTITY, ..view.camera.clone() });
         let world = times(&model, self.vertex).truncate();
         let local = times(&world_from_view.inverse(), world).truncate();
-        self.placed(times(&upright.clip_from_relative(), local))
+        self.projected(times(&upright.clip_from_relative(), local))
     }
 
-    /// How far the vertex is from the middle of the picture, in pixels.
+    /// The distance of the vertex from the centre of the picture, in pixels.
     pub fn eccentricity(&self) -> f64 {
         let [width, height] = self.camera.size.map(f64::from);
         self.truth().distance(DVec2::new(width, height) * 0.5)
     }
 
-    /// What comes after the matrix, as `clip_position` of `drawloom.wgsl` has it. What comes after the shader is the device's: it
-    /// is done in f64, so that only what the shader lost is measured.
-    fn placed(&self, clip: Vec4) -> DVec2 {
+    /// Computes what follows the matrix, as `clip_position` of `drawloom.wgsl` does. What follows the shader is the device's
+    /// work; it is computed in f64, so that only the shader's error is measured.
+    fn projected(&self, clip: Vec4) -> DVec2 {
         if self.camera.projection == Projection::Paraboloid {
-            let place = clip.truncate();
-            let distance = place.length();
-            let forward = -place.z / distance.max(1e-30);
+            let position = clip.truncate();
+            let distance = position.length();
+            let forward = -position.z / distance.max(1e-30);
             let across = distance.max(1e-30) * (1.0 + forward).max(0.1);
-            return self.pixels(DVec2::new(f64::from(place.x / across), f64::from(place.y / across)));
+            return self.pixels(DVec2::new(f64::from(position.x / across), f64::from(position.y / across)));
         }
         let clip = clip.as_dvec4();
         self.pixels(DVec2::new(clip.x, clip.y) / clip.w)
@@ -91,15 +91,16 @@ impl Case {
     }
 }
 
-/// Pixels per radian, at most, at this distance from the centre of a perspective picture, which is stretched towards its edges. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, whose derivative
-/// is f(1 + tan² a).
+/// The maximum number of pixels per radian at this distance from the centre of a perspective picture, which is stretched
+/// towards its edges. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, with the derivative
+/// f(1 + tan² a).
 pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
     match camera.projection {
         Projection::Perspective { field_of_view } => {
             let focal = f64::from(camera.size[1]) * 0.5 / (f64::from(field_of_view) * 0.5).tan();
             focal + eccentricity * eccentricity / focal
         }
-        // tan(a / 2) times half the picture, whose derivative is half of that at the rim, and less before it.
+        // tan(a / 2) times half the picture. Its derivative is greatest at the rim, half of the picture.
         _ => f64::from(camera.size[1]) * 0.5,
     }
 }
@@ -122,8 +123,8 @@ fn rotate(orientation: Quat, direction: Vec3) -> Vec3 {
     direction + orientation.w * twice + axis.cross(twice)
 }
 
-fn times(matrix: &Mat4, place: Vec3) -> Vec4 {
-    matrix.x_axis * place.x + matrix.y_axis * place.y + matrix.z_axis * place.z + matrix.w_axis
+fn times(matrix: &Mat4, position: Vec3) -> Vec4 {
+    matrix.x_axis * position.x + matrix.y_axis * position.y + matrix.z_axis * position.z + matrix.w_axis
 }
 
 fn fixed_difference(object: &GpuObject, view: &GpuView) -> Vec3 {
@@ -146,11 +147,11 @@ fn fixed_difference(object: &GpuObject, view: &GpuView) -> Vec3 {
 const STEP: f32 = 1.0 / (1_u32 << 30) as f32;
 
 /// Whether the vertex is in the picture and behind the near plane.
-pub fn is_seen(case: &Case) -> bool {
+pub fn is_visible(case: &Case) -> bool {
     let local = unit(case.camera.orientation).inverse() * case.relative();
-    let place = case.truth();
+    let pixel = case.truth();
     let [width, height] = case.camera.size.map(f64::from);
     let distance = if case.camera.projection == Projection::Paraboloid { local.length() } else { -local.z };
     let near = case.camera.kind == ViewKind::Shadow || distance >= f64::from(case.camera.near);
-    near && distance > 0.0 && (0.0..=width).contains(&place.x) && (0.0..=height).contains(&place.y)
+    near && distance > 0.0 && (0.0..=width).contains(&pixel.x) && (0.0..=height).contains(&pixel.y)
 }

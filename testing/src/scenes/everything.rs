@@ -27,8 +27,15 @@ pub fn everything() -> Scene {
     add(&mut scene, strip, plaster, DVec3::new(0.0, 2.0, -4.0), Vec3::splat(6.0), Quat::IDENTITY);
     for (index, x) in [-2.4, -0.8, 0.8, 2.4].into_iter().enumerate() {
         let mirrored = if index == 2 { -1.0 } else { 1.0 };
-        let place = DVec3::new(x, 0.5, -0.5 * index as f64);
-        add(&mut scene, block, stone, place, Vec3::new(0.4 * mirrored, 0.5, 0.4), Quat::from_rotation_y(index as f32));
+        let position = DVec3::new(x, 0.5, -0.5 * index as f64);
+        add(
+            &mut scene,
+            block,
+            stone,
+            position,
+            Vec3::new(0.4 * mirrored, 0.5, 0.4),
+            Quat::from_rotation_y(index as f32),
+        );
     }
     for (x, blend) in [(-2.0, Blend::Alpha), (0.0, Blend::Additive), (2.0, Blend::Subtractive)] {
         let diffuse = Vec3::new(0.3, 0.5, 0.2);
@@ -46,11 +53,11 @@ fn add(
     scene: &mut Scene,
     mesh: Handle<Mesh>,
     material: Handle<Material>,
-    place: DVec3,
+    position: DVec3,
     scale: Vec3,
     orientation: Quat,
 ) {
-    scene.add_object(RenderObject { scale, orientation, ..RenderObject::new(mesh, material, place) }).unwrap();
+    scene.add_object(RenderObject { scale, orientation, ..RenderObject::new(mesh, material, position) }).unwrap();
 }
 
 /// A light of a class. `None` for shadowed point lights, which do not exist.
