@@ -1,10 +1,10 @@
-//! An engine that owns its device, its world and its loop, and has Drawloom produce its frames.
+//! An engine that owns its device, its world and its loop, and renders its frames with Drawloom.
 //!
 //!     cargo run --release --example engine_loop
 //!
-//! Each turn of the loop: hand the world over, get it back as soon as the frame is recorded, submit the frame on this
-//! thread, the device thread, while the next update runs on another. Without a window: the picture goes into a texture
-//! that stands for the surface's, and at the end to `engine_loop.png`.
+//! Each iteration of the loop lends the world to the renderer, which returns it when the frame is recorded. It then submits
+//! the frame on this thread, the device thread, while the next update runs on another thread. The example opens no window:
+//! it copies the picture into a texture in place of a surface's, and finally saves it as `engine_loop.png`.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ const FRAMES: usize = 120;
 const STEP: Duration = Duration::from_millis(16);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // The engine's own device. What Drawloom needs of it is in WgpuBackend's constants.
+    // The engine's own device. WgpuBackend's constants list the features and limits that Drawloom needs.
     let (device, queue) = open_device()?;
     let surface = Arc::new(Surface::new(&device, [960, 540]));
 
@@ -39,16 +39,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         .build(Arc::clone(&scheduler))?;
 
     let mut world = World::new()?;
-    let mut held = Vec::with_capacity(FRAMES);
+    let mut lent_times = Vec::with_capacity(FRAMES);
     let mut last = None;
     for frame in 0..FRAMES {
         if frame == FRAMES / 2 {
             world.camera.size = [640, 480];
             surface.resize(&device, world.camera.size);
         }
-        let handed_over = Instant::now();
+        let lent = Instant::now();
         let recorded = renderer.record(world.as_scene_ref())?;
-        held.push(handed_over.elapsed());
+        lent_times.push(lent.elapsed());
 
         let submitted = thread::scope(|scope| {
             let update = scope.spawn(|| world.update(&scheduler));
@@ -59,9 +59,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         last = Some(submitted.submission);
     }
 
-    held.sort();
+    lent_times.sort();
     println!("{} objects, {FRAMES} frames on {}", world.positions.len(), adapter_name(&device));
-    println!("the world was held {:?} a frame (median), {:?} at most", held[FRAMES / 2], held[FRAMES - 1]);
+    println!(
+        "the world was lent for {:?} per frame (median), {:?} at most",
+        lent_times[FRAMES / 2],
+        lent_times[FRAMES - 1]
+    );
     let submission = last.ok_or("no frame was drawn")?;
     let picture = submission.read(0, "picture")?;
     let path = "engine_loop.png";
@@ -70,7 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The engine's own storage: one array a property, which Drawloom reads in place.
+/// The engine's own storage: one array per property. Drawloom reads the arrays without copying them first.
 struct World {
     time: f64,
     camera: Camera,
@@ -120,7 +124,7 @@ impl World {
         })
     }
 
-    /// What Drawloom may read until the frame is recorded.
+    /// The data that Drawloom reads until the frame is recorded.
     fn as_scene_ref(&self) -> SceneRef<'_> {
         SceneRef {
             positions: &self.positions,
@@ -157,8 +161,8 @@ impl World {
     }
 }
 
-/// A pipeline of the engine's own over Drawloom's commands, in the place of Drawloom's transparency: objects of
-/// additive materials glow, brightest at their rims.
+/// An engine's process with a pipeline of its own for Drawloom's commands. It replaces Drawloom's transparency: objects
+/// with additive materials glow, brightest at their rims.
 struct Glow;
 
 impl RenderProcess for Glow {
@@ -200,7 +204,7 @@ impl RenderProcess for Glow {
     }
 }
 
-/// A process of the engine's own that encodes itself: it copies the finished picture to where the engine shows it.
+/// An engine's process with a raw pass: it copies the finished picture to the engine's surface.
 struct Present {
     surface: Arc<Surface>,
 }
@@ -212,7 +216,7 @@ impl RenderProcess for Present {
 
     fn declare(&self, declare: &mut Declare) {
         declare.reads("picture");
-        // Nothing in the graph reads what it writes.
+        // No process reads its output, so it must be kept explicitly.
         declare.keep();
     }
 
@@ -228,13 +232,13 @@ impl RawPass for Present {
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         let picture = resources.target("picture").ok_or("there is no picture to present")?;
-        let shown = self.surface.texture.lock();
-        encoder.copy_texture_to_texture(picture.as_image_copy(), shown.as_image_copy(), picture.size());
+        let surface = self.surface.texture.lock();
+        encoder.copy_texture_to_texture(picture.as_image_copy(), surface.as_image_copy(), picture.size());
         Ok(())
     }
 }
 
-/// Stands for a window's surface.
+/// A texture in place of a window's surface.
 struct Surface {
     texture: Mutex<wgpu::Texture>,
 }
@@ -266,7 +270,7 @@ fn adapter_name(device: &wgpu::Device) -> String {
     device.adapter_info().name
 }
 
-/// A device on the machine's best adapter, with what Drawloom requires and what it can use beyond that.
+/// A device on the machine's best adapter, with the features that Drawloom requires and the optional ones it can use.
 fn open_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions {
@@ -283,7 +287,7 @@ fn open_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     Ok(pollster::block_on(adapter.request_device(&descriptor))?)
 }
 
-/// A cube of 2 m, each side with normals of its own.
+/// A cube of 2 m, with separate normals for each side.
 fn cube() -> Result<Mesh, SceneError> {
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
     for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {

@@ -1,4 +1,4 @@
-//! A steady frame allocates nothing: neither in graphs nor in loops, on no thread. And jobs that have run leave no memory behind.
+//! A steady frame allocates nothing on any thread, neither in graphs nor in loops. Finished jobs release their memory.
 //!
 //! The allocator of this binary counts for all threads, so everything is in one test. A second test, or the harness that starts
 //! it, would be counted too.
@@ -58,16 +58,16 @@ fn allocations_of(mut frame: impl FnMut(usize)) -> usize {
     rounds.min().expect("at least one round")
 }
 
-/// The context of a frame: how much work an item is.
+/// The context of a frame, with the work per item.
 #[derive(Default)]
 struct World {
     work: AtomicUsize,
     items: AtomicUsize,
 }
 
-type Process = Closure<'static, World>;
+type TestNode = Closure<'static, World>;
 
-fn process() -> Process {
+fn node() -> TestNode {
     Closure::new(|world: &World, range: Range<usize>, _: &Worker| {
         world.items.fetch_add(range.len(), Ordering::Relaxed);
         (0..world.work.load(Ordering::Relaxed)).for_each(|step| {
@@ -78,18 +78,18 @@ fn process() -> Process {
 }
 
 /// A layered graph of narrow, wide and pinned nodes, each of which depends on some nodes of the layer before.
-fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
+fn layered(seed: u64, layers: &[usize]) -> Schedule<TestNode> {
     let mut random = Rng::with_seed(seed);
     let mut graph = FrameGraph::new();
     let mut before: Vec<NodeId> = Vec::new();
     for (layer, &width) in layers.iter().enumerate() {
-        let processes: Vec<NodeId> = (0..width)
+        let nodes: Vec<NodeId> = (0..width)
             .map(|index| {
                 let (items, chunk) = (2 + random.usize(..100), 1 + random.usize(..4));
                 let payload = match random.usize(..8) {
-                    0 => process().on_calling_thread(),
-                    1 | 2 => process().with_width(move |_| items).with_chunk(chunk),
-                    _ => process(),
+                    0 => node().on_calling_thread(),
+                    1 | 2 => node().with_width(move |_| items).with_chunk(chunk),
+                    _ => node(),
                 };
                 let added = graph.add(format!("{layer} {index}"), payload);
                 graph.keep(added);
@@ -99,7 +99,7 @@ fn layered(seed: u64, layers: &[usize]) -> Schedule<Process> {
                 added
             })
             .collect();
-        before = processes;
+        before = nodes;
     }
     graph.compile().expect("the graph is valid")
 }
@@ -131,12 +131,12 @@ fn comb() -> Schedule<Closure<'static, Duration>> {
 }
 
 /// A root on which all pinned nodes depend.
-fn pinned_nodes() -> Schedule<Process> {
+fn pinned_nodes() -> Schedule<TestNode> {
     let mut graph = FrameGraph::new();
-    let root = graph.add("root", process());
+    let root = graph.add("root", node());
     graph.keep(root);
     for index in 0..MAX_JOBS {
-        let pinned = graph.add(format!("pinned {index}"), process().on_calling_thread());
+        let pinned = graph.add(format!("pinned {index}"), node().on_calling_thread());
         graph.order(root, pinned);
         graph.keep(pinned);
     }
@@ -183,7 +183,7 @@ fn with_others_blocked(scheduler: &Scheduler, chosen: usize, call: impl FnMut() 
 }
 
 /// The allocations of frames of a graph whose work changes. Heavy frames are too long to run serially.
-fn allocations_of_graph(scheduler: &Scheduler, mut schedule: Schedule<Process>, always_parallel: bool) -> usize {
+fn allocations_of_graph(scheduler: &Scheduler, mut schedule: Schedule<TestNode>, always_parallel: bool) -> usize {
     schedule.always_parallel(always_parallel);
     let world = World::default();
     let allocations = allocations_of(|frame| {
@@ -230,7 +230,7 @@ fn a_steady_frame_allocates_nothing() {
     for (seed, layers) in [&[1, 12, 3, 30, 7, 1][..], &[5, 100, 2, 150, 40], &[200, 1, 200]].into_iter().enumerate() {
         for always_parallel in [true, false] {
             let allocations = allocations_of_graph(&scheduler, layered(seed as u64, layers), always_parallel);
-            check(format!("layers of {layers:?}, always shared: {always_parallel}"), allocations);
+            check(format!("layers of {layers:?}, always parallel: {always_parallel}"), allocations);
         }
     }
     let mut schedule = comb();
@@ -240,7 +240,7 @@ fn a_steady_frame_allocates_nothing() {
     });
     check("more jobs than fit into a deque".to_owned(), allocations);
     let allocations = allocations_of(|_frame| schedule.run(&scheduler, &Duration::ZERO).unwrap());
-    check("the same with thieves".to_owned(), allocations);
+    check("the same while others steal".to_owned(), allocations);
     for (length, chunk) in [(1_000, 1), (1_000, 7), (2, 1), (1, 1)] {
         let sum = AtomicUsize::new(0);
         let allocations = allocations_of(|_frame| {

@@ -31,7 +31,7 @@ fn main() -> ExitCode {
 /// The largest allowed average size of a command, in bytes: half of its uncompressed size.
 const MAX_AVERAGE_BYTES: f64 = 12.0;
 
-/// Encodes and decodes each draw list of a frame by itself.
+/// Encodes and decodes each draw list of a frame separately.
 fn check(scene: &Scene) -> Result<(), Failed> {
     let lists = draw_lists(scene)?;
     let (mut count, mut bytes) = (0, 0);
@@ -49,5 +49,5 @@ fn check(scene: &Scene) -> Result<(), Failed> {
     let average = bytes as f64 / count as f64;
     println!("{count} commands in {} lists, {average:.2} bytes each", lists.len());
     // Without commands the average is NaN, which fails.
-    if average <= MAX_AVERAGE_BYTES { Ok(()) } else { Err(format!("{average:.1} bytes a command").into()) }
+    if average <= MAX_AVERAGE_BYTES { Ok(()) } else { Err(format!("{average:.1} bytes per command").into()) }
 }

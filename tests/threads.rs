@@ -7,7 +7,7 @@ use std::sync::{
 
 use drawloom::task::Scheduler;
 
-/// How many threads the process has.
+/// The number of threads of this process.
 #[cfg(target_os = "linux")]
 fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
@@ -47,7 +47,7 @@ fn a_thousand_dropped_schedulers_leave_no_thread() {
     assert_eq!(started.load(Ordering::Relaxed), 3_000);
     // A joined thread may be listed for a moment longer; a leaked one would be listed for ever.
     #[cfg(target_os = "linux")]
-    assert!((0..10_000).any(|_look| {
+    assert!((0..10_000).any(|_attempt| {
         threads() <= before || {
             std::thread::sleep(std::time::Duration::from_millis(1));
             false

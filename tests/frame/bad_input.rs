@@ -1,4 +1,4 @@
-//! Invalid input is refused by name, or counted and left out. Nothing panics, and the next frame is complete.
+//! Invalid input is refused with an error that names it, or counted and left out. No case panics, and the next frame is complete.
 
 use std::f32::consts::PI;
 use std::sync::Arc;

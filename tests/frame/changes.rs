@@ -33,7 +33,7 @@ fn spot(position: DVec3) -> Light {
     }
 }
 
-/// One camera that looks at boxes, without lights.
+/// Boxes in front of one camera, without lights.
 fn dark_field() -> Scene {
     let mut scene = field(50);
     scene.cameras.truncate(1);
@@ -161,7 +161,7 @@ fn an_engines_process_may_sample_shadow_maps_even_without_lights() {
 }
 
 #[test]
-fn left_out_processes_leave_no_gap_and_without_casters_no_light_is_shadowed() {
+fn the_chain_skips_left_out_processes_and_without_casters_no_light_is_shadowed() {
     let steps = || Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0)];

@@ -15,12 +15,12 @@ use drawloom_testing::scenes::everything::{dark, everything};
 use drawloom_testing::scenes::sized;
 
 /// An engine's own render process, declared by a closure.
-struct Own<F> {
+struct OwnProcess<F> {
     name: &'static str,
     declare: F,
 }
 
-impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for Own<F> {
+impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for OwnProcess<F> {
     fn name(&self) -> &str {
         self.name
     }
@@ -35,7 +35,7 @@ impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for Own<F> {
 }
 
 fn own(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> impl RenderProcess + 'static {
-    Own { name, declare }
+    OwnProcess { name, declare }
 }
 
 fn builder(deferred: Deferred) -> RendererBuilder<NullBackend> {
@@ -225,7 +225,7 @@ fn a_left_out_process_is_in_no_plan() {
     let names = processes(&mut renderer, &everything());
     assert_eq!(names.len(), 9);
     assert!(names.iter().all(|name| name != "point lights" && name != "transparency"), "{names:?}");
-    // A process whose targets others read cannot be left out.
+    // A process cannot be left out if others read its targets.
     let error = build_error(builder(Deferred::to_picture().leave_out("geometry buffer"))).to_string();
     assert!(error.contains("nothing writes") && error.contains("lights"), "{error}");
 }

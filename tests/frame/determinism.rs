@@ -130,14 +130,19 @@ fn visibility_matches_a_reference_loop() {
                 |coordinate: f64, angle: f64| coordinate.abs() * angle.cos() + position.z * angle.sin() <= radius;
             -position.z + radius >= f64::from(camera.near) && beside(position.x, half_x) && beside(position.y, half)
         };
-        let seen: Vec<u32> =
+        let expected_visible: Vec<u32> =
             (0..reference.object_count()).filter(|&object| inside(object)).map(|object| object as u32).collect();
         // A sphere that touches a plane may be on either side of it, depending on rounding.
-        assert!(view.visible.abs_diff(seen.len()) <= 1, "{} against {}", view.visible, seen.len());
+        assert!(
+            view.visible.abs_diff(expected_visible.len()) <= 1,
+            "{} against {}",
+            view.visible,
+            expected_visible.len()
+        );
         assert!(view.visible > 100 && view.visible < 2000, "the camera {} tests something", camera.name);
         let is_opaque =
             |object: &u32| scene.assets().get(reference.materials[*object as usize]).unwrap().blend == Blend::None;
-        let expected: BTreeSet<u32> = seen.into_iter().filter(is_opaque).collect();
+        let expected: BTreeSet<u32> = expected_visible.into_iter().filter(is_opaque).collect();
         let drawn: BTreeSet<u32> = list.objects.iter().copied().collect();
         assert!(expected.symmetric_difference(&drawn).count() <= 1);
         assert_eq!(drawn.len(), list.objects.len(), "no object is drawn twice");

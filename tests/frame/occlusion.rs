@@ -13,7 +13,7 @@ use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
 use drawloom_testing::scenes::{cube, field, sized};
 
-/// A wall before the first camera, and small cubes behind and beside it, one in four of them glass. The second camera sees the
+/// A wall in front of the first camera, and small cubes behind and beside it, one in four of them glass. The second camera views the
 /// scene from behind, so that its cubes are in front of the wall.
 fn yard() -> Scene {
     let mut scene = Scene::new();
@@ -78,7 +78,7 @@ fn hidden_objects_are_culled_and_all_others_are_drawn() {
 }
 
 #[test]
-fn workers_and_granularity_do_not_change_what_is_occluded() {
+fn workers_and_granularity_do_not_change_the_occluded_objects() {
     for scene in [yard(), field(3000)] {
         for side in Quality::OCCLUSION_TILE_SIZES {
             let first = |workers, granularity| {
@@ -98,7 +98,7 @@ fn workers_and_granularity_do_not_change_what_is_occluded() {
 }
 
 #[test]
-fn the_occlusion_policy_tries_both_and_only_occluded_objects_differ() {
+fn the_occlusion_policy_draws_frames_with_and_without_culling_that_differ_only_in_occluded_objects() {
     let scene = yard();
     let mut with = renderer(Some(4), 1, Granularity::default());
     let all = drawn(&mut renderer(None, 1, Granularity::default()), &scene, "geometry buffer").0;
@@ -150,9 +150,9 @@ fn shadow_maps_are_not_occlusion_culled() {
 }
 
 /// Draws objects with the depth test that it declares.
-struct Own(fn(&mut Declare));
+struct OwnProcess(fn(&mut Declare));
 
-impl RenderProcess for Own {
+impl RenderProcess for OwnProcess {
     fn name(&self) -> &str {
         "own"
     }
@@ -175,7 +175,7 @@ fn nothing_is_culled_if_a_process_draws_without_the_depth_test() {
     let occluded = |depth: fn(&mut Declare)| {
         let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
         let builder =
-            Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Own(depth)).quality(quality);
+            Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(OwnProcess(depth)).quality(quality);
         let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         renderer.record(scene.as_scene_ref()).unwrap().statistics().views[0].occluded
     };

@@ -26,12 +26,12 @@ fn depths(scene: &Scene, list: &DrawList) -> Vec<f32> {
     let camera = &scene.cameras[0];
     let forward = camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
     let position = |object: &u32| scene.as_scene_ref().positions[*object as usize];
-    // Rounded to f32, as keys are.
+    // Rounded to f32, like keys.
     list.objects.iter().map(|object| forward.dot(position(object) - camera.position) as f32).collect()
 }
 
 #[test]
-fn keys_have_as_many_depth_bits_as_configured() {
+fn keys_have_the_configured_number_of_depth_bits() {
     let scene = field(2_000);
     for bits in [6, 12] {
         for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }] {

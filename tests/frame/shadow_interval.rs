@@ -1,4 +1,4 @@
-//! Shadow maps that are drawn every n-th frame, and the changes that draw them earlier.
+//! Shadow maps that are drawn every n-th frame, and changes that cause them to be drawn earlier.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
-/// A renderer whose shadow maps are drawn every n-th frame.
+/// A renderer that draws shadow maps every n-th frame.
 struct Fixture {
     renderer: Renderer<NullBackend>,
     submitter: Submitter<NullBackend>,
@@ -21,12 +21,12 @@ struct Fixture {
 impl Fixture {
     fn new(interval: u32) -> Self {
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(every(interval));
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality_with(interval));
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { renderer, submitter }
     }
 
-    /// Draws a frame, and returns the views whose shadow map it draws.
+    /// Draws a frame, and returns the views that draw a shadow map in it.
     fn drawn(&mut self, scene: &Scene) -> Vec<usize> {
         let recorded = self.renderer.record(scene.as_scene_ref()).unwrap();
         let passes = self.submitter.submit(recorded).unwrap().submission.passes;
@@ -36,7 +36,7 @@ impl Fixture {
     }
 }
 
-fn every(interval: u32) -> Quality {
+fn quality_with(interval: u32) -> Quality {
     let quality = Quality::balanced();
     Quality { shadows: ShadowQuality { interval, ..quality.shadows }, ..quality }
 }
@@ -119,13 +119,13 @@ fn a_change_of_lights_or_views_draws_all_maps_at_once() {
     type Change<'a> = &'a dyn Fn(&mut Scene);
     let changes: [(&str, Change<'_>, &[usize]); 9] = [
         ("another plan", &|scene| scene.lights.push(lamp()), &[2, 3]),
-        ("a light more", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4]),
+        ("a light added", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4]),
         ("a light in between", &|scene| scene.lights.insert(0, lamp()), &[2, 3, 4]),
         ("two lights swapped", &|scene| scene.lights.swap(1, 2), &[2, 3, 4]),
-        ("a light less", &|scene| _ = scene.lights.pop(), &[2, 3]),
-        ("a light again", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4]),
-        ("a camera more", &|scene| scene.cameras.push(scene.cameras[0].clone()), &[3, 4, 5]),
-        ("a camera less", &|scene| _ = scene.cameras.pop(), &[2, 3, 4]),
+        ("a light removed", &|scene| _ = scene.lights.pop(), &[2, 3]),
+        ("another light added", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4]),
+        ("a camera added", &|scene| scene.cameras.push(scene.cameras[0].clone()), &[3, 4, 5]),
+        ("a camera removed", &|scene| _ = scene.cameras.pop(), &[2, 3, 4]),
         ("one more light casts shadows", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5]),
     ];
     for (what, change, drawn) in changes {
@@ -139,14 +139,14 @@ fn a_change_of_lights_or_views_draws_all_maps_at_once() {
 fn a_change_of_quality_or_pipeline_draws_all_maps_at_once() {
     let (scene, mut fixture) = (two_lights(), Fixture::new(100));
     fixture.drawn(&scene);
-    fixture.renderer.set_quality(every(50)).unwrap();
+    fixture.renderer.set_quality(quality_with(50)).unwrap();
     assert_eq!(fixture.drawn(&scene), [2, 3]);
     assert!(fixture.drawn(&scene).is_empty());
     let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
     fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
     assert_eq!(fixture.drawn(&scene), [2, 3]);
     assert!(fixture.drawn(&scene).is_empty());
-    fixture.renderer.set_quality(every(1)).unwrap();
+    fixture.renderer.set_quality(quality_with(1)).unwrap();
     assert_eq!(fixture.drawn(&scene), [2, 3]);
     assert_eq!(fixture.drawn(&scene), [2, 3]);
 }
@@ -158,7 +158,7 @@ fn maps_of_frames_that_were_not_submitted_are_not_cached() {
     drop(fixture.renderer.record(scene.as_scene_ref()).unwrap());
     assert_eq!(fixture.drawn(&scene), [2, 3]);
     // The second frame is recorded before the first one is dropped.
-    fixture.renderer.set_quality(every(100)).unwrap();
+    fixture.renderer.set_quality(quality_with(100)).unwrap();
     let first = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     let second = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     drop(first);

@@ -1,4 +1,4 @@
-//! The timeline of a frame, and that recording it changes nothing.
+//! The timeline of a frame. Recording it does not change the frame.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -45,11 +45,11 @@ fn a_log_accounts_for_whole_frames() {
             assert!(frame.began <= spans[0].began && spans[0].began < run.began && run.ended < spans[0].ended);
             assert!(spans[0].ended <= spans[1].began && spans[1].ended == frame.ended);
 
-            // Each object is counted once by the visibility stage, whatever the size of its jobs.
-            let processes = run.graph.nodes.iter().enumerate();
-            let seen = processes.filter(|(_, process)| process.labels.stage.as_deref() == Some("visibility"));
-            let seen: Vec<_> = seen.map(|(index, _)| run.width(index)).collect();
-            assert_eq!(seen, vec![2_000; scene.cameras.len()]);
+            // The visibility stage counts each object once, with jobs of any size.
+            let nodes = run.graph.nodes.iter().enumerate();
+            let visibility = nodes.filter(|(_, node)| node.labels.stage.as_deref() == Some("visibility"));
+            let widths: Vec<_> = visibility.map(|(index, _)| run.width(index)).collect();
+            assert_eq!(widths, vec![2_000; scene.cameras.len()]);
 
             let replay = Replay::of_frame(&log, frame.number, SchedulerCosts::ZERO).unwrap();
             let serial = (spans[0].ended - spans[0].began) - run.duration() + (spans[1].ended - spans[1].began);
@@ -66,7 +66,7 @@ fn every_node_is_labelled_with_its_process_stage_and_view() {
     renderer.scheduler().timeline().start();
     let _recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let log = renderer.scheduler().timeline().take();
-    let labels = || log.runs[0].graph.nodes.iter().map(|process| &process.labels);
+    let labels = || log.runs[0].graph.nodes.iter().map(|node| &node.labels);
     let plan = renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
     let processes: BTreeSet<_> = labels().filter_map(|labels| labels.process.clone()).collect();
     assert_eq!(processes, plan.collect::<BTreeSet<_>>());

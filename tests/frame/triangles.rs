@@ -1,4 +1,4 @@
-//! Triangle culling, of meshes that request it.
+//! Culling the triangles of meshes that request it.
 
 use std::sync::Arc;
 

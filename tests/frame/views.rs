@@ -82,7 +82,7 @@ fn graphs_can_be_exported_to_dot() {
 }
 
 #[test]
-fn bundles_hold_256_batches_whatever_the_granularity() {
+fn bundles_hold_256_batches_with_any_granularity() {
     let mut scene = field(3000);
     // Every object has a mesh of its own, so no commands merge.
     let (cube, stone) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);

@@ -8,7 +8,7 @@ use std::ffi::{c_int, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-/// The system's allocator; it counts every allocation by its backtrace while [`count`] enables that.
+/// The system's allocator, which also counts every allocation by its backtrace while [`count`] enables that.
 struct CountingAllocator;
 
 #[global_allocator]

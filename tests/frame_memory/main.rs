@@ -1,4 +1,4 @@
-//! Counts the allocations of steady frames by the code that allocates: the crate, which never does in its jobs, or wgpu.
+//! Counts the allocations of steady frames by the code that allocates: the crate, which must not allocate in its jobs, or wgpu.
 //!
 //! The allocator of this binary counts for all threads, so there is only one test. Frames are static and repeat exactly.
 //! Counting starts after a warm-up in which tables, pools and queues grow to their final size.
@@ -26,7 +26,7 @@ use drawloom::task::Scheduler;
 use drawloom_testing::{adapter, scenes};
 
 use report::Report;
-use stack::{Owner, Stage};
+use stack::{Owner, Phase};
 
 const WARM_UP_FRAMES: usize = 30;
 const COUNTED_FRAMES: usize = 20;
@@ -52,13 +52,13 @@ fn count_allocations() {
         for workers in [1, 2] {
             let rounds = steady_frames(scene, workers);
             // A thread may allocate when it does something for the first time, in any frame. So take the best round.
-            let own = |report: &Report| report.allocations_of(Owner::Drawloom, Stage::Jobs);
+            let own = |report: &Report| report.allocations_of(Owner::Drawloom, Phase::Jobs);
             let report = rounds.into_iter().min_by_key(own).unwrap();
             report.print(&format!("{name}, {workers} workers"), show);
             assert_eq!(own(&report), 0, "{name}, {workers} workers: allocations of jobs in {COUNTED_FRAMES} frames");
-            assert!(report.allocations_of(Owner::Wgpu, Stage::Jobs) > 0, "wgpu allocates in jobs, so counting works");
-            let unknown = [Owner::Drawloom, Owner::Wgpu].map(|owner| report.allocations_of(owner, Stage::Unknown));
-            assert_eq!(unknown, [0, 0], "every allocation of a frame has a known stage");
+            assert!(report.allocations_of(Owner::Wgpu, Phase::Jobs) > 0, "wgpu allocates in jobs, so counting works");
+            let unknown = [Owner::Drawloom, Owner::Wgpu].map(|owner| report.allocations_of(owner, Phase::Unknown));
+            assert_eq!(unknown, [0, 0], "every allocation of a frame has a known phase");
         }
     }
 }

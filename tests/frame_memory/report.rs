@@ -1,9 +1,9 @@
-//! Allocations by stage and by call site.
+//! Allocations by phase and by call site.
 
 use std::collections::BTreeMap;
 
 use crate::counting_allocator::AllocationSite;
-use crate::stack::{self, CallSite, Owner, Stage};
+use crate::stack::{self, CallSite, Owner, Phase};
 
 /// The allocations of a number of frames.
 pub struct Report {
@@ -20,20 +20,20 @@ impl Report {
         Self { frames, call_sites }
     }
 
-    /// The number of this owner's allocations at this stage, over all frames.
-    pub fn allocations_of(&self, owner: Owner, stage: Stage) -> usize {
-        self.sum(|site| (site.owner, site.stage) == (owner, stage))
+    /// The number of this owner's allocations at this phase, over all frames.
+    pub fn allocations_of(&self, owner: Owner, phase: Phase) -> usize {
+        self.sum(|site| (site.owner, site.phase) == (owner, phase))
     }
 
-    /// Prints the allocations per frame by stage, and all call sites if `show` is set.
+    /// Prints the allocations per frame by phase, and all call sites if `show` is set.
     pub fn print(&self, case: &str, show: bool) {
         println!("\n{case}: allocations per frame, mean of {} frames", self.frames);
-        println!("| {:<7} | {:>8} | {:>8} | {:>8} |", "stage", "drawloom", "wgpu", "others");
+        println!("| {:<7} | {:>8} | {:>8} | {:>8} |", "phase", "drawloom", "wgpu", "others");
         println!("| ------- | -------: | -------: | -------: |");
-        for stage in [Stage::Jobs, Stage::Around, Stage::Submit, Stage::Unknown] {
+        for phase in [Phase::Jobs, Phase::Around, Phase::Submit, Phase::Unknown] {
             let [ours, wgpu, others] = [Owner::Drawloom, Owner::Wgpu, Owner::Other]
-                .map(|owner| self.per_frame(self.allocations_of(owner, stage)));
-            let name = format!("{stage:?}").to_lowercase();
+                .map(|owner| self.per_frame(self.allocations_of(owner, phase)));
+            let name = format!("{phase:?}").to_lowercase();
             println!("| {name:<7} | {ours:>8.2} | {wgpu:>8.2} | {others:>8.2} |");
         }
         if show {
@@ -45,8 +45,8 @@ impl Report {
         let mut call_sites: Vec<_> = self.call_sites.iter().collect();
         call_sites.sort_by_key(|&(site, &count)| (site.owner, std::cmp::Reverse(count)));
         for (site, &count) in call_sites {
-            let CallSite { stage, owner, lines } = site;
-            println!("{:>9.2} {owner:?}, {stage:?}: {}", self.per_frame(count), lines.join(" < "));
+            let CallSite { phase, owner, lines } = site;
+            println!("{:>9.2} {owner:?}, {phase:?}: {}", self.per_frame(count), lines.join(" < "));
         }
     }
 

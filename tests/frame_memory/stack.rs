@@ -1,6 +1,6 @@
-//! Reads backtraces: the stage of the frame, the owner of the allocating code, and the crate's lines that led there.
+//! Reads backtraces: the phase of the frame, the owner of the allocating code, and the crate's lines on the way.
 
-/// Whose code allocated: the innermost known owner.
+/// The owner of the allocating code: the innermost known one in the backtrace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Owner {
     /// The crate.
@@ -11,10 +11,10 @@ pub enum Owner {
     Other,
 }
 
-/// The stage of a frame.
+/// The phase of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Stage {
-    /// In the jobs: from visibility to the finished pass, and in the graph that runs them.
+pub enum Phase {
+    /// In the jobs, from visibility to the finished pass, and in the graph that runs them.
     Jobs,
     /// Before and after the jobs, while the frame is recorded.
     Around,
@@ -25,9 +25,9 @@ pub enum Stage {
 /// The call site of an allocation.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CallSite {
-    pub stage: Stage,
+    pub phase: Phase,
     pub owner: Owner,
-    /// The crate's lines that led there, the innermost first.
+    /// The crate's lines in the backtrace, the innermost first.
     pub lines: Vec<String>,
 }
 
@@ -43,7 +43,7 @@ pub fn read(stack: &str) -> CallSite {
     // A closure's frame has the line of its caller.
     lines.dedup();
     lines.truncate(MAX_LINES);
-    CallSite { stage: stage(&ours), owner, lines }
+    CallSite { phase: phase(&ours), owner, lines }
 }
 
 struct Frame<'a> {
@@ -80,15 +80,15 @@ fn owner_of(file: &str) -> Owner {
     }
 }
 
-fn stage(ours: &[&Frame<'_>]) -> Stage {
+fn phase(ours: &[&Frame<'_>]) -> Phase {
     let visits = |folder: &str| ours.iter().any(|frame| frame.file.starts_with(folder));
     if visits("src/graph/") {
-        Stage::Jobs
+        Phase::Jobs
     } else if visits("src/frame/renderer.rs") {
-        Stage::Around
+        Phase::Around
     } else if visits("src/frame/recorded.rs") {
-        Stage::Submit
+        Phase::Submit
     } else {
-        Stage::Unknown
+        Phase::Unknown
     }
 }

@@ -1,4 +1,4 @@
-//! Which nodes are kept, their order, and the reported problems: compared with the oracle, and case by case.
+//! The kept nodes, their order, and the reported problems: compared with the oracle, and in single cases.
 
 use drawloom::graph::{FrameGraph, GraphProblem, NodeId, Schedule};
 use proptest::prelude::*;

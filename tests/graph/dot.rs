@@ -1,4 +1,4 @@
-//! DOT files: what they contain, and that they are well-formed whatever the names.
+//! DOT files: their contents, and that they are well-formed with any names.
 
 use std::collections::BTreeSet;
 
@@ -63,7 +63,7 @@ fn string(text: &str) -> Option<(String, &str)> {
     }
 }
 
-/// The identifier and the attributes of the statement with that label.
+/// The identifier and the attributes of the statement with this label.
 fn statement_of<'a>(statements: &'a [Statement<'a>], label: &str) -> (String, Vec<(&'a str, &'a str)>) {
     let has_label =
         |(_, attributes): &&Statement<'_>| attributes.iter().any(|(key, value)| *key == "label" && value == label);
@@ -195,7 +195,7 @@ proptest! {
     }
 }
 
-/// Per index, all that the arrows lead to, directly or through others. Arrows lead to higher indices.
+/// For each index, the indices that the arrows lead to, directly or through others. Arrows lead to higher indices.
 fn reachable(arrows: &[(usize, usize)], count: usize) -> Vec<BTreeSet<usize>> {
     let mut after = vec![BTreeSet::new(); count];
     for index in (0..count).rev() {

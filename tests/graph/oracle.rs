@@ -139,9 +139,9 @@ impl GraphModel {
     }
 }
 
-/// What the rules say about a graph.
+/// The consequences of the rules for a graph.
 pub struct Oracle {
-    /// Whether a node depends on what another writes to a resource: `[resource][before][after]`.
+    /// Whether a node depends on another one's write to a resource: `[resource][before][after]`.
     pub data: Vec<Relation>,
     /// Whether a node comes before another, directly or through others.
     pub before: Relation,

@@ -1,4 +1,4 @@
-//! Every problem says what is wrong, and returns the graph so that it can be corrected.
+//! Every problem has a message that names its cause, and returns the graph so that it can be corrected.
 
 use drawloom::graph::{FrameGraph, GraphProblem, NodeId, ResourceId, Schedule};
 
@@ -229,7 +229,7 @@ fn removing_a_node_keeps_the_accesses_and_orders_of_the_others() {
 }
 
 #[test]
-fn errors_can_be_returned_and_printed_whatever_the_payload() {
+fn errors_can_be_returned_and_printed_with_any_payload() {
     struct Opaque;
     let compile = || -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let mut graph = FrameGraph::new();

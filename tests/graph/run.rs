@@ -54,7 +54,7 @@ impl Node<ItemCounts> for Counting {
         counts[self.node].len()
     }
 
-    fn chunk(&self, _tally: &ItemCounts) -> usize {
+    fn chunk(&self, _counts: &ItemCounts) -> usize {
         self.chunk
     }
 
@@ -117,7 +117,7 @@ pub fn single<'a, C>(node: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
     graph.compile().expect("the graph is valid")
 }
 
-/// Runs the schedule in parallel, however little work it is.
+/// Runs the schedule in parallel, even if it has little work.
 pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Scheduler, context: &C) {
     schedule.always_parallel(true);
     schedule.run(scheduler, context).expect("no node fails");
@@ -125,7 +125,7 @@ pub fn run<C: Sync, P: Node<C>>(schedule: &mut Schedule<P>, scheduler: &Schedule
 
 #[test]
 fn all_workers_join_a_wide_node() {
-    // Each item waits for the others, so the run only ends if a worker runs each of them.
+    // Each item waits for the others, so the run ends only if each has a worker of its own.
     let mut schedule = single(Closure::new(|barrier: &Barrier, _, _| {
         barrier.wait();
         Ok(())

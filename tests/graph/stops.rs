@@ -1,4 +1,4 @@
-//! Failing runs: what is cancelled, what is reported, and that the next run is unaffected.
+//! Failing runs: the chunks that are cancelled, the reported error, and the next run, which is unaffected.
 
 use std::{
     ops::Range,
@@ -144,7 +144,7 @@ fn no_further_chunk_starts_after_a_failure() {
             }
             if range.contains(&5) { Err("enough".into()) } else { Ok(()) }
         });
-        // So wide that the run only ends because the failure stops it.
+        // So wide that the run ends only because the failure stops it.
         let node = node.with_width(|()| usize::MAX);
         let mut graph = FrameGraph::new();
         let node = graph.add("endless", if pinned { node.on_calling_thread() } else { node });

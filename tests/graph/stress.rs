@@ -45,11 +45,11 @@ fn plans(seed: u64) -> Vec<Plan> {
         .collect()
 }
 
-/// The context of a run: how often each item was processed, the calling thread, and which node fails, if any.
+/// The context of a run: how often each item was processed, the calling thread, and the node that fails, if any.
 struct RunContext {
     done: Vec<Vec<AtomicUsize>>,
     /// Whether a node ran too early or on the wrong thread.
-    is_misplaced: AtomicBool,
+    is_invalid: AtomicBool,
     caller: ThreadId,
     failing: Option<usize>,
 }
@@ -57,12 +57,12 @@ struct RunContext {
 impl RunContext {
     fn new(plans: &[Plan], failing: Option<usize>) -> Self {
         let done = plans.iter().map(|plan| (0..plan.width).map(|_| AtomicUsize::new(0)).collect()).collect();
-        Self { done, is_misplaced: AtomicBool::new(false), caller: thread::current().id(), failing }
+        Self { done, is_invalid: AtomicBool::new(false), caller: thread::current().id(), failing }
     }
 
     /// Per node, how often each of its items was processed.
     fn counts(self) -> Vec<Vec<usize>> {
-        assert!(!self.is_misplaced.into_inner(), "a node ran too early or on the wrong thread");
+        assert!(!self.is_invalid.into_inner(), "a node ran too early or on the wrong thread");
         self.done.into_iter().map(|items| items.into_iter().map(AtomicUsize::into_inner).collect()).collect()
     }
 }
@@ -77,7 +77,7 @@ impl Node<RunContext> for CountingNode {
         context.done[self.index].len()
     }
 
-    fn chunk(&self, _world: &RunContext) -> usize {
+    fn chunk(&self, _context: &RunContext) -> usize {
         self.plan.chunk
     }
 
@@ -90,7 +90,7 @@ impl Node<RunContext> for CountingNode {
         let is_done = |&node: &usize| context.done[node].iter().all(|count| count.load(Ordering::Relaxed) == 1);
         let is_on_wrong_thread = self.plan.is_pinned && thread::current().id() != context.caller;
         if is_on_wrong_thread || !self.plan.dependencies.iter().all(is_done) {
-            context.is_misplaced.store(true, Ordering::Relaxed);
+            context.is_invalid.store(true, Ordering::Relaxed);
         }
         if context.failing == Some(self.index) {
             return Err("as planned".into());
@@ -218,6 +218,6 @@ fn a_seed_determines_the_order_of_one_worker() {
     // Of two nodes, two chunks or two iterations, each comes first with some seed.
     let first = |order: &[(usize, usize)], two: [(usize, usize); 2]| order.iter().find(|&at| two.contains(at)).copied();
     for two in [[(0, 0), (5, 0)], [(0, 0), (0, 5)], [(usize::MAX, 0), (usize::MAX, 19)]] {
-        assert!(two.map(|one| orders.iter().any(|order| first(order, two) == Some(one))).iter().all(|&seen| seen));
+        assert!(two.map(|one| orders.iter().any(|order| first(order, two) == Some(one))).iter().all(|&occurs| occurs));
     }
 }

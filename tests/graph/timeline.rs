@@ -22,7 +22,7 @@ use proptest::{collection::vec, prelude::*};
 
 use crate::oracle::valid_graph;
 
-/// A node whose items take some time. The context has the chunk size.
+/// A node with items that take some time. The context sets the chunk size.
 #[derive(Clone, Copy, Debug)]
 struct Busy {
     width: usize,
@@ -36,7 +36,7 @@ struct RunContext {
 }
 
 impl Node<RunContext> for Busy {
-    fn width(&self, _call: &RunContext) -> usize {
+    fn width(&self, _context: &RunContext) -> usize {
         self.width
     }
 
@@ -125,7 +125,7 @@ proptest! {
             for &chunk in &chunks {
                 let log = recorded(&mut schedule, scheduler, &RunContext { chunk, fails: false });
                 check(&log, &schedule, chunk, scheduler.workers());
-                // A run while the timeline is off leaves nothing in the next log.
+                // A run while the timeline is off must not appear in the next log.
                 schedule.run(scheduler, &RunContext { chunk: 1, fails: false }).unwrap();
             }
         }
@@ -133,7 +133,7 @@ proptest! {
 }
 
 #[test]
-fn a_run_that_began_serially_says_when_it_became_parallel() {
+fn the_log_has_the_time_at_which_a_serial_run_became_parallel() {
     let scheduler = Scheduler::new(2).unwrap();
     let mut schedule = single(Busy { width: 20_000, pinned: false });
     let log = recorded(&mut schedule, &scheduler, &RunContext { chunk: 16, fails: false });
@@ -273,7 +273,7 @@ fn each_run_is_a_frame_unless_the_engine_marks_frames() {
 }
 
 #[test]
-fn frames_that_an_engine_marked_before_the_start_count() {
+fn frames_that_an_engine_marked_before_the_start_are_counted() {
     let scheduler = Scheduler::new(1).unwrap();
     let mut schedule = single(Busy { width: 5, pinned: false });
     let timeline = scheduler.timeline();
@@ -412,7 +412,7 @@ fn each_log_names_only_its_own_threads() {
         let log = timeline.take();
         assert_eq!((log.threads, log.spans[0].thread), (vec![round.to_owned()], 0));
     }
-    // A thread whose spans were all dropped is not named either.
+    // If all spans of a thread were dropped, it is not named either.
     (0..1 << 16).for_each(|_span| drop(timeline.span("span")));
     thread::scope(|scope| _ = scope.spawn(|| drop(timeline.span("late"))));
     let log = timeline.take();
@@ -449,6 +449,6 @@ fn single(busy: Busy) -> Schedule<Busy> {
     graph.compile().unwrap()
 }
 
-/// Not the schedulers of the other tests, whose runs would be recorded, too.
+/// Separate from the schedulers of the other tests, because all runs of a scheduler are recorded.
 static RECORDED: LazyLock<[Scheduler; 3]> =
     LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));

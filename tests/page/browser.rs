@@ -17,7 +17,7 @@ use libtest_mimic::Failed;
 
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// How long a page may take to load on a busy machine.
+/// The maximum time to load a page on a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(180);
 
 pub struct Browser {
@@ -26,17 +26,17 @@ pub struct Browser {
 
 /// A page after all its scripts have run.
 pub struct LoadedPage {
-    /// The opening tag of its body, whose data attributes describe the page's state.
+    /// The opening tag of its body. Its data attributes describe the page's state.
     body: String,
     /// The size of the file in bytes.
     pub length: u64,
 }
 
-/// How often a page is loaded until it is ready.
+/// The maximum number of attempts to load a page until it is ready.
 const ATTEMPTS: usize = 4;
 
 impl Browser {
-    /// The one in `PATH`.
+    /// The browser in `PATH`.
     pub fn find() -> Option<Self> {
         let path = env::var_os("PATH")?;
         let folders: Vec<_> = env::split_paths(&path).collect();
@@ -105,7 +105,7 @@ impl Browser {
 }
 
 impl LoadedPage {
-    /// The value of the body's data attribute of that name, or an empty string.
+    /// The value of the body's data attribute of this name, or an empty string.
     pub fn value(&self, name: &str) -> String {
         let start = format!(" data-{name}=\"");
         let found = self.body.split_once(&start).and_then(|(_, rest)| rest.split_once('"'));

@@ -86,8 +86,8 @@ pub fn many_chunks(count: usize, frames: usize) -> Log {
     log
 }
 
-/// Three frames with a diamond of nodes each: two depend on the root, of which the second ends later, and the end depends on
-/// both, in two chunks. A thread works before and after them. The second frame is twice as long as the others.
+/// Three frames with a diamond of nodes each: `left` and `right` depend on the root, `right` ends later, and the end
+/// depends on both, in two chunks. A thread works before and after them. The second frame is twice as long as the others.
 pub fn diamonds() -> Log {
     let node = |name: &str, dependencies: &[usize]| NodeInfo {
         name: name.to_owned(),

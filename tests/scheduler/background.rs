@@ -21,15 +21,16 @@ fn frames_never_run_background_jobs_on_the_calling_thread() {
         .map(|_job| {
             let (scheduler, on_caller) = (Arc::clone(&scheduler), Arc::clone(&on_caller));
             scheduler.clone().background(move || {
-                let look = || {
+                let record_thread = || {
                     // Long enough for other workers to join.
                     thread::sleep(Duration::from_micros(200));
                     on_caller.fetch_add(usize::from(thread::current().id() == here), Ordering::Relaxed);
                 };
-                look();
+                record_thread();
                 // Its loops and scopes are background work too.
-                scheduler.parallel_for(8, 1, |_range, _worker| look()).unwrap();
-                let inner = scheduler.scope(|scope| (0..8).for_each(|_| scope.spawn(|_scope, _worker| look())));
+                scheduler.parallel_for(8, 1, |_range, _worker| record_thread()).unwrap();
+                let inner =
+                    scheduler.scope(|scope| (0..8).for_each(|_| scope.spawn(|_scope, _worker| record_thread())));
                 inner.unwrap();
             })
         })

@@ -1,4 +1,4 @@
-//! Hooks, clocks and captures of the engine may panic: that is an error or is reported, and no job, worker or borrow is lost.
+//! Panics of the engine's hooks, clocks and captures are returned or reported, and no job, worker or borrow is lost.
 
 use std::{
     sync::{
@@ -28,7 +28,7 @@ fn clock_that_panics(first: usize) -> (impl Fn() -> Duration + Send + Sync, Arc<
 #[test]
 fn a_clock_that_panics_loses_no_job_and_no_borrow() {
     assert_ends(|| {
-        // So that the clock panics on the caller and on workers: before a job, after one, and as the worker goes to sleep.
+        // The clock panics on the caller and on workers: before a job, after one, and when the worker goes to sleep.
         for first in 1..40 {
             let (clock, readings) = clock_that_panics(first);
             let scheduler = Scheduler::builder().workers(3).timeline_clock(clock).build().unwrap();
@@ -73,10 +73,10 @@ fn a_hook_that_panics_while_the_scheduler_is_built_is_an_error_that_names_it() {
     assert_eq!(error.to_string(), "the hook that names the thread of worker 1 failed: no name for 1");
     assert_eq!(ended.load(Ordering::Relaxed), 0, "no thread was started");
 
-    let affinity = |worker| if worker == 2 { panic!("no place for {worker}") } else { AffinityMask::new(0..1024) };
+    let affinity = |worker| if worker == 2 { panic!("no affinity for {worker}") } else { AffinityMask::new(0..1024) };
     let error = builder().affinity(affinity).build().unwrap_err();
     assert!(matches!(&error, SchedulerError::AffinityHook { worker: 2, .. }));
-    assert_eq!(error.to_string(), "the hook that places the thread of worker 2 failed: no place for 2");
+    assert_eq!(error.to_string(), "the hook that places the thread of worker 2 failed: no affinity for 2");
     assert_eq!(ended.load(Ordering::Relaxed), 1, "the thread that was started has ended");
 }
 

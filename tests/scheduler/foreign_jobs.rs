@@ -18,12 +18,12 @@ use drawloom::{
 use crate::{eventually, scheduler};
 
 thread_local! {
-    /// The families whose jobs are running on this thread, the innermost last.
+    /// The families of the jobs that are running on this thread, the innermost last.
     static WITHIN: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Calls `job` as a job of a family. It may run on top of jobs of that family only; others count as foreign.
-fn as_one_of(family: usize, foreign: &AtomicUsize, job: impl FnOnce()) {
+/// Calls `job` as a job of a family. It may run only on top of jobs of the same family; other jobs are counted as foreign.
+fn run_in_family(family: usize, foreign: &AtomicUsize, job: impl FnOnce()) {
     WITHIN.with_borrow_mut(|within| {
         if within.iter().any(|&other| other != family) {
             foreign.fetch_add(1, Ordering::Relaxed);
@@ -34,9 +34,9 @@ fn as_one_of(family: usize, foreign: &AtomicUsize, job: impl FnOnce()) {
     WITHIN.with_borrow_mut(|within| within.pop());
 }
 
-/// Waits inside a job for a scope, a loop or a graph, whose jobs all belong to its family.
+/// Waits inside a job for a scope, a loop or a graph. All of its jobs belong to the job's family.
 fn wait_inside(scheduler: &Scheduler, family: usize, foreign: &AtomicUsize) {
-    let child = |_: Range<usize>, _: &Worker| as_one_of(family, foreign, thread::yield_now);
+    let child = |_: Range<usize>, _: &Worker| run_in_family(family, foreign, thread::yield_now);
     match family % 3 {
         0 => scheduler.parallel_for(8, 1, child).unwrap(),
         1 => scheduler
@@ -62,8 +62,8 @@ fn wait_inside(scheduler: &Scheduler, family: usize, foreign: &AtomicUsize) {
             ];
             graph.order(first, wide);
             graph.order(first, pinned);
-            [wide, pinned].into_iter().for_each(|process| graph.keep(process));
-            let mut schedule = graph.compile().expect("nothing is wrong");
+            [wide, pinned].into_iter().for_each(|node| graph.keep(node));
+            let mut schedule = graph.compile().expect("the graph is valid");
             schedule.always_parallel(true);
             schedule.run(scheduler, &()).unwrap();
         }
@@ -81,7 +81,7 @@ fn a_job_that_waits_runs_no_foreign_jobs() {
                     for family in 0..24 {
                         let (scheduler, foreign) = (&scheduler, &foreign);
                         scope.spawn(move |_scope, _worker| {
-                            as_one_of(family, foreign, || wait_inside(scheduler, family, foreign));
+                            run_in_family(family, foreign, || wait_inside(scheduler, family, foreign));
                         });
                     }
                 })
@@ -102,19 +102,19 @@ fn jobs_of_an_outer_scope_do_not_run_in_an_inner_wait() {
                     for family in 0..8 {
                         let (scheduler, foreign, ran) = (&scheduler, &foreign, &ran);
                         outer.spawn(move |outer, _worker| {
-                            as_one_of(family, foreign, || {
+                            run_in_family(family, foreign, || {
                                 // A job of another family, which the inner scope does not wait for.
                                 let spawn = || {
                                     outer.spawn(move |_scope, _worker| {
-                                        as_one_of(family + 100, foreign, || {
+                                        run_in_family(family + 100, foreign, || {
                                             ran.fetch_add(1, Ordering::Relaxed);
                                         });
                                     });
                                 };
                                 let inner = scheduler.scope(|inner| {
-                                    inner.spawn(|_scope, _worker| as_one_of(family, foreign, thread::yield_now));
+                                    inner.spawn(|_scope, _worker| run_in_family(family, foreign, thread::yield_now));
                                     spawn();
-                                    inner.spawn(|_scope, _worker| as_one_of(family, foreign, thread::yield_now));
+                                    inner.spawn(|_scope, _worker| run_in_family(family, foreign, thread::yield_now));
                                 });
                                 inner.unwrap();
                             });
@@ -128,15 +128,15 @@ fn jobs_of_an_outer_scope_do_not_run_in_an_inner_wait() {
 }
 
 #[test]
-fn an_idle_owner_runs_jobs_that_a_thief_spawns_into_its_scope() {
+fn an_idle_owner_runs_jobs_that_a_stealing_worker_spawns_into_its_scope() {
     let scheduler = scheduler(2);
     for _round in 0..50 {
         let (together, has_run) = (Barrier::new(2), AtomicBool::new(false));
         let ran_on = Mutex::new(Vec::new());
         let pinned = |_: &Scope<'_>, _: &Worker| {
-            // The owner waits inside a job, so it does not steal, and finds the thief's jobs in its mailbox.
+            // The owner waits inside a job, so it does not steal, and finds the stealing worker's jobs in its mailbox.
             let inner = scheduler.scope(|scope| {
-                scope.spawn(|scope, thief| {
+                scope.spawn(|scope, stealing| {
                     together.wait();
                     thread::yield_now();
                     for _job in 0..1_000 {
@@ -149,7 +149,11 @@ fn an_idle_owner_runs_jobs_that_a_thief_spawns_into_its_scope() {
                         }
                         thread::sleep(std::time::Duration::from_millis(1));
                     }
-                    assert!(eventually(|| has_run.load(Ordering::Relaxed)), "nobody helps worker {}", thief.index());
+                    assert!(
+                        eventually(|| has_run.load(Ordering::Relaxed)),
+                        "no worker helps worker {}",
+                        stealing.index()
+                    );
                 });
                 together.wait();
             });

@@ -1,4 +1,4 @@
-//! What an embedder can rely on in the job system, compared with plain loops and counts.
+//! The guarantees of the job system, compared with plain loops and counts.
 
 mod background;
 mod callbacks;
@@ -35,9 +35,9 @@ fn assert_intact(scheduler: &Scheduler) {
     assert_eq!(outcome, Ok(()));
 }
 
-/// Waits until the condition holds, for as long as the slowest machine may take, and returns whether it does.
+/// Waits until the condition holds, with a timeout that suffices on the slowest machine. Returns whether it holds.
 fn eventually(condition: impl Fn() -> bool) -> bool {
-    (0..10_000).any(|_look| {
+    (0..10_000).any(|_attempt| {
         condition() || {
             thread::sleep(Duration::from_millis(1));
             false
@@ -45,7 +45,7 @@ fn eventually(condition: impl Fn() -> bool) -> bool {
     })
 }
 
-/// How often a loop over `length` items visits each of them, and the ranges of its chunks.
+/// The number of visits of each item by a loop over `length` items, and the ranges of its chunks.
 fn visits(scheduler: &Scheduler, length: usize, chunk: usize) -> (Vec<usize>, Vec<Range<usize>>) {
     let visited: Vec<AtomicUsize> = (0..length).map(|_| AtomicUsize::new(0)).collect();
     let ranges = Mutex::new(Vec::new());
@@ -101,19 +101,19 @@ fn workers_have_an_index_each_and_the_caller_has_the_first() {
     let scheduler = scheduler(4);
     assert_eq!(scheduler.workers(), 4);
     let together = Barrier::new(4);
-    let seen = Mutex::new(Vec::new());
+    let workers = Mutex::new(Vec::new());
     scheduler
         .parallel_for(4, 1, |_range, worker| {
             // Four chunks that wait for each other need four workers.
             together.wait();
-            seen.lock().unwrap().push((worker.index(), thread::current().id()));
+            workers.lock().unwrap().push((worker.index(), thread::current().id()));
         })
         .unwrap();
-    let mut seen = seen.into_inner().unwrap();
-    seen.sort_by_key(|&(index, _)| index);
-    assert_eq!(seen.iter().map(|&(index, _)| index).collect::<Vec<_>>(), [0, 1, 2, 3]);
-    assert_eq!(seen[0].1, thread::current().id());
-    assert_eq!(seen.iter().map(|&(_, thread)| thread).collect::<HashSet<_>>().len(), 4);
+    let mut workers = workers.into_inner().unwrap();
+    workers.sort_by_key(|&(index, _)| index);
+    assert_eq!(workers.iter().map(|&(index, _)| index).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    assert_eq!(workers[0].1, thread::current().id());
+    assert_eq!(workers.iter().map(|&(_, thread)| thread).collect::<HashSet<_>>().len(), 4);
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn pinned_jobs_run_on_the_thread_that_opened_their_scope() {
 }
 
 #[test]
-fn a_scope_may_be_lent_to_a_thread_that_is_no_worker() {
+fn a_scope_may_be_lent_to_a_thread_that_is_not_a_worker() {
     let scheduler = scheduler(2);
     let ran = AtomicUsize::new(0);
     scheduler
@@ -320,7 +320,7 @@ fn a_pinned_job_does_not_keep_another_job_from_a_sleeping_worker() {
     let outcome = scheduler.scope(|scope| {
         scope.spawn(|scope, worker| {
             elsewhere.store(worker.index() != 0, Ordering::SeqCst);
-            // Long enough for the others to fall asleep, the owner last. Otherwise the test shows nothing.
+            // Long enough for the others to fall asleep, the owner last. Otherwise the test is vacuous.
             thread::sleep(Duration::from_millis(30));
             scope.spawn(|_scope, _worker| begun.store(true, Ordering::SeqCst));
             // The pinned job waits for the other job, and so does this one, so only the third worker can run that.
@@ -337,7 +337,7 @@ fn a_pinned_job_does_not_keep_another_job_from_a_sleeping_worker() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_dropped_scheduler_leaves_no_thread() {
-    /// How many threads of this process have the name.
+    /// The number of threads of this process with the name.
     fn threads_named(name: &str) -> usize {
         let tasks = std::fs::read_dir("/proc/self/task").unwrap();
         // A thread of another test may end after it was listed and before its name is read.
@@ -357,7 +357,7 @@ fn a_dropped_scheduler_leaves_no_thread() {
     assert_eq!(threads_named(last), 1);
 }
 
-/// The test would time out if each job were searched for among all others.
+/// The test would time out if finding a job took a search among all others.
 #[test]
 fn a_million_pinned_jobs_run_in_linear_time() {
     const JOBS: usize = if cfg!(debug_assertions) { 200_000 } else { 1_000_000 };

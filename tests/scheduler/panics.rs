@@ -1,4 +1,4 @@
-//! Panics in jobs: each becomes an error with its message, and the scheduler works as before.
+//! Each panic in a job becomes an error with its message, and the scheduler keeps working.
 
 use std::{
     panic::panic_any,
@@ -73,7 +73,7 @@ fn a_panic_is_an_error_and_the_scheduler_works_as_before() {
         });
         assert_eq!(nested, Ok(()));
         assert_intact(&scheduler);
-        assert_eq!(others.into_inner(), 4, "jobs that were spawned beside a panic run");
+        assert_eq!(others.into_inner(), 4, "other jobs of the scope run despite the panic");
     }
 }
 

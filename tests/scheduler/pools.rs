@@ -1,4 +1,4 @@
-//! How schedulers are built and dropped: names, affinities and hooks of their threads, and failures of these.
+//! How schedulers are built and dropped: their threads' names, affinities and hooks, and failures of these.
 
 use std::{
     sync::{Arc, Mutex, mpsc},
@@ -11,7 +11,7 @@ use crate::{assert_intact, eventually};
 
 type Threads = Arc<Mutex<Vec<(usize, ThreadId)>>>;
 
-/// A builder whose hooks log which worker starts and stops on which thread.
+/// A builder with hooks that log the worker and the thread of each start and stop.
 fn logged(workers: usize) -> (SchedulerBuilder, [Threads; 2]) {
     let log: [Threads; 2] = Default::default();
     let [started, stopped] = log.clone();
@@ -25,18 +25,18 @@ fn sorted(threads: &Threads) -> Vec<(usize, ThreadId)> {
     threads
 }
 
-/// The thread of each worker, and the result of `look` on it.
-fn on_each<R: Send>(scheduler: &Scheduler, look: impl Fn() -> R + Sync) -> Vec<(usize, ThreadId, R)> {
+/// The thread of each worker, and the result of `query` on it.
+fn on_each<R: Send>(scheduler: &Scheduler, query: impl Fn() -> R + Sync) -> Vec<(usize, ThreadId, R)> {
     let together = std::sync::Barrier::new(scheduler.workers());
-    let seen = Mutex::new(Vec::new());
+    let results = Mutex::new(Vec::new());
     let body = |_, worker: &drawloom::task::Worker| {
         together.wait();
-        seen.lock().unwrap().push((worker.index(), thread::current().id(), look()));
+        results.lock().unwrap().push((worker.index(), thread::current().id(), query()));
     };
     scheduler.parallel_for(scheduler.workers(), 1, body).unwrap();
-    let mut seen = seen.into_inner().unwrap();
-    seen.sort_by_key(|(worker, ..)| *worker);
-    seen
+    let mut results = results.into_inner().unwrap();
+    results.sort_by_key(|(worker, ..)| *worker);
+    results
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn a_panic_in_a_stop_hook_does_not_affect_other_threads() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn threads_stay_on_their_processors() {
+fn threads_have_their_configured_affinity() {
     /// The processors that the calling thread may run on.
     fn allowed() -> Vec<usize> {
         let status = std::fs::read_to_string("/proc/thread-self/status").unwrap();
@@ -119,9 +119,9 @@ fn threads_stay_on_their_processors() {
     let mask_of = move |worker: usize| AffinityMask::new([processors[worker % processors.len()]]);
     let scheduler = Scheduler::builder().workers(4).affinity(mask_of.clone()).build().unwrap();
     for _frame in 0..3 {
-        let seen = on_each(&scheduler, allowed);
-        assert_eq!(seen[0].2, here, "the affinity of the caller does not change");
-        for (worker, _, allowed) in &seen[1..] {
+        let results = on_each(&scheduler, allowed);
+        assert_eq!(results[0].2, here, "the affinity of the caller does not change");
+        for (worker, _, allowed) in &results[1..] {
             assert_eq!(allowed, mask_of(*worker).processors());
         }
     }

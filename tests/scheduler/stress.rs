@@ -61,7 +61,7 @@ fn run_tree<'scope>(
     }
 }
 
-/// The count of [`run_tree`], without jobs.
+/// The count of [`run_tree`], computed without jobs.
 fn leaves(seed: u64, height: usize) -> usize {
     if height == 0 {
         return 1;

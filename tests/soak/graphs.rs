@@ -1,4 +1,4 @@
-//! Random graphs inside of random programs: every item runs once, after everything that it depends on, and again after a failure.
+//! Random graphs inside of random programs: every item runs once, after its dependencies, also in runs after a failure.
 
 use std::{
     ops::Range,
@@ -67,14 +67,14 @@ struct Frame<'frame> {
     failing: Option<(usize, Failure)>,
 }
 
-struct Process {
+struct RandomNode {
     index: usize,
     plan: Plan,
-    /// What it waits for, with their widths.
+    /// The nodes that it depends on, with their widths.
     before: Vec<(usize, usize)>,
 }
 
-impl Node<Frame<'_>> for Process {
+impl Node<Frame<'_>> for RandomNode {
     fn width(&self, _frame: &Frame<'_>) -> usize {
         self.plan.width
     }
@@ -115,7 +115,7 @@ pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
         let depends_on = plan.depends_on.clone();
         let before = depends_on.iter().map(|&before| (before, widths[before])).collect();
         // The name contains the width, for `check_log`.
-        let id = graph.add(format!("{index} of width {}", plan.width), Process { index, plan, before });
+        let id = graph.add(format!("{index} of width {}", plan.width), RandomNode { index, plan, before });
         depends_on.iter().for_each(|&before| graph.order(ids[before], id));
         graph.keep(id);
         ids.push(id);
@@ -135,7 +135,7 @@ pub fn run(world: &Arc<World>, seed: u64, height: usize) -> u64 {
 /// Returns the sum over all items, or `None` if a node was made to fail.
 fn run_once(
     world: &Arc<World>,
-    schedule: &mut Schedule<Process>,
+    schedule: &mut Schedule<RandomNode>,
     widths: &[usize],
     seed: u64,
     height: usize,

@@ -1,5 +1,5 @@
-//! Random programs on one scheduler, for any length of time: scopes in scopes, loops, graphs, background jobs and jobs that wait
-//! for them, locks held over waits, panics, threads that are no workers, and a timeline that is started and stopped. Their
+//! Random programs on one scheduler, for a given time: scopes in scopes, loops, graphs, background jobs and jobs that wait
+//! for them, locks held over waits, panics, threads that are not workers, and a timeline that is started and stopped. Their
 //! results are compared with a plain recursion. A hang aborts with a list of what each thread is doing.
 //!
 //! `cargo test` runs it for a second. This runs it for an hour, and shows the progress and the seed that repeats a failure:
@@ -29,13 +29,13 @@ fn setting(name: &str, default: u64) -> u64 {
     env::var(name).map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number: {text}")))
 }
 
-/// How many seeds run under Miri, whose clock is virtual.
+/// The number of seeds that run under Miri, which has a virtual clock.
 const SEEDS_UNDER_MIRI: u64 = 6;
 
-/// How many panics no program planned. Planned panics do not call the panic hook.
+/// The number of unplanned panics. Planned panics do not call the panic hook.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
-/// Counts unplanned panics. They might not be returned otherwise: the panic of a job is caught, and nobody may wait for the job.
+/// Counts unplanned panics. Without this some would be missed: a panic of a job is caught, and no thread may wait for the job.
 fn count_panics() {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(move |info| {

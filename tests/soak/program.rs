@@ -2,7 +2,7 @@
 //!
 //! A program adds numbers, so its value does not depend on their order. A part of one height consists of parts of lower heights. A
 //! part waits for a background job, or holds a lock, only for parts of lower height, which take only the locks of lower
-//! heights. So no program waits for itself.
+//! heights. So no program can deadlock.
 
 use std::{
     ops::Range,
@@ -28,7 +28,7 @@ pub const MAX_HEIGHT: usize = if cfg!(miri) { 2 } else { 5 };
 /// The maximum length of a loop.
 const MAX_LOOP: usize = if cfg!(miri) { 6 } else { 60 };
 
-/// What all parts of all programs share.
+/// The state that all parts of all programs share.
 pub struct World {
     pub name: String,
     pub scheduler: Scheduler,
@@ -67,7 +67,7 @@ enum Piece {
     },
     /// Holds a lock while it waits for a part.
     Lock(u64),
-    /// Lends the scope to a thread that is no worker, which spawns jobs.
+    /// Lends the scope to a thread that is not a worker, which spawns jobs.
     LentThread(u64),
 }
 
@@ -122,7 +122,7 @@ pub fn branches(seed: u64, index: usize) -> bool {
     Rng::with_seed(seed ^ index as u64).u8(..23) == 0
 }
 
-/// How many jobs a thread that is no worker spawns.
+/// The number of jobs that a thread that is not a worker spawns.
 const LENT_JOBS: u64 = 3;
 
 /// The value of a part, computed without jobs, and what the part adds to the value of the scope outside of its own.
@@ -177,7 +177,7 @@ pub fn items(seed: u64, range: Range<usize>, height: usize) -> u64 {
     })
 }
 
-/// The same, with parts that run as jobs.
+/// The same value, computed with parts that run as jobs.
 pub fn run_items(world: &Arc<World>, seed: u64, range: Range<usize>, height: usize) -> u64 {
     range.fold(0, |sum, index| {
         let of_item =

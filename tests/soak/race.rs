@@ -1,5 +1,5 @@
-//! An intentional data race. `.ci/run` checks that the thread sanitizer reports it, so that its silence about the soak means
-//! something.
+//! An intentional data race. `.ci/run` checks that the thread sanitizer reports it, so its silence about the
+//! soak is evidence.
 
 use std::{
     cell::UnsafeCell,
@@ -8,7 +8,7 @@ use std::{
 
 use drawloom::task::Scheduler;
 
-/// A number that nothing protects.
+/// A number without synchronization.
 struct Unprotected(UnsafeCell<u64>);
 
 // SAFETY: Unsound on purpose. Two threads change the number at once, in a test that only the thread sanitizer runs, to report
@@ -26,13 +26,13 @@ impl Unprotected {
 /// from the sanitizer.
 #[test]
 #[ignore = "a data race for the thread sanitizer to find"]
-fn a_race_between_two_chunks_is_there_to_be_found() {
+fn two_chunks_race_deliberately() {
     let scheduler = Scheduler::new(2).expect("a thread can be started");
     // The sanitizer remembers only a few accesses, so it may miss one pair of them, but not all.
     for _round in 0..100 {
         let (number, begun) = (Unprotected(UnsafeCell::new(0)), AtomicUsize::new(0));
         let outcome = scheduler.parallel_for(2, 1, |_range, _worker| {
-            // Relaxed, so that it brings both chunks together and orders nothing.
+            // Relaxed: both chunks run at the same time, and nothing orders them.
             begun.fetch_add(1, Ordering::Relaxed);
             while begun.load(Ordering::Relaxed) < 2 {
                 std::hint::spin_loop();

@@ -22,7 +22,7 @@ use crate::{
     watchdog::{self, Activity, during},
 };
 
-/// How much has run.
+/// Counts of what has run.
 #[derive(Default)]
 pub struct Totals {
     schedulers: u64,
@@ -68,7 +68,7 @@ pub fn run(seed: u64) -> Totals {
     let builder = Scheduler::builder().workers(workers).timeline_capacity(CAPACITIES[random.usize(..2)]);
     let shuffle = (random.u8(..4) == 0).then(|| random.u64(..));
     let builder = shuffle.into_iter().fold(builder, SchedulerBuilder::shuffle);
-    // Measuring it would take longer than the programs, and different costs make different decisions.
+    // Measuring the cost would take longer than the programs, and different costs lead to different decisions.
     let cost = Duration::from_micros([0, 1, 20, 1_000][random.usize(..4)]);
     let builder = match random.usize(..6) {
         0..3 => builder,
@@ -147,16 +147,16 @@ fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
     totals
 }
 
-/// Checks that each run that the log calls complete contains every item once, and counts the runs.
+/// Checks that each run that is marked as complete contains every item once, and counts the runs.
 fn check_log(log: &Log, totals: &mut Totals) {
     totals.recorded_runs += log.runs.len() as u64;
     for run in log.runs.iter().filter(|run| run.complete && !run.failed) {
-        for (index, process) in run.graph.nodes.iter().enumerate() {
-            let width = process.name.rsplit(' ').next().and_then(|width| width.parse().ok());
-            assert_eq!(Some(run.width(index)), width, "{:?} of a complete run", process.name);
+        for (index, node) in run.graph.nodes.iter().enumerate() {
+            let width = node.name.rsplit(' ').next().and_then(|width| width.parse().ok());
+            assert_eq!(Some(run.width(index)), width, "{:?} of a complete run", node.name);
             let mut ends = 0;
             for chunk in run.chunks_of(index) {
-                assert_eq!(chunk.items.start, ends, "{:?} has a gap, or an item twice", process.name);
+                assert_eq!(chunk.items.start, ends, "{:?} has a gap, or an item twice", node.name);
                 ends = chunk.items.end;
             }
         }

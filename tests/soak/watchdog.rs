@@ -1,4 +1,4 @@
-//! Turns a hang into a list of what each thread is doing.
+//! Aborts a program that hangs, with a list of each thread's activities.
 //!
 //! Every thread keeps a stack of its current activities in relaxed atomics. These order nothing, so they hide no race from a
 //! sanitizer.
@@ -18,10 +18,10 @@ use std::{
 
 use crate::program::World;
 
-/// How long there may be no progress.
+/// The maximum time without progress.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// How many activities of a thread are listed at most.
+/// The maximum number of listed activities of a thread.
 const MAX_LISTED: usize = 64;
 
 static DONE: AtomicU64 = AtomicU64::new(0);
@@ -29,7 +29,7 @@ static THREADS: Mutex<Vec<Arc<Activities>>> = Mutex::new(Vec::new());
 static WORLD: Mutex<Weak<World>> = Mutex::new(Weak::new());
 static STARTED: OnceLock<()> = OnceLock::new();
 
-/// What a thread can be doing.
+/// The kinds of activities of a thread.
 #[derive(Clone, Copy, Debug)]
 pub enum Activity {
     Scope,
@@ -78,7 +78,7 @@ pub fn progress() {
     DONE.fetch_add(1, Ordering::Relaxed);
 }
 
-/// How many steps of progress there were.
+/// The number of steps of progress so far.
 pub fn done() -> u64 {
     DONE.load(Ordering::Relaxed)
 }
@@ -115,7 +115,7 @@ fn register() -> Arc<Activities> {
     activities
 }
 
-/// Sets the world whose scheduler is printed after a hang.
+/// Sets the world to print after a hang.
 pub fn watch(world: &Arc<World>) {
     *WORLD.lock().unwrap() = Arc::downgrade(world);
 }

@@ -78,7 +78,7 @@ proptest! {
     }
 }
 
-/// A layer that panics once, when `fuse` more changes of that kind have happened.
+/// A layer that panics once, when `fuse` more changes of this kind have happened.
 struct PanickingLayer {
     kind: ChangeKind,
     fuse: Arc<AtomicIsize>,
@@ -125,7 +125,7 @@ impl<S: Subscriber> Layer<S> for PanickingSubscriber {
 }
 
 #[test]
-fn a_panic_in_an_event_kills_no_worker() {
+fn a_panic_in_an_event_ends_no_worker() {
     const JOBS: isize = 8;
     const WORKERS: usize = 4;
     let found = Arc::new(AtomicIsize::new(0));

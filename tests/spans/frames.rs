@@ -29,7 +29,7 @@ fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<Stri
             submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
         }
         let log = timeline.timeline().take();
-        let names = log.runs[0].graph.nodes.iter().map(|process| process.name.clone()).collect();
+        let names = log.runs[0].graph.nodes.iter().map(|node| node.name.clone()).collect();
         (scene.as_scene_ref().object_count(), names)
     })
 }

@@ -14,7 +14,7 @@ use tracing::{Dispatch, Event, Level, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 use tracing_subscriber::registry::LookupSpan;
 
-/// What a recorder has recorded.
+/// The spans, events and changes that a recorder has recorded.
 #[derive(Debug, Default)]
 pub struct Record {
     pub spans: Vec<Span>,
@@ -57,7 +57,7 @@ pub enum ChangeKind {
 }
 
 impl Record {
-    /// The indices of all spans with that name, in the order they were created.
+    /// The indices of all spans with this name, in the order they were created.
     pub fn named<'a>(&'a self, name: &'a str) -> impl Iterator<Item = usize> + 'a {
         (0..self.spans.len()).filter(move |&span| self.spans[span].origin.name == name)
     }
@@ -167,7 +167,7 @@ impl Visit for FieldTexts {
     }
 }
 
-/// A subscriber with that layer and maximum level.
+/// A subscriber with this layer and maximum level.
 pub fn subscriber<L>(layer: L, level: LevelFilter) -> Dispatch
 where
     L: Layer<tracing_subscriber::layer::Layered<LevelFilter, tracing_subscriber::Registry>> + Send + Sync,
@@ -175,7 +175,7 @@ where
     Dispatch::new(tracing_subscriber::registry().with(level).with(layer))
 }
 
-/// A scheduler whose workers have that subscriber. The calling thread must set it for itself.
+/// A scheduler with this subscriber on its workers. The calling thread must set it for itself.
 pub fn scheduler(builder: SchedulerBuilder, dispatch: &Dispatch) -> Scheduler {
     let dispatch = dispatch.clone();
     // Never dropped, so that the subscriber stays set until the thread ends.

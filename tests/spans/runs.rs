@@ -54,7 +54,7 @@ fn a_node_that_ran_serially_is_closed_before_the_run_becomes_parallel() {
     let mut graph = FrameGraph::new();
     let first = graph.add("first", Work { number: 0, width: 3, pinned: false });
     graph.keep(first);
-    // So many that some nodes begin while others are still being pushed.
+    // Enough nodes that some begin while others are still being pushed.
     for number in 1..20_000 {
         let node = graph.add(format!("node {number}"), Work { number, width: 0, pinned: false });
         graph.order(first, node);

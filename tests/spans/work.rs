@@ -19,7 +19,7 @@ pub struct Work {
     pub pinned: bool,
 }
 
-/// The context of a run: the chunks that ran, and which node fails.
+/// The context of a run: the chunks that ran, and the failure.
 #[derive(Default)]
 pub struct RunContext {
     pub ran_chunks: Mutex<Vec<RanChunk>>,
@@ -34,7 +34,7 @@ pub struct RanChunk {
     pub thread: ThreadId,
 }
 
-/// How a node fails, at its item 0, and its number.
+/// The failure of a node at its item 0, with the node's number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Failure {
     #[default]
@@ -65,7 +65,7 @@ impl Node<RunContext> for Work {
     }
 }
 
-/// Up to twelve nodes, each of which depends on some of those before it.
+/// Up to twelve nodes. Each depends on some of those before it.
 pub fn schedules() -> impl Strategy<Value = Schedule<Work>> {
     vec((0..40_usize, prop::bool::weighted(0.2), any::<u16>()), 1..12).prop_map(|nodes| {
         let mut graph = FrameGraph::new();

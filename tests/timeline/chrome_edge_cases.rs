@@ -141,7 +141,7 @@ fn arrows_of_chunks_of_no_duration_are_in_topological_order() {
 }
 
 #[test]
-fn counters_keep_their_values_and_those_that_are_not_finite_are_left_out() {
+fn finite_counters_are_written_unchanged_and_others_are_left_out() {
     let values = [0.5, -3.0, f64::NAN, f64::INFINITY, 1e300];
     let counters =
         values.iter().enumerate().map(|(index, &value)| Counter { name: "bytes".into(), at: at(index as u64), value });
@@ -183,27 +183,27 @@ fn without_a_device_there_is_no_device_process() {
 }
 
 #[test]
-fn a_large_trace_is_not_in_memory_as_a_whole() {
+fn a_large_trace_is_written_in_pieces() {
     let chunks =
         (0..100_000).map(|index| chunk(0, index as usize % 2, 0, index / 2 * 10, index / 2 * 10 + 10)).collect();
     let log = log(vec![run(vec![node("wide", &[])], 500_000, chunks)]);
     let mut trace = SliceCounter::default();
     write_chrome_trace(&log, &mut trace).unwrap();
     assert_eq!(trace.slices, 100_000);
-    assert!(trace.largest_write < 64 << 10, "{} bytes were in memory at once", trace.largest_write);
+    assert!(trace.max_write < 64 << 10, "{} bytes were in memory at once", trace.max_write);
 }
 
 /// Counts the slices that are written, and the largest write.
 #[derive(Default)]
 struct SliceCounter {
     slices: usize,
-    largest_write: usize,
+    max_write: usize,
     rest: Vec<u8>,
 }
 
 impl Write for SliceCounter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.largest_write = self.largest_write.max(bytes.len());
+        self.max_write = self.max_write.max(bytes.len());
         self.rest.extend(bytes);
         while let Some(end) = self.rest.iter().position(|&byte| byte == b'\n') {
             let line: Vec<u8> = self.rest.drain(..=end).collect();
@@ -227,7 +227,7 @@ fn errors_of_the_writer_are_returned() {
 }
 
 #[test]
-fn a_log_that_refers_to_what_it_does_not_list_is_an_error() {
+fn a_log_with_invalid_indices_is_an_error() {
     let fine = run(vec![node("a", &[]), node("b", &[0])], 9, vec![chunk(1, 1, 0, 0, 9)]);
     let cases = [
         (Run { chunks: vec![chunk(2, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 2 of 2"),
@@ -248,9 +248,9 @@ fn a_log_that_refers_to_what_it_does_not_list_is_an_error() {
     assert_eq!(error.to_string(), "there is a span of thread 0 of 0");
 }
 
-/// Names that break careless writers.
+/// Names that break writers that do not escape.
 fn any_name() -> impl Strategy<Value = String> {
-    let hostile = prop::sample::select(vec![
+    let special = prop::sample::select(vec![
         "",
         "\"",
         "\\",
@@ -263,7 +263,7 @@ fn any_name() -> impl Strategy<Value = String> {
         "ü 漢字 🧵",
         "\"ts\":1",
     ]);
-    prop_oneof![hostile.prop_map(str::to_owned), any::<String>(), Just("\"\n\u{1}".repeat(3_500)),]
+    prop_oneof![special.prop_map(str::to_owned), any::<String>(), Just("\"\n\u{1}".repeat(3_500)),]
 }
 
 proptest! {

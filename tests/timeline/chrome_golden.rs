@@ -14,8 +14,8 @@ use drawloom::{
 use expect_test::expect_file;
 
 #[test]
-fn a_frame_makes_the_golden_trace() {
-    // The calling thread gets a name, because the test harness decides how a test's own thread is called.
+fn the_trace_of_a_frame_equals_the_golden_file() {
+    // The calling thread gets a name, because the test harness names a test's own thread.
     let trace = thread::Builder::new().name("engine".to_owned()).spawn(trace_of_a_frame).unwrap().join().unwrap();
     expect_file!["golden_trace.json"].assert_eq(&trace);
 }

@@ -1,4 +1,4 @@
-//! Reports of frames made by hand, whose answers are known.
+//! Reports of hand-made frames with known results.
 
 use std::{ops::Range, sync::Arc, time::Duration};
 
@@ -85,7 +85,7 @@ fn report_of(log: &Log) -> FrameReport {
 }
 
 #[test]
-fn the_report_of_a_frame_made_by_hand_is_as_calculated() {
+fn the_report_of_a_hand_made_frame_equals_the_calculation() {
     let report = report_of(&log());
     assert_eq!((report.frame, report.began, report.duration), (12, micros(1_000), micros(1_000)));
     let steps = report.critical_path.iter();
@@ -144,7 +144,7 @@ fn the_report_of_a_frame_made_by_hand_is_as_calculated() {
 }
 
 #[test]
-fn the_text_is_as_expected() {
+fn the_text_equals_the_golden_file() {
     expect_file!["report.txt"].assert_eq(&report_of(&log()).to_string());
 }
 
@@ -218,7 +218,7 @@ fn of_two_overlapping_spans_the_one_that_began_last_is_on_the_path() {
 }
 
 #[test]
-fn the_part_of_a_span_between_two_runs_is_named_so() {
+fn the_part_of_a_span_between_two_runs_is_named_between() {
     let mut log = log();
     let later = |time: Duration| time + micros(740);
     let mut second = log.runs[0].clone();
@@ -268,7 +268,7 @@ fn an_inconsistent_log_is_an_error() {
 }
 
 #[test]
-fn times_that_run_backwards_do_not_break_the_report() {
+fn a_report_tolerates_times_that_run_backwards() {
     let range = |start, end| Range { start, end };
     let mut log = log();
     let run = &mut log.runs[0];
@@ -293,7 +293,7 @@ fn times_that_run_backwards_do_not_break_the_report() {
 }
 
 #[test]
-fn the_text_stays_short_whatever_the_names() {
+fn the_text_is_short_with_any_names() {
     let mut log = log();
     let names = (0..200).map(|index| format!("{index}\n\u{1b}[31m{}", "x".repeat(10_000)));
     let nodes = names.enumerate().map(|(index, name)| {

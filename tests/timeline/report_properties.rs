@@ -18,7 +18,7 @@ use drawloom::{
 };
 use proptest::{collection::vec, prelude::*, sample::Index};
 
-/// A node: its dependencies, how many items it has, how long each takes, and its group.
+/// A node: its dependencies, its number of items, the time of each, and its group.
 #[derive(Clone, Debug)]
 struct NodeSpec {
     dependencies: Vec<Index>,
@@ -38,7 +38,7 @@ fn any_graph() -> impl Strategy<Value = Vec<NodeSpec>> {
 struct Context {
     /// The simulated clock that chunks advance, unless time is real.
     clock: Option<Arc<AtomicU64>>,
-    /// The group that has nothing to do.
+    /// The group without work.
     free: Option<String>,
 }
 
@@ -105,7 +105,7 @@ struct WorkerSpan {
     ended: Duration,
 }
 
-/// When each node could have begun, and when it did.
+/// The times at which each node was ready and at which it started.
 fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
     let chunks_of = |node| run.chunks.iter().chain(&run.empty).filter(move |chunk| chunk.node == node);
     let ended = |node| chunks_of(node).map(|chunk| chunk.ended).max().expect("every node has a chunk or an empty one");
@@ -117,7 +117,7 @@ fn ready_and_started(run: &Run) -> Vec<(Duration, Duration)> {
     times.collect()
 }
 
-/// All worker spans by when they ended, and pairs of which the first had to end before the second.
+/// All worker spans, ordered by their end, and the pairs in which the first had to end before the second.
 fn spans_and_edges(run: &Run) -> (Vec<WorkerSpan>, Vec<[usize; 2]>) {
     let mut chunks: Vec<_> = run.chunks.iter().chain(&run.empty).collect();
     chunks.sort_by_key(|chunk| (chunk.ended, chunk.started, chunk.node));
@@ -141,7 +141,7 @@ fn spans_and_edges(run: &Run) -> (Vec<WorkerSpan>, Vec<[usize; 2]>) {
     (spans, edges)
 }
 
-/// When each span ends if it begins as early as possible, takes as long as its weight, and ends no earlier than `at_least`.
+/// The end of each span if it begins as early as possible, takes as long as its weight, and ends no earlier than `at_least`.
 fn ends(run: &Run, weights: &[Duration], edges: &[[usize; 2]], at_least: impl Fn(usize) -> Duration) -> Vec<Duration> {
     let mut ends: Vec<_> = (0..weights.len()).map(|span| at_least(span).max(run.began + weights[span])).collect();
     loop {

@@ -1,4 +1,4 @@
-//! Reads a trace as a viewer does.
+//! Parses a Chrome trace.
 
 use drawloom::{report::write_chrome_trace, timeline::Log};
 use serde_json::Value;
@@ -51,7 +51,7 @@ impl Trace {
         values.map(|event| (event.began, event.arguments["value"].as_f64().expect("it is a number"))).collect()
     }
 
-    /// The names of the threads, each with the numbers of its process and its own.
+    /// The process number, thread number and name of each thread.
     pub fn thread_names(&self) -> Vec<(u64, u64, String)> {
         let names = self.of_kind("M").filter(|event| event.name == "thread_name");
         names.map(|event| (event.process, event.thread, text_of(&event.arguments["name"]))).collect()
@@ -68,7 +68,7 @@ impl Event {
     }
 }
 
-/// All times are microseconds with three decimals: `ts`, `dur`, and arguments whose names end in `_us`.
+/// All times are microseconds with three decimals: `ts`, `dur`, and arguments with names that end in `_us`.
 fn check_decimals(text: &str) {
     for key in ["\"ts\":", "\"dur\":", "_us\":"] {
         for (at, _) in text.match_indices(key) {

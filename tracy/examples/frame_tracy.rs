@@ -1,4 +1,4 @@
-//! Renders frames for Tracy to look at. It waits for a viewer first.
+//! Renders frames to inspect in Tracy. It waits for a viewer first.
 //!
 //!     cargo run --release -p drawloom-tracy --example frame_tracy
 //!     cargo run --release -p drawloom-tracy --example frame_tracy -- --frames 60 --no-wait
@@ -18,16 +18,16 @@ use drawloom_testing::adapter;
 use drawloom_tracy::Zones;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Renders frames for Tracy to look at.
+/// Renders frames to inspect in Tracy.
 #[derive(Parser)]
 struct Arguments {
-    /// How many frames to render. Ctrl-C ends it sooner.
+    /// The number of frames. Ctrl-C ends it sooner.
     #[arg(long, default_value_t = 600)]
     frames: u64,
-    /// How many workers there are: as many as the machine runs threads at once, if not given.
+    /// The number of workers. The default is the number of threads that the machine runs at once.
     #[arg(long)]
     workers: Option<NonZeroUsize>,
-    /// Begin at once, whether a viewer is connected or not.
+    /// Begin at once, with or without a viewer.
     #[arg(long)]
     no_wait: bool,
     /// Show every chunk of every node.
@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}")?);
     for _frame in 0..arguments.frames {
         let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
-        // So that the device is never more than a frame behind.
+        // Waits, so that the device is never more than a frame behind.
         submitted.submission.wait()?;
         drawloom_tracy::mark_frame();
         progress.inc(1);
@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The machine's adapter, or one that draws nothing: what the workers do is the same.
+/// The machine's adapter, or one that draws nothing: the workers do the same in both cases.
 fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     adapter::device().or_else(|error| {
         eprintln!("{error}; going on with a device that draws nothing");

@@ -1,5 +1,5 @@
-//! Shows [Drawloom](https://docs.rs/drawloom)'s frames in [Tracy](https://github.com/wolfpld/tracy): what each worker did,
-//! on one timeline.
+//! Shows [Drawloom](https://docs.rs/drawloom)'s frames in [Tracy](https://github.com/wolfpld/tracy): the work of each
+//! worker, on one timeline.
 //!
 //! An engine with a `tracing` subscriber adds [`layer`] to it; an engine without one calls [`install`]. Then a viewer can connect.
 //! It shows a zone for each node that a worker runs, the number of ready nodes, and the number of queued jobs.
@@ -36,13 +36,13 @@ use crate::{
 /// The target of Drawloom's spans and events of runs.
 const RUNS: &str = "drawloom::graph";
 
-/// Which spans of a run are zones in Tracy.
+/// The spans of a run that are zones in Tracy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Zones {
     /// Nodes: one zone for each worker that runs a part of the node.
     #[default]
     Nodes,
-    /// Nodes and their chunks. This makes some hundred times as many zones, at as many times the cost.
+    /// Nodes and their chunks. This makes about a hundred times as many zones, at a hundred times the cost.
     Chunks,
 }
 
@@ -79,7 +79,7 @@ pub fn install(zones: Zones) -> Result<(), InstallError> {
 
 /// The program already has a global subscriber.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("the program has a subscriber of spans already: add drawloom_tracy::layer to that one")]
+#[error("the program already has a subscriber: add drawloom_tracy::layer to that one")]
 pub struct InstallError;
 
 /// Names the calling thread after a worker. Use it as the hook of `SchedulerBuilder::on_start`. Worker 0 is the thread that calls

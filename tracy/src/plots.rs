@@ -17,7 +17,7 @@ use tracing_tracy::client::{Client, PlotName, plot_name};
 
 use crate::RUNS;
 
-/// Whether it is Drawloom's event with counters.
+/// Whether the metadata is that of Drawloom's event with counters.
 pub fn is_counters(metadata: &Metadata<'_>) -> bool {
     metadata.is_event() && metadata.target() == RUNS && metadata.name() == "taken"
 }

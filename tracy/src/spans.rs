@@ -1,4 +1,4 @@
-//! Spans as zones: a node's span has the node's name, any other span its own.
+//! Shows spans as zones. The zone of a node has the node's name, that of any other span the span's name.
 
 use std::{
     cell::RefCell,
@@ -23,12 +23,12 @@ use tracing_tracy::{
 
 use crate::RUNS;
 
-/// Whether it is the span of a node.
+/// Whether the metadata is that of a node's span.
 pub fn is_node(metadata: &Metadata<'_>) -> bool {
     metadata.is_span() && metadata.target() == RUNS && metadata.name() == "node"
 }
 
-/// Whether it is the span of a chunk.
+/// Whether the metadata is that of a chunk's span.
 pub fn is_chunk(metadata: &Metadata<'_>) -> bool {
     metadata.is_span() && metadata.target() == RUNS && metadata.name() == "chunk"
 }
@@ -117,7 +117,7 @@ where
     }
 }
 
-/// The name of a node's zone: the node's name, truncated to what Tracy accepts.
+/// The name of a node's zone: the node's name, truncated to a length that Tracy accepts.
 pub fn name_of(attributes: &Attributes<'_>) -> String {
     let mut name = NameField(String::new());
     attributes.record(&mut name);
@@ -168,7 +168,7 @@ mod tests {
 
     use super::{MAX_NAME_BYTES, NameOnly, is_chunk, is_node, name_of};
 
-    /// Collects the names of zones: a node's name, or a span's name and what the formatter adds to it.
+    /// Collects the names of zones: a node's name, or a span's name and the formatter's addition.
     #[derive(Clone, Default)]
     struct Collected(Arc<Mutex<BTreeSet<String>>>);
 

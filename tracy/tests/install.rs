@@ -1,4 +1,4 @@
-//! Only one subscriber can be the whole program's, so this is a program of its own.
+//! A program has only one global subscriber, so this test has a binary of its own.
 
 use drawloom_tracy::{InstallError, Zones};
 

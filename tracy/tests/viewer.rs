@@ -1,4 +1,4 @@
-//! What comes out of a program, as a viewer on the same machine sees it.
+//! The data that a program sends to a viewer on the same machine.
 
 use std::{
     env,
@@ -17,50 +17,50 @@ use drawloom::{
 use drawloom_tracy::Zones;
 use tracing::{debug_span, trace_span};
 
-/// What every viewer of Tracy 0.14 says first, before the number of its protocol.
+/// The first bytes that every viewer of Tracy 0.14 sends, before the number of its protocol.
 const GREETING: &[u8] = b"TracyPrf";
 const PROTOCOL: u32 = 82;
 const WELCOME: u8 = 1;
 const PROTOCOL_MISMATCH: u8 = 2;
 
-/// Letters in no order that turns up anywhere else, so that Tracy's compression leaves them as they are.
+/// Letters in an order that occurs nowhere else, so that Tracy's compression does not change them.
 const NODE: &str = "Wq7x#jvKz9";
 const SPAN: &str = "Yb3u@fnGd5";
 const SECRETS: [&str; 4] = ["Ph8c!mtRs2", "Lk6e%ovXa4", "Uz1i&wyJr0", "Dg5o~hqBn3"];
 
 #[test]
-fn a_viewer_of_tracy_0_14_sees_names_and_no_fields() {
+fn a_viewer_of_tracy_0_14_receives_names_and_no_fields() {
     let program = Program::start();
-    let stranger = program.greet("127.0.0.1", PROTOCOL - 1).map(|(_, answer)| answer);
-    assert_eq!(stranger, Some(PROTOCOL_MISMATCH));
+    let other_protocol = program.greet("127.0.0.1", PROTOCOL - 1).map(|(_, answer)| answer);
+    assert_eq!(other_protocol, Some(PROTOCOL_MISMATCH));
     let (mut stream, answer) = program.greet("127.0.0.1", PROTOCOL).expect("it listens");
     assert_eq!(answer, WELCOME);
     stream.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
-    let (mut seen, mut part) = (Vec::new(), [0; 4096]);
-    let has = |seen: &[u8], text: &str| seen.windows(text.len()).any(|window| window == text.as_bytes());
+    let (mut received, mut part) = (Vec::new(), [0; 4096]);
+    let has = |received: &[u8], text: &str| received.windows(text.len()).any(|window| window == text.as_bytes());
     let start = Instant::now();
-    while !(has(&seen, NODE) && has(&seen, SPAN)) {
-        assert!(start.elapsed() < Duration::from_secs(60), "{} bytes, and no names", seen.len());
+    while !(has(&received, NODE) && has(&received, SPAN)) {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} bytes, and no names", received.len());
         if let Ok(count) = stream.read(&mut part) {
-            assert!(count > 0, "the program has hung up after {} bytes", seen.len());
-            seen.extend_from_slice(&part[..count]);
+            assert!(count > 0, "the program has hung up after {} bytes", received.len());
+            received.extend_from_slice(&part[..count]);
         }
     }
     for secret in SECRETS {
-        assert!(!has(&seen, secret), "{secret} of a field was sent");
+        assert!(!has(&received, secret), "{secret} of a field was sent");
     }
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn nobody_is_let_in_but_by_the_loopback_address() {
+fn only_the_loopback_address_accepts_connections() {
     let program = Program::start();
     assert!(program.greet("127.0.0.1", PROTOCOL).is_some());
-    // It is this machine's too, and a program that listened to the network would answer there.
+    // Another address of this machine: a program that listened to the network would answer there.
     assert!(TcpStream::connect(("127.0.0.2", program.port)).is_err());
 }
 
-/// The program that is looked at: this one, started once more.
+/// The traced program: this test binary, started as a child process.
 struct Program {
     child: Child,
     port: u16,
@@ -70,14 +70,14 @@ impl Program {
     fn start() -> Self {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let child = Command::new(env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "the_program_that_is_looked_at"])
+            .args(["--ignored", "--exact", "the_traced_program"])
             .env("TRACY_PORT", port.to_string())
             .spawn()
             .unwrap();
         Self { child, port }
     }
 
-    /// Connects as a viewer of that protocol, and returns the answer. `None` if nobody answers in time.
+    /// Connects as a viewer with this protocol, and returns the answer. `None` without an answer in time.
     fn greet(&self, address: &str, protocol: u32) -> Option<(TcpStream, u8)> {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(20) {
@@ -103,7 +103,7 @@ impl Drop for Program {
 
 #[test]
 #[ignore = "the other tests start it in a process of its own"]
-fn the_program_that_is_looked_at() {
+fn the_traced_program() {
     drawloom_tracy::install(Zones::Nodes).unwrap();
     let scheduler = Scheduler::builder().workers(2).on_start(drawloom_tracy::name_worker).build().unwrap();
     let mut graph = FrameGraph::new();
@@ -114,7 +114,7 @@ fn the_program_that_is_looked_at() {
     let mut schedule = graph.compile().unwrap();
     schedule.always_parallel(true);
     let start = Instant::now();
-    // Whoever looks ends it sooner.
+    // The test that started this program ends it sooner.
     while start.elapsed() < Duration::from_secs(120) {
         let outer = debug_span!("Yb3u@fnGd5", secret = SECRETS[3]).entered();
         trace_span!("of no interest").in_scope(|| schedule.run(&scheduler, &()).unwrap());
