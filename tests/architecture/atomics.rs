@@ -33,7 +33,7 @@ fn listed_atomics(architecture: &str) -> BTreeSet<String> {
     let mut sections = architecture.split("\n## ");
     let section = sections.find(|section| section.starts_with("Memory orderings\n")).unwrap_or_default();
     let cells = section.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
-    // Code stands between every other pair of backticks.
+    // Code is between every other pair of backticks.
     let names = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter_map(|name| name.split_once("::"));
     let mut file = "";
     let whole = names.map(|(in_file, field)| {
@@ -43,8 +43,8 @@ fn listed_atomics(architecture: &str) -> BTreeSet<String> {
     whole.collect()
 }
 
-/// The names of fields and statics whose type mentions an atomic, and of tuple structs, enums and type aliases that do. Locals
-/// and parameters do not count, nor does anything that only tests are built with.
+/// The names of fields and statics with types that mention an atomic, and of tuple structs, enums and type aliases that mention
+/// one. Locals and parameters do not count, nor do items that only tests are built with.
 fn declared_atomics(trees: &[TokenTree]) -> Vec<String> {
     let (mut names, mut at) = (Vec::new(), 0);
     while let Some(tree) = trees.get(at) {
@@ -77,7 +77,7 @@ fn declared_atomics(trees: &[TokenTree]) -> Vec<String> {
     names
 }
 
-/// The fields of a struct whose type mentions an atomic.
+/// The fields of a struct with types that mention an atomic.
 fn atomic_fields(trees: &[TokenTree]) -> Vec<String> {
     let (mut names, mut field) = (Vec::new(), None);
     for (at, tree) in trees.iter().enumerate() {

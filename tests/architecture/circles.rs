@@ -4,7 +4,7 @@
 //! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
 //! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a
 //! re-export of an item that the file does not use itself. So a `mod.rs` that only declares modules and re-exports their
-//! items is no part of a circle.
+//! items is not part of a circle.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -20,7 +20,7 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 const KNOWN_CIRCLES: &[&str] = &[
 ];
 
-/// How many re-exports are followed to the definition of one item.
+/// The maximum number of re-exports that are followed to the definition of one item.
 const MAX_REEXPORTS: usize = 8;
 
 #[test]
@@ -86,7 +86,7 @@ impl<'a> Imports<'a> {
         Self { modules, of_file }
     }
 
-    /// A shortest way through imports that leads from the file back to it.
+    /// A shortest path through imports from the file back to itself.
     fn circle_through(&self, file: usize) -> Option<Vec<usize>> {
         let mut importer = BTreeMap::new();
         let mut queue = VecDeque::from([file]);
@@ -137,7 +137,7 @@ impl<'a> Imports<'a> {
 /// Finds the file that defines an item.
 struct Resolver {
     files: BTreeMap<Vec<String>, usize>,
-    /// For each file the names that it imports, and the paths they stand for.
+    /// For each file the names that it imports, with their paths.
     names: Vec<BTreeMap<String, Vec<String>>>,
 }
 

@@ -1,4 +1,4 @@
-//! Files are short, are Rust if they say so, and have names that say what is inside.
+//! Files are short, parse if they are Rust, and have specific names.
 
 use std::path::Path;
 

@@ -33,7 +33,7 @@ fn wrong_uses(sources: &[Source]) -> Vec<String> {
     problems
 }
 
-/// What `lib.rs` lists.
+/// The layers and names that `lib.rs` lists.
 #[derive(Default)]
 struct Root {
     layers: Vec<String>,

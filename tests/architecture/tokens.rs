@@ -2,7 +2,7 @@
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
-/// Whether this is that word or punctuation mark.
+/// Whether the token is this word or punctuation mark.
 pub fn is(tree: Option<&TokenTree>, text: &str) -> bool {
     tree.is_some_and(|tree| !matches!(tree, TokenTree::Group(_)) && tree.to_string() == text)
 }

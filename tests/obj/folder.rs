@@ -1,4 +1,4 @@
-//! Temporary files, and access to what was loaded from them.
+//! Temporary files, and access to the scenes loaded from them.
 
 use std::fs;
 use std::path::PathBuf;

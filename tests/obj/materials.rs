@@ -146,7 +146,7 @@ const EMISSIVE: &str = "newmtl glow\nKe 2 1 0.5\n";
 
 fn an_emissive_plane_is_a_hemispherical_light() {
     let text = "mtllib a.mtl\nusemtl glow\nv 0 5 0\nv 3 5 0\nv 3 5 2\nv 0 5 2\n";
-    // Its winding says up. A normal that says down is right.
+    // The winding faces up. A normal in the file takes precedence.
     for (face, normal) in [("f 4 3 2 1", Vec3::Y), ("f 4//1 3//1 2//1 1//1\n", Vec3::NEG_Y)] {
         let text = format!("{text}vn 0 -1 0\n{face}\n");
         let imported = Folder::new().with("a.obj", text).with("a.mtl", EMISSIVE).load().unwrap();

@@ -10,7 +10,7 @@ use libtest_mimic::Trial;
 
 use crate::trial;
 
-/// What a file must give: objects, triangles and warnings, and no degenerate triangle; or an error with this in it.
+/// The expected outcome of a file: objects, triangles and warnings without degenerate triangles, or an error that contains a text.
 enum Outcome {
     Scene { objects: usize, triangles: usize, warnings: usize },
     Error(&'static str),
@@ -125,7 +125,7 @@ fn cornell() {
     // 17, 12 and 4 times 0.47 m by 0.38 m.
     assert!(intensity.abs_diff_eq(Vec3::new(3.0362, 2.1432, 0.7144), 1e-3), "{intensity}");
     assert!(range > 2.0, "{range}");
-    // The box is open towards +Z, where the camera looks in horizontally.
+    // The box is open towards +Z, and the camera is there at mid height.
     demo::add_camera_and_lights(&mut scene);
     let camera = &scene.cameras[0];
     assert!((camera.orientation * Vec3::NEG_Z).abs_diff_eq(Vec3::NEG_Z, 1e-4));

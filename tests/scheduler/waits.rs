@@ -43,8 +43,8 @@ impl Flag {
     }
 }
 
-/// Waits for the background job in a frame's job, and lets the worker that helps with the background job continue, which may find
-/// that job.
+/// Waits for the background job in a frame's job, and lets the worker that helps with the background job continue. That worker
+/// may find the frame's job.
 fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_on: &Flag) {
     let waits = Flag::default();
     let outcome = scheduler.scope(|scope| {
@@ -227,7 +227,7 @@ fn a_job_of_an_outer_scope_does_not_run_inside_the_wait_for_an_inner_one() {
                     assert!(!INSIDE.replace(true));
                     let outcome = scheduler.scope(|_inner| {
                         outer.spawn(|_outer, _worker| {
-                            assert!(!INSIDE.get(), "it runs on top of a job that waits for something else");
+                            assert!(!INSIDE.get(), "it runs on top of a job that does not wait for it");
                             ran.fetch_add(1, Ordering::Relaxed);
                         });
                     });
@@ -241,9 +241,9 @@ fn a_job_of_an_outer_scope_does_not_run_inside_the_wait_for_an_inner_one() {
     }
 }
 
-/// One thief takes two jobs out of an overflow at once, which wait for each other.
+/// A worker steals two jobs out of an overflow at once, and the jobs wait for each other.
 #[test]
-fn extra_jobs_that_a_thief_takes_are_visible_to_others() {
+fn extra_stolen_jobs_are_visible_to_other_workers() {
     assert_ends(|| {
         // A shuffled scheduler keeps all jobs in overflows.
         let scheduler = Scheduler::builder().workers(3).shuffle(1).build().unwrap();
@@ -270,8 +270,7 @@ fn extra_jobs_that_a_thief_takes_are_visible_to_others() {
     });
 }
 
-/// The owner of a scope waits inside a job, and has nothing to do. Other workers run jobs that are spawned into the scope then,
-/// too.
+/// The owner of a scope waits inside a job and is idle. Jobs that are spawned into the scope then also run on other workers.
 #[test]
 fn an_idle_owner_does_not_run_all_jobs_of_its_scope() {
     let scheduler = &Scheduler::new(5).unwrap();

@@ -1,4 +1,4 @@
-//! Chrome traces, checked against their logs: what viewers need of a trace, for real runs and for any log.
+//! Chrome traces of real runs, checked against their logs.
 
 use std::{
     collections::HashSet,
@@ -18,7 +18,7 @@ use serde_json::json;
 
 use crate::trace::{Event, Trace, nanoseconds};
 
-/// A node whose chunks have the size that the run is called with.
+/// A node with chunks of the size that is the context of the run.
 #[derive(Clone, Debug)]
 struct Busy {
     width: usize,
@@ -101,7 +101,7 @@ fn record(schedule: &mut Schedule<Busy>, scheduler: &Scheduler, chunks: &[usize]
     timeline.take()
 }
 
-/// Checks what must hold for the trace of every log.
+/// Checks the trace of a log.
 pub fn check(log: &Log) {
     let trace = Trace::of(log);
     check_tracks(log, &trace);
@@ -252,7 +252,7 @@ fn check_ready(log: &Log, trace: &Trace) {
     assert_eq!(trace.counter_values("ready nodes"), expected);
 }
 
-/// When the last dependency of a node had ended, or `None` if one of them has no slices.
+/// The time at which the last dependency of a node ended, or `None` if one of them has no slices.
 fn ready(run: &Run, node: usize) -> Option<Duration> {
     let ends = |&dependency: &usize| slices_of(run, dependency).map(|slice| slice.ended).max();
     let dependencies = &run.graph.nodes[node].dependencies;
@@ -298,7 +298,7 @@ proptest! {
 }
 
 #[test]
-fn the_trace_of_an_incomplete_log_says_what_is_missing() {
+fn the_trace_of_an_incomplete_log_counts_what_is_missing() {
     let scheduler = Scheduler::builder().workers(2).timeline_capacity(16).build().unwrap();
     let node = |width, dependencies: &[usize]| {
         (Busy { width, pinned: false, fails_at: None }, dependencies.iter().copied().collect())

@@ -1,4 +1,4 @@
-//! Chrome traces of logs made by hand: cases that real runs rarely have.
+//! Chrome traces of hand-made logs, with cases that are rare in real runs.
 
 use std::{
     io::{self, Write},
