@@ -7,7 +7,7 @@ use clap::Parser;
 #[cfg(feature = "wgpu")]
 use crate::backends::BackendName;
 
-/// How much is measured.
+/// The extent of the measurement.
 #[derive(Parser)]
 pub struct ExtentArguments {
     /// Runs few rounds on small scenes, to see that the benchmark works.
@@ -19,13 +19,13 @@ pub struct ExtentArguments {
 }
 
 impl ExtentArguments {
-    /// Whether the run is a quick one, whose results must not overwrite those of a full run.
+    /// Whether the run is a quick one. Its results must not overwrite those of a full run.
     pub fn is_quick(&self) -> bool {
         self.quick || !self.bench
     }
 }
 
-/// How much is measured, and on which wgpu backends.
+/// The extent of the measurement, and its wgpu backends.
 #[cfg(feature = "wgpu")]
 #[derive(Args)]
 pub struct BackendArguments {
@@ -38,7 +38,7 @@ pub struct BackendArguments {
 
 #[cfg(feature = "wgpu")]
 impl BackendArguments {
-    /// Whether the run is a quick one, whose results must not overwrite those of a full run.
+    /// Whether the run is a quick one. Its results must not overwrite those of a full run.
     pub fn is_quick(&self) -> bool {
         self.extent.is_quick()
     }

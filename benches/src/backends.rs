@@ -10,7 +10,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendName {
-    /// wgpu's no-op backend, which leaves the CPU part of a frame.
+    /// wgpu's no-op backend, which measures the CPU part of a frame.
     Noop,
     /// The machine's adapter.
     Adapter,

@@ -20,7 +20,7 @@ const CLOUD_RADIUS: f64 = 50.0;
 /// Width and height in pixels. It is small, as the CPU part is measured and a software device would share the cores.
 const PICTURE: u32 = 64;
 
-/// Cameras around one cloud of objects, all of which see all of it.
+/// Cameras around one cloud of objects. Each sees the whole cloud.
 ///
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.

@@ -1,4 +1,4 @@
-//! Interleaves contenders, so that whatever else the machine does disturbs all of them alike.
+//! Interleaves contenders, so that other activity on the machine disturbs all of them alike.
 
 use drawloom_testing::random::Random;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -6,10 +6,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Warm-up rounds that suffice where nothing is tuned: tables grow and pipelines are created in them.
 pub const WARM_UP: usize = 2;
 
-/// How many rounds a harness runs.
+/// The number of rounds of a harness.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounds {
-    /// Rounds at the start whose results are dropped.
+    /// Rounds at the start. Their results are dropped.
     pub warm_up: usize,
     pub measured: usize,
 }
@@ -91,7 +91,7 @@ impl<'a> Harness<'a> {
     }
 }
 
-/// A progress bar that counts in this unit. Its length is that of what is announced later.
+/// A progress bar that counts in this unit. Its length grows with the rounds that are announced later.
 pub fn progress_bar(unit: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {prefix}, {eta} left  {msg}");
     ProgressBar::new(0).with_style(style.expect("the template is valid")).with_prefix(unit)

@@ -1,4 +1,4 @@
-//! What Drawloom's benchmarks share.
+//! Code that Drawloom's benchmarks share.
 //!
 //!     cargo bench -p drawloom-benches --bench record
 //!     cargo bench -p drawloom-benches --bench record -- --quick

@@ -1,4 +1,4 @@
-//! A scene whose objects all move.
+//! A scene in which all objects move.
 
 use drawloom::glam::DVec3;
 use drawloom::scene::{Scene, SceneRef};
@@ -10,7 +10,7 @@ pub struct Moving {
     frame: u32,
 }
 
-/// How far an object moves per frame, in metres, and after how many frames it turns around.
+/// The distance that an object moves per frame, in metres, and the number of frames after which it turns around.
 const STEP: f64 = 1e-3;
 const FRAMES: u32 = 64;
 

@@ -1,4 +1,4 @@
-//! Where benchmarks write their results: in `target/drawloom/`.
+//! Writes the benchmarks' results to `target/drawloom/`.
 
 use std::env;
 use std::fs;
@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Writes `value` as the file `name`.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_json(name: &str, value: &impl Serialize) -> io::Result<()> {
     let path = file(name)?;
     fs::write(&path, serde_json::to_string_pretty(value)? + "\n")?;
@@ -18,20 +18,20 @@ pub fn write_json(name: &str, value: &impl Serialize) -> io::Result<()> {
     Ok(())
 }
 
-/// The path of the file `name`, in a folder that is there.
+/// The path of the file `name`. Creates its folder.
 ///
 /// # Errors
-/// If the folder cannot be made.
+/// Returns an error if the folder cannot be created.
 pub fn file(name: &str) -> io::Result<PathBuf> {
     let folder = folder()?;
     Ok(folder.join(name))
 }
 
-/// The folder `drawloom` of the target folder, which Cargo's programs are in: `target/release/deps/bench`,
-/// `target/release/examples/example`.
+/// The folder `drawloom` in Cargo's target folder. Creates it. Cargo's programs are two folders below the target folder:
+/// `target/release/deps/bench`, `target/release/examples/example`.
 ///
 /// # Errors
-/// If the folder cannot be made.
+/// Returns an error if the folder cannot be created.
 pub fn folder() -> io::Result<PathBuf> {
     let program = env::current_exe()?;
     let target = program.ancestors().nth(3).unwrap_or(Path::new("target"));

@@ -2,20 +2,20 @@
 
 use std::time::Duration;
 
-/// The median; of an even number of values, the upper of the two in the middle. Zero of none.
+/// The median, or the upper of the two values in the middle. Zero without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let sorted = sorted(values);
     sorted.get(sorted.len() / 2).copied().unwrap_or_default()
 }
 
-/// The same of durations.
+/// The median of durations.
 pub fn median_duration(times: impl IntoIterator<Item = Duration>) -> Duration {
     let mut times: Vec<_> = times.into_iter().collect();
     times.sort();
     times.get(times.len() / 2).copied().unwrap_or_default()
 }
 
-/// The least value that `percent` of 100 values do not exceed. Zero of none.
+/// The smallest value that `percent` of 100 values do not exceed. Zero without values.
 pub fn percentile(percent: usize, values: impl IntoIterator<Item = f64>) -> f64 {
     let sorted = sorted(values);
     let rank = (sorted.len() * percent).div_ceil(100);

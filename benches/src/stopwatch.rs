@@ -1,4 +1,4 @@
-//! How long frames take, on the CPU and on the device.
+//! Frame times, on the CPU and on the device.
 
 use std::error::Error;
 use std::time::{Duration, Instant};

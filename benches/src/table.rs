@@ -1,6 +1,6 @@
 //! Tables in Markdown.
 
-/// A table whose columns are as wide as their longest cell. Columns of numbers are aligned to the right.
+/// A table. Columns are as wide as their longest cell. Columns of numbers are aligned to the right.
 pub struct Table {
     lines: Vec<Vec<String>>,
 }

@@ -31,7 +31,7 @@ impl Work {
         Self { rounds: rounds.round().max(1.0) as u32, record: None }
     }
 
-    /// The same jobs, which record when they run.
+    /// The same jobs, which also record when they run.
     pub fn recorded(&self, jobs: usize) -> Self {
         Self { record: Some(Record::new(jobs)), ..*self }
     }
@@ -65,7 +65,7 @@ fn arithmetic(rounds: u32) {
     }
 }
 
-/// When each job of a frame ran, by a logical clock that counts starts and ends.
+/// The times at which the jobs of a frame ran, by a logical clock that counts starts and ends.
 pub struct Record {
     clock: AtomicU32,
     jobs: Vec<Job>,

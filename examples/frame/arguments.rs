@@ -20,7 +20,7 @@ pub struct Arguments {
 
     /// The camera's position and target, in metres.
     #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
-    pub camera: Option<PlacedCamera>,
+    pub camera: Option<CameraPosition>,
 
     /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
     /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter.
@@ -36,8 +36,8 @@ pub struct Arguments {
     pub granularity: JobSize,
 
     /// The recording strategy. Default: for each pass the one that is measured to be cheapest.
-    #[arg(long, value_enum, value_name = "WAY")]
-    pub record: Option<RecordName>,
+    #[arg(long, value_enum, value_name = "STRATEGY")]
+    pub record: Option<StrategyName>,
 
     /// Repeats the scene's objects N times, at the same positions.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -67,7 +67,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     pub graph: Option<PathBuf>,
 
-    /// Explains in words why a frame took as long as it did: the median of the last 60.
+    /// Explains in words why the median of the last 60 frames took as long as it did.
     #[arg(long)]
     pub explain: bool,
 
@@ -104,34 +104,35 @@ fn conflict(message: &str) -> ! {
 
 /// A recording strategy.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum RecordName {
+pub enum StrategyName {
     /// Directly into each pass.
     Direct,
     /// Into bundles, on all workers.
     Bundles,
-    /// Into bundles that are kept from frame to frame.
-    Kept,
-    /// Indirect draws, which not every adapter has.
+    /// Into bundles that are cached from frame to frame.
+    #[value(name = "kept")]
+    Cached,
+    /// With indirect draws, which not every adapter supports.
     Indirect,
 }
 
-impl RecordName {
+impl StrategyName {
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
             Self::Bundles => "bundles",
-            Self::Kept => "kept",
+            Self::Cached => "kept",
             Self::Indirect => "indirect",
         }
     }
 
-    /// What it stands for.
-    pub fn way(self) -> RecordingStrategy {
+    /// The recording strategy with this name.
+    pub fn strategy(self) -> RecordingStrategy {
         match self {
             Self::Direct => RecordingStrategy::Direct,
             Self::Bundles => RecordingStrategy::Bundles,
-            Self::Kept => RecordingStrategy::CachedBundles,
+            Self::Cached => RecordingStrategy::CachedBundles,
             Self::Indirect => RecordingStrategy::Indirect,
         }
     }
@@ -146,7 +147,7 @@ pub enum BackendName {
     Software,
     /// The CPU, in f64 on one thread: the reference for the others.
     Reference,
-    /// wgpu's no-op backend, which leaves the cost of recording.
+    /// wgpu's no-op backend, which shows the cost of recording alone.
     Noop,
     /// Drawloom's null backend, which counts and checks.
     Null,
@@ -171,13 +172,13 @@ impl BackendName {
 
 /// `x,y,z,tx,ty,tz`.
 #[derive(Clone)]
-pub struct PlacedCamera {
+pub struct CameraPosition {
     position: DVec3,
     target: DVec3,
 }
 
-impl PlacedCamera {
-    /// Moves a camera there.
+impl CameraPosition {
+    /// Moves a camera to this position.
     pub fn apply(&self, camera: &mut Camera) {
         let placed = Camera::looking_at(camera.name.clone(), self.position, self.target);
         camera.position = placed.position;
@@ -185,7 +186,7 @@ impl PlacedCamera {
     }
 }
 
-impl FromStr for PlacedCamera {
+impl FromStr for CameraPosition {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

@@ -110,7 +110,7 @@ fn wgpu_backend(
     let backend = WgpuBackend::new(device, queue)?;
     Ok(match arguments.record {
         None => backend,
-        Some(record) => backend.recording_strategy(record.way())?,
+        Some(record) => backend.recording_strategy(record.strategy())?,
     })
 }
 

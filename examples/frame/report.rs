@@ -7,7 +7,7 @@ use std::time::Duration;
 use drawloom::FrameStatistics;
 use serde::Serialize;
 
-use crate::arguments::{Arguments, BackendName, RecordName};
+use crate::arguments::{Arguments, BackendName, StrategyName};
 
 /// The report on all frames.
 #[derive(Serialize)]
@@ -23,10 +23,10 @@ pub struct Report {
     views: Vec<View>,
     stages_ms: Stages,
     cpu_ms: Cpu,
-    /// What was left out or drawn differently; only printed.
+    /// Rejections: what was left out or drawn differently. They are printed, but not in the file.
     #[serde(skip)]
     rejections: Vec<String>,
-    /// Why the preferred backend did not draw it; only printed.
+    /// Why the preferred backend did not draw the frames. It is printed, but not in the file.
     #[serde(skip)]
     reason: Option<String>,
 }
@@ -65,7 +65,7 @@ struct Cpu {
 }
 
 impl Report {
-    /// From the measurements of each frame, of which there is at least one.
+    /// Creates the report from the measurements of each frame. There must be at least one frame.
     pub fn new(
         adapter: String,
         backend: BackendName,
@@ -94,7 +94,7 @@ impl Report {
             backend: backend.name(),
             workers,
             granularity: arguments.granularity.name(),
-            record: arguments.record.map(RecordName::name),
+            record: arguments.record.map(StrategyName::name),
             objects: frame.objects,
             frames: measured.len(),
             views: frame.views.iter().map(view).collect(),
@@ -135,7 +135,7 @@ impl Report {
         println!("frames   {frames} on {backend}, {workers} workers, {granularity}{record}");
         println!("objects  {objects}");
         for rejection in &self.rejections {
-            println!("not as asked: {rejection}");
+            println!("rejected: {rejection}");
         }
         println!();
         println!(
@@ -147,7 +147,7 @@ impl Report {
             print!("{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}");
             match view.triangles {
                 0 => println!(),
-                looked_at => println!("   {} of {looked_at} triangles left out", view.culled_triangles),
+                tested => println!("   {} of {tested} triangles left out", view.culled_triangles),
             }
         }
         println!();

@@ -1,4 +1,4 @@
-//! What is made of the frames' timeline: a report as text, a page, a trace.
+//! The outputs of the frames' timeline: a report as text, a page, a trace.
 
 use std::error::Error;
 use std::fs::File;
@@ -10,7 +10,7 @@ use drawloom::timeline::{Frame, Log};
 
 use crate::arguments::Arguments;
 
-/// How many of the last frames are recorded. The first ones create pipelines and try recording strategies.
+/// The number of recorded frames, from the last one backwards. The first frames create pipelines and try recording strategies.
 const RECORDED_FRAMES: u32 = 60;
 
 /// The capacity of the timeline, in events of each worker.

@@ -1,4 +1,4 @@
-//! The cost of frustum culling, and a check that it never culls what a camera sees.
+//! The cost of frustum culling, and a check that it never culls a visible object.
 //!
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling -- --quick
@@ -8,7 +8,7 @@
 //! Then the check: cameras at all extremes (`drawloom_testing::culling::cameras`), a new one every 256 objects, against an f64
 //! oracle (`drawloom_testing::culling::oracle`). Three in four spheres, and as many objects, touch a plane, an edge or a corner of
 //! the frustum to within four steps of f32 (*tangent*); the others are *anywhere*. Spheres are tested directly; objects pass from
-//! the scene through the object table, with scales from 0 to 1e20. A false cull fails the run, and so do too many visible objects
+//! the scene through the object table, with scales from 0 to 1e20. A false cull fails the run, and so do too many kept objects
 //! that are outside.
 //!
 //! `target/drawloom/culling.json` has the same.

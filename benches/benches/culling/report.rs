@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::speed::Speed;
 
-/// The largest share of the objects outside, among those that are anywhere, that may be kept.
+/// The maximum share of kept objects among those outside, for objects anywhere.
 const MAX_FALSE_VISIBLES: f64 = 1e-3;
 
 /// The results.
@@ -47,12 +47,12 @@ impl Report {
     }
 
     pub fn print(&self) {
-        let note = if self.extent == "full" { "" } else { ", whose figures mean little" };
+        let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
         println!("{} run{note}: medians, on one thread\n", self.extent);
-        let mut table = Table::new(&["scene", "volume", "objects", "ns an object", "seen"]);
+        let mut table = Table::new(&["scene", "volume", "objects", "ns per object", "visible"]);
         self.speeds.iter().for_each(|speed| table.row(speed.cells()));
         table.print();
-        println!("false visible: of what is outside by the oracle, the share that is kept\n");
+        println!("false visible: the share of the objects outside according to the oracle that is kept\n");
         let mut table = Table::new(&["test", "cases", "population", "false culls", "outside", "false visible"]);
         for Line { test, tallies, .. } in &self.tests {
             for (population, tally) in [("tangent", &tallies.tangent), ("anywhere", &tallies.anywhere)] {
@@ -80,7 +80,9 @@ impl Report {
             if tallies.false_culls() > 0 {
                 Some(format!("{test}: {} of {} cases falsely culled", tallies.false_culls(), tallies.cases()))
             } else if share > MAX_FALSE_VISIBLES {
-                Some(format!("{test}: {share:.1e} of what is outside is kept, and {MAX_FALSE_VISIBLES:.0e} may be"))
+                Some(format!(
+                    "{test}: {share:.1e} of the objects outside are kept, and at most {MAX_FALSE_VISIBLES:.0e} may be"
+                ))
             } else {
                 None
             }

@@ -97,7 +97,7 @@ fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
         "sphere, one by one",
         Box::new(move || one_by_one(spheres, |bounds| frustum.intersects_sphere(bounds.center, bounds.radius))),
     ));
-    // The spheres in f32, 16 bytes each, as such engines store them.
+    // The spheres in f32, 16 bytes each, as engines with this test store them.
     let plain: Vec<(Vec3, f32)> = (0..spheres.len())
         .map(|object| {
             let bounds = spheres.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
@@ -111,7 +111,7 @@ fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
     all
 }
 
-/// As a frame does it: one word of objects at a time, each with its block locked once.
+/// Culls like a frame: one word of objects at a time, with one lock of its block.
 fn visible_by_words(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
     let word = |first: usize| {
         let count = (table.len() - first).min(Frustum::WORD);

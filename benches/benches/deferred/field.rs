@@ -9,14 +9,14 @@ use drawloom_testing::random::Random;
 
 use crate::Extent;
 
-/// From the centre of the field to its edges, in metres.
+/// The distance from the centre of the field to its edges, in metres.
 const HALF: f64 = 25.0;
 const MATERIALS: usize = 16;
 
-/// A field of boxes, and what else is in it.
+/// The contents of a field of boxes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Field {
-    /// Small lights, half of them point lights and half spot lights, that reach some 3 m. A smaller number of lights is a prefix of
+    /// Small lights, half of them point lights and half spot lights, that reach about 3 m. A smaller number of lights is a prefix of
     /// a larger one.
     pub lights: usize,
     /// Spot lights that cast shadows, high above the field.
@@ -96,7 +96,7 @@ fn small_light(index: usize, random: &mut Random) -> Light {
     }
 }
 
-/// One of several lights on a ring above the field, each of which lights its centre and more.
+/// One of `of` lights on a ring above the field. Each lights at least the field's centre.
 fn high_light(index: usize, of: usize) -> Light {
     let (sine, cosine) = (TAU * index as f64 / of as f64).sin_cos();
     Light::Spot {

@@ -26,14 +26,15 @@ pub struct Row {
     draws: usize,
     /// Objects drawn by all processes.
     commands: usize,
-    processor_ms: f64,
+    #[serde(rename = "processor_ms")]
+    cpu_ms: f64,
     device_ms: Option<f64>,
-    /// CPU time for each light more than in the row above.
+    /// Additional CPU time per additional light, against the row above.
     #[serde(rename = "ns_a_light")]
     ns_per_light: Option<f64>,
 }
 
-/// A way to draw lights.
+/// A pipeline that draws lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Pipeline {
@@ -52,8 +53,8 @@ impl Pipeline {
     fn name(self) -> &'static str {
         match self {
             Self::Deferred => "deferred",
-            Self::PassPerLight => "a pass a light",
-            Self::LoopOverLights => "a loop a pixel",
+            Self::PassPerLight => "pass per light",
+            Self::LoopOverLights => "loop per pixel",
         }
     }
 }
@@ -88,7 +89,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     for pipeline in Pipeline::ALL {
         for (setting, (_, field)) in settings.iter().zip(&drawn).filter(|(_, (own, _))| *own == pipeline) {
             check_visible(setting, *field, extent)?;
-            let processor_ms = milliseconds(setting.cpu());
+            let cpu_ms = milliseconds(setting.cpu());
             let above = rows.last().filter(|row| row.pipeline == pipeline);
             rows.push(Row {
                 backend,
@@ -97,10 +98,9 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
                 processes: setting.processes(),
                 draws: setting.draws(),
                 commands: setting.commands(),
-                processor_ms,
+                cpu_ms,
                 device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
-                ns_per_light: above
-                    .map(|above| (processor_ms - above.processor_ms) * 1e6 / (field.lights - above.lights) as f64),
+                ns_per_light: above.map(|above| (cpu_ms - above.cpu_ms) * 1e6 / (field.lights - above.lights) as f64),
             });
         }
     }
@@ -113,17 +113,17 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     Ok(rows)
 }
 
-/// All objects and lights must be visible, or a row would measure fewer lights than it says.
+/// All objects and lights must be visible, so that a row measures the stated number of lights.
 fn check_visible(setting: &Setting, field: Field, extent: &Extent) -> Result<(), Box<dyn Error>> {
     let view = &setting.statistics().views[0];
-    let (seen, there) = ([view.visible, view.lights], [field.objects(extent), field.lights]);
-    if seen != there {
-        return Err(format!("the camera sees {seen:?} objects and lights of {there:?}").into());
+    let (visible, expected) = ([view.visible, view.lights], [field.objects(extent), field.lights]);
+    if visible != expected {
+        return Err(format!("the camera sees {visible:?} objects and lights instead of {expected:?}").into());
     }
     Ok(())
 }
 
-/// All pipelines must draw the same picture, or their work is not comparable.
+/// All pipelines must draw the same picture, so that their work is comparable.
 fn check_pictures<'a>(
     lights: usize,
     settings: impl Iterator<Item = (Pipeline, &'a Setting)>,
@@ -138,9 +138,10 @@ fn check_pictures<'a>(
         let share = share_that_differs(first, &picture);
         if share > MAX_DIFFERENT {
             let name = pipeline.name();
-            return Err(
-                format!("{lights} lights: {share:.4} of what {name:?} draws is not the deferred picture").into()
-            );
+            return Err(format!(
+                "{lights} lights: {share:.4} of the picture of {name:?} differs from the deferred one"
+            )
+            .into());
         }
     }
     Ok(())
@@ -150,8 +151,8 @@ fn check_pictures<'a>(
 /// half floats are added in another order.
 fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
     const ROUNDING: u8 = 3;
-    let apart = one.bytes.iter().zip(&other.bytes).filter(|(one, other)| one.abs_diff(**other) > ROUNDING);
-    apart.count() as f64 / one.bytes.len() as f64
+    let differing = one.bytes.iter().zip(&other.bytes).filter(|(one, other)| one.abs_diff(**other) > ROUNDING);
+    differing.count() as f64 / one.bytes.len() as f64
 }
 
 /// A few pixels on edges may differ.
@@ -162,7 +163,7 @@ pub fn print(rows: &[Row]) {
         "Lights over a field of boxes, 1 worker. Draws: batches of objects, and one for each process that draws lights."
     );
     println!(
-        "Objects: as often as they are drawn. ns a light: of CPU time, for each light more than in the row above.\n"
+        "Objects: the number of drawn objects. ns per light: additional CPU time per additional light, against the row above.\n"
     );
     let mut table = Table::new(&[
         "backend",
@@ -173,7 +174,7 @@ pub fn print(rows: &[Row]) {
         "objects",
         "CPU ms",
         "device ms",
-        "ns a light",
+        "ns per light",
     ]);
     for row in rows {
         table.row([
@@ -183,7 +184,7 @@ pub fn print(rows: &[Row]) {
             row.processes.to_string(),
             row.draws.to_string(),
             row.commands.to_string(),
-            format!("{:.3}", row.processor_ms),
+            format!("{:.3}", row.cpu_ms),
             row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
             row.ns_per_light.map_or_else(String::new, |share| format!("{share:.0}")),
         ]);

@@ -39,13 +39,13 @@ struct Arguments {
 /// The size of the measurement.
 pub struct Extent {
     name: &'static str,
-    /// On `noop`, where frames are short, and on the adapter.
+    /// The rounds on `noop`, where frames are short, and on the adapter.
     rounds: [usize; 2],
     /// Width and height of the pictures.
     picture: [u32; 2],
     boxes: usize,
     lights: &'static [usize],
-    /// The most lights that the pipeline with a pass per light is measured with; on `noop` and on the adapter.
+    /// The maximum number of lights of the pipeline with a pass per light, on `noop` and on the adapter.
     max_passes: [usize; 2],
     shadow_maps: &'static [usize],
 }

@@ -24,7 +24,8 @@ pub struct Row {
     scene: &'static str,
     depth_pre_pass: bool,
     draws: usize,
-    processor_ms: f64,
+    #[serde(rename = "processor_ms")]
+    cpu_ms: f64,
     device_ms: Option<f64>,
 }
 
@@ -56,7 +57,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         scene,
         depth_pre_pass,
         draws: setting.draws(),
-        processor_ms: milliseconds(setting.cpu()),
+        cpu_ms: milliseconds(setting.cpu()),
         device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
     };
     Ok(settings.iter().zip(names).map(row).collect())
@@ -72,7 +73,7 @@ enum Order {
     BackToFront,
 }
 
-/// Thirty walls one behind the other, each of which fills the picture. Objects are sorted by material first and by depth second, so
+/// Thirty walls one behind the other. Each fills the picture. Objects are sorted by material first and by depth second, so
 /// the materials determine the order.
 fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     const WALLS: usize = 30;
@@ -98,7 +99,7 @@ pub fn print(rows: &[Row]) {
             row.scene.to_owned(),
             if row.depth_pre_pass { "on" } else { "off" }.to_owned(),
             row.draws.to_string(),
-            format!("{:.3}", row.processor_ms),
+            format!("{:.3}", row.cpu_ms),
             row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
         ]);
     }

@@ -43,7 +43,7 @@ impl Report {
         );
         println!(
             "{boxes} boxes in the field{}",
-            if *extent == "trial" { "; a trial, whose figures mean nothing" } else { "" }
+            if *extent == "trial" { "; a trial run: the figures are meaningless" } else { "" }
         );
         println!("adapter: {}", adapter.as_deref().unwrap_or("none"));
         println!(

@@ -1,4 +1,4 @@
-//! Cost by the number of shadow maps, each of which is a view.
+//! Cost by the number of shadow maps. Each is a view.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -24,9 +24,10 @@ pub struct Row {
     views: usize,
     /// Objects drawn in all views.
     commands: usize,
-    processor_ms: f64,
+    #[serde(rename = "processor_ms")]
+    cpu_ms: f64,
     device_ms: Option<f64>,
-    /// Of the CPU time, against one worker.
+    /// Speed-up of the CPU time over one worker.
     speed_up: f64,
 }
 
@@ -51,7 +52,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
                 workers,
                 views: setting.statistics().views.len(),
                 commands: setting.commands(),
-                processor_ms: milliseconds(setting.cpu()),
+                cpu_ms: milliseconds(setting.cpu()),
                 device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
                 speed_up: settings[0].cpu().as_secs_f64() / setting.cpu().as_secs_f64(),
             });
@@ -62,7 +63,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
 
 pub fn print(rows: &[Row]) {
     println!(
-        "Spot lights that cast shadows over the same field. Objects: as often as they are drawn, over all views.\n"
+        "Spot lights that cast shadows over the same field. Objects: the number of drawn objects over all views.\n"
     );
     let mut table =
         Table::new(&["backend", "shadow maps", "workers", "views", "objects", "CPU ms", "device ms", "speed-up"]);
@@ -73,7 +74,7 @@ pub fn print(rows: &[Row]) {
             row.workers.to_string(),
             row.views.to_string(),
             row.commands.to_string(),
-            format!("{:.3}", row.processor_ms),
+            format!("{:.3}", row.cpu_ms),
             row.device_ms.map_or_else(String::new, |device| format!("{device:.2}")),
             format!("{:.2}x", row.speed_up),
         ]);

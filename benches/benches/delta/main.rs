@@ -1,4 +1,4 @@
-//! What delta commands save and cost, compared with the fixed form of commands.
+//! The savings and the cost of delta commands, compared with the fixed form of commands.
 //!
 //!     cargo bench -p drawloom-benches --bench delta
 //!     cargo bench -p drawloom-benches --bench delta -- --quick
@@ -95,7 +95,7 @@ fn scattered(objects: u32) -> Vec<RenderCommand> {
 fn measure(case: &Case, rounds: usize, progress: &ProgressBar) -> Row {
     let Case { scene, lists } = case;
     let commands: usize = lists.iter().map(Vec::len).sum();
-    // One small frame is too short to be timed.
+    // A small frame is too short to be timed once.
     let frames = (10_000 / commands).max(1);
     let mut coded: Vec<_> = lists.iter().map(|_| DeltaCommands::new()).collect();
     let (mut copies, mut decoded) = (lists.clone(), lists.clone());

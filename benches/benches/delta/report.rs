@@ -15,15 +15,15 @@ pub struct Row {
     pub commands: usize,
     /// Mean bytes per delta command.
     pub bytes: f64,
-    /// Encodes them.
+    /// Time to encode the commands.
     pub encode: f64,
-    /// Validates bytes from another source.
+    /// Time to validate bytes from another source.
     pub check: f64,
-    /// Decodes them to the fixed form.
+    /// Time to decode them to the fixed form.
     pub decode: f64,
-    /// Copies the fixed form.
+    /// Time to copy the fixed form.
     pub copy: f64,
-    /// Compares the fixed form with an equal one.
+    /// Time to compare the fixed form with an equal one.
     pub compare: f64,
 }
 
@@ -52,11 +52,11 @@ impl Report {
     }
 
     pub fn print(&self) {
-        let note = if self.quick { "; a quick run, whose figures mean little" } else { "" };
-        println!("ns a command, median of {} rounds{note}", self.rounds);
-        println!("fixed form: {} bytes a command; copy, compare: of the fixed form", size_of::<RenderCommand>());
+        let note = if self.quick { "; a quick run with inaccurate figures" } else { "" };
+        println!("ns per command, median of {} rounds{note}", self.rounds);
+        println!("fixed form: {} bytes per command; copy, compare: of the fixed form", size_of::<RenderCommand>());
         println!(
-            "wins below: GB/s of what is written to or sent through, under which fewer bytes save more than they cost\n"
+            "wins below: the bandwidth in GB/s of a memory or link below which fewer bytes save more time than they cost\n"
         );
         let headings = ["scene", "commands", "bytes", "encode", "check", "decode", "copy", "compare", "wins below"];
         let mut table = Table::new(&headings);

@@ -1,4 +1,4 @@
-//! The picture: what each mode gains on each scene, and what more workers would.
+//! The chart: the speed-up of each mode on each scene, and the predicted speed-up with more workers.
 
 use std::error::Error;
 use std::path::Path;
@@ -20,9 +20,9 @@ pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         if rows.is_empty() {
             continue;
         }
-        let most = rows.iter().filter(|row| !row.predicted).map(|row| row.workers).max().unwrap_or(1);
-        panels.push(Panel::Bars(measured(&rows, backend, most)));
-        panels.push(Panel::Lines(predicted(&rows, backend, most)));
+        let max_workers = rows.iter().filter(|row| !row.predicted).map(|row| row.workers).max().unwrap_or(1);
+        panels.push(Panel::Bars(measured(&rows, backend, max_workers)));
+        panels.push(Panel::Lines(predicted(&rows, backend, max_workers)));
     }
     chart::draw(path, &panels)
 }
@@ -35,9 +35,9 @@ fn measured(rows: &[&Row], backend: BackendName, workers: usize) -> Bars {
     let modes = &Mode::ALL;
     let speed_up = |scene: &str, mode: &Mode| {
         let workers = if mode.is_serial { 1 } else { workers };
-        let is_it =
+        let matches =
             |row: &&&Row| (row.scene, row.mode, row.workers, row.predicted) == (scene, mode.name, workers, false);
-        rows.iter().find(is_it).map_or(f64::NAN, |row| row.speedup_vs_serial)
+        rows.iter().find(matches).map_or(f64::NAN, |row| row.speedup_vs_serial)
     };
     let group = |scene: &'static str| (scene.to_owned(), modes.iter().map(|mode| speed_up(scene, mode)).collect());
     Bars {
@@ -53,10 +53,10 @@ fn measured(rows: &[&Row], backend: BackendName, workers: usize) -> Bars {
 fn predicted(rows: &[&Row], backend: BackendName, workers: usize) -> Lines {
     let line = |scene: &'static str| {
         let adaptive = |workers: usize, predicted| {
-            let is_it = |row: &&&Row| {
+            let matches = |row: &&&Row| {
                 (row.scene, row.mode, row.workers, row.predicted) == (scene, "adaptive", workers, predicted)
             };
-            rows.iter().find(is_it).map(|row| (workers as f64, row.speedup_vs_serial))
+            rows.iter().find(matches).map(|row| (workers as f64, row.speedup_vs_serial))
         };
         let measured = (1..=workers.ilog2()).filter_map(|power| adaptive(1 << power, false));
         let beyond = PREDICTED.into_iter().filter(|&count| count > workers).filter_map(|count| adaptive(count, true));

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// How long it spins, and how long it sleeps.
+/// The duration of each phase of spinning and of sleeping.
 const SLICE: Duration = Duration::from_millis(2);
 
 /// The thread spins and sleeps alternately until this is dropped.

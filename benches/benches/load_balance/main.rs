@@ -7,7 +7,7 @@
 //!
 //! A block is one scene on one backend. Its modes are interleaved; a sample is as many frames as fill some milliseconds, from
 //! hand-over to the return of submit. The first half of the rounds determines the best fixed mode, and the second half gives the
-//! results: the best of seven modes in the rounds it is judged by would be the luckiest as well. A ratio is the median of the
+//! results: in the rounds that select it, the best of seven modes is also the luckiest. A ratio is the median of the
 //! rounds' own ratios.
 //!
 //! Results for more workers are predicted: measured frames are replayed. A replay for the actual number of workers shows the error

@@ -137,7 +137,7 @@ impl Report {
 
     pub fn print(&self) {
         let [noop, adapter] = self.rounds;
-        let note = if self.extent == "full" { "" } else { ", whose figures mean nothing" };
+        let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
         println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
         println!("ns: record + submit, per object and view that sees it; best: of the fixed modes, in other rounds\n");
@@ -188,7 +188,7 @@ impl Report {
     }
 
     fn print_errors(&self) {
-        println!("The replay, for the workers that there are\n");
+        println!("The replay for the actual number of workers\n");
         let mut table = Table::new(&["scene", "backend", "workers", "mode", "predicted ms", "measured ms", "error %"]);
         for error in &self.errors {
             table.row([
@@ -204,18 +204,18 @@ impl Report {
         table.print();
     }
 
-    /// Prints the targets on `noop` with two workers, and what was reached.
+    /// Prints the targets and the results on `noop` with two workers.
     fn print_targets(&self) {
-        println!("On noop, two workers: what is to be reached, and what was\n");
-        let mut table = Table::new(&["what", "scene", "at target", "reached"]);
+        println!("Targets and results on noop with two workers\n");
+        let mut table = Table::new(&["figure", "scene", "target", "reached"]);
         let mut target_row = |what: &str, scene: &str, target: f64, reached: f64| {
             let verdict = if reached >= target { "" } else { ", short" };
             table.row([what.to_owned(), scene.to_owned(), format!("{target:.2}"), format!("{reached:.3}{verdict}")]);
         };
-        let is_judged = |row: &&Row| {
+        let has_target = |row: &&Row| {
             row.backend == BackendName::Noop && row.workers == 2 && row.mode == "adaptive" && !row.predicted
         };
-        for row in self.rows.iter().filter(is_judged) {
+        for row in self.rows.iter().filter(has_target) {
             let target = if ["small", "interrupted"].contains(&row.scene) { 0.90 } else { 0.97 };
             target_row("adaptive, of the best fixed mode", row.scene, target, row.ratio_to_best_mode);
             target_row("adaptive, of serial", row.scene, 0.97, row.speedup_vs_serial);
@@ -225,8 +225,8 @@ impl Report {
         {
             target_row("adaptive, of per-camera", "uneven", 1.5, ratio);
         }
-        let is_judged = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
-        let worst = self.errors.iter().filter(is_judged).map(|error| (error.predicted / error.measured - 1.0).abs());
+        let has_target = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
+        let worst = self.errors.iter().filter(has_target).map(|error| (error.predicted / error.measured - 1.0).abs());
         let worst = worst.fold(0.0, f64::max);
         target_row("the replay's worst, 1 − error", "all but interrupted", 0.95, 1.0 - worst);
         table.print();

@@ -6,11 +6,11 @@ use drawloom_benches::clouds::{around_one, back_to_back};
 /// In the order they are shown.
 pub const NAMES: [&str; 6] = ["even", "uneven", "single", "many", "small", "interrupted"];
 
-/// A scene, and what its cameras see.
+/// A scene, and the number of objects that its cameras see.
 pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
-    /// How many objects each camera must see.
+    /// The number of objects that each camera must see.
     pub visible: Vec<usize>,
     /// Whether another thread occupies a core half of the time (the system events of M 10.5).
     pub is_interrupted: bool,

@@ -4,7 +4,7 @@
 //!     cargo bench -p drawloom-benches --bench objects -- --quick
 //!     cargo bench -p drawloom-benches --bench objects -- --backend noop
 //!
-//! L's scene holds 7 to 2,006 objects; further objects stand where others stand already, so that they cost the device little.
+//! L's scene holds 7 to 2,006 objects; further objects have the positions of existing ones, so that they cost the device little.
 //! All of them move a little in every frame. The deferred pipeline draws them with one hemispherical light that casts shadows, so
 //! each is drawn in two views.
 //!

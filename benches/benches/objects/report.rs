@@ -34,10 +34,12 @@ impl Report {
 
     pub fn print(&self) {
         let ([noop, adapter], [many_noop, many_adapter]) = (self.rounds, self.growth_rounds);
-        let note = if self.extent == "full" { "" } else { ", whose figures mean nothing" };
+        let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
         println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
-        println!("frames: record + submit, without what the device takes; held: until recording ended, of the frame\n");
+        println!(
+            "fps: frames of record + submit per second, without the device's time; held: the time, and the share of the frame, in which the world is borrowed\n"
+        );
         let mut table = Table::new(&[
             "objects",
             "backend",
@@ -68,7 +70,7 @@ impl Report {
         }
         table.print();
         println!("Growth: two workers, no instancing; medians of {many_noop} and {many_adapter} rounds\n");
-        let mut table = Table::new(&["objects", "backend", "ns an object and view"]);
+        let mut table = Table::new(&["objects", "backend", "ns per object and view"]);
         for row in &self.growth {
             let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
             table.row([objects, backend, format!("{:.1}", row.ns_per_object_view)]);
@@ -77,10 +79,10 @@ impl Report {
         self.print_targets();
     }
 
-    /// Prints the targets on `noop`, and what was reached.
+    /// Prints the targets and the results on `noop`.
     fn print_targets(&self) {
-        println!("On noop, without instancing: what is to be reached, and what was\n");
-        let mut table = Table::new(&["what", "objects", "bound", "reached"]);
+        println!("Targets and results on noop, without instancing\n");
+        let mut table = Table::new(&["figure", "objects", "bound", "reached"]);
         let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
             let verdict = if is_reached { "" } else { ", short" };
             table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{verdict}")]);
@@ -102,7 +104,7 @@ impl Report {
         let growth: Vec<_> = self.growth.iter().filter(|row| row.backend == BackendName::Noop).collect();
         if let [first, .., last] = growth[..] {
             let grown = last.ns_per_object_view / first.ns_per_object_view;
-            target_row("ns, of those of the fewest, at most", last.objects, 1.5, grown, grown <= 1.5);
+            target_row("growth of the ns, at most", last.objects, 1.5, grown, grown <= 1.5);
         }
         table.print();
     }

@@ -15,7 +15,7 @@ use drawloom_benches::stopwatch::{mean_frame, timed_frame};
 
 use crate::world::{PICTURE, VIEWS};
 
-/// A renderer whose frames are timed.
+/// A renderer with timed frames.
 pub struct Runner {
     renderer: Renderer<WgpuBackend>,
     submitter: Submitter<WgpuBackend>,

@@ -28,7 +28,7 @@ pub struct Row {
     pub multi_fps: f64,
     pub ratio: f64,
     pub ceiling: f64,
-    /// How long the world is borrowed.
+    /// The time in which the world is borrowed.
     pub single_held_ms: f64,
     pub multi_held_ms: f64,
     /// The same as a share of the frame.

@@ -1,4 +1,4 @@
-//! The scene of L 6: a few objects under a light. Further objects stand where these stand already.
+//! The scene of L 6: a few objects under a light. Further objects have the same positions as these.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ pub const VIEWS: usize = 2;
 /// the cores.
 pub const PICTURE: u32 = 64;
 
-/// Objects that stand beside each other.
+/// The number of objects with positions of their own.
 const ORIGINALS: usize = 7;
 /// In metres. From there a box needs no subdivision in the light's map: its edges subtend at most 5°.
 const LIGHT_HEIGHT: f64 = 20.0;

@@ -1,11 +1,11 @@
-//! Coarse occlusion culling in a city: how much it culls, whether it culls visible objects, and its cost.
+//! Coarse occlusion culling in a city: the number of culled objects, the number of falsely culled ones, and its cost.
 //!
 //!     cargo bench -p drawloom-benches --bench occlusion
 //!     cargo bench -p drawloom-benches --bench occlusion -- --quick
 //!
-//! Cameras in the streets, above the roofs and high above see a city of 20,000 boxes of all heights, some of them rotated. An oracle
-//! draws every triangle in f64 with 4 × 4 samples per pixel. *Hidden* are the objects that would cover a sample if nothing else
-//! were there, and cover none. *False* are culled objects that cover a sample: the benchmark fails if there is one.
+//! Cameras in the streets, above the roofs and high above see a city of 20,000 boxes of all heights, some of them rotated. An
+//! oracle draws every triangle in f64 with 4 × 4 samples per pixel. An object is *hidden* if it would cover a sample alone, and
+//! covers none in the scene. A culled object that covers a sample is *false*: the benchmark fails if there is one.
 //!
 //! *Naive* is the usual method: occluders are drawn with one sample in the centre of each tile, and objects are tested by a
 //! rectangle of tiles. `target/drawloom/occlusion.json` has the same.
@@ -22,7 +22,7 @@ use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 
-use measure::{Row, Sight};
+use measure::{CameraCase, Row};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
@@ -34,16 +34,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     for camera in scene.cameras {
         progress.set_message(camera.name.clone());
-        let sight = Sight::new(&scene, camera);
+        let case = CameraCase::new(&scene, camera);
         progress.inc(1);
         for side in Quality::OCCLUSION_TILE_SIZES {
-            rows.push(sight.measure(side, rounds));
+            rows.push(case.measure(side, rounds));
             progress.inc(1);
         }
     }
     progress.finish_and_clear();
     let rows = [Row::totals(&rows), rows].concat();
-    let note = if quick { "; a quick run, whose figures mean little" } else { "" };
+    let note = if quick { "; a quick run with inaccurate figures" } else { "" };
     println!(
         "a city of {boxes} boxes, {} x {} pixels; times are medians of {rounds} rounds{note}\n",
         picture[0], picture[1]

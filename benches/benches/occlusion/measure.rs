@@ -1,4 +1,4 @@
-//! What occlusion culling finds for a camera, and its cost.
+//! Measures the objects that occlusion culling finds for a camera, and its cost.
 
 use std::time::Instant;
 
@@ -16,19 +16,20 @@ use crate::naive;
 #[derive(Clone, Default, Serialize)]
 pub struct Row {
     pub camera: String,
-    /// Pixels of a tile's side.
+    /// The side of a tile in pixels.
     pub side: u32,
     /// Objects in the frustum.
-    pub seen: usize,
-    /// Of those, the hidden ones: they would cover a sample alone, but do not.
+    #[serde(rename = "seen")]
+    pub in_frustum: usize,
+    /// The hidden objects in the frustum: alone they would cover a sample, but among the others they do not.
     pub truly_hidden: usize,
-    /// Of those, the culled ones.
+    /// The truly hidden objects that were culled.
     pub found: usize,
     /// Visible objects that were culled.
     pub false_hidden: usize,
     pub naive_found: usize,
     pub naive_false: usize,
-    /// Convex parts of occluders drawn.
+    /// The number of drawn convex parts of occluders.
     pub parts: usize,
     /// Selection and projection of occluders, in microseconds.
     pub choose_us: f64,
@@ -49,7 +50,7 @@ impl Row {
             Self {
                 camera: "all".to_owned(),
                 side,
-                seen: sum(|row| row.seen),
+                in_frustum: sum(|row| row.in_frustum),
                 truly_hidden: sum(|row| row.truly_hidden),
                 found: sum(|row| row.found),
                 false_hidden: sum(|row| row.false_hidden),
@@ -65,17 +66,17 @@ impl Row {
     }
 }
 
-/// What a camera sees.
-pub struct Sight<'a> {
+/// A camera, and the objects in its frustum.
+pub struct CameraCase<'a> {
     scene: &'a SceneRef<'a>,
     view: RenderView,
     table: ObjectTable,
     meshes: OccluderMeshes,
-    seen: Vec<bool>,
+    in_frustum: Vec<bool>,
     truth: Samples,
 }
 
-impl<'a> Sight<'a> {
+impl<'a> CameraCase<'a> {
     pub fn new(scene: &'a SceneRef<'a>, camera: &Camera) -> Self {
         let count = scene.object_count();
         let mut table = ObjectTable::default();
@@ -88,21 +89,21 @@ impl<'a> Sight<'a> {
             let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
             view.frustum.intersects_sphere(bounds.center, bounds.radius)
         };
-        let seen: Vec<_> = (0..count).map(sees).collect();
-        let truth = Samples::new(scene, camera, 0.25, |object| seen[object]);
-        Self { scene, view, table, meshes, seen, truth }
+        let in_frustum: Vec<_> = (0..count).map(sees).collect();
+        let truth = Samples::new(scene, camera, 0.25, |object| in_frustum[object]);
+        Self { scene, view, table, meshes, in_frustum, truth }
     }
 
     /// Culls with tiles of `side` pixels.
     pub fn measure(&self, side: u32, rounds: usize) -> Row {
-        let Self { scene, view, table, meshes, seen, truth } = self;
-        let count = seen.len();
+        let Self { scene, view, table, meshes, in_frustum, truth } = self;
+        let count = in_frustum.len();
         let mut occlusion = OcclusionCuller::default();
         let mut visible = VisibleSet::default();
         let mut times: [Vec<f64>; 3] = Default::default();
         for _ in 0..rounds {
             visible.reset(count);
-            let bits = |(bit, object): (usize, usize)| u64::from(seen[object]) << bit;
+            let bits = |(bit, object): (usize, usize)| u64::from(in_frustum[object]) << bit;
             visible.test(0..count, |objects| objects.enumerate().fold(0, |all, object| all | bits(object)));
             occlusion.reset(view, side);
             let start = Instant::now();
@@ -110,21 +111,22 @@ impl<'a> Sight<'a> {
             let chosen = Instant::now();
             (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
             let drawn = Instant::now();
-            visible.remove_hidden(0..count, |first, seen| occlusion.hidden(scene, table, first, seen));
+            visible.remove_hidden(0..count, |first, in_frustum| occlusion.hidden(scene, table, first, in_frustum));
             let spans = [chosen - start, drawn - chosen, drawn.elapsed()];
             times.iter_mut().zip(spans).for_each(|(times, span)| times.push(span.as_secs_f64()));
         }
-        let is_left = |object: usize| visible.word(object / VisibleSet::WORD) >> (object % VisibleSet::WORD) & 1 == 1;
-        let hidden: Vec<_> = (0..count).map(|object| seen[object] && !is_left(object)).collect();
-        let naive = naive::hidden(scene, &view.camera, side, seen);
+        let is_visible =
+            |object: usize| visible.word(object / VisibleSet::WORD) >> (object % VisibleSet::WORD) & 1 == 1;
+        let hidden: Vec<_> = (0..count).map(|object| in_frustum[object] && !is_visible(object)).collect();
+        let naive = naive::hidden(scene, &view.camera, side, in_frustum);
         let number = |of: &dyn Fn(usize) -> bool| (0..count).filter(|&object| of(object)).count();
         let is_truly_hidden = |object: usize| truth.alone[object] && !truth.shown[object];
-        let sights = number(&|object| seen[object]);
+        let in_frustum_count = number(&|object| in_frustum[object]);
         let [choose, draw, test] = times.map(median);
         Row {
             camera: view.name().to_owned(),
             side,
-            seen: sights,
+            in_frustum: in_frustum_count,
             truly_hidden: number(&is_truly_hidden),
             found: number(&|object| is_truly_hidden(object) && hidden[object]),
             false_hidden: number(&|object| truth.shown[object] && hidden[object]),
@@ -133,7 +135,7 @@ impl<'a> Sight<'a> {
             parts: occlusion.part_count(),
             choose_us: choose * 1e6,
             draw_us: draw * 1e6,
-            object_ns: test * 1e9 / sights.max(1) as f64,
+            object_ns: test * 1e9 / in_frustum_count.max(1) as f64,
         }
     }
 }
@@ -148,9 +150,9 @@ pub fn print(rows: &[Row]) {
         "false",
         "naive found",
         "naive false",
-        "choose µs",
+        "select µs",
         "draw µs",
-        "ns an object",
+        "ns per object",
     ];
     let mut table = Table::new(&headings);
     let percent = |part: usize, whole: usize| format!("{:.1}", part as f64 / whole.max(1) as f64 * 100.0);
@@ -158,7 +160,7 @@ pub fn print(rows: &[Row]) {
         table.row([
             row.camera.clone(),
             row.side.to_string(),
-            row.seen.to_string(),
+            row.in_frustum.to_string(),
             row.truly_hidden.to_string(),
             percent(row.found, row.truly_hidden),
             row.false_hidden.to_string(),

@@ -4,10 +4,10 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, SceneRef};
 use drawloom_testing::samples::{ReferenceCamera, Samples};
 
-/// For each object, whether the method takes it for hidden.
-pub fn hidden(scene: &SceneRef<'_>, camera: &Camera, side: u32, seen: &[bool]) -> Vec<bool> {
+/// For each object, whether the method considers it hidden.
+pub fn hidden(scene: &SceneRef<'_>, camera: &Camera, side: u32, in_frustum: &[bool]) -> Vec<bool> {
     let width = f64::from(side);
-    let samples = Samples::new(scene, camera, width, |object| seen[object]);
+    let samples = Samples::new(scene, camera, width, |object| in_frustum[object]);
     let reference = ReferenceCamera::new(camera);
     let is_hidden = |object: usize| {
         let [low, high] =
@@ -35,5 +35,5 @@ pub fn hidden(scene: &SceneRef<'_>, camera: &Camera, side: u32, seen: &[bool]) -
             && !rows.is_empty()
             && rows.into_iter().all(|row| columns.clone().all(|column| samples.nearness_at(column, row) > nearness))
     };
-    seen.iter().enumerate().map(|(object, &seen)| seen && is_hidden(object)).collect()
+    in_frustum.iter().enumerate().map(|(object, &in_frustum)| in_frustum && is_hidden(object)).collect()
 }

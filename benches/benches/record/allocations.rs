@@ -10,7 +10,7 @@ pub struct Counting;
 static IS_COUNTING: AtomicBool = AtomicBool::new(false);
 static REQUESTS: AtomicUsize = AtomicUsize::new(0);
 
-/// Runs `work`, and returns how often all threads allocated meanwhile.
+/// Runs `work`, and returns the number of allocations of all threads meanwhile.
 pub fn requests_in<R>(work: impl FnOnce() -> R) -> (R, usize) {
     let before = REQUESTS.load(Ordering::Relaxed);
     IS_COUNTING.store(true, Ordering::Relaxed);

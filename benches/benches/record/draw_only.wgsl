@@ -20,8 +20,8 @@ fn vertex(
     @builtin(instance_index) instance: u32,
 ) -> Surface {
     let object = objects[instance];
-    let place = object.world_from_object * vec4<f32>(position, 1.0);
-    return Surface(clip_from_world * place, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz, object.material);
+    let world_position = object.world_from_object * vec4<f32>(position, 1.0);
+    return Surface(clip_from_world * world_position, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz, object.material);
 }
 
 @fragment

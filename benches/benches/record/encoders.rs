@@ -61,7 +61,7 @@ fn encode(shared: &DrawOnly, scene: &SceneRef<'_>, index: usize, camera: &Camera
     let mut pass = shared.fixture.pass(&mut encoder, index);
     shared.set(&mut pass, index);
     let mut drawn = 0;
-    for object in (0..scene.object_count()).filter(|&object| shared.spheres[object].is_seen(&frustum)) {
+    for object in (0..scene.object_count()).filter(|&object| shared.spheres[object].is_visible(&frustum)) {
         shared.draw(&mut pass, scene, object);
         drawn += 1;
     }

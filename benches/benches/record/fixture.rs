@@ -1,4 +1,4 @@
-//! What all hand-written techniques share: a device, and the targets of each camera.
+//! A device and the targets of each camera, which all hand-written techniques share.
 
 use drawloom::backend::WgpuBackend;
 use drawloom::scene::{Camera, SceneRef, Vertex};

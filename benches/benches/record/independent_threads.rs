@@ -1,4 +1,4 @@
-//! The most that two threads can do on this machine: each draws frames of its own, and they share nothing but the hardware.
+//! The maximum throughput of two threads on this machine: each draws frames of its own, and they share only the hardware.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -23,7 +23,7 @@ struct Runner {
     times: Receiver<Result<f64, String>>,
 }
 
-/// Frames per request: enough that it does not matter if the threads begin at slightly different times.
+/// Frames per request: enough that slightly different start times of the threads do not matter.
 const FRAMES: u32 = 8;
 
 impl IndependentThreads {

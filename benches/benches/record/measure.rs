@@ -18,7 +18,7 @@ use crate::report::Row;
 use crate::technique::{Contender, Failure};
 use crate::{CAMERAS, Extent, pictures};
 
-/// Frames whose allocations are counted.
+/// The number of frames with counted allocations.
 const COUNTED: usize = 8;
 
 /// The results on one backend.
@@ -106,7 +106,7 @@ fn requests(world: &mut Moving, mut frame: impl FnMut(&Moving) -> Result<usize, 
     Ok(counts[COUNTED / 2])
 }
 
-/// How often a frame of this crate allocates on the no-op backend.
+/// The number of allocations of a frame of this crate on the no-op backend.
 fn own_requests(workers: usize, warm_up: usize, world: &mut Moving) -> Result<usize, Failure> {
     let (mut renderer, submitter) = renderer(NoopBackend, workers)?;
     for _ in 0..warm_up {

@@ -96,7 +96,7 @@ impl Technique for Naive {
             queue.write_buffer(buffer, 0, bytemuck::bytes_of(&clip_from_world(camera)));
             let frustum = Frustum::new(camera);
             let mut pass = self.fixture.pass(&mut encoder, index);
-            for object in (0..scene.object_count()).filter(|&object| self.spheres[object].is_seen(&frustum)) {
+            for object in (0..scene.object_count()).filter(|&object| self.spheres[object].is_visible(&frustum)) {
                 let (vertices, indices, count) = &self.meshes[scene.meshes[object].index() as usize];
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, camera_group, &[]);

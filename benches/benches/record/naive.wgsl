@@ -14,8 +14,8 @@ struct Surface {
 
 @vertex
 fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> Surface {
-    let place = object.world_from_object * vec4<f32>(position, 1.0);
-    return Surface(clip_from_world * place, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz);
+    let world_position = object.world_from_object * vec4<f32>(position, 1.0);
+    return Surface(clip_from_world * world_position, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz);
 }
 
 @fragment

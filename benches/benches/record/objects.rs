@@ -1,4 +1,4 @@
-//! What the hand-written techniques compute for each object and each camera.
+//! The data that the hand-written techniques compute for each object and each camera.
 
 use bytemuck::{Pod, Zeroable};
 use drawloom::glam::{DVec3, Mat4};
@@ -44,7 +44,7 @@ impl Sphere {
         Self { center: scene.positions[object] + center.as_dvec3(), radius: bounds.radius * scale.abs().max_element() }
     }
 
-    pub fn is_seen(&self, frustum: &Frustum) -> bool {
+    pub fn is_visible(&self, frustum: &Frustum) -> bool {
         frustum.intersects_sphere(self.center, self.radius)
     }
 }

@@ -65,7 +65,7 @@ fn record(shared: &DrawOnly, scene: &SceneRef<'_>) -> usize {
         shared.set(&mut encoder, camera);
         let mut count = 0;
         for object in (chunk * CHUNK..shared.spheres.len()).take(CHUNK) {
-            if shared.spheres[object].is_seen(&frustums[camera]) {
+            if shared.spheres[object].is_visible(&frustums[camera]) {
                 shared.draw(&mut encoder, scene, object);
                 count += 1;
             }

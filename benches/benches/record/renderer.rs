@@ -25,7 +25,7 @@ impl Drawloom {
     }
 }
 
-/// A renderer with that process, on any backend.
+/// A renderer with this process, on any backend.
 pub fn renderer<B: Backend>(backend: B, workers: usize) -> Result<(Renderer<B>, Submitter<B>), Failure> {
     Ok(Renderer::builder(backend).process(Surfaces).output(COLOR).build(Arc::new(Scheduler::new(workers)?))?)
 }

@@ -42,7 +42,7 @@ impl Report {
 
     pub fn print(&self) {
         let [noop, adapter] = self.rounds;
-        let note = if self.extent == "full" { "" } else { ", whose figures mean nothing" };
+        let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
         println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
         println!("4 cameras × {} moving objects; ns: from visibility to submit, per object and view", self.objects);

@@ -34,7 +34,7 @@ fn row(name: &'static str, shape: Chain, job: Duration, pace: Pace<'static>) -> 
     contenders.extend(shape.contenders());
     Row {
         name,
-        unit: "µs a frame",
+        unit: "µs per frame",
         scale: 1e6,
         pace,
         work: Work::busy(job),
@@ -121,7 +121,7 @@ impl Chain {
         })
     }
 
-    /// As rayon itself splits a node's jobs.
+    /// rayon itself decides how to split a node's jobs.
     pub fn rayon(self) -> Contender {
         Contender::new("rayon", move |work, timer| {
             pools::rayon()?.install(|| {

@@ -66,7 +66,7 @@ pub fn row(extent: &Extent) -> Row {
     });
     Row {
         name: "flat",
-        unit: "ns a job",
+        unit: "ns per job",
         scale: 1e9,
         pace: extent.back_to_back(),
         work: Work::empty(),

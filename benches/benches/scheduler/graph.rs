@@ -16,7 +16,7 @@ use crate::{Extent, Failure, WORKERS, pools};
 
 const LAYER: usize = 64;
 
-/// All contenders run the same graph: layers of [`LAYER`] nodes, each of which depends on 1 to 4 nodes of the layer before.
+/// All contenders run the same graph: layers of [`LAYER`] nodes. Each node depends on 1 to 4 nodes of the layer before.
 ///
 /// chili and std's threads have no dependencies between jobs. They run layer by layer, and the plain loop runs node by node:
 /// none of these has to find out which node is ready.
@@ -24,7 +24,7 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
     let graph = Arc::new(Graph::new(nodes));
     Row {
         name,
-        unit: "ns a node",
+        unit: "ns per node",
         scale: 1e9 / nodes as f64,
         pace: extent.back_to_back(),
         work: Work::empty(),
@@ -54,7 +54,7 @@ struct Graph {
 }
 
 struct GraphNode {
-    /// How many dependencies have not run yet. The thread that runs the node resets it for the next frame.
+    /// The number of dependencies that have not run yet. The thread that runs the node resets it for the next frame.
     pending: AtomicU32,
     dependencies: u32,
     /// Its successors' range in [`Graph::successors`].
@@ -109,7 +109,7 @@ impl Graph {
         self.successors(node).iter().copied().filter(is_ready)
     }
 
-    /// Where each layer ends.
+    /// The end of each layer.
     fn ends(&self) -> impl Iterator<Item = usize> {
         (1..=self.nodes.len().div_ceil(LAYER)).map(|layer| self.nodes.len().min(layer * LAYER))
     }
@@ -146,7 +146,7 @@ impl Node<Work> for Empty {
 }
 
 /// By default one thread runs a schedule of so little work.
-const ALWAYS_PARALLEL: &str = "drawloom always shared";
+const ALWAYS_PARALLEL: &str = "drawloom always parallel";
 
 /// The schedule is compiled for each sample, so that it has no measurements of an earlier pool.
 fn drawloom(name: &'static str, workers: usize, graph: &Arc<Graph>) -> Contender {
@@ -173,7 +173,7 @@ fn schedule(graph: &Graph) -> Result<Schedule<Empty>, Failure> {
     Ok(frame_graph.compile()?)
 }
 
-/// Runs the first node that becomes ready in place and spawns the others: the fastest way by hand.
+/// Runs the first node that becomes ready in place and spawns the others. This is the fastest hand-written scheme.
 fn rayon_inline(graph: &Arc<Graph>) -> Contender {
     fn run_on<'scope>(graph: &'scope Graph, mut node: u32, work: &'scope Work, scope: &rayon::Scope<'scope>) {
         loop {

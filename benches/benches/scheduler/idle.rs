@@ -17,7 +17,7 @@ const FRAME: Chain = Chain { nodes: 1, jobs: 64 };
 pub fn idle(extent: &Extent) -> Row {
     let interval = Duration::from_secs(1) / 60;
     let pace = Pace::CpuTime { interval, frames: extent.idle_frames };
-    let mut row = row("idle", "µs CPU a frame", pace);
+    let mut row = row("idle", "µs CPU per frame", pace);
     let sleep_only = Contender::new("sleep only", |_work, timer| timer.frames(|| Ok(())));
     row.contenders.push(sleep_only.with_workers(1).with_easier_task().with_jobs(0));
     row
@@ -25,7 +25,7 @@ pub fn idle(extent: &Extent) -> Row {
 
 /// One frame, and then none.
 pub fn asleep(extent: &Extent) -> Row {
-    row("asleep", "µs CPU a second", Pace::Asleep { idle: extent.asleep })
+    row("asleep", "µs CPU per second", Pace::Asleep { idle: extent.asleep })
 }
 
 fn row(name: &'static str, unit: &'static str, pace: Pace<'static>) -> Row {

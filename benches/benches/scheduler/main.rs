@@ -1,4 +1,4 @@
-//! What the job system costs, beside rayon, bevy_tasks, chili and std's threads.
+//! The cost of the job system, beside rayon, bevy_tasks, chili and std's threads.
 //!
 //!     cargo bench -p drawloom-benches --bench scheduler
 //!     cargo bench -p drawloom-benches --bench scheduler -- --quick

@@ -58,7 +58,7 @@ impl Report {
     }
 
     pub fn print(&self) {
-        let note = if self.extent == "full" { "" } else { ", whose figures mean little" };
+        let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
         println!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
         println!("workers: threads that run jobs, the caller's included; ratio: to the best of the peers");
         println!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
@@ -82,7 +82,7 @@ impl Report {
         self.print_cold_target();
     }
 
-    /// A frame that finds all workers asleep has to wake them: prints how far it is from the ideal plus that.
+    /// A frame that finds all workers asleep has to wake them. Prints its distance from the ideal plus the time of a wake-up.
     fn print_cold_target(&self) {
         let (Some(wake), Some(ideal)) = (self.median("wake", "drawloom"), self.median("frame_cold", "ideal")) else {
             return;

@@ -18,7 +18,7 @@ pub struct Contender {
     divisor: usize,
     /// Whether its task is easier than that of the others, which therefore are not compared with it.
     pub is_easier: bool,
-    /// How many jobs it runs; `None` for all of the row.
+    /// The number of jobs it runs; `None` for all of the row.
     jobs: Option<usize>,
     /// Builds a pool, times frames on it, and drops it.
     run: Run,
@@ -27,7 +27,7 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// One with [`WORKERS`].
+    /// A contender with [`WORKERS`] workers.
     pub fn new(name: &'static str, run: impl FnMut(&Work, &mut Timer) -> Result<(), Failure> + 'static) -> Self {
         Self {
             name,
@@ -105,7 +105,7 @@ pub struct Row {
     pub work: Work,
     /// Jobs in a frame.
     pub jobs: usize,
-    /// What must hold of a frame, beyond that each job runs once.
+    /// Checks a frame. That each job runs once is checked for every row.
     pub order: Order,
     pub contenders: Vec<Contender>,
 }

@@ -12,7 +12,7 @@ use crate::{Failure, WORKERS};
 
 /// The calling thread, and others that live for one sample. A thread claims the next jobs of a node by a ticket.
 pub struct ThreadTeam {
-    /// Where each node's jobs end.
+    /// The end of each node's jobs.
     ends: Vec<usize>,
     jobs_per_ticket: usize,
     tickets: Vec<CachePadded<AtomicUsize>>,
@@ -21,7 +21,7 @@ pub struct ThreadTeam {
 }
 
 impl ThreadTeam {
-    /// `ends` is where each node's jobs end; they begin where those of the node before it end.
+    /// `ends` has the end of each node's jobs. They begin at the end of those of the node before.
     pub fn new(ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
         let tickets = ends.iter().map(|_| CachePadded::default()).collect();
         let (barrier, is_over) = (Barrier::new(WORKERS), AtomicBool::new(false));

@@ -22,11 +22,11 @@ pub enum Pace<'a> {
     Asleep { idle: Duration },
     /// Single jobs, each after this long without any; a sample is the time from submission to start, in seconds.
     Wakes { idle: Duration, jobs: usize },
-    /// Some frames, each of which is checked.
+    /// Some frames, and each is checked.
     Check { record: &'a Record, check: &'a (dyn Fn(&Record) -> Result<(), String> + Sync) },
 }
 
-/// Times or checks frames, as its pace says.
+/// Times or checks frames according to its pace.
 pub struct Timer<'a> {
     pace: Pace<'a>,
     samples: Vec<f64>,
@@ -40,7 +40,7 @@ const WARM_UP_TIME: [Duration; 2] = [Duration::from_millis(5), Duration::from_mi
 /// Warm-up frames where frames are paced.
 const PACED_WARM_UP: usize = 10;
 const CHECKED_FRAMES: usize = 20;
-/// After this time a pool has finished what it does at its start.
+/// After this time a pool has finished its start-up.
 const START_UP: Duration = Duration::from_millis(10);
 
 impl<'a> Timer<'a> {
@@ -135,12 +135,12 @@ impl<'a> Timer<'a> {
 
 /// Returns a lower estimate of the frame time, which is not zero even if the clock is coarse.
 fn warm_up(mut frame: impl FnMut() -> Result<(), Failure>) -> Result<Duration, Failure> {
-    let [least, most] = WARM_UP_TIME;
+    let [min_time, max_time] = WARM_UP_TIME;
     let (start, mut count) = (Instant::now(), 0);
     let mut shortest = Duration::MAX;
     loop {
         let elapsed = start.elapsed();
-        if count >= MIN_WARM_UP && elapsed >= least && (count >= WARM_UP || elapsed >= most) {
+        if count >= MIN_WARM_UP && elapsed >= min_time && (count >= WARM_UP || elapsed >= max_time) {
             return Ok(shortest.max(Duration::from_nanos(50)));
         }
         frame()?;

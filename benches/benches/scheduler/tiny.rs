@@ -15,7 +15,7 @@ pub fn row(extent: &Extent) -> Row {
     contenders.extend(chain.contenders());
     Row {
         name: "tiny",
-        unit: "µs a frame",
+        unit: "µs per frame",
         scale: 1e6,
         pace: extent.back_to_back(),
         work: Work::busy(Duration::from_micros(1)),

@@ -56,9 +56,9 @@ impl Report {
 
     pub fn print(&self, quick: bool) {
         let Figures { rounds, timed, span, counted, ring_bytes } = &self.figures;
-        let note = if quick { "; a quick run, whose figures mean little" } else { "" };
+        let note = if quick { "; a quick run with inaccurate figures" } else { "" };
         println!("recording, median of {rounds} rounds{note}\n");
-        let mut table = Table::new(&["row", "chunks", "frame, µs", "on: ns a chunk", "on: % of the frame"]);
+        let mut table = Table::new(&["row", "chunks", "frame, µs", "on: ns per chunk", "on: % of the frame"]);
         for row in timed {
             let (frame, share) = (row.frame / 1e3, row.share * 100.0);
             let figures = [format!("{frame:.1}"), format!("{:.1}", row.a_chunk), format!("{share:.2}")];
@@ -67,7 +67,7 @@ impl Report {
         }
         table.print();
         if !counted.is_empty() {
-            let mut table = Table::new(&["instructions a chunk", "without a recorder", "off", "more"]);
+            let mut table = Table::new(&["instructions per chunk", "without a recorder", "off", "more"]);
             for Counted { shape, off, without } in counted {
                 let figures = [*without, *off, off - without].map(|figure| format!("{figure:.2}"));
                 let [without, off, more] = figures;

@@ -24,7 +24,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     pub backend: Option<BackendName>,
 
-    /// Searches the most accurate settings whose frame takes at most this, in milliseconds.
+    /// Searches for the most accurate settings with a frame time of at most this many milliseconds.
     #[arg(long, value_name = "X")]
     pub budget_ms: Option<f64>,
 
@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// Small pictures and no rounds. Errors are measured; times are those of cold frames, which say little.
+    /// Small pictures and no rounds. Errors are measured; times are those of cold frames, and inaccurate.
     #[arg(long)]
     pub quick: bool,
 }

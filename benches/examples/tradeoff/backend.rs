@@ -15,7 +15,7 @@ use drawloom_testing::adapter;
 use crate::Failure;
 use crate::arguments::{Arguments, BackendName};
 
-/// A backend whose frames are timed and read.
+/// A backend with timed frames and readable targets.
 pub trait BackendUnderTest {
     /// The name of the adapter.
     fn name(&self) -> &str;

@@ -1,4 +1,4 @@
-//! Searches the most accurate settings within a frame time budget.
+//! Searches for the most accurate settings within a frame time budget.
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Scene};
@@ -15,7 +15,7 @@ use crate::settings::{Knob, Setting};
 ///
 /// # Errors
 /// Returns an error if a frame fails.
-pub fn answer(
+pub fn search(
     budget_ms: f64,
     backend: &mut dyn BackendUnderTest,
     scene: &Scene,
@@ -32,7 +32,7 @@ pub fn answer(
     let mut steps = steps(settings, results);
     while time > budget_ms {
         let Some(step) = steps.pop() else {
-            println!("Nothing fits into {budget_ms} ms: with {} it is {time:.2} ms.", names(&reduced));
+            println!("No setting fits into {budget_ms} ms: with {} a frame takes {time:.2} ms.", names(&reduced));
             return Ok(());
         };
         let changed = step.knob.changed(&quality, &step.quality);
@@ -67,7 +67,7 @@ pub fn answer(
             (quality, time) = (changed, slower);
         }
     }
-    println!("The most accurate found that fits into {budget_ms} ms takes {time:.2} ms:\n");
+    println!("The most accurate settings found that fit into {budget_ms} ms take {time:.2} ms:\n");
     if reduced.is_empty() {
         println!("Quality::exact()");
     } else {
@@ -97,5 +97,5 @@ fn steps<'a>(settings: &'a [Setting], results: &Results) -> Vec<&'a Setting> {
     steps.into_iter().map(|(_, setting)| setting).collect()
 }
 
-/// Smaller differences of pictures of bytes count as this.
+/// The minimum error of a setting: smaller differences between pictures of bytes are noise.
 const MIN_ERROR: f64 = 1e-6;

@@ -1,5 +1,5 @@
-//! The error of each knob in its own unit, and its bound. Bounds are derived here or in the knob's documentation from what the knob does,
-//! never from measurements.
+//! The error of each knob in its own unit, and its bound. Bounds are derived here or in the knob's documentation from the
+//! knob's definition, never from measurements.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ pub struct KnobError {
     pub metric: &'static str,
     /// `None` if no bound is known.
     pub bound: Option<f64>,
-    /// What the error is measured against.
+    /// The oracle that the error is measured against.
     pub oracle: &'static str,
 }
 
@@ -100,7 +100,7 @@ impl Case<'_> {
     }
 
     /// The greatest depth difference of two objects in the wrong order. The order applies to opaque objects of one mesh and state, and
-    /// to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: some ten roundings of 2⁻²⁴ each.
+    /// to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: about ten roundings of 2⁻²⁴ each.
     fn order(&self, key: DepthKey, commands: &[RenderCommand], blend: Blend) -> KnobError {
         let is_opaque = blend == Blend::None;
         let runs = commands.chunk_by(|one, other| !is_opaque || (one.mesh, one.state) == (other.mesh, other.state));
@@ -176,8 +176,8 @@ impl Case<'_> {
 
     /// The greatest difference of a pixel's radiance from that of `exact`.
     ///
-    /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]), of which a surface reflects its diffuse
-    /// share over π. Alpha-blended objects in front reduce it, and each additive or subtractive object may add as much again.
+    /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]). A surface reflects its diffuse
+    /// share of that, over π. Alpha-blended objects in front reduce it, and each additive or subtractive object may add as much again.
     /// Truncation to half floats adds 2⁻¹⁰ of the radiance per light. No bound is known if such a light casts shadows: its map ends
     /// with its range, so a shadow's edge may move.
     fn light_cut_off(&self) -> Result<KnobError, Failure> {

@@ -1,4 +1,4 @@
-//! What accuracy costs on a scene: measures the frame time and the error of every knob of `Quality` alone, and of the presets.
+//! The cost of accuracy on a scene: measures the frame time and the error of every knob of `Quality` alone, and of the presets.
 //!
 //!     cargo run --release -p drawloom-benches --example tradeoff
 //!     cargo run --release -p drawloom-benches --example tradeoff -- scene.obj --camera-path orbit --budget-ms 8
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints how many triangles are not visible: what culling them on the CPU would save the device (S 9.6).
+/// Prints the number of invisible triangles, which CPU culling would save the device (S 9.6).
 fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
     let Some(view) = path.first().map(RenderView::new) else { return };
     let (scene, mut kept) = (scene.as_scene_ref(), Vec::new());
@@ -57,7 +57,7 @@ fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
     }
     let each = start.elapsed().as_nanos() as f64 / culled.triangles.max(1) as f64;
     println!(
-        "triangles: {}, of which the CPU could cull {:.1}%: {} face away, {} are off screen, {} cover no pixel, {} \
+        "triangles: {}; the CPU could cull {:.1}% of them: {} face away, {} are off screen, {} cover no pixel, {} \
          are degenerate; {each:.0} ns each\n",
         culled.triangles,
         culled.share() * 100.0,
@@ -90,12 +90,12 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     page::write(&pictures, &results, &measurements)?;
 
     if let Some(budget) = arguments.budget_ms {
-        budget::answer(budget, &mut *backend, &scene, &path, &settings, &results)?;
+        budget::search(budget, &mut *backend, &scene, &path, &settings, &results)?;
     }
     let exceeded: Vec<_> = results.exceeded().collect();
     for entry in &exceeded {
         let (error, bound) = (entry.error.unwrap_or_default(), entry.bound.unwrap_or_default());
-        eprintln!("{}, {}: off by {error} {}, and can be by {bound}", entry.knob, entry.setting, entry.metric);
+        eprintln!("{}, {}: an error of {error} {}, above the bound {bound}", entry.knob, entry.setting, entry.metric);
     }
     Ok(exceeded.is_empty())
 }

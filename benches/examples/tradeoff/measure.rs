@@ -40,7 +40,7 @@ pub struct Measurement {
     pub occluded: usize,
 }
 
-/// The least difference of 255 that is visible when switching between two pictures.
+/// The minimum difference of 255 that is visible when switching between two pictures.
 const VISIBLE: u8 = 3;
 
 /// The commands and targets of a frame.
@@ -96,7 +96,7 @@ impl Measurements {
         let mut reference_backend = backend::reference()?;
         for camera in path {
             progress.set_message("the reference in f64");
-            reference_backend.draw(seen_from(scene, camera))?;
+            reference_backend.draw(with_camera(scene, camera))?;
             reference.push(reference_backend.read("picture")?);
             progress.inc(1);
         }
@@ -163,7 +163,7 @@ fn draw_pictures(
             backend.set_quality(&Quality::exact())?;
             backend.set_quality(&setting.quality)?;
         }
-        drawn.times.push(backend.draw(seen_from(scene, camera))?);
+        drawn.times.push(backend.draw(with_camera(scene, camera))?);
         drawn.pictures.push(backend.read("picture")?);
     }
     Ok(drawn)
@@ -208,14 +208,14 @@ pub fn time_along(
     backend.set_quality(quality)?;
     let start = path.first().ok_or("the path has no position")?;
     for _ in 0..WARM_UP {
-        backend.draw(seen_from(scene, start))?;
+        backend.draw(with_camera(scene, start))?;
     }
-    let times: Vec<_> = path.iter().map(|camera| backend.draw(seen_from(scene, camera))).collect::<Result<_, _>>()?;
+    let times: Vec<_> = path.iter().map(|camera| backend.draw(with_camera(scene, camera))).collect::<Result<_, _>>()?;
     Ok(FrameTime::mean(&times))
 }
 
 /// The scene with this camera alone.
-fn seen_from<'a>(scene: &'a Scene, camera: &'a Camera) -> SceneRef<'a> {
+fn with_camera<'a>(scene: &'a Scene, camera: &'a Camera) -> SceneRef<'a> {
     SceneRef { cameras: std::slice::from_ref(camera), ..scene.as_scene_ref() }
 }
 

@@ -34,8 +34,8 @@ pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]
                     let segments = 1 << level as u32;
                     let (start, end) = (position(one), position(other));
                     // The crate clamps distances to the light to a thousandth of its range.
-                    let is_seen = [start, end].iter().all(|point| -point.z > f64::from(range) * 1e-3);
-                    if is_seen {
+                    let is_in_front = [start, end].iter().all(|point| -point.z > f64::from(range) * 1e-3);
+                    if is_in_front {
                         let error = edge_error(start, end, segments);
                         worst = Some(worst.map_or(error, |worst| worst_of(worst, error)));
                     }
@@ -64,7 +64,7 @@ fn edge_error(start: DVec3, end: DVec3, segments: u32) -> f64 {
     worst * 512.0
 }
 
-/// Projects a point with a paraboloid that looks along −Z (Brabec et al. 2002).
+/// Projects a point with a paraboloid that faces −Z (Brabec et al. 2002).
 fn project(point: DVec3) -> DVec2 {
     let distance = point.length();
     point.truncate() / (distance - point.z)

@@ -107,7 +107,7 @@ impl Results {
         &self.backend
     }
 
-    /// The entries whose error exceeds its bound.
+    /// The entries with errors that exceed their bounds.
     pub fn exceeded(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| entry.exceeds())
     }

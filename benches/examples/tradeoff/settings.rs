@@ -141,8 +141,8 @@ pub fn all() -> Vec<Setting> {
     {
         add(Knob::Culling, name, Quality { culling, ..exact });
     }
-    for square in Quality::OCCLUSION_TILE_SIZES {
-        add(Knob::Occlusion, &format!("1/{square}"), Quality { occlusion: Some(square), ..exact });
+    for tile_size in Quality::OCCLUSION_TILE_SIZES {
+        add(Knob::Occlusion, &format!("1/{tile_size}"), Quality { occlusion: Some(tile_size), ..exact });
     }
     for (name, normals) in [
         ("octahedral, 8 bits", NormalFormat::Octahedral8),

@@ -34,11 +34,11 @@ pub fn greatest_error(scene: &Scene, camera: &Camera, precision: TransformPrecis
             let local = Vec3::from(vertex.position) * scale;
             let exact_local = Vec3::from(vertex.position).as_dvec3() * scale.as_dvec3();
             let exact = position - camera.position + exact_turn * exact_local;
-            let seen = turn * exact;
-            if -seen.z < f64::from(camera.near) || exact.length() < radius {
+            let in_camera = turn * exact;
+            if -in_camera.z < f64::from(camera.near) || exact.length() < radius {
                 continue;
             }
-            let right = pixel(seen.x * focal * height / width / -seen.z, seen.y * focal / -seen.z);
+            let right = pixel(in_camera.x * focal * height / width / -in_camera.z, in_camera.y * focal / -in_camera.z);
             let relative = match precision {
                 TransformPrecision::CameraRelative => origin + orientation * local,
                 TransformPrecision::Absolute => position.as_vec3() + orientation * local - camera.position.as_vec3(),
