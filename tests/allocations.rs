@@ -116,13 +116,13 @@ fn comb() -> Schedule<Closure<'static, Duration>> {
     // Of nodes with equal cost the one that was added first comes first, so the spine does.
     let mut last = graph.add("root", root);
     graph.keep(last);
-    let bones: Vec<NodeId> = (0..MAX_JOBS).map(|index| graph.add(format!("bone {index}"), nothing())).collect();
-    for (index, bone) in bones.into_iter().enumerate() {
-        graph.order(last, bone);
-        last = bone;
+    let spine_nodes: Vec<NodeId> = (0..MAX_JOBS).map(|index| graph.add(format!("spine {index}"), nothing())).collect();
+    for (index, spine_node) in spine_nodes.into_iter().enumerate() {
+        graph.order(last, spine_node);
+        last = spine_node;
         let tooth = graph.add(format!("tooth {index}"), nothing());
-        graph.order(bone, tooth);
-        graph.keep(bone);
+        graph.order(spine_node, tooth);
+        graph.keep(spine_node);
         graph.keep(tooth);
     }
     let mut schedule = graph.compile().expect("the graph is valid");

@@ -86,11 +86,11 @@ fn frames_draw_objects_whose_volume_is_visible() -> Result<(), Box<dyn Error>> {
 fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     let vertices = [0.0, 0.1, 0.1].map(|size| Vertex { position: [size; 3], ..Vertex::default() });
-    let speck = scene.add(Mesh::new("speck", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
+    let tiny = scene.add(Mesh::new("tiny", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
     let paint = scene.add(Material::default())?;
     // Behind the camera: visible only with bounds that say that a shader moves its vertices by up to 9 m.
     for _ in 0..3 {
-        scene.add_object(RenderObject::new(speck, paint, DVec3::new(0.0, 0.0, 5.0)))?;
+        scene.add_object(RenderObject::new(tiny, paint, DVec3::new(0.0, 0.0, 5.0)))?;
     }
     let scene_ref = scene.as_scene_ref();
     let mut bounds = scene_ref.bounds.to_vec();

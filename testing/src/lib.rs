@@ -1,4 +1,4 @@
-//! What Drawloom's tests, examples and benchmarks share: scenes, devices, random numbers, and oracles in f64.
+//! Code that Drawloom's tests, examples and benchmarks share: scenes, devices, random numbers, and oracles in f64.
 
 #[cfg(feature = "wgpu")]
 pub mod adapter;

@@ -24,8 +24,8 @@ fn wrong_atomics(architecture: &str, sources: &[Source]) -> Vec<String> {
         declared.extend(names.map(|name| format!("{}::{name}", file.join("/"))));
     }
     let missing = declared.difference(&listed).map(|name| format!("{name} is in no table of memory orderings"));
-    let gone = listed.difference(&declared).map(|name| format!("{name} is in a table, but not in src"));
-    missing.chain(gone).collect()
+    let removed = listed.difference(&declared).map(|name| format!("{name} is in a table, but not in src"));
+    missing.chain(removed).collect()
 }
 
 /// The names `file::field` in the first columns of the section. `::field` is in the file named before it.
@@ -129,7 +129,7 @@ fn an_atomic_that_is_not_listed_is_found() {
 
 #[test]
 fn a_row_without_an_atomic_is_found() {
-    let gone = "low.rs::a is in a table, but not in src";
+    let removed = "low.rs::a is in a table, but not in src";
     for text in [
         "struct A { a: u8 }",
         "fn f(a: &AtomicU8) { let a: AtomicU8 = AtomicU8::new(0); A { a: AtomicU8::new(0) }; }",
@@ -138,6 +138,6 @@ fn a_row_without_an_atomic_is_found() {
         "#[test] fn f() { static a: AtomicU8 = AtomicU8::new(0); }",
     ] {
         let problems = atomics_with("low.rs", text, "| `low.rs::a` |");
-        assert!(problems.contains(&gone.to_owned()), "{text}\n{problems:?}");
+        assert!(problems.contains(&removed.to_owned()), "{text}\n{problems:?}");
     }
 }

@@ -90,8 +90,8 @@ fn at_the_edges(harness: &mut Harness) -> Result<(), Failed> {
             let marker = Marker::before(&camera, 5.0, narrow * 0.8);
             marker.moved(&camera, x * outside(right), y * outside(up))
         });
-        let what = format!("{:?}, {:?}", camera.projection, camera.size);
-        MarkerScene::new(camera, markers)?.expect(harness, &what, 6)?;
+        let context = format!("{:?}, {:?}", camera.projection, camera.size);
+        MarkerScene::new(camera, markers)?.expect(harness, &context, 6)?;
     }
     Ok(())
 }
@@ -108,8 +108,8 @@ fn near_and_far(harness: &mut Harness) -> Result<(), Failed> {
                     }
                     let camera = Camera { near, far, ..camera(SIZE) };
                     let markers = two_markers(&camera, distance, factor);
-                    let what = format!("near {near:e}, far {far:e}, at {distance:e} m and {factor} times that");
-                    MarkerScene::new(camera, markers)?.expect(harness, &what, 2)?;
+                    let context = format!("near {near:e}, far {far:e}, at {distance:e} m and {factor} times that");
+                    MarkerScene::new(camera, markers)?.expect(harness, &context, 2)?;
                 }
             }
         }
@@ -130,12 +130,12 @@ fn nearest(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 /// Fails unless the picture is correct, or the camera is refused.
-fn correct_or_refused(harness: &mut Harness, markers: &MarkerScene, what: &str) -> Result<(), Failed> {
+fn correct_or_refused(harness: &mut Harness, markers: &MarkerScene, context: &str) -> Result<(), Failed> {
     match harness.outcome(&markers.scene.as_scene_ref())? {
-        Outcome::Drawn(drawn) => markers.compare(&drawn, 2).map_err(|failed| with_context(what, failed)),
+        Outcome::Drawn(drawn) => markers.compare(&drawn, 2).map_err(|failed| with_context(context, failed)),
         Outcome::Refused(FrameError::Scene(SceneError::InvalidCamera { .. })) => Ok(()),
-        Outcome::Refused(error) => Err(format!("{what}: {error}").into()),
-        Outcome::NotSubmitted(error) => Err(format!("{what}: {error}").into()),
+        Outcome::Refused(error) => Err(format!("{context}: {error}").into()),
+        Outcome::NotSubmitted(error) => Err(format!("{context}: {error}").into()),
     }
 }
 
@@ -257,8 +257,8 @@ fn inside(harness: &mut Harness) -> Result<(), Failed> {
                 color: BLUE,
                 double_sided,
             };
-            let what = format!("in a box of {scale} m, double-sided {double_sided}");
-            MarkerScene::of(cube(), camera, [around])?.expect(harness, &what, min_visible)?;
+            let context = format!("in a box of {scale} m, double-sided {double_sided}");
+            MarkerScene::of(cube(), camera, [around])?.expect(harness, &context, min_visible)?;
         }
     }
     Ok(())

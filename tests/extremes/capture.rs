@@ -67,13 +67,14 @@ impl Capture {
 
 /// Fails if two pictures of equivalent scenes differ. Where an edge runs through the centre of a pixel, rounding determines the
 /// pixel, so 2% of the pixels may differ by any amount.
-pub fn assert_alike(what: &str, one: Option<&Capture>, other: Option<&Capture>) -> Result<(), Failed> {
+pub fn assert_alike(context: &str, one: Option<&Capture>, other: Option<&Capture>) -> Result<(), Failed> {
     let (Some(one), Some(other)) = (one, other) else { return Ok(()) };
     let [root_mean_square, share] = one.distance(other);
     if root_mean_square <= 2.55 || share <= 0.02 {
         return Ok(());
     }
-    Err(format!("{what}: differs by {root_mean_square:.2} of 255, and at {:.1}% of the pixels", share * 100.0).into())
+    Err(format!("{context}: differs by {root_mean_square:.2} of 255, and at {:.1}% of the pixels", share * 100.0)
+        .into())
 }
 
 fn numbers(picture: &Picture) -> Result<Vec<[f64; 3]>, Failed> {

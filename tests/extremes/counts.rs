@@ -45,8 +45,8 @@ fn instances(harness: &mut Harness) -> Result<(), Failed> {
             let hidden = markers.scene.objects().next().ok_or("there is one")?;
             let hidden = markers.scene.object(hidden)?;
             for index in 2..count {
-                let aside = DVec3::new(0.3, -0.4, -0.8) * (index as f64 * 1e-4);
-                markers.scene.add_object(RenderObject { position: hidden.position + aside, ..hidden })?;
+                let offset = DVec3::new(0.3, -0.4, -0.8) * (index as f64 * 1e-4);
+                markers.scene.add_object(RenderObject { position: hidden.position + offset, ..hidden })?;
             }
         }
         if count > 1 {

@@ -104,7 +104,7 @@ pub enum Outcome {
 pub struct Drawn {
     /// The pictures of the first view. `None` if the backend draws nothing.
     pub capture: Option<Capture>,
-    /// What was left out or drawn at lower quality.
+    /// The objects and effects that were left out or drawn at lower quality.
     pub rejections: Vec<Rejection>,
     /// The number of visible objects of the first view.
     pub visible: usize,

@@ -14,7 +14,7 @@ use crate::markers::with_context;
 
 pub const CASES: &[Case] = &[
     ("lights_in_a_surface_and_very_close_to_it", at_a_surface),
-    ("the_brightest_lights_of_f32_cause_no_nan", blinding),
+    ("the_brightest_lights_of_f32_cause_no_nan", brightest_lights),
     ("an_opaque_pane_hides_radiance_beyond_half_floats", pane),
     ("lights_of_every_range", ranges),
     ("cones_from_almost_nothing_to_a_half_space", cones),
@@ -45,8 +45,8 @@ fn lamps(position: DVec3, intensity: Vec3, range: f32, direction: Vec3) -> Vec<L
     lamps
 }
 
-fn drawn(harness: &mut Harness, what: &str, scene: &Scene) -> Result<Option<Capture>, Failed> {
-    Ok(harness.draw(scene).map_err(|failed| with_context(what, failed))?.capture)
+fn drawn(harness: &mut Harness, context: &str, scene: &Scene) -> Result<Option<Capture>, Failed> {
+    Ok(harness.draw(scene).map_err(|failed| with_context(context, failed))?.capture)
 }
 
 /// Fails if a channel without light is lit: clamping may have turned NaN into any number.
@@ -63,15 +63,15 @@ fn at_a_surface(harness: &mut Harness) -> Result<(), Failed> {
             // The middle pixel shows exactly the point at which the light is.
             for intensity in [1.0, 1e10, 1e38] {
                 for lamp in lamps(DVec3::Z * height, Vec3::X * intensity, 10.0, direction) {
-                    let what = format!("{lamp:?}");
+                    let context = format!("{lamp:?}");
                     let mut scene = wall(0.5)?;
                     scene.lights = vec![lamp];
-                    let Some(capture) = drawn(harness, &what, &scene)? else { continue };
-                    assert_lit_only_in(&capture, Vec3::X).map_err(|failed| with_context(&what, failed))?;
+                    let Some(capture) = drawn(harness, &context, &scene)? else { continue };
+                    assert_lit_only_in(&capture, Vec3::X).map_err(|failed| with_context(&context, failed))?;
                     let behind = height < 0.0 || (direction.z > 0.0 && !matches!(lamp, Light::Point { .. }));
                     // A light behind a surface, or facing away from it, does not light it.
                     if behind && capture.covered() > 0.0 {
-                        return Err(format!("{what}: lights {:.1}% from behind", capture.covered() * 100.0).into());
+                        return Err(format!("{context}: lights {:.1}% from behind", capture.covered() * 100.0).into());
                     }
                 }
             }
@@ -80,7 +80,7 @@ fn at_a_surface(harness: &mut Harness) -> Result<(), Failed> {
     Ok(())
 }
 
-fn blinding(harness: &mut Harness) -> Result<(), Failed> {
+fn brightest_lights(harness: &mut Harness) -> Result<(), Failed> {
     for intensity in [1e5, 1e20, 1e38, f32::MAX] {
         for color in [Vec3::ONE, Vec3::X, Vec3::new(0.0, 1.0, 1e-30)] {
             for diffuse in [1.0, 1e-30, f32::MAX] {
@@ -97,11 +97,11 @@ fn blinding(harness: &mut Harness) -> Result<(), Failed> {
                     };
                     scene.lights = lamps(DVec3::Z, color * intensity, f32::MAX, Vec3::NEG_Z);
                     scene.lights.extend([sun(false), sun(true)]);
-                    let what = format!("{color} * {intensity:e} on {diffuse:e}, {blend:?}");
-                    let Some(capture) = drawn(harness, &what, &scene)? else { continue };
-                    assert_lit_only_in(&capture, color).map_err(|failed| with_context(&what, failed))?;
+                    let context = format!("{color} * {intensity:e} on {diffuse:e}, {blend:?}");
+                    let Some(capture) = drawn(harness, &context, &scene)? else { continue };
+                    assert_lit_only_in(&capture, color).map_err(|failed| with_context(&context, failed))?;
                     if capture.radiance(2, 2)[1..] == [0.0; 2] && color.y == 1.0 && diffuse == 1.0 {
-                        return Err(format!("{what}: the wall is dark").into());
+                        return Err(format!("{context}: the wall is dark").into());
                     }
                 }
             }
@@ -127,15 +127,15 @@ fn ranges(harness: &mut Harness) -> Result<(), Failed> {
         for lamp in lamps(DVec3::Z, Vec3::splat(10.0), range, Vec3::NEG_Z) {
             let mut scene = wall(0.5)?;
             scene.lights = vec![lamp];
-            let what = format!("{lamp:?}");
-            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let context = format!("{lamp:?}");
+            let Some(capture) = drawn(harness, &context, &scene)? else { continue };
             let middle = capture.middle()[0];
             // 1 m away: 10 lux on a surface of diffuse 0.5, windowed by the range.
             let window = (1.0 - f64::from(range).powi(-4)).max(0.0);
             let expected = 10.0 * 0.5 / std::f64::consts::PI * window * window;
             let expected = if range > 1.0 { expected } else { 0.0 };
             if (middle - expected).abs() > 0.02 * expected + 1e-6 {
-                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+                return Err(format!("{context}: the middle is {middle}, not {expected}").into());
             }
         }
     }
@@ -157,17 +157,17 @@ fn cones(harness: &mut Harness) -> Result<(), Failed> {
                 outer_angle,
                 casts_shadow,
             }];
-            let what = format!("{inner_angle}..{outer_angle}, shadow {casts_shadow}");
-            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let context = format!("{inner_angle}..{outer_angle}, shadow {casts_shadow}");
+            let Some(capture) = drawn(harness, &context, &scene)? else { continue };
             let middle = capture.middle()[0];
             let expected = 10.0 * 0.5 / std::f64::consts::PI;
             // The middle pixel is 0.17 m wide.
             if outer_angle > 0.3 && (middle - expected).abs() > 0.02 * expected {
-                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+                return Err(format!("{context}: the middle is {middle}, not {expected}").into());
             }
             let corner = capture.radiance(0, 0)[0];
             if outer_angle < 1.2 && corner != 0.0 {
-                return Err(format!("{what}: the corner is {corner}").into());
+                return Err(format!("{context}: the corner is {corner}").into());
             }
         }
     }
@@ -190,11 +190,11 @@ fn falloff(harness: &mut Harness) -> Result<(), Failed> {
             object.scale = Vec3::splat((distance * 2.0) as f32);
             scene.replace_object(handle, object)?;
             scene.lights = vec![lamp];
-            let what = format!("{lamp:?}");
-            let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+            let context = format!("{lamp:?}");
+            let Some(capture) = drawn(harness, &context, &scene)? else { continue };
             let (middle, expected) = (capture.middle()[0], 3.0 * 0.5 / std::f64::consts::PI);
             if (middle - expected).abs() > 0.02 * expected {
-                return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+                return Err(format!("{context}: the middle is {middle}, not {expected}").into());
             }
         }
     }
@@ -213,14 +213,14 @@ fn camera_at_light(harness: &mut Harness) -> Result<(), Failed> {
                 let around = RenderObject::new(block, material, position + DVec3::Z * 2.5);
                 scene.add_object(RenderObject { orientation: Quat::from_rotation_z(0.5), ..around })?;
                 scene.lights = vec![lamp];
-                let what = format!("{lamp:?}");
-                let Some(capture) = drawn(harness, &what, &scene)? else { continue };
+                let context = format!("{lamp:?}");
+                let Some(capture) = drawn(harness, &context, &scene)? else { continue };
                 let away = 5.0 + offset.z;
                 let window = 1.0 - (away / f64::from(range)).powi(4);
                 let expected = 100.0 * 0.5 / std::f64::consts::PI * window * window / (away * away);
                 let middle = capture.middle()[0];
                 if (middle - expected).abs() > 0.03 * expected {
-                    return Err(format!("{what}: the middle is {middle}, not {expected}").into());
+                    return Err(format!("{context}: the middle is {middle}, not {expected}").into());
                 }
             }
         }

@@ -91,9 +91,9 @@ impl MarkerScene {
 
     /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and unless at
     /// least `min_visible` markers have such pixels.
-    pub fn expect(&self, harness: &mut Harness, what: &str, min_visible: usize) -> Result<(), Failed> {
-        let drawn = harness.draw_whole(&self.scene).map_err(|failed| with_context(what, failed))?;
-        self.compare(&drawn, min_visible).map_err(|failed| with_context(what, failed))
+    pub fn expect(&self, harness: &mut Harness, context: &str, min_visible: usize) -> Result<(), Failed> {
+        let drawn = harness.draw_whole(&self.scene).map_err(|failed| with_context(context, failed))?;
+        self.compare(&drawn, min_visible).map_err(|failed| with_context(context, failed))
     }
 
     /// Checks the same of a frame that has been drawn already.
@@ -131,6 +131,6 @@ impl MarkerScene {
 }
 
 /// Prefixes the message of a failure.
-pub fn with_context(what: &str, failed: Failed) -> Failed {
-    format!("{what}: {}", failed.message().unwrap_or("failed")).into()
+pub fn with_context(context: &str, failed: Failed) -> Failed {
+    format!("{context}: {}", failed.message().unwrap_or("failed")).into()
 }

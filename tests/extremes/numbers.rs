@@ -429,7 +429,7 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
             drawloom::scene::Blend::Subtractive,
         ] {
             for number in SPECIAL {
-                let what = format!("{name} = {number:e}, {blend:?}");
+                let context = format!("{name} = {number:e}, {blend:?}");
                 let mut material = Material { blend, ..Material::default() };
                 set(&mut material, number);
                 let max = if name == "opacity" { 1.0 } else { f32::MAX };
@@ -438,16 +438,16 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
                 match (test, is_valid) {
                     (Ok(test), true) => {
                         check_one(harness, &test, Expected::Drawn, true)
-                            .map_err(|failed| with_context(&what, failed))?;
+                            .map_err(|failed| with_context(&context, failed))?;
                     }
                     (Err(_), false) => {
                         let error = Scene::new().add(material).err();
                         if !matches!(error, Some(SceneError::InvalidMaterial { .. })) {
-                            return Err(format!("{what}: {error:?}").into());
+                            return Err(format!("{context}: {error:?}").into());
                         }
                     }
-                    (Ok(_), false) => return Err(format!("{what}: it was accepted").into()),
-                    (Err(failed), true) => return Err(with_context(&what, failed)),
+                    (Ok(_), false) => return Err(format!("{context}: it was accepted").into()),
+                    (Err(failed), true) => return Err(with_context(&context, failed)),
                 }
             }
         }
@@ -471,7 +471,7 @@ fn vertices(harness: &mut Harness) -> Result<(), Failed> {
     ];
     for (name, set) in setters {
         for number in SPECIAL {
-            let what = format!("{name} = {number:e}");
+            let context = format!("{name} = {number:e}");
             let plain = square(Topology::TriangleList);
             let mut changed = plain.vertices().to_vec();
             changed.iter_mut().for_each(|vertex| set(vertex, number));
@@ -479,14 +479,14 @@ fn vertices(harness: &mut Harness) -> Result<(), Failed> {
             let mesh = match mesh {
                 Err(SceneError::NonFiniteVertex { vertex: 0, .. }) if !number.is_finite() => continue,
                 Err(SceneError::NonFiniteVertex { vertex: 1, .. }) if !number.is_finite() => continue,
-                Err(error) => return Err(format!("{what}: {error}").into()),
-                Ok(_) if !number.is_finite() => return Err(format!("{what}: it was accepted").into()),
+                Err(error) => return Err(format!("{context}: {error}").into()),
+                Ok(_) if !number.is_finite() => return Err(format!("{context}: it was accepted").into()),
                 Ok(mesh) => mesh,
             };
             let is_far = name.starts_with("position") && number.abs() == f32::MAX;
             let expected = if is_far { Expected::Without(RejectionReason::InvalidBounds) } else { Expected::Drawn };
             let test = TestScene::with(mesh, Material { double_sided: true, ..Material::default() }, Some(red()?))?;
-            check_one(harness, &test, expected, true).map_err(|failed| with_context(&what, failed))?;
+            check_one(harness, &test, expected, true).map_err(|failed| with_context(&context, failed))?;
             if is_far {
                 continue;
             }
@@ -495,7 +495,7 @@ fn vertices(harness: &mut Harness) -> Result<(), Failed> {
             let [r, g, b] = capture.radiance(x, y);
             // Ambient light reaches it, and the texture is red everywhere.
             if !(r >= 0.19 && g < 1e-3 && b < 1e-3) {
-                return Err(format!("{what}: the subject is {:?}", [r, g, b]).into());
+                return Err(format!("{context}: the subject is {:?}", [r, g, b]).into());
             }
         }
     }

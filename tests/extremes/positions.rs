@@ -83,12 +83,14 @@ fn anywhere(harness: &mut Harness) -> Result<(), Failed> {
             for direction in directions.into_iter().skip(if is_slow { 3 } else { 0 }) {
                 let mut scene = make();
                 shift(&mut scene, direction * distance)?;
-                let what = format!("at {distance:e} m along {direction}");
-                let there = harness.draw_whole(&scene).map_err(|failed| with_context(&what, failed))?;
+                let context = format!("at {distance:e} m along {direction}");
+                let there = harness.draw_whole(&scene).map_err(|failed| with_context(&context, failed))?;
                 if there.visible != here.visible {
-                    return Err(format!("{what}: {} objects are visible, not {}", there.visible, here.visible).into());
+                    return Err(
+                        format!("{context}: {} objects are visible, not {}", there.visible, here.visible).into()
+                    );
                 }
-                assert_alike(&what, there.capture.as_ref(), here.capture.as_ref())?;
+                assert_alike(&context, there.capture.as_ref(), here.capture.as_ref())?;
             }
         }
     }
@@ -176,9 +178,9 @@ fn enlarged(factor: f64) -> Result<Scene, Failed> {
 fn scaled_scenes(harness: &mut Harness) -> Result<(), Failed> {
     let usual = harness.draw_whole(&enlarged(1.0)?)?;
     for factor in [1e-6, 1e-3, 0.1, 30.0, 1e3, 1e6, 1e7] {
-        let what = format!("{factor:e} times as large");
-        let other = harness.draw_whole(&enlarged(factor)?).map_err(|failed| with_context(&what, failed))?;
-        assert_alike(&what, other.capture.as_ref(), usual.capture.as_ref())?;
+        let context = format!("{factor:e} times as large");
+        let other = harness.draw_whole(&enlarged(factor)?).map_err(|failed| with_context(&context, failed))?;
+        assert_alike(&context, other.capture.as_ref(), usual.capture.as_ref())?;
     }
     Ok(())
 }
@@ -205,10 +207,10 @@ fn sizes(harness: &mut Harness) -> Result<(), Failed> {
             for marker in &mut markers {
                 marker.scale *= 2.0 / of_mesh;
             }
-            let what = format!("{size:e} m, {of_mesh:e} of it by the mesh");
+            let context = format!("{size:e} m, {of_mesh:e} of it by the mesh");
             let mut all = MarkerScene::of(sized_square(of_mesh)?, near, markers)?;
             all.scene.background = Vec3::ZERO;
-            all.expect(harness, &what, 2)?;
+            all.expect(harness, &context, 2)?;
         }
     }
     Ok(())
@@ -242,8 +244,8 @@ fn scales(harness: &mut Harness) -> Result<(), Failed> {
         for double_sided in [false, true] {
             for orientation in [camera.orientation, tilt] {
                 let marker = Marker { scale, double_sided, orientation, ..Marker::before(&camera, 6.0, 1.0) };
-                let what = format!("scale {scale}, double-sided {double_sided}, tilted {}", orientation == tilt);
-                MarkerScene::new(camera.clone(), [control, marker])?.expect(harness, &what, min_visible)?;
+                let context = format!("scale {scale}, double-sided {double_sided}, tilted {}", orientation == tilt);
+                MarkerScene::new(camera.clone(), [control, marker])?.expect(harness, &context, min_visible)?;
             }
         }
     }
@@ -261,17 +263,17 @@ fn larger_than_far(harness: &mut Harness) -> Result<(), Failed> {
                 let scale = scale * size;
                 let orientation = camera.orientation * Quat::from_rotation_x(tilt);
                 let behind = Marker { scale, orientation, ..Marker::before(&camera, 6.0, 1.0) };
-                let what = format!("scale {scale}, tilted by {tilt}");
+                let context = format!("scale {scale}, tilted by {tilt}");
                 let markers = MarkerScene::new(camera.clone(), [control, behind])?;
-                let drawn = harness.draw_whole(&markers.scene).map_err(|failed| with_context(&what, failed))?;
+                let drawn = harness.draw_whole(&markers.scene).map_err(|failed| with_context(&context, failed))?;
                 if drawn.visible != 2 {
-                    return Err(format!("{what}: {} of 2 were drawn", drawn.visible).into());
+                    return Err(format!("{context}: {} of 2 were drawn", drawn.visible).into());
                 }
                 let Some(capture) = drawn.capture else { continue };
                 let known = [BLUE, GREEN, markers.scene.background].map(|color| color.as_dvec3().to_array());
                 let all = (0..capture.size[1]).flat_map(|y| (0..capture.size[0]).map(move |x| (x, y)));
                 if let Some((x, y)) = all.into_iter().find(|&(x, y)| !known.contains(&capture.radiance(x, y))) {
-                    return Err(format!("{what}: ({x}, {y}) is {:?}", capture.radiance(x, y)).into());
+                    return Err(format!("{context}: ({x}, {y}) is {:?}", capture.radiance(x, y)).into());
                 }
             }
         }

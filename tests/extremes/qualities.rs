@@ -21,7 +21,7 @@ pub const CASES: &[Case] = &[
 ];
 
 /// A scene with every feature, and with the largest finite brightness.
-fn blinding() -> Result<Scene, Failed> {
+fn very_bright() -> Result<Scene, Failed> {
     let mut scene = everything();
     let bright = Vec3::splat(f32::MAX);
     for light in &mut scene.lights {
@@ -42,20 +42,20 @@ fn blinding() -> Result<Scene, Failed> {
 }
 
 /// Draws scenes; some of them have an oracle for every pixel.
-fn expect_all(harness: &mut Harness, what: &str) -> Result<(), Failed> {
+fn expect_all(harness: &mut Harness, context: &str) -> Result<(), Failed> {
     for position in [DVec3::ZERO, DVec3::new(1e3, -2e3, 5e2)] {
         let camera = Camera { position, ..camera([48, 32]) };
         let markers = [
             Marker::before(&camera, 5.0, 1.5).moved(&camera, 1.5, 1.0),
             Marker::before(&camera, 9.0, 3.0).moved(&camera, -1.0, 0.0).colored(RED),
         ];
-        MarkerScene::new(camera, markers)?.expect(harness, what, 2)?;
+        MarkerScene::new(camera, markers)?.expect(harness, context, 2)?;
     }
-    MarkerScene::new(camera([48, 32]), [])?.expect(harness, what, 0)?;
-    for (name, scene) in [("everything", everything()), ("blinding", blinding()?)] {
-        let drawn = harness.draw_whole(&scene).map_err(|failed| with_context(&format!("{what}: {name}"), failed))?;
+    MarkerScene::new(camera([48, 32]), [])?.expect(harness, context, 0)?;
+    for (name, scene) in [("everything", everything()), ("very bright", very_bright()?)] {
+        let drawn = harness.draw_whole(&scene).map_err(|failed| with_context(&format!("{context}: {name}"), failed))?;
         if drawn.capture.is_some_and(|capture| capture.covered() < 0.9) {
-            return Err(format!("{what}: {name} is dark").into());
+            return Err(format!("{context}: {name} is dark").into());
         }
     }
     Ok(())

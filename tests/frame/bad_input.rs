@@ -255,13 +255,13 @@ fn invalid_lights_are_counted_and_left_out() {
 #[test]
 fn invalid_renderers_are_refused() {
     let scheduler = || Arc::new(Scheduler::new(1).unwrap());
-    let empty = Renderer::builder(NullBackend)
+    let empty_chunk = Renderer::builder(NullBackend)
         .deferred(Deferred::to_picture())
         .granularity(Granularity::Chunk(0))
         .build(scheduler());
-    assert!(matches!(empty.err(), Some(BuildError::EmptyChunk)));
-    let nothing = Renderer::builder(NullBackend).build(scheduler());
-    assert!(matches!(nothing.err(), Some(BuildError::Plan(PlanError::Empty))));
+    assert!(matches!(empty_chunk.err(), Some(BuildError::EmptyChunk)));
+    let no_processes = Renderer::builder(NullBackend).build(scheduler());
+    assert!(matches!(no_processes.err(), Some(BuildError::Plan(PlanError::Empty))));
     let formats = GeometryFormats::default();
     let lights = LightVolumes::new(LightKind::Point, formats);
     let unlit = Renderer::builder(NullBackend).process(lights).process(ToneMapping::default()).output("picture");

@@ -15,7 +15,7 @@ use drawloom_testing::scenes::{cube, field, sized};
 
 /// A wall in front of the first camera, and small cubes behind and beside it, one in four of them glass. The second camera views the
 /// scene from behind, so that its cubes are in front of the wall.
-fn yard() -> Scene {
+fn wall_and_cubes() -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add(cube()).unwrap();
     let stone = scene.add(Material::default()).unwrap();
@@ -55,7 +55,7 @@ fn drawn(renderer: &mut Renderer<NullBackend>, scene: &Scene, process: &str) -> 
 
 #[test]
 fn hidden_objects_are_culled_and_all_others_are_drawn() {
-    let scene = yard();
+    let scene = wall_and_cubes();
     // The wall at 9.9 m is 4 m wide to either side. A metre of slack allows for tiles of 8 pixels.
     let is_behind = |object: u32, within: f64| {
         let position = scene.as_scene_ref().positions[object as usize];
@@ -79,7 +79,7 @@ fn hidden_objects_are_culled_and_all_others_are_drawn() {
 
 #[test]
 fn workers_and_granularity_do_not_change_the_occluded_objects() {
-    for scene in [yard(), field(3000)] {
+    for scene in [wall_and_cubes(), field(3000)] {
         for side in Quality::OCCLUSION_TILE_SIZES {
             let first = |workers, granularity| {
                 let (lists, statistics) =
@@ -99,7 +99,7 @@ fn workers_and_granularity_do_not_change_the_occluded_objects() {
 
 #[test]
 fn the_occlusion_policy_draws_frames_with_and_without_culling_that_differ_only_in_occluded_objects() {
-    let scene = yard();
+    let scene = wall_and_cubes();
     let mut with = renderer(Some(4), 1, Granularity::default());
     let all = drawn(&mut renderer(None, 1, Granularity::default()), &scene, "geometry buffer").0;
     let remaining = drawn(&mut with, &scene, "geometry buffer").0;
@@ -115,7 +115,7 @@ fn the_occlusion_policy_draws_frames_with_and_without_culling_that_differ_only_i
 
 #[test]
 fn quality_changes_between_frames() {
-    let scene = yard();
+    let scene = wall_and_cubes();
     let mut renderer = renderer(None, 2, Granularity::default());
     let mut occluded = |occlusion| {
         renderer.set_quality(Quality { occlusion, ..Quality::balanced() }).unwrap();
@@ -130,7 +130,7 @@ fn quality_changes_between_frames() {
 
 #[test]
 fn shadow_maps_are_not_occlusion_culled() {
-    let mut scene = yard();
+    let mut scene = wall_and_cubes();
     scene.cameras.truncate(1);
     scene.lights = vec![Light::Spot {
         position: DVec3::ZERO,
@@ -171,7 +171,7 @@ impl RenderProcess for OwnProcess {
 
 #[test]
 fn nothing_is_culled_if_a_process_draws_without_the_depth_test() {
-    let scene = yard();
+    let scene = wall_and_cubes();
     let occluded = |depth: fn(&mut Declare)| {
         let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
         let builder =
@@ -209,6 +209,6 @@ fn objects_that_are_not_drawn_occlude_nothing() {
     let quality = Quality { occlusion: Some(4), culling: CullingVolume::Sphere, ..Quality::balanced() };
     let builder = Renderer::builder(NullBackend).process(Glass).output("picture").quality(quality);
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
-    assert_eq!(renderer.record(yard().as_scene_ref()).unwrap().statistics().views[0].occluded, 0);
+    assert_eq!(renderer.record(wall_and_cubes().as_scene_ref()).unwrap().statistics().views[0].occluded, 0);
     assert!(!renderer.jobs_to_dot().unwrap().contains("coarse depth"), "no coarse depth buffer is drawn");
 }

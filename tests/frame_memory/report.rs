@@ -31,10 +31,10 @@ impl Report {
         println!("| {:<7} | {:>8} | {:>8} | {:>8} |", "phase", "drawloom", "wgpu", "others");
         println!("| ------- | -------: | -------: | -------: |");
         for phase in [Phase::Jobs, Phase::Around, Phase::Submit, Phase::Unknown] {
-            let [ours, wgpu, others] = [Owner::Drawloom, Owner::Wgpu, Owner::Other]
+            let [drawloom, wgpu, others] = [Owner::Drawloom, Owner::Wgpu, Owner::Other]
                 .map(|owner| self.per_frame(self.allocations_of(owner, phase)));
             let name = format!("{phase:?}").to_lowercase();
-            println!("| {name:<7} | {ours:>8.2} | {wgpu:>8.2} | {others:>8.2} |");
+            println!("| {name:<7} | {drawloom:>8.2} | {wgpu:>8.2} | {others:>8.2} |");
         }
         if show {
             self.print_call_sites();

@@ -37,13 +37,13 @@ const MAX_LINES: usize = 4;
 /// Parses a backtrace as the standard library prints it.
 pub fn read(stack: &str) -> CallSite {
     let frames = frames(stack);
-    let ours: Vec<_> = frames.iter().filter(|frame| frame.owner == Owner::Drawloom).collect();
+    let own_frames: Vec<_> = frames.iter().filter(|frame| frame.owner == Owner::Drawloom).collect();
     let owner = frames.iter().map(|frame| frame.owner).find(|&owner| owner != Owner::Other).unwrap_or(Owner::Other);
-    let mut lines: Vec<_> = ours.iter().map(|frame| format!("{}:{}", frame.file, frame.line)).collect();
+    let mut lines: Vec<_> = own_frames.iter().map(|frame| format!("{}:{}", frame.file, frame.line)).collect();
     // A closure's frame has the line of its caller.
     lines.dedup();
     lines.truncate(MAX_LINES);
-    CallSite { phase: phase(&ours), owner, lines }
+    CallSite { phase: phase(&own_frames), owner, lines }
 }
 
 struct Frame<'a> {
@@ -80,8 +80,8 @@ fn owner_of(file: &str) -> Owner {
     }
 }
 
-fn phase(ours: &[&Frame<'_>]) -> Phase {
-    let visits = |folder: &str| ours.iter().any(|frame| frame.file.starts_with(folder));
+fn phase(own_frames: &[&Frame<'_>]) -> Phase {
+    let visits = |folder: &str| own_frames.iter().any(|frame| frame.file.starts_with(folder));
     if visits("src/graph/") {
         Phase::Jobs
     } else if visits("src/frame/renderer.rs") {

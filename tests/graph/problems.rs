@@ -181,13 +181,13 @@ fn two_nodes_with_the_same_name_are_reported() {
 fn calls_with_ids_of_another_graph_are_reported() {
     let (mut other, [foreign]) = graph(["foreign"]);
     let foreign_resource: ResourceId = other.resource("foreign resource");
-    let (mut graph, [own, gone]) = graph(["own", "gone"]);
+    let (mut graph, [own, removed]) = graph(["own", "removed"]);
     let resource = graph.resource("depth");
-    graph.remove(gone);
+    graph.remove(removed);
     graph.read(foreign, resource);
     graph.write(own, foreign_resource);
     graph.order(own, foreign);
-    graph.order(gone, own);
+    graph.order(removed, own);
     graph.keep(foreign);
     graph.import(foreign_resource);
     graph.output(foreign_resource);

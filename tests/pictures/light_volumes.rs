@@ -123,13 +123,13 @@ fn cones() -> Result<(), Failed> {
             // Tilted, so that the axis meets no corner.
             let position = DVec3::new(0.11, -0.23, 0.17);
             let panel_scene = room(spot(position, direction, degrees));
-            let aside = direction.any_orthonormal_vector();
+            let sideways = direction.any_orthonormal_vector();
             let ahead = position + direction * (0.6 * RANGE);
             let wide = (f64::from(degrees) * 2.6).min(110.0);
             let views = [
-                camera(position - direction * 0.2 + aside * 0.3, position + direction * RANGE, wide),
-                camera(position + aside * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
-                camera(position + (direction + aside) * 0.4, position - direction, 100.0),
+                camera(position - direction * 0.2 + sideways * 0.3, position + direction * RANGE, wide),
+                camera(position + sideways * 2.0, ahead, (f64::from(degrees) * 6.0).min(90.0)),
+                camera(position + (direction + sideways) * 0.4, position - direction, 100.0),
             ];
             let counts = panel_scene
                 .expect(&mut fixture, &views)
@@ -148,11 +148,11 @@ fn hemispheres() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for direction in directions() {
         let position = DVec3::new(0.11, -0.23, 0.17);
-        let aside = direction.any_orthonormal_vector();
+        let sideways = direction.any_orthonormal_vector();
         let views = [
             camera(position - direction * 0.3, position + direction, 110.0),
-            camera(position + direction * 2.0, position + aside, 100.0),
-            camera(position - aside, position - direction + aside * 4.0, 100.0),
+            camera(position + direction * 2.0, position + sideways, 100.0),
+            camera(position - sideways, position - direction + sideways * 4.0, 100.0),
         ];
         let counts = room(hemisphere(position, direction)).expect(&mut fixture, &views)?;
         expect_lit(counts, 0.15).map_err(|failed| with_direction(failed, 90.0, direction))?;
@@ -167,11 +167,11 @@ fn spheres() -> Result<(), Failed> {
         let position = DVec3::new(0.3, 0.1, -0.2);
         let wall = Panel::facing(position - direction * 0.05, direction, 3.0 * RANGE);
         let panel_scene = PanelScene::new(vec![wall], vec![point(position)]);
-        let aside = direction.any_orthonormal_vector();
+        let sideways = direction.any_orthonormal_vector();
         let views = [
             camera(position + direction * 12.0, position, 45.0),
-            camera(position + (direction + aside * 2.0) * 3.0, position, 70.0),
-            camera(position + (direction * 0.1 - aside) * 3.0, position, 100.0),
+            camera(position + (direction + sideways * 2.0) * 3.0, position, 70.0),
+            camera(position + (direction * 0.1 - sideways) * 3.0, position, 100.0),
         ];
         expect_lit(panel_scene.expect(&mut fixture, &views)?, 0.2)?;
     }

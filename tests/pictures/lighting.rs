@@ -73,12 +73,12 @@ fn point() -> Result<(), Failed> {
 
 fn spot() -> Result<(), Failed> {
     let share = windowed(2.0, 20.0);
-    for (aside, lit) in [(0.0, 1.0), (0.2, 1.0), (0.35, 0.5), (0.45, 0.0), (3.0, 0.0)] {
+    for (angle, lit) in [(0.0, 1.0), (0.2, 1.0), (0.35, 0.5), (0.45, 0.0), (3.0, 0.0)] {
         // The axis is turned away from the wall's centre by this angle.
         let (inner, outer) = (0.3_f32, 0.4_f32);
         let light = Light::Spot {
             position: DVec3::Z * 2.0,
-            direction: Vec3::new((aside as f32).sin(), 0.0, -(aside as f32).cos()),
+            direction: Vec3::new((angle as f32).sin(), 0.0, -(angle as f32).cos()),
             intensity: Vec3::splat(6.0),
             range: 20.0,
             inner_angle: inner,
@@ -86,7 +86,7 @@ fn spot() -> Result<(), Failed> {
             casts_shadow: false,
         };
         let fade = if lit == 0.5 {
-            let along = f64::from((aside as f32).cos());
+            let along = f64::from((angle as f32).cos());
             let step = (along - f64::from(outer.cos())) / f64::from(inner.cos() - outer.cos());
             step * step * (3.0 - 2.0 * step)
         } else {

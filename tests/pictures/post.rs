@@ -165,9 +165,9 @@ fn slanted_edge() -> Result<(), Failed> {
     Ok(())
 }
 
-fn unchanged(what: &str, (before, after): (Picture, Picture)) -> Result<(), Failed> {
+fn unchanged(context: &str, (before, after): (Picture, Picture)) -> Result<(), Failed> {
     let changed = before.bytes.chunks(4).zip(after.bytes.chunks(4)).position(|(before, after)| before != after);
-    changed.map_or(Ok(()), |first| Err(format!("{what}: pixel {first} changed").into()))
+    changed.map_or(Ok(()), |first| Err(format!("{context}: pixel {first} changed").into()))
 }
 
 fn straight_edges() -> Result<(), Failed> {
@@ -179,12 +179,12 @@ fn straight_edges() -> Result<(), Failed> {
 
 fn no_contrast() -> Result<(), Failed> {
     // Without thresholds every pixel is processed.
-    let unrestrained = Fxaa { contrast_threshold: 0.0, dark_threshold: 0.0, sub_pixel: 1.0 };
+    let without_thresholds = Fxaa { contrast_threshold: 0.0, dark_threshold: 0.0, sub_pixel: 1.0 };
     for value in 0..=255 {
         let decoded = f64::from(value) / 255.0;
         let linear = if decoded <= 0.040_45 { decoded / 12.92 } else { ((decoded + 0.055) / 1.055).powf(2.4) };
         let numbers = [linear as f32, 0.3, 1.0 - linear as f32, 0.6];
-        let pair = smoothed([3, 2], unrestrained, "return numbers;", numbers)?;
+        let pair = smoothed([3, 2], without_thresholds, "return numbers;", numbers)?;
         assert_color([pixel(&pair.0, 0, 0)[0]; 3], [value; 3])?;
         unchanged(&format!("flat {value}"), pair)?;
     }

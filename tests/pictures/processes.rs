@@ -441,8 +441,8 @@ fn refused_pass() -> Result<(), Failed> {
     let fixture = Fixture::with(2, |builder| builder.process(first_writer).process(refused).output("tail"))?;
     expect_named(&error_of(fixture)?, "ouroboros", "finish")?;
 
-    let nonsense = RawProcess { action: Action::InvalidCopy };
-    let fixture = Fixture::with(2, |builder| builder.process(nonsense).output("raw"))?;
+    let invalid = RawProcess { action: Action::InvalidCopy };
+    let fixture = Fixture::with(2, |builder| builder.process(invalid).output("raw"))?;
     expect_named(&error_of(fixture)?, "raw process", "refused")
 }
 

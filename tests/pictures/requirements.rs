@@ -79,34 +79,40 @@ fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
 
 /// Checks a scene without a feature. Its cost and its picture must equal those of a bare pipeline without a process for the
 /// feature, and its cost must be lower than that of the scene with everything, by `saved`.
-fn expect_saved(full: &(Cost, Picture), what: &str, scene: &Scene, bare: Deferred, saved: Cost) -> Result<(), Failed> {
+fn expect_saved(
+    full: &(Cost, Picture),
+    context: &str,
+    scene: &Scene,
+    bare: Deferred,
+    saved: Cost,
+) -> Result<(), Failed> {
     let (cost, picture) = drawn(deferred(), scene)?;
     let (bare_cost, bare_picture) = drawn(bare, scene)?;
     if cost != bare_cost {
-        return Err(format!("{what}: {cost:?}, where a pipeline without it has {bare_cost:?}").into());
+        return Err(format!("{context}: {cost:?}, where a pipeline without it has {bare_cost:?}").into());
     }
     if picture != bare_picture {
-        return Err(format!("{what}: a pipeline without it draws another picture").into());
+        return Err(format!("{context}: a pipeline without it draws another picture").into());
     }
     if full.0.minus(cost) != saved {
-        return Err(format!("{what}: {:?} is saved, and should be {saved:?}", full.0.minus(cost)).into());
+        return Err(format!("{context}: {:?} is saved, and should be {saved:?}", full.0.minus(cost)).into());
     }
-    expect_changed(what, &full.1, &picture)
+    expect_changed(context, &full.1, &picture)
 }
 
 /// Fails if two pictures differ by no more than rounding.
-fn expect_changed(what: &str, one: &Picture, other: &Picture) -> Result<(), Failed> {
+fn expect_changed(context: &str, one: &Picture, other: &Picture) -> Result<(), Failed> {
     let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
     let differ = |one: &[u8], other: &[u8]| one.iter().zip(other).any(|(one, other)| one.abs_diff(*other) > 8);
     let changed = pixels.filter(|(one, other)| differ(one, other)).count();
-    if changed >= 20 { Ok(()) } else { Err(format!("{what}: only {changed} pixels change").into()) }
+    if changed >= 20 { Ok(()) } else { Err(format!("{context}: only {changed} pixels change").into()) }
 }
 
-fn expect_same(what: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Result<(), Failed> {
+fn expect_same(context: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Result<(), Failed> {
     if one.0 != other.0 {
-        return Err(format!("{what}: {:?} should be {:?}", one.0, other.0).into());
+        return Err(format!("{context}: {:?} should be {:?}", one.0, other.0).into());
     }
-    if one.1 == other.1 { Ok(()) } else { Err(format!("{what}: the picture differs").into()) }
+    if one.1 == other.1 { Ok(()) } else { Err(format!("{context}: the picture differs").into()) }
 }
 
 /// Every class of lights.
@@ -337,36 +343,36 @@ fn cached_plans() -> Result<(), Failed> {
     let mut scene = everything();
     let mut pictures = Vec::new();
     let mut pipelines = 0;
-    for (what, plans, new_pipelines, change) in STEPS {
+    for (context, plans, new_pipelines, change) in STEPS {
         change(&mut scene)?;
         let picture = fixture.draw(&scene)?;
         if fixture.renderer.plan_count() != *plans {
-            return Err(format!("{what}: {} plans should be {plans}", fixture.renderer.plan_count()).into());
+            return Err(format!("{context}: {} plans should be {plans}", fixture.renderer.plan_count()).into());
         }
         let kept = fixture.renderer.backend().resources();
         pipelines += new_pipelines;
         if kept.pipelines != pipelines {
-            return Err(format!("{what}: {} pipelines should be {pipelines}", kept.pipelines).into());
+            return Err(format!("{context}: {} pipelines should be {pipelines}", kept.pipelines).into());
         }
         let (fresh, fresh_picture) = drawn(deferred(), &scene)?;
         if picture != fresh_picture {
-            return Err(format!("{what}: a new renderer draws another picture").into());
+            return Err(format!("{context}: a new renderer draws another picture").into());
         }
         // The backend keeps up to twice as many shadow maps as are drawn.
         let max_bytes = fresh.target_bytes + fresh.shadow_views * BYTES_OF_A_MAP;
         if kept.targets as i64 != fresh.targets
             || !(fresh.target_bytes..=max_bytes).contains(&(kept.target_bytes as i64))
         {
-            return Err(format!("{what}: {kept:?}, where a new renderer has {fresh:?}").into());
+            return Err(format!("{context}: {kept:?}, where a new renderer has {fresh:?}").into());
         }
         pictures.push(picture);
     }
     let kept = |fixture: &Fixture| (fixture.renderer.plan_count(), fixture.renderer.backend().resources().pipelines);
     let before = kept(&fixture);
-    for ((what, .., change), before) in STEPS.iter().zip(&pictures) {
+    for ((context, .., change), before) in STEPS.iter().zip(&pictures) {
         change(&mut scene)?;
         if fixture.draw(&scene)? != *before {
-            return Err(format!("{what}: the second time, the picture differs").into());
+            return Err(format!("{context}: the second time, the picture differs").into());
         }
     }
     if kept(&fixture) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&fixture)).into()) }

@@ -51,8 +51,8 @@ fn slope(
     let [cosine, sine] = [off_axis.to_radians().cos(), off_axis.to_radians().sin()];
     let direction = axis * cosine + (right * 0.8 + right.cross(axis) * 0.6) * sine;
     let right = (right - direction * right.dot(direction)).normalize();
-    let aside = right * turn.cos() + right.cross(direction) * turn.sin();
-    let normal = -direction * slope.to_radians().cos() + aside * slope.to_radians().sin();
+    let tangent = right * turn.cos() + right.cross(direction) * turn.sin();
+    let normal = -direction * slope.to_radians().cos() + tangent * slope.to_radians().sin();
     let center = position + direction * distance;
     let panel = Panel::facing(center, normal, distance * 0.2);
     let projection = Projection::Perspective { field_of_view: 0.7 };
@@ -211,11 +211,12 @@ fn close_to_a_wall() -> Result<(), Failed> {
             let lit = (0..width).rev().find(|x| found[middle + *x as usize][0] > 0.0);
             let lit = lit.ok_or("nothing is lit")?;
             let away = ((f64::from(lit) + 0.5) / f64::from(width) * 2.0 - 1.0) * half_width / pixel;
-            let most = f64::from(filter) + 1.5;
-            if !(0.0..=most).contains(&away) {
-                return Err(
-                    format!("at {degrees} degrees it is {away} pixels to the shadow, and {most} is the most").into()
-                );
+            let max = f64::from(filter) + 1.5;
+            if !(0.0..=max).contains(&away) {
+                return Err(format!(
+                    "at {degrees} degrees the shadow begins {away} pixels away, instead of at most {max}"
+                )
+                .into());
             }
         }
     }

@@ -247,8 +247,8 @@ fn map_ray(map: &Camera, x: f64, y: f64) -> Option<(DVec3, DVec3)> {
         // The half space as a disc: a direction at an angle of φ from the axis is at tan(φ/2).
         _ => {
             let angle = 2.0 * clip.length().atan();
-            let aside = clip.normalize_or(DVec2::X) * angle.sin();
-            (clip.length() < 1.0).then_some((DVec3::ZERO, aside.extend(-angle.cos())))?
+            let offset = clip.normalize_or(DVec2::X) * angle.sin();
+            (clip.length() < 1.0).then_some((DVec3::ZERO, offset.extend(-angle.cos())))?
         }
     };
     Some((map.position + orientation * from, orientation * along))

@@ -1,4 +1,4 @@
-//! Shadows lie where ray casting finds them, to within the filter and a pixel of the map.
+//! Shadows are where ray casting finds them, to within the filter and a pixel of the map.
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -91,8 +91,8 @@ fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
     if enough && sure { Ok(()) } else { Err(format!("too few pixels to compare: {counts:?}").into()) }
 }
 
-pub fn with_context(failed: Failed, what: impl std::fmt::Display) -> Failed {
-    format!("{what}: {}", failed.message().unwrap_or("")).into()
+pub fn with_context(failed: Failed, context: impl std::fmt::Display) -> Failed {
+    format!("{context}: {}", failed.message().unwrap_or("")).into()
 }
 
 /// The six axes, and two directions between them.
@@ -107,18 +107,18 @@ fn square_occluder() -> Result<(), Failed> {
         let mut fixture = fixture_with(maps)?;
         // The filter does not depend on the direction.
         for up in directions().skip(if filter == 1 { 0 } else { 7 }) {
-            let aside = up.any_orthonormal_vector();
-            let across = up.cross(aside);
+            let sideways = up.any_orthonormal_vector();
+            let across = up.cross(sideways);
             let floor = Panel::facing(DVec3::ZERO, up, 6.0);
             let mut square = Panel::facing(up * 1.2, up, 0.7).double_sided();
             // Neither along the map's axes nor across them.
             (square.right, square.up) = (square.right + square.up * 0.3, square.up - square.right * 0.3);
-            let position = up * 3.0 + aside * 0.7 + across * 0.4;
-            let down = (-up - aside * 0.2).normalize();
-            let eye = up * 4.0 - aside * 3.0 + across * 2.0;
+            let position = up * 3.0 + sideways * 0.7 + across * 0.4;
+            let down = (-up - sideways * 0.2).normalize();
+            let eye = up * 4.0 - sideways * 3.0 + across * 2.0;
             for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
                 let panel_scene = panel_scene(vec![floor, square], vec![light], maps);
-                let view = camera(eye, aside * -0.5, 50.0);
+                let view = camera(eye, sideways * -0.5, 50.0);
                 let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, up))?;
                 if filter == 1 {
                     expect(counts, 0.4, 0.01).map_err(|failed| with_context(failed, format!("{light:?}")))?;
@@ -132,8 +132,8 @@ fn square_occluder() -> Result<(), Failed> {
 /// A direction at an angle from `axis`, rotated by `around` about it.
 fn tilted(axis: DVec3, degrees: f64, around: f64) -> DVec3 {
     let right = axis.any_orthonormal_vector();
-    let aside = right * around.cos() + axis.cross(right) * around.sin();
-    axis * degrees.to_radians().cos() + aside * degrees.to_radians().sin()
+    let sideways = right * around.cos() + axis.cross(right) * around.sin();
+    axis * degrees.to_radians().cos() + sideways * degrees.to_radians().sin()
 }
 
 fn around_a_hemisphere() -> Result<(), Failed> {
@@ -145,11 +145,11 @@ fn around_a_hemisphere() -> Result<(), Failed> {
             let wall = Panel::facing(position + direction * 2.5, -direction, 1.5);
             let square = Panel::facing(position + direction, -direction, 0.2).double_sided();
             let panel_scene = panel_scene(vec![wall, square], vec![hemisphere(position, axis)], MAPS);
-            let aside = direction.cross(axis).normalize_or(direction.any_orthonormal_vector());
-            let view = camera(position + aside * 0.8, wall.center, 40.0);
-            let what = format!("{degrees} degrees from {axis}");
-            let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &what))?;
-            expect(counts, 0.3, 0.05).map_err(|failed| with_context(failed, &what))?;
+            let sideways = direction.cross(axis).normalize_or(direction.any_orthonormal_vector());
+            let view = camera(position + sideways * 0.8, wall.center, 40.0);
+            let context = format!("{degrees} degrees from {axis}");
+            let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &context))?;
+            expect(counts, 0.3, 0.05).map_err(|failed| with_context(failed, &context))?;
         }
     }
     Ok(())
@@ -211,10 +211,10 @@ fn across_the_rim() -> Result<(), Failed> {
                 camera(position - away * 0.2, position + axis * 3.0, 90.0),
                 camera(position - away * 2.0, position + axis + away, 90.0),
             ];
-            let what = format!("{turn} degrees from {axis}, {distance} m away");
-            let counts = panel_scene.expect(&mut fixture, &views).map_err(|failed| with_context(failed, &what))?;
+            let context = format!("{turn} degrees from {axis}, {distance} m away");
+            let counts = panel_scene.expect(&mut fixture, &views).map_err(|failed| with_context(failed, &context))?;
             if counts.lit < 500 {
-                return Err(format!("{what}: too few pixels to compare: {counts:?}").into());
+                return Err(format!("{context}: too few pixels to compare: {counts:?}").into());
             }
         }
     }
@@ -235,10 +235,11 @@ fn close_behind() -> Result<(), Failed> {
                 panels.push(slab);
                 let panel_scene = panel_scene(panels, vec![hemisphere(position, axis)], MAPS);
                 let view = camera(position + axis * 0.5, position + axis * 3.0, 90.0);
-                let what = format!("{turn} degrees from {axis}, {distance} m away");
-                let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &what))?;
+                let context = format!("{turn} degrees from {axis}, {distance} m away");
+                let counts =
+                    panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, &context))?;
                 if counts.lit < 500 {
-                    return Err(format!("{what}: too few pixels to compare: {counts:?}").into());
+                    return Err(format!("{context}: too few pixels to compare: {counts:?}").into());
                 }
             }
         }

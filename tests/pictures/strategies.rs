@@ -277,8 +277,8 @@ pub fn counts(fixture: &Fixture, is_counted: impl Fn(&WgpuPassStatistics) -> boo
         .fold((0, 0), |(recorded, replayed), pass| (recorded + pass.recorded_bundles, replayed + pass.replayed_bundles))
 }
 
-pub fn expect(condition: bool, what: impl Fn() -> String) -> Result<(), Failed> {
-    if condition { Ok(()) } else { Err(what().into()) }
+pub fn expect(condition: bool, message: impl Fn() -> String) -> Result<(), Failed> {
+    if condition { Ok(()) } else { Err(message().into()) }
 }
 
 fn moving() -> Result<(), Failed> {

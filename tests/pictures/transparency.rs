@@ -78,21 +78,21 @@ fn middle(radiance: &Picture) -> [f64; 3] {
 }
 
 /// Fails if the picture's centre is not the tone-mapped radiance, computed in f64.
-fn expect(what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
+fn expect(context: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
     // The relative error of a half float is at most 2⁻¹⁰, and those of the last few blends add up.
-    expect_within(2e-3, what, drawn, expected)
+    expect_within(2e-3, context, drawn, expected)
 }
 
 /// The same with the greatest error of the radiance, as a fraction of the radiance or of one quarter.
-fn expect_within(share: f64, what: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
+fn expect_within(share: f64, context: &str, drawn: &(Picture, Picture), expected: [f64; 3]) -> Result<(), Failed> {
     let found = middle(&drawn.0);
     let close = |(found, expected): (&f64, f64)| (found - expected).abs() <= share * expected.abs().max(0.25);
     if !found.iter().zip(expected).all(close) {
-        return Err(format!("{what}: radiance {found:?} should be {expected:?}").into());
+        return Err(format!("{context}: radiance {found:?} should be {expected:?}").into());
     }
     let shown = expected.map(|radiance| radiance.max(0.0));
     assert_color(pixel(&drawn.1, SIDE / 2, SIDE / 2), tone_mapped(shown))
-        .map_err(|failed| format!("{what}: {}", failed.message().unwrap_or_default()).into())
+        .map_err(|failed| format!("{context}: {}", failed.message().unwrap_or_default()).into())
 }
 
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
@@ -258,8 +258,8 @@ fn lit_on_the_visible_side() -> Result<(), Failed> {
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0 * eye, DVec3::ZERO), [SIDE; 2])];
         scene.lights = vec![Light::Point { position: DVec3::Z * 2.0 * lamp, intensity: Vec3::splat(4.0), range: 8.0 }];
         let expected = expected.map_or(BACKGROUND.as_dvec3().to_array(), |radiance| [radiance; 3]);
-        let what = format!("viewed from {eye}, lit from {lamp}, double-sided: {double_sided}");
-        expect(&what, &drawn(&mut fixture, &scene)?, expected)?;
+        let context = format!("viewed from {eye}, lit from {lamp}, double-sided: {double_sided}");
+        expect(&context, &drawn(&mut fixture, &scene)?, expected)?;
     }
     Ok(())
 }

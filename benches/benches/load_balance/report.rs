@@ -209,8 +209,8 @@ impl Report {
         println!("Targets and results on noop with two workers\n");
         let mut table = Table::new(&["figure", "scene", "target", "reached"]);
         let mut target_row = |what: &str, scene: &str, target: f64, reached: f64| {
-            let verdict = if reached >= target { "" } else { ", short" };
-            table.row([what.to_owned(), scene.to_owned(), format!("{target:.2}"), format!("{reached:.3}{verdict}")]);
+            let note = if reached >= target { "" } else { ", short" };
+            table.row([what.to_owned(), scene.to_owned(), format!("{target:.2}"), format!("{reached:.3}{note}")]);
         };
         let has_target = |row: &&Row| {
             row.backend == BackendName::Noop && row.workers == 2 && row.mode == "adaptive" && !row.predicted

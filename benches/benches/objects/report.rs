@@ -84,8 +84,8 @@ impl Report {
         println!("Targets and results on noop, without instancing\n");
         let mut table = Table::new(&["figure", "objects", "bound", "reached"]);
         let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
-            let verdict = if is_reached { "" } else { ", short" };
-            table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{verdict}")]);
+            let note = if is_reached { "" } else { ", short" };
+            table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{note}")]);
         };
         for row in self.scenarios.iter().filter(|row| row.backend == BackendName::Noop && !row.instancing) {
             let target = match row.objects {

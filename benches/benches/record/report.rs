@@ -78,14 +78,14 @@ impl Report {
         let Some(noop) = self.measured.iter().find(|measured| measured.backend == BackendName::Noop) else { return };
         let two = noop.rows.iter().find(|row| (row.technique, row.workers) == ("drawloom", 2));
         let of_naive = two.map_or(f64::NAN, |two| two.speed_up_over_naive);
-        println!("On noop: what is to be reached, and what was\n");
-        let mut table = Table::new(&["what", "at least", "reached"]);
-        for (what, least, reached) in [
+        println!("Targets and results on noop\n");
+        let mut table = Table::new(&["figure", "target", "reached"]);
+        for (figure, target, reached) in [
             ("naive, of drawloom with 2 workers", 20.0, of_naive),
             ("drawloom with 1 worker, of 2", 1.8, noop.speed_ups[0]),
         ] {
-            let verdict = if reached >= least { "" } else { ", short" };
-            table.row([what.to_owned(), format!("{least:.1}"), format!("{reached:.2}{verdict}")]);
+            let note = if reached >= target { "" } else { ", short" };
+            table.row([figure.to_owned(), format!("{target:.1}"), format!("{reached:.2}{note}")]);
         }
         table.print();
     }

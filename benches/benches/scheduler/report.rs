@@ -89,8 +89,8 @@ impl Report {
         };
         let target = ideal + 1.5 * wake;
         println!("frame_cold: a wake takes {wake:.1} µs (row wake, drawloom); ideal + 1.5 wakes = {target:.1} µs");
-        let ours = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
-        for Line { executor, median, .. } in ours {
+        let own_lines = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
+        for Line { executor, median, .. } in own_lines {
             println!("frame_cold: {executor} takes {:+.1} µs against that", median - target);
         }
         println!();

@@ -76,7 +76,7 @@ impl Timed {
         if is_on {
             timeline.start();
         }
-        // What a worker's ring has room for, less a quarter for its idle times.
+        // The capacity of a worker's ring, less a quarter for its idle times.
         let max_frames = ((1 << 16) * 3 / 4 / self.chunks).max(1);
         let (start, mut frames) = (Instant::now(), 0);
         while frames < max_frames && start.elapsed() < RUN {

@@ -29,9 +29,9 @@ pub struct TimedFigures {
     pub chunks: usize,
     /// A frame with the recorder off.
     pub frame: f64,
-    /// What recording adds to a chunk: the difference of the frame times, times the workers, divided by the chunks.
+    /// The cost of recording per chunk: the difference of the frame times, times the workers, divided by the chunks.
     pub a_chunk: f64,
-    /// What recording adds to the frame, as a share.
+    /// The share of the frame time that recording adds.
     pub share: f64,
 }
 

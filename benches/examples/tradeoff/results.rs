@@ -34,7 +34,7 @@ pub struct Entry {
     pub metric: String,
     /// The bound of the error, if known.
     pub bound: Option<f64>,
-    /// What the error is measured against.
+    /// The oracle that the error is measured against.
     pub oracle: String,
     /// Distance of the picture from that of `Quality::exact`: 0 to 1.
     pub rmse: f64,

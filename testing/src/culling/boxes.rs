@@ -10,7 +10,7 @@ use drawloom::scene::{Bounds, Material, Mesh, Scene, SceneError, SceneRef, Topol
 use drawloom::view::{FixedPosition, Frustum, ObjectTable};
 
 use super::cameras::{any_camera, magnitude};
-use super::oracle::{Oracle, Verdict};
+use super::oracle::{Classification, Oracle};
 use super::spheres::{any_along, any_aside, any_planes};
 use super::tally::Tallies;
 use crate::random::Random;
@@ -102,10 +102,10 @@ impl Objects {
 #[derive(Clone, Copy)]
 struct Case {
     is_tangent: bool,
-    /// The verdict on the object itself: its mesh's box.
-    object: Verdict,
+    /// The classification of the object itself, by its mesh's box.
+    object: Classification,
     /// The verdicts on the tested volumes. A volume contains the object, so it is `Outside` only if the object is.
-    volumes: [Verdict; 3],
+    volumes: [Classification; 3],
 }
 
 /// Tests one camera with [`ObjectTable::BLOCK_SIZE`] objects for each number of `batches`.
@@ -133,12 +133,12 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
                 let visible = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);
                 for (bit, case) in cases[first..][..Frustum::WORD].iter().enumerate() {
                     // It must be visible if the object is inside, and may be culled if its volume is outside.
-                    let verdict = match (case.object, case.volumes[volume]) {
-                        (Verdict::Inside, _) => Verdict::Inside,
-                        (_, Verdict::Outside) => Verdict::Outside,
-                        _ => Verdict::Touching,
+                    let classification = match (case.object, case.volumes[volume]) {
+                        (Classification::Inside, _) => Classification::Inside,
+                        (_, Classification::Outside) => Classification::Outside,
+                        _ => Classification::Touching,
                     };
-                    tallies.volumes[volume].of(case.is_tangent).count(verdict, visible >> bit & 1 == 1);
+                    tallies.volumes[volume].of(case.is_tangent).count(classification, visible >> bit & 1 == 1);
                 }
             }
         }
@@ -187,12 +187,12 @@ impl Objects {
         let sphere = around(&|_| radius);
         let half = solid.half_axes.iter().fold(DVec3::ZERO, |half, axis| half + axis.abs());
         // The sphere is tested first: an object is outside of a plane if either volume is.
-        let either = |verdict| if sphere == Verdict::Outside { sphere } else { verdict };
+        let either = |classification| if sphere == Classification::Outside { sphere } else { classification };
         let world = either(around(&|normal| normal.abs().dot(half)));
         let mut volumes = [sphere, world, either(object)];
         if has_own_bounds {
             // The oracle does not know how much larger the engine's bounds are.
-            volumes = [Verdict::Touching; 3];
+            volumes = [Classification::Touching; 3];
         }
 
         self.positions.push(position);

@@ -16,7 +16,7 @@ pub struct Oracle {
     far: f64,
 }
 
-/// Two opposite edges of the picture. Points with `sine · along + offset ≥ cosine · |aside|` are between them.
+/// Two opposite edges of the picture. Points with `sine · along + offset ≥ cosine · |across|` are between them.
 struct Edge {
     sine: f64,
     cosine: f64,
@@ -25,7 +25,7 @@ struct Edge {
 
 /// The position of a bounding volume relative to the frustum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Classification {
     /// A part of it is inside of every plane.
     Inside,
     /// All of it is outside of a plane.
@@ -76,30 +76,30 @@ impl Oracle {
     /// The distance of a point relative to the camera from each plane, positive inside.
     pub fn depths(&self, point: DVec3) -> [f64; 6] {
         let local = self.axes.transpose() * point;
-        let depth = |edge: &Edge, aside: f64| edge.sine * local.z - edge.cosine * aside + edge.offset;
+        let depth = |edge: &Edge, across: f64| edge.sine * local.z - edge.cosine * across + edge.offset;
         let [sides, ends] = &self.edges;
-        let [right, left] = [local.x, -local.x].map(|aside| depth(sides, aside));
-        let [upper, lower] = [local.y, -local.y].map(|aside| depth(ends, aside));
+        let [right, left] = [local.x, -local.x].map(|across| depth(sides, across));
+        let [upper, lower] = [local.y, -local.y].map(|across| depth(ends, across));
         [right, left, upper, lower, local.z - self.near, self.far - local.z]
     }
 
     /// Classifies a volume around a point relative to the camera. `reaches` is its extent towards each plane, `size` that in any direction.
-    pub fn classify(&self, center: DVec3, reaches: [f64; 6], size: f64) -> Verdict {
+    pub fn classify(&self, center: DVec3, reaches: [f64; 6], size: f64) -> Classification {
         let offsets = [self.edges[0].offset, self.edges[1].offset, self.near, self.far];
         let known = offsets.map(|offset| if offset.is_finite() { offset.abs() } else { 0.0 });
         let error = 1e-14 * (center.abs().element_sum() + size + known.iter().fold(0.0, |max, &one| one.max(max)));
         let depths = self.depths(center);
         let min = depths.iter().zip(reaches).map(|(depth, reach)| depth + reach).fold(f64::INFINITY, f64::min);
         match min {
-            _ if min > error => Verdict::Inside,
-            _ if min < -error => Verdict::Outside,
-            _ => Verdict::Touching,
+            _ if min > error => Classification::Inside,
+            _ if min < -error => Classification::Outside,
+            _ => Classification::Touching,
         }
     }
 
     /// A point relative to the camera, at a distance of `reaches` outside of the selected planes. No two of them may be
-    /// opposite. `along` and `aside` give the other coordinates, the latter as fractions of the picture.
-    pub fn touching(&self, selected: [bool; 6], reaches: [f64; 6], along: f64, aside: [f64; 2]) -> DVec3 {
+    /// opposite. `along` and `across` give the other coordinates, the latter as fractions of the picture.
+    pub fn touching(&self, selected: [bool; 6], reaches: [f64; 6], along: f64, across: [f64; 2]) -> DVec3 {
         let along = match selected {
             [.., true, _] if self.near.is_finite() => self.near - reaches[4],
             [.., true] if self.far.is_finite() => self.far + reaches[5],
@@ -111,7 +111,7 @@ impl Oracle {
             match [selected[pair * 2], selected[pair * 2 + 1]] {
                 [true, _] => (middle + reaches[pair * 2]) / edge.cosine,
                 [_, true] => -(middle + reaches[pair * 2 + 1]) / edge.cosine,
-                _ => aside[pair] * middle / edge.cosine,
+                _ => across[pair] * middle / edge.cosine,
             }
         };
         self.axes * DVec3::new(across(0), across(1), along)

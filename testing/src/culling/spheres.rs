@@ -6,7 +6,7 @@ use drawloom::view::{BoundingSphere, BoundingSpheres, Frustum};
 
 use super::cameras::{any_camera, magnitude};
 use super::naive::Naive;
-use super::oracle::{Oracle, Verdict};
+use super::oracle::{Classification, Oracle};
 use super::tally::Tallies;
 use crate::random::Random;
 
@@ -32,7 +32,7 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
         let mut random = Random::stream(batch as u64);
         let camera = any_camera(&mut random);
         let (oracle, frustum, naive) = (Oracle::new(&camera), Frustum::new(&camera), Naive::new(&camera));
-        let mut cases = [(false, Verdict::Touching); BoundingSpheres::COUNT];
+        let mut cases = [(false, Classification::Touching); BoundingSpheres::COUNT];
         for (entry, case) in cases.iter_mut().enumerate() {
             let is_tangent = entry % 4 != 0;
             let bounds = if is_tangent { tangent(&oracle, &mut random) } else { anywhere(&oracle, &mut random) };
@@ -42,14 +42,14 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
         }
         for first in (0..BoundingSpheres::COUNT).step_by(Frustum::WORD) {
             let visible = frustum.intersects_spheres(&spheres, first);
-            for (bit, &(is_tangent, verdict)) in cases[first..][..Frustum::WORD].iter().enumerate() {
-                tallies.drawloom.of(is_tangent).count(verdict, visible >> bit & 1 == 1);
+            for (bit, &(is_tangent, classification)) in cases[first..][..Frustum::WORD].iter().enumerate() {
+                tallies.drawloom.of(is_tangent).count(classification, visible >> bit & 1 == 1);
             }
         }
         if let Some(naive) = naive {
-            for (entry, &(is_tangent, verdict)) in cases.iter().enumerate() {
+            for (entry, &(is_tangent, classification)) in cases.iter().enumerate() {
                 let BoundingSphere { center, radius } = spheres.get(entry);
-                tallies.naive.of(is_tangent).count(verdict, naive.sees_in_world(center, radius));
+                tallies.naive.of(is_tangent).count(classification, naive.sees_in_world(center, radius));
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::oracle::Verdict;
+use super::oracle::Classification;
 
 /// How often a test was wrong.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -17,11 +17,11 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub fn count(&mut self, verdict: Verdict, is_visible: bool) {
+    pub fn count(&mut self, classification: Classification, is_visible: bool) {
         self.cases += 1;
-        self.false_culls += u64::from(verdict == Verdict::Inside && !is_visible);
-        self.outside += u64::from(verdict == Verdict::Outside);
-        self.false_visibles += u64::from(verdict == Verdict::Outside && is_visible);
+        self.false_culls += u64::from(classification == Classification::Inside && !is_visible);
+        self.outside += u64::from(classification == Classification::Outside);
+        self.false_visibles += u64::from(classification == Classification::Outside && is_visible);
     }
 
     pub fn add(&mut self, other: &Self) {
