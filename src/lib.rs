@@ -5,18 +5,20 @@
 //! author expects; it is right at the extremes; it is fast; it is pleasant to read; it is small.
 //!
 //! ```text
-//!  Scene (read-only while a frame is produced)                                        scene
-//!    │  views        one a camera: "everything is a camera"                           view
+//!  scene (read-only while a frame is recorded)                                        scene
+//!    │  views        one per camera: "everything is a camera"                         view
+//!    ▼
+//!  objects           checked, described and uploaded once     parallel over objects   view
 //!    ▼
 //!  visibility        per view: which objects it sees          parallel over objects   view
 //!    ▼
-//!  fill              per view: a command for each of them     parallel over chunks    view
+//!  fill              per pass: a command for each of them     parallel over objects   view
 //!    ▼
-//!  sort → instance   by key; equal runs become one draw       parallel over buckets   command
+//!  sort → instance   by key; equal commands become one draw   parallel over buckets   command
 //!    ▼
-//!  record            batches into passes, or bundles first    parallel over chunks    backend
+//!  record            batches into passes, or bundles first    parallel over parts     backend
 //!    ▼
-//!  per-camera queue  finished passes in order, one queue a view
+//!  view queues       finished passes in order, one per view
 //!    ▼
 //!  submit            the device thread alone
 //! ```

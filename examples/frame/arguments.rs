@@ -110,7 +110,6 @@ pub enum StrategyName {
     /// Into bundles, on all workers.
     Bundles,
     /// Into bundles that are cached from frame to frame.
-    #[value(name = "kept")]
     Cached,
     /// With indirect draws, which not every adapter supports.
     Indirect,
@@ -122,7 +121,7 @@ impl StrategyName {
         match self {
             Self::Direct => "direct",
             Self::Bundles => "bundles",
-            Self::Cached => "kept",
+            Self::Cached => "cached",
             Self::Indirect => "indirect",
         }
     }

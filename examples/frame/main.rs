@@ -1,7 +1,7 @@
 //! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend draws it.
 //!
 //!     cargo run --release --example frame
-//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record kept --frames 100
+//!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record cached --frames 100
 //!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
 
 mod arguments;

@@ -17,7 +17,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     /// Whether equal commands become one instanced draw.
     pub(super) instancing: bool,
     pub(super) backend: &'a B,
-    pub(super) frame: &'a B::Frame,
+    pub(super) backend_frame: &'a B::Frame,
     /// One for each pass.
     pub(super) recordings: &'a [PassRecording<B>],
     pub(super) clock: &'a StageClock,
@@ -30,14 +30,14 @@ pub(super) struct FrameContext<'a, B: Backend> {
 }
 
 impl<B: Backend> FrameContext<'_, B> {
-    /// The index of a pass' view.
-    pub(super) fn view_of(&self, pass: usize) -> usize {
+    /// The index of a pass's view.
+    pub(super) fn view_index_of(&self, pass: usize) -> usize {
         self.request.passes[pass].view_index
     }
 
-    /// The number of objects that a pass' view sees.
+    /// The number of objects that a pass's view sees.
     pub(super) fn visible_count(&self, pass: usize) -> usize {
-        self.tables.visible[self.view_of(pass)].count()
+        self.tables.visible[self.view_index_of(pass)].count()
     }
 
     /// What the backend records of a pass.
@@ -47,17 +47,17 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// The number of parts that the backend records a pass in.
     pub(super) fn part_count(&self, pass: usize) -> usize {
-        self.backend.part_count(self.frame, &self.pass_request(pass, &self.tables.passes[pass].list.read()))
+        self.backend.part_count(self.backend_frame, &self.pass_request(pass, &self.tables.passes[pass].list.read()))
     }
 
     /// Whether a pass culls triangles of meshes that ask for it.
-    pub(super) fn culls_triangles_of(&self, pass: usize) -> bool {
-        self.culls_triangles && self.request.views[self.view_of(pass)].can_cull_triangles()
+    pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
+        self.culls_triangles && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 
     /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.
     pub(super) fn can_merge(&self, pass: usize, mesh: u32) -> bool {
-        self.instancing && !(self.culls_triangles_of(pass) && self.tables.cullable_meshes.contains(mesh))
+        self.instancing && !(self.pass_culls_triangles(pass) && self.tables.cullable_meshes.contains(mesh))
     }
 
     /// The number of a node's `width` items that make a job.

@@ -18,7 +18,7 @@ pub enum BuildError {
     #[error(transparent)]
     Quality(#[from] QualityError),
     /// [`Granularity::Chunk`](super::Granularity::Chunk) of 0.
-    #[error("a chunk of 0 draws makes no jobs")]
+    #[error("`Granularity::Chunk` must be at least 1")]
     EmptyChunk,
 }
 
@@ -40,7 +40,7 @@ pub enum FrameError {
         height: u32,
     },
     /// A view that no process draws.
-    #[error("no process draws views of kind {kind:?}, as view {view:?} is")]
+    #[error("view {view:?} has kind {kind:?}, which no process draws")]
     NoProcess {
         /// The view.
         view: String,
@@ -94,7 +94,7 @@ pub enum FrameError {
     #[error(transparent)]
     Job(#[from] JobPanic),
     /// The job graph has no order: a bug in Drawloom.
-    #[error("the frame's jobs have no order: {0}")]
+    #[error("the job graph has a cycle: {0}")]
     Jobs(GraphProblem),
 }
 

@@ -1,6 +1,6 @@
 //! How finely a frame is divided into jobs.
 
-/// The job size of every stage that can be divided: of the objects' stages, and of each view's and pass' visibility, fill, sort,
+/// The job size of every stage that can be divided: of the objects' stages, and of each view's and pass's visibility, fill, sort,
 /// instance, triangles and record (M 10.5, "Better Load Balancing"). It decides which worker does what, never the picture: bundles
 /// end at fixed batches, so every granularity draws the same bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -9,9 +9,9 @@ pub enum Granularity {
     /// to a change of it, within 30 frames.
     #[default]
     Adaptive,
-    /// One job a stage and view: M's first design.
+    /// One job per stage and camera, and one per stage for what all cameras share: M's first design.
     PerCamera,
-    /// One job a draw: M's "more advanced solution". Where the smallest item holds several draws, as a bundle does, one job an
+    /// One job per draw: M's "more advanced solution". Where the smallest item holds several draws, as a bundle does, one job per
     /// item.
     PerDraw,
     /// One job for this many objects or draws, rounded up to whole items. Not 0.

@@ -5,10 +5,13 @@ use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// The objects that may occlude others in a view, as the selections of the passes that draw them. `None` where no object may be
-/// removed because it could be seen through what is in front of it: where objects do not test the view's single depth target, test
-/// it before all occluders are drawn or after it is cleared again, or are drawn into other targets than the occluders. Shadow maps
-/// test nothing: they show objects that are hidden from elsewhere.
+/// The objects that may occlude others in a view, as the selections of the passes that draw them.
+///
+/// `None` where a hidden object could still be visible in the picture, so that no object may be removed:
+/// - in shadow maps, which show objects that are hidden from elsewhere;
+/// - where a pass draws without testing the view's single depth target;
+/// - where an object is tested before all occluders are drawn, or after the depth is cleared again;
+/// - where occluders are drawn into different colour targets.
 pub(super) fn occluders(
     plan: &FramePlan,
     draws: &[Draws<'_>],

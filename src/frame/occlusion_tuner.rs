@@ -15,7 +15,8 @@ pub(super) struct OcclusionTuner {
 impl OcclusionTuner {
     /// Frames of a trial with the test, and as many without. The first of each is not counted: caches are in the state of the other.
     const TRIAL_FRAMES: u32 = 3;
-    /// Frames from one trial to the next where the test is off; and where it is on, as trial frames without it are then the longer ones.
+    /// Frames from one trial to the next where the test is off, and where it is on. It is retried less often while it is on, because
+    /// trial frames without it are the slow ones.
     const RETRIAL_FRAMES_OFF: u32 = 60;
     const RETRIAL_FRAMES_ON: u32 = 600;
 

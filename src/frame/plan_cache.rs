@@ -66,7 +66,7 @@ impl PlanCache {
     /// If the processes make no frame.
     pub(super) fn select(&mut self, lights: &[Light], assets: &Assets) -> Result<Arc<FramePlan>, PlanError> {
         if let Some(deferred) = &self.deferred {
-            let requirements = Requirements::of(lights, assets, self.shades_shadowed_lights_apart());
+            let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights());
             self.current = match self.compiled.get(&requirements) {
                 Some(plan) => Arc::clone(plan),
                 None => {
@@ -86,7 +86,7 @@ impl PlanCache {
     }
 
     /// Whether processes of their own draw the lights that cast shadows.
-    pub(super) fn shades_shadowed_lights_apart(&self) -> bool {
+    pub(super) fn separates_shadowed_lights(&self) -> bool {
         match &self.deferred {
             Some(deferred) => deferred.maps().is_some(),
             None => self.current.draws_views(ViewKind::Shadow),

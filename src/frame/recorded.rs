@@ -10,8 +10,8 @@ use crate::backend::{Backend, ViewQueue};
 use crate::process::Pass;
 use crate::timeline::Timeline;
 
-/// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. Dropped
-/// without being submitted, it leaves no trace.
+/// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
+/// dropped without being submitted, the next frame draws the shadow maps again that this one would have drawn.
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.
@@ -92,12 +92,12 @@ impl<B: Backend> Submitter<B> {
 /// those of other views.
 fn in_submission_order<T>(queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
     let mut remaining: Vec<_> = queues.into_iter().map(|queue| queue.passes.into_iter()).collect();
-    let of_one_view = order.chunk_by(|one, next| one.view_index == next.view_index);
+    let passes_by_view = order.chunk_by(|one, next| one.view_index == next.view_index);
     let take = |passes: &[Pass]| {
         let view = passes[0].view_index;
         ViewQueue { view, passes: remaining[view].by_ref().take(passes.len()).collect() }
     };
-    of_one_view.map(take).collect()
+    passes_by_view.map(take).collect()
 }
 
 /// A frame that was submitted.

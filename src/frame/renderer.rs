@@ -25,7 +25,7 @@ use crate::quality::{Quality, TransformPrecision};
 use crate::scene::SceneRef;
 use crate::task::Scheduler;
 
-/// Produces frames: records a scene on all workers, and gives it back when that is done.
+/// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -130,8 +130,8 @@ impl<B: Backend> Renderer<B> {
         let graph = self.graphs.get(&plan, &draws, &views, options)?;
         graph.reset_tables(&mut self.tables, &scene, &views, self.scheduler.workers());
         let clock = StageClock::default();
-        let shadowed_apart = self.plans.shades_shadowed_lights_apart();
-        clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, shadowed_apart));
+        let separate_shadowed_lights = self.plans.separates_shadowed_lights();
+        clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, separate_shadowed_lights));
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
@@ -147,14 +147,14 @@ impl<B: Backend> Renderer<B> {
         let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0?;
         reset_recordings(&mut self.recordings, request.passes.len());
 
-        // Visibility → fill → sort → instance → record, on all workers: `stages.rs` lists them.
+        // Objects → visibility → fill → sort → instance → record, on all workers: `stages.rs` lists the stages.
         let context = FrameContext {
             request: &request,
             tables: &self.tables,
             granularity: self.granularity,
             instancing: self.instancing,
             backend: &*self.backend,
-            frame: &frame,
+            backend_frame: &frame,
             recordings: &self.recordings,
             clock: &clock,
             costs: &graph.costs,

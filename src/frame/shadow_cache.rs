@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::views::FrameViews;
 use crate::process::FramePlan;
 use crate::scene::{Light, Projection};
-
 use crate::view::RenderView;
 
 /// The shadow maps of the latest frame, for the next one to read: see
@@ -43,11 +42,11 @@ pub(super) struct InFlight {
 
 impl ShadowCache {
     /// Decides whether a frame draws its shadow maps or reads cached ones. The views that are returned are the requested ones; where
-    /// maps are cached, their views and lights are those that the maps were drawn for, because a map is of use only beside its light.
+    /// maps are cached, their views and lights are those that the maps were drawn for, because a map is valid only with the light that it was drawn for.
     /// The brightness of a light is always the requested one.
     ///
-    /// Maps are cached for less than `interval` frames, and only while the same lights request maps in the same layers. Neither a
-    /// light that moves nor one that lights other objects renews them, so they are up to `interval` − 1 frames old.
+    /// Maps are cached for less than `interval` frames, and only while the same lights request maps in the same layers. Lights and
+    /// objects that move do not cause a redraw, so maps are up to `interval` − 1 frames old.
     ///
     /// The maps that are returned are for [`ShadowCache::store`]; `None` where every frame draws its own.
     pub(super) fn resolve(

@@ -26,8 +26,8 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
         1
     }
 
-    /// The number of items that the time of a job over `items` is divided by to estimate the cost of an item; `None` where the
-    /// cost model has no use for it.
+    /// The divisor for the cost estimate: the time of a job over `items`, divided by this, is the cost of an item. `None` where the
+    /// cost model does not estimate the stage.
     fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
         let _ = frame;
         matches!(self.info().chunking, Chunking::ByCost { .. }).then(|| items.len())
@@ -45,7 +45,8 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
 pub(super) struct StageInfo {
     /// The name in timelines.
     pub(super) name: &'static str,
-    /// The stage that this one waits for, by name: the first of these that the pass, its view or the frame has.
+    /// The name of the stage that this one waits for, and alternatives for frames without it, in order of preference: the stage
+    /// waits for the first that the pass, its view or the frame has.
     pub(super) after: &'static [&'static str],
     /// Which of the [`StageTimes`](super::StageTimes) its time is part of.
     pub(super) group: StageGroup,
@@ -60,9 +61,9 @@ pub(super) struct StageInfo {
 /// How a stage's items are divided into jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Chunking {
-    /// One item a job.
+    /// One item per job.
     PerItem,
-    /// As many items a job as the [`Granularity`] says, or as are worth a job.
+    /// As many items per job as the [`Granularity`] says, or as are worth a job.
     ByCost {
         /// The objects or batches in one item.
         units_per_item: usize,

@@ -57,7 +57,7 @@ impl GraphKey {
         }
     }
 
-    /// Whether it is that of a frame. Allocates nothing.
+    /// Whether the key matches the inputs of a frame. Allocates nothing.
     fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> bool {
         let views_of_key = self.views.iter().map(|(name, kind, is_cached)| (name.as_str(), *kind, *is_cached));
         self.options == options

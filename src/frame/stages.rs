@@ -1,7 +1,7 @@
 //! The stages of a frame, in order.
 //!
-//! A stage is a type that holds its name, its dependency, its width, its chunking, its cost kind and its work: see [`Stage`].
-//! To add one, implement the trait and add a line to one of these lists.
+//! A stage is a type that holds all about itself: its [`StageInfo`](super::stage::StageInfo), when a frame needs it, its width and
+//! its work. To add one, implement [`Stage`] and add a line to one of these lists.
 
 mod of_frame;
 mod of_pass;

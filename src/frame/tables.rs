@@ -43,9 +43,9 @@ impl FrameTables {
     }
 
     /// Finds the lights that reach each view: see [`LightTable::fill`].
-    pub(super) fn fill_lights(&mut self, views: &[RenderView], lights: &[Light], shadowed_apart: bool) {
+    pub(super) fn fill_lights(&mut self, views: &[RenderView], lights: &[Light], separate_shadowed_lights: bool) {
         for (view, table) in views.iter().zip(&mut self.lights) {
-            table.fill(view, lights, views, shadowed_apart);
+            table.fill(view, lights, views, separate_shadowed_lights);
         }
     }
 }

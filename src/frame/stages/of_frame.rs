@@ -51,6 +51,6 @@ impl<B: Backend> Stage<B> for Upload {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        frame.backend.upload_objects(job.worker, frame.frame, &frame.tables.objects, job.items)
+        frame.backend.upload_objects(job.worker, frame.backend_frame, &frame.tables.objects, job.items)
     }
 }

@@ -31,7 +31,7 @@ impl<B: Backend> Stage<B> for Fill {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let (table, view_index) = (&frame.tables.passes[self.pass], frame.view_of(self.pass));
+        let (table, view_index) = (&frame.tables.passes[self.pass], frame.view_index_of(self.pass));
         let fill = view::Fill {
             table: &frame.tables.objects,
             view: &frame.request.views[view_index],
@@ -45,7 +45,7 @@ impl<B: Backend> Stage<B> for Fill {
     }
 }
 
-/// Chooses the splitters that divide the pass' commands into buckets.
+/// Chooses the splitters that divide the pass's commands into buckets.
 pub(super) struct Split {
     pub(super) pass: usize,
 }
@@ -57,7 +57,7 @@ impl<B: Backend> Stage<B> for Split {
             after: &["fill"],
             group: StageGroup::Sort,
             chunking: Chunking::PerItem,
-            // Splitting decides how large the jobs are that sort.
+            // It shares the estimate of sort, because it chooses the size of the sort jobs.
             cost_kind: "sort",
             depends_on_occlusion: true,
         }
@@ -142,7 +142,7 @@ impl<B: Backend> Stage<B> for Instance {
     }
 }
 
-/// Joins the buckets to the pass' draw list.
+/// Joins the buckets to the pass's draw list.
 pub(super) struct Join {
     pub(super) pass: usize,
 }
@@ -166,7 +166,7 @@ impl<B: Backend> Stage<B> for Join {
         for bucket in &table.buckets[..table.splitters.read().bucket_count()] {
             list.append(&mut bucket.write(), |mesh| frame.can_merge(self.pass, mesh));
         }
-        if frame.culls_triangles_of(self.pass) {
+        if frame.pass_culls_triangles(self.pass) {
             table.triangles.write().find(&list, &frame.tables.cullable_meshes, frame.request.scene.assets);
         }
         Ok(())
@@ -200,7 +200,7 @@ impl<B: Backend> Stage<B> for Triangles {
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let table = &frame.tables.passes[self.pass];
-        let view = &frame.request.views[frame.view_of(self.pass)];
+        let view = &frame.request.views[frame.view_index_of(self.pass)];
         table.triangles.read().cull(job.items, view, frame.request.scene, &table.list.read());
         Ok(())
     }
@@ -228,7 +228,7 @@ impl<B: Backend> Stage<B> for Prepare {
         table.triangles.read().apply(&mut table.list.write());
         frame.recordings[self.pass].reserve(frame.part_count(self.pass));
         let list = table.list.read();
-        frame.backend.prepare(job.worker, frame.frame, &frame.pass_request(self.pass, &list))
+        frame.backend.prepare(job.worker, frame.backend_frame, &frame.pass_request(self.pass, &list))
     }
 }
 
@@ -257,7 +257,7 @@ impl<B: Backend> Stage<B> for Record {
         let list = frame.tables.passes[self.pass].list.read();
         let request = frame.pass_request(self.pass, &list);
         let mut put_part = frame.recordings[self.pass].put_parts_from(job.items.start);
-        frame.backend.record(job.worker, frame.frame, &request, job.items, &mut put_part)
+        frame.backend.record(job.worker, frame.backend_frame, &request, job.items, &mut put_part)
     }
 }
 
@@ -286,6 +286,7 @@ impl<B: Backend> Stage<B> for Finish {
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let list = frame.tables.passes[self.pass].list.read();
         let request = frame.pass_request(self.pass, &list);
-        frame.recordings[self.pass].finish(|parts| frame.backend.finish(job.worker, frame.frame, &request, parts))
+        frame.recordings[self.pass]
+            .finish(|parts| frame.backend.finish(job.worker, frame.backend_frame, &request, parts))
     }
 }
