@@ -11,16 +11,16 @@ pub enum BackendError {
         missing: String,
     },
     /// A limit of the device is too low; see the backend's constants for all required ones.
-    #[error("the device's {limit} is {allowed}, and {needed} are needed")]
+    #[error("device limit {limit} is {allowed}; Drawloom needs {needed}")]
     Limit {
         /// The limit's name.
         limit: &'static str,
         /// What the device allows.
         allowed: u64,
-        /// What is needed.
+        /// What Drawloom needs.
         needed: u64,
     },
-    /// The device refused a pass: an error in a render process' shader, targets or parameters.
+    /// The device refused a pass: an error in a render process's shader, targets or parameters.
     #[error("the device refused {label}: {message}")]
     Validation {
         /// The pass or resource.
@@ -40,8 +40,10 @@ pub enum BackendError {
         /// The device's message.
         message: String,
     },
-    /// The view's camera is too far from the world's origin, or its numbers are not finite.
-    #[error("view {view:?} is out of reach: its camera is more than 2^32 m from the origin")]
+    /// The view's camera is too far from the world's origin, or its position is not finite.
+    #[error(
+        "view {view:?} is out of reach: its camera is more than 2^32 m from the origin, or its position is not finite"
+    )]
     ViewOutOfReach {
         /// The view's name.
         view: String,
@@ -49,13 +51,13 @@ pub enum BackendError {
     /// A render process has WGSL but no CPU shader, which the software backend runs instead.
     #[error("process {process:?} has no CPU shader, so the software backend cannot draw it")]
     NoCpuShader {
-        /// The render process' name.
+        /// The render process's name.
         process: String,
     },
     /// The CPU shader of a render process panicked.
     #[error("the CPU shader of process {process:?} panicked: {message}")]
     CpuShaderPanicked {
-        /// The render process' name.
+        /// The render process's name.
         process: String,
         /// The panic's message.
         message: String,
@@ -74,15 +76,15 @@ pub enum BackendError {
     /// Pass times were requested from a backend that does not time passes.
     #[error("passes are not timed: see `WgpuBackend::time_passes`")]
     NotTimed,
-    /// Drawloom broke a rule between frame and backend: a bug of Drawloom's.
+    /// Drawloom broke a rule between frame and backend. This is a bug in Drawloom.
     #[error("broken rule: {rule}")]
     BrokenRule {
-        /// The rule.
+        /// The rule that must hold.
         rule: String,
     },
 }
 
-/// A broken rule between frame and backend.
+/// The error for a broken rule between frame and backend. `rule` states what must hold.
 #[cfg(feature = "wgpu")]
 pub(crate) fn broken_rule(rule: &str) -> BackendError {
     BackendError::BrokenRule { rule: rule.to_owned() }

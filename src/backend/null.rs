@@ -15,11 +15,16 @@ use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::view::{GpuView, ObjectTable};
 
-/// Draws nothing, and returns an error if the frame breaks a rule between frame and backend:
+/// Draws nothing. It returns an error if the frame breaks one of the rules between frame and backend:
 ///
-/// - an object is uploaded twice, or not at all;
-/// - batches overlap, draw no mesh, exceed a bundle, or are partial though all their triangles remain;
-/// - a pass is recorded twice, or submitted out of order.
+/// - each object of the scene is uploaded once, and no others;
+/// - each pass of the frame is prepared once, with a sorted list that has one object per command, all of them in the scene;
+/// - each bundle is recorded once, and has 1 to [`DrawList::BATCHES_PER_BUNDLE`] batches;
+/// - batches are not empty, draw existing meshes, and follow each other without gaps or overlaps;
+/// - a partial batch draws one object, and fewer triangles than its mesh has;
+/// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
+/// - a pass without commands has neither batches nor bundles;
+/// - passes are submitted in the planned order.
 #[derive(Debug, Default)]
 pub struct NullBackend;
 
@@ -33,7 +38,7 @@ pub struct NullSubmission {
 /// A submitted pass: one render process in one view.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NullPass {
-    /// The render process' name.
+    /// The render process's name.
     pub process: String,
     /// The view's index.
     pub view: usize,
@@ -113,8 +118,12 @@ impl Backend for NullBackend {
         for block in blocks {
             let (first, records) = objects.gpu_objects(block);
             for object in first..first + records.len() {
-                ensure(object < frame.object_count, || format!("object {object} is not in the scene"))?;
-                ensure(uploaded.insert(object), || format!("object {object} was uploaded twice"))?;
+                ensure(object < frame.object_count, || {
+                    format!("uploaded objects are in the scene, but object {object} is not")
+                })?;
+                ensure(uploaded.insert(object), || {
+                    format!("each object is uploaded once, but object {object} is uploaded again")
+                })?;
             }
         }
         Ok(())
@@ -126,14 +135,14 @@ impl Backend for NullBackend {
         frame: &NullFrame,
         &PassRequest { pass, list, .. }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
-        ensure(frame.passes.contains(&pass), || format!("{pass:?} is not of this frame"))?;
+        ensure(frame.passes.contains(&pass), || format!("prepared passes belong to the frame, but {pass:?} does not"))?;
         let before = frame.prepared.lock().insert(pass, list.objects.len());
-        ensure(before.is_none(), || format!("{pass:?} was prepared twice"))?;
-        ensure(list.objects.len() == list.commands().count(), || "objects and commands differ in number".to_owned())?;
+        ensure(before.is_none(), || format!("each pass is prepared once, but {pass:?} is prepared again"))?;
+        ensure(list.objects.len() == list.commands().count(), || "a list has one object per command".to_owned())?;
         let ordered = list.commands().is_sorted_by_key(|command| (command.key, command.object));
-        ensure(ordered, || "commands are not sorted".to_owned())?;
+        ensure(ordered, || "commands are sorted by key and object".to_owned())?;
         let out_of_range = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
-        ensure(out_of_range.is_none(), || format!("object {out_of_range:?} is not in the scene"))
+        ensure(out_of_range.is_none(), || format!("drawn objects are in the scene, but {out_of_range:?} is not"))
     }
 
     fn part_count(&self, _frame: &NullFrame, pass: &PassRequest<'_>) -> usize {
@@ -150,7 +159,9 @@ impl Backend for NullBackend {
     ) -> Result<(), BackendError> {
         for bundle in bundles {
             let first_time = frame.recorded.lock().insert((pass, bundle));
-            ensure(first_time, || format!("bundle {bundle} of {pass:?} was recorded twice"))?;
+            ensure(first_time, || {
+                format!("each bundle is recorded once, but bundle {bundle} of {pass:?} is recorded again")
+            })?;
             emit(record_bundle(frame, list, bundle)?);
         }
         Ok(())
@@ -163,19 +174,23 @@ impl Backend for NullBackend {
         &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
         bundles: &mut Vec<NullBundle>,
     ) -> Result<NullPass, BackendError> {
-        ensure(frame.finished.lock().insert(pass), || format!("{pass:?} was finished twice"))?;
+        ensure(frame.finished.lock().insert(pass), || {
+            format!("each pass is finished once, but {pass:?} is finished again")
+        })?;
         let process = &request.plan.processes()[pass.process_index].process;
         if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
             let has_none = bundles.is_empty() && list.batches.is_empty();
-            ensure(has_none, || format!("{:?} draws no commands but has bundles", process.name()))?;
+            ensure(has_none, || {
+                format!("a pass without commands has no bundles, but one of {:?} has", process.name())
+            })?;
         }
         let mut end = 0;
         for bundle in &*bundles {
-            ensure(bundle.objects.start == end, || "bundles are not in order".to_owned())?;
+            ensure(bundle.objects.start == end, || "bundles are finished in order".to_owned())?;
             end = bundle.objects.end;
         }
         let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
-        ensure(end == prepared, || format!("{end} of {prepared} objects recorded"))?;
+        ensure(end == prepared, || format!("all prepared objects are recorded, but {end} of {prepared} are"))?;
         Ok(NullPass {
             process: process.name().to_owned(),
             view: pass.view_index,
@@ -192,10 +207,12 @@ impl Backend for NullBackend {
 
     fn submit(&self, frame: NullFrame, queues: Vec<ViewQueue<NullPass>>) -> Result<NullSubmission, BackendError> {
         let uploaded = frame.uploaded.lock().len();
-        ensure(uploaded == frame.object_count, || format!("{uploaded} of {} objects uploaded", frame.object_count))?;
+        ensure(uploaded == frame.object_count, || {
+            format!("all objects are uploaded, but {uploaded} of {} are", frame.object_count)
+        })?;
         let passes = || queues.iter().flat_map(|queue| &queue.passes);
         let in_order = passes().map(|(pass, _)| pass).eq(&frame.passes);
-        ensure(in_order, || "passes were submitted in another order than planned".to_owned())?;
+        ensure(in_order, || "passes are submitted in the planned order".to_owned())?;
         let passes = queues.into_iter().flat_map(|queue| queue.passes);
         Ok(NullSubmission { passes: passes.map(|(_, pass)| pass).collect() })
     }
@@ -204,20 +221,28 @@ impl Backend for NullBackend {
 fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
     let batches = list.bundle(bundle);
     let within = (1..=DrawList::BATCHES_PER_BUNDLE).contains(&batches.len());
-    ensure(within, || format!("a bundle of {} batches", batches.len()))?;
+    ensure(within, || {
+        format!("a bundle has 1 to {} batches, but one has {}", DrawList::BATCHES_PER_BUNDLE, batches.len())
+    })?;
     let start = batches[0].first;
     let (mut end, mut triangles) = (start, 0);
     for (index, batch) in (bundle * DrawList::BATCHES_PER_BUNDLE..).zip(batches) {
-        ensure(batch.first == end && batch.count > 0, || format!("a gap or an overlap at object {end}"))?;
+        ensure(batch.first == end && batch.count > 0, || {
+            format!("batches have no gaps or overlaps, but there is one at object {end}")
+        })?;
         let mesh = frame.triangles.get(batch.mesh as usize).copied().flatten();
         let Some(mesh_triangles) = mesh else {
-            return Err(BackendError::BrokenRule { rule: format!("slot {} holds no mesh", batch.mesh) });
+            return Err(BackendError::BrokenRule {
+                rule: format!("a batch draws an existing mesh, but slot {} is empty", batch.mesh),
+            });
         };
         triangles += match list.remaining(index) {
             None => mesh_triangles * batch.count as usize,
             Some(remaining) => {
                 let holds = batch.count == 1 && remaining.len() < mesh_triangles * 3;
-                ensure(holds, || format!("partial batch {index} draws some triangles of one object"))?;
+                ensure(holds, || {
+                    format!("a partial batch draws some triangles of one object, but batch {index} does not")
+                })?;
                 remaining.len() / 3
             }
         };

@@ -100,15 +100,15 @@ impl DepthKey {
         DepthQuantizer { curve, unused }
     }
 
-    pub(super) fn check(&self, knob: &'static str, max_bits: u32) -> Result<(), QualityError> {
+    pub(super) fn check(&self, setting: &'static str, max_bits: u32) -> Result<(), QualityError> {
         if !(1..=max_bits).contains(&self.bits) {
             let range = if max_bits == Self::MAX_OPAQUE_BITS { "1 to 20 bits" } else { "1 to 32 bits" };
-            return Err(QualityError::OutOfRange { knob, value: format!("{} bits", self.bits), range });
+            return Err(QualityError::OutOfRange { setting, value: format!("{} bits", self.bits), range });
         }
         match self.curve {
             DepthCurve::Linear { far } if !(far > 0.0 && far.is_finite()) => {
                 let value = format!("linear up to {far} m");
-                Err(QualityError::OutOfRange { knob, value, range: "linear up to a finite distance above 0" })
+                Err(QualityError::OutOfRange { setting, value, range: "linear up to a finite distance above 0" })
             }
             _ => Ok(()),
         }

@@ -5,10 +5,10 @@
 #[non_exhaustive]
 pub enum QualityError {
     /// A setting is out of range.
-    #[error("quality: {knob} is {value}, and can be {range}")]
+    #[error("quality setting {setting} is {value}; valid: {range}")]
     OutOfRange {
         /// The setting's field name, such as `shadows.side`.
-        knob: &'static str,
+        setting: &'static str,
         /// Its value.
         value: String,
         /// The valid range.

@@ -151,7 +151,7 @@ impl Quality {
         if let Some(tile_size) = self.occlusion {
             if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
                 return Err(QualityError::OutOfRange {
-                    knob: "occlusion",
+                    setting: "occlusion",
                     value: tile_size.to_string(),
                     range: "1, 2, 4, 8 or 16 pixels",
                 });
@@ -162,7 +162,7 @@ impl Quality {
         }
         if !(self.light_cut_off >= 0.0 && self.light_cut_off.is_finite()) {
             let value = self.light_cut_off.to_string();
-            return Err(QualityError::OutOfRange { knob: "light_cut_off", value, range: "0 or more, and finite" });
+            return Err(QualityError::OutOfRange { setting: "light_cut_off", value, range: "0 or more, and finite" });
         }
         if self.occlusion.is_some() && self.transforms == TransformPrecision::Absolute {
             return Err(QualityError::OcclusionWithAbsoluteTransforms);
@@ -193,7 +193,7 @@ mod tests {
         let valid = Quality::exact();
         let shadows = valid.shadows;
         let order = |bits, curve| DepthKey { bits, curve };
-        for (wrong, knob) in [
+        for (wrong, setting) in [
             (Quality { occlusion: Some(3), ..valid }, "occlusion"),
             (Quality { occlusion: Some(0), ..valid }, "occlusion"),
             (Quality { light_cut_off: -1.0, ..valid }, "light_cut_off"),
@@ -212,8 +212,8 @@ mod tests {
             (Quality { shadows: ShadowQuality { widest_edge: 91.0, ..shadows }, ..valid }, "shadows.widest_edge"),
         ] {
             let error = wrong.check().unwrap_err();
-            let is_named = matches!(&error, QualityError::OutOfRange { knob: named, .. } if *named == knob);
-            assert!(is_named, "{knob}: {error}");
+            let is_named = matches!(&error, QualityError::OutOfRange { setting: named, .. } if *named == setting);
+            assert!(is_named, "{setting}: {error}");
         }
         let without_volume = Quality { occlusion: Some(8), culling: CullingVolume::None, ..valid };
         assert_eq!(without_volume.check(), Err(QualityError::OcclusionWithoutVolume));

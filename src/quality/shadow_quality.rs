@@ -38,8 +38,8 @@ impl ShadowQuality {
 
     pub(super) fn check(&self) -> Result<(), QualityError> {
         let Self { side, filter, bias, interval, widest_edge } = *self;
-        let check = |holds, knob, value: String, range| {
-            if holds { Ok(()) } else { Err(QualityError::OutOfRange { knob, value, range }) }
+        let check = |holds, setting, value: String, range| {
+            if holds { Ok(()) } else { Err(QualityError::OutOfRange { setting, value, range }) }
         };
         check(side > 0, "shadows.side", side.to_string(), "1 pixel or more")?;
         check(filter <= Self::MAX_FILTER, "shadows.filter", filter.to_string(), "0 to 4")?;

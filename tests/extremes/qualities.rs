@@ -118,7 +118,7 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
     let usual = Quality::exact();
     let shadows = usual.shadows;
     let key = |bits, curve| DepthKey { bits, curve };
-    for (wrong, knob) in [
+    for (wrong, setting) in [
         (Quality { occlusion: Some(32), ..usual }, "occlusion"),
         (Quality { light_cut_off: f32::NAN, ..usual }, "light_cut_off"),
         (Quality { light_cut_off: -f32::from_bits(1), ..usual }, "light_cut_off"),
@@ -133,10 +133,10 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
         (Quality { shadows: ShadowQuality { widest_edge: f32::NAN, ..shadows }, ..usual }, "shadows.widest_edge"),
     ] {
         match harness.with_quality(wrong).err() {
-            Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { knob: named, .. })))
-                if named == knob => {}
-            Some(error) => return Err(format!("{knob}: {error}").into()),
-            None => return Err(format!("{knob}: it was accepted").into()),
+            Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { setting: named, .. })))
+                if named == setting => {}
+            Some(error) => return Err(format!("{setting}: {error}").into()),
+            None => return Err(format!("{setting}: it was accepted").into()),
         }
     }
     let without_volume = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };

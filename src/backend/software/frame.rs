@@ -58,7 +58,9 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         let _one_at_a_time = self.context.drawing.lock();
         for (pass, commands) in queues.iter().flat_map(|queue| &queue.passes) {
             let known = self.passes.iter().find(|known| known.pass == *pass);
-            let unknown = || BackendError::BrokenRule { rule: format!("{pass:?} is of this frame") };
+            let unknown = || BackendError::BrokenRule {
+                rule: format!("submitted passes belong to the frame, but {pass:?} does not"),
+            };
             self.draw(known.ok_or_else(unknown)?, commands)?;
         }
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))

@@ -39,7 +39,7 @@ pub enum PlanError {
         format: Format,
     },
     /// A target is drawn as a layer of a texture array by one process, and used as a texture of its own by another.
-    #[error("process {process:?} does not agree with others on whether the views share target {target:?} as layers")]
+    #[error("process {process:?} uses {target:?} as a layered target; others use it per view, or vice versa")]
     LayeringMismatch {
         /// The process.
         process: String,
@@ -53,7 +53,7 @@ pub enum PlanError {
         process: String,
     },
     /// The settings of the shadow maps are invalid.
-    #[error("shadow maps cannot have {problem}")]
+    #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {
         /// What is wrong with them.
         problem: &'static str,
@@ -74,7 +74,7 @@ pub enum PlanError {
     Empty,
 }
 
-/// An error in a process' declaration or draws.
+/// An error in a process's declaration or draws.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProcessError {
