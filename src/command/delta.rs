@@ -1,4 +1,4 @@
-//! Commands in as few bytes as they differ by.
+//! Delta coding of commands.
 
 mod code;
 #[cfg(all(test, not(drawloom_loom)))]
@@ -9,27 +9,27 @@ use std::iter::FusedIterator;
 use crc32fast::Hasher;
 
 use super::RenderCommand;
-use code::{Coder, Fault, LONGEST};
+use code::{Coder, Fault, MAX_LENGTH};
 
-/// Commands one after the other, of each only what it does not share with the one before (M 10.3, its "bonus points"). Any
-/// commands come back as they were, bit by bit, but it is sorted ones that become short.
+/// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is lossless for
+/// any commands, and compact for sorted ones.
 ///
 /// ```text
 /// byte 0 … 3 | 4 … 7    | 8 … 15            | 16 …
 /// "DLC2"     | checksum | count of commands | the commands
 /// ```
 ///
-/// All numbers are little-endian. The checksum is the CRC-32 of the commands followed by their count. It finds
-/// accidents, not bytes that were changed on purpose. A command is a byte that says how long its parts are, and those
-/// parts: the difference of the keys, that of the objects if it is not the same as last time, and mesh, material and
-/// state where they are not as expected. Expected is what the key of an opaque command repeats of them; of other
-/// commands, what they were before.
+/// All numbers are little-endian. The checksum is the CRC-32 of the coded commands followed by their count. It detects
+/// accidental damage, not tampering. A coded command is a byte with the lengths of its parts, and the parts: the difference
+/// between its key and the previous one, the difference between the objects if it is not the same as last time, and mesh,
+/// material and state where they differ from the prediction, which is the mesh and the state in the key of an opaque command,
+/// and the previous command's values for everything else.
 ///
-/// They are for commands that leave the frame: stored, sent, or kept for many frames. Sorted commands take 1 to 6 bytes in
-/// place of 24. To code, to check and to decode one takes 3 to 8 ns each, so they win where bytes pass at less than 0.8 GB/s.
-/// Within a frame they lose, and it does not use them: commands are sorted and read there several times, and to copy the
-/// fixed form takes 0.5 ns, to compare it with the last frame's 1.3. (`cargo bench -p drawloom-benches --bench delta`, on a virtual machine of two
-/// cores.)
+/// Delta coding is for commands that leave the frame: stored, sent, or kept for many frames. Sorted commands take 1 to 6 bytes
+/// instead of 24. Encoding, checking and decoding take 3 to 8 ns each per command, so delta coding is faster where bytes are
+/// transferred at less than 0.8 GB/s. Frames do not use them: they sort and read commands several times, and copying a
+/// [`RenderCommand`] takes 0.5 ns, comparing it with the last frame's 1.3. (`cargo bench -p drawloom-benches --bench delta`, on
+/// a virtual machine with two cores.)
 ///
 /// ```
 /// use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
@@ -52,78 +52,80 @@ use code::{Coder, Fault, LONGEST};
 pub struct DeltaCommands {
     bytes: Vec<u8>,
     count: usize,
-    /// The CRC-32 of the commands.
+    /// The CRC-32 of the coded commands.
     crc: Hasher,
-    /// Behind the last command.
+    /// The state after the last command.
     coder: Coder,
 }
 
-/// Why bytes are no [`DeltaCommands`].
+/// Why bytes are not [`DeltaCommands`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeltaError {
-    /// They begin with something else.
-    #[error("these bytes are no delta commands, or are of another version")]
+    /// The header is not that of this version.
+    #[error("not delta-coded commands, or an unsupported version")]
     Foreign,
-    /// They end too early.
+    /// The bytes end too early.
     #[error("the bytes end within command {index} of {count}")]
     Truncated {
-        /// Which command, from 0.
+        /// The index of the command.
         index: u64,
-        /// How many there should be.
+        /// The number of commands in the header.
         count: u64,
     },
-    /// A command whose first bytes mean nothing.
-    #[error("command {index} is coded in no way that there is")]
+    /// A command has lengths that the encoder never writes.
+    #[error("command {index} has an invalid encoding")]
     Malformed {
-        /// Which command, from 0.
+        /// The index of the command.
         index: u64,
     },
-    /// They go on behind the last command.
-    #[error("{bytes} bytes are left behind the last command")]
+    /// There are bytes after the last command.
+    #[error("{bytes} bytes follow the last command")]
     TooLong {
-        /// How many are left.
+        /// The number of excess bytes.
         bytes: usize,
     },
-    /// Some are not what they were.
+    /// The checksum does not match.
     #[error("the bytes are damaged: their checksum is {found:#010x}, not {stored:#010x}")]
     Damaged {
-        /// What it is.
+        /// The checksum of the bytes.
         found: u32,
-        /// What it was.
+        /// The checksum in the header.
         stored: u32,
     },
 }
 
-const MARK: [u8; 4] = *b"DLC2";
+/// The first bytes: the format and its version.
+const MAGIC: [u8; 4] = *b"DLC2";
+/// The length of the header.
 const HEADER: usize = 16;
-/// Commands that are coded before they are appended as one.
-const TOGETHER: usize = 64;
+/// The number of commands that are coded on the stack before they are appended.
+const CHUNK: usize = 64;
 
 impl DeltaCommands {
-    /// No commands.
+    /// An empty list.
     pub fn new() -> Self {
         let mut new = Self { bytes: vec![0; HEADER], count: 0, crc: Hasher::new(), coder: Coder::default() };
         new.write_header();
         new
     }
 
-    /// These commands.
+    /// Encodes commands.
     pub fn encode(commands: &[RenderCommand]) -> Self {
         let mut new = Self::new();
         new.extend_from_slice(commands);
         new
     }
 
-    /// The commands in what [`DeltaCommands::bytes`] once were, stored or sent since. It takes no memory, whatever the bytes
-    /// say.
+    /// The commands in bytes that [`DeltaCommands::bytes`] returned. It checks all of them, and allocates nothing, so that invalid
+    /// bytes cannot exhaust memory.
     ///
     /// # Errors
-    /// If they are anything else, or damaged.
+    /// If the bytes are not delta-coded commands of this version, or are damaged.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, DeltaError> {
         let (header, body) = bytes.split_first_chunk::<HEADER>().ok_or(DeltaError::Foreign)?;
         let [m0, m1, m2, m3, s0, s1, s2, s3, count @ ..] = *header;
-        if [m0, m1, m2, m3] != MARK {
+        if [m0, m1, m2, m3] != MAGIC {
             return Err(DeltaError::Foreign);
         }
         let (stored, count) = (u32::from_le_bytes([s0, s1, s2, s3]), u64::from_le_bytes(count));
@@ -143,7 +145,7 @@ impl DeltaCommands {
         if found != stored {
             return Err(DeltaError::Damaged { found, stored });
         }
-        // Each command is a byte at least, so there are no more of them than fit into memory.
+        // A coded command has at least a byte, so the count fits into a usize.
         Ok(Self { bytes, count: count as usize, crc, coder })
     }
 
@@ -155,10 +157,10 @@ impl DeltaCommands {
     /// Appends commands.
     pub fn extend_from_slice(&mut self, commands: &[RenderCommand]) {
         let old_length = self.bytes.len();
-        let mut coded = [0; TOGETHER * LONGEST + code::SLACK];
-        for part in commands.chunks(TOGETHER) {
+        let mut coded = [0; CHUNK * MAX_LENGTH + code::SLACK];
+        for chunk in commands.chunks(CHUNK) {
             let mut end = 0;
-            for command in part {
+            for command in chunk {
                 end = self.coder.encode(command, &mut coded, end);
             }
             self.bytes.extend_from_slice(&coded[..end]);
@@ -168,7 +170,7 @@ impl DeltaCommands {
         self.write_header();
     }
 
-    /// Drops all commands, and keeps the memory for the next ones.
+    /// Removes all commands and keeps the memory.
     pub fn clear(&mut self) {
         self.bytes.truncate(HEADER);
         (self.count, self.crc, self.coder) = (0, Hasher::new(), Coder::default());
@@ -180,22 +182,22 @@ impl DeltaCommands {
         Commands { rest: &self.bytes[HEADER..], left: self.count, coder: Coder::default() }
     }
 
-    /// How many commands.
+    /// The number of commands.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there is no command.
+    /// Whether there are no commands.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// What to store or to send.
+    /// The bytes to store or send.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// The same without a copy.
+    /// The bytes to store or send, without a copy.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
@@ -203,13 +205,13 @@ impl DeltaCommands {
     fn write_header(&mut self) {
         let count = self.count as u64;
         let checksum = checksum(&self.crc, count);
-        self.bytes[..4].copy_from_slice(&MARK);
+        self.bytes[..4].copy_from_slice(&MAGIC);
         self.bytes[4..8].copy_from_slice(&checksum.to_le_bytes());
         self.bytes[8..HEADER].copy_from_slice(&count.to_le_bytes());
     }
 }
 
-/// The checksum of the header: the CRC-32 of the commands, continued by their count.
+/// The header's checksum: the CRC-32 of the coded commands, continued by their count.
 fn checksum(commands: &Hasher, count: u64) -> u32 {
     let mut crc = commands.clone();
     crc.update(&count.to_le_bytes());
@@ -234,7 +236,7 @@ impl Iterator for Commands<'_> {
     #[inline]
     fn next(&mut self) -> Option<RenderCommand> {
         self.left = self.left.checked_sub(1)?;
-        // All bytes were coded here or checked.
+        // Never an error: the bytes were encoded or checked by `DeltaCommands`.
         self.coder.decode(&mut self.rest).ok()
     }
 

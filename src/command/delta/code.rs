@@ -1,46 +1,47 @@
-//! How one command is coded, after another.
+//! The encoding of a command relative to the previous one.
 
 use crate::command::{DrawState, RenderCommand, SortKey};
 
-/// Bytes of the longest command: its first byte, key, object, second byte, mesh, material and state.
-pub(super) const LONGEST: usize = 1 + 8 + 4 + 1 + 4 + 4 + 1;
+/// The maximum length of a coded command: its first byte, key, object, second byte, mesh, material and state.
+pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 1;
 
-/// Room that [`Coder::encode`] needs behind the longest command, as it writes whole words.
+/// The number of bytes that [`Coder::encode`] needs after the longest command, because it writes whole words.
 pub(super) const SLACK: usize = 8;
 
-// Never longer than the fixed form.
-const _: () = assert!(LONGEST <= size_of::<RenderCommand>());
+// A coded command is never longer than a `RenderCommand`.
+const _: () = assert!(MAX_LENGTH <= size_of::<RenderCommand>());
 
-/// What the next command is coded against.
+/// The state of encoding or decoding: what the next command is coded relative to.
 ///
 /// ```text
-/// first byte   bit 7    | 6 … 4       | 3 … 0
-///              surprise | object's    | key's length
-/// second byte  bit 7    | 6     | 5 … 3      | 2 … 0
-/// if surprise  0        | state | material's | mesh's length
+/// first byte   bit 7    | 6 … 4         | 3 … 0
+///              explicit | object length | key length
+/// second byte  bit 7    | 6     | 5 … 3           | 2 … 0
+/// if explicit  0        | state | material length | mesh length
 /// ```
 ///
-/// Lengths are in bytes. A key's length over 8 means 8 less, of a difference whose lowest three bytes are 0 and left out: keys
-/// of blended commands end in 30 zeros. An object's length of 5 means no byte, and the same difference as last time: copies of an
-/// object are evenly apart.
+/// "Explicit": mesh, material or state differ from the prediction, and follow. Lengths are those of the differences, in bytes.
+/// Key length n > 8: n - 8 bytes of the difference, shifted left by 24 bits, because keys of blended commands end in 30 zeros.
+/// Object length 5: no bytes, and the same difference as last time, because copies of an object often have indices at equal
+/// distances.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coder {
     last: RenderCommand,
-    /// By how much the last object differs from the one before.
+    /// The difference between the last two objects.
     step: u32,
 }
 
-/// Why bytes are no command.
+/// Why bytes are not a coded command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     Truncated,
     Malformed,
 }
 
-const KEY_WITHOUT_ZEROS: u8 = 8;
-const ZEROS: u32 = 24;
+const SHIFTED_KEY: u8 = 8;
+const KEY_SHIFT: u32 = 24;
 const SAME_STEP: u8 = 5;
-const SURPRISE: u8 = 1 << 7;
+const EXPLICIT: u8 = 1 << 7;
 const STATE: u8 = 1 << 6;
 
 impl Default for Coder {
@@ -51,7 +52,7 @@ impl Default for Coder {
 }
 
 impl Coder {
-    /// Writes a command to `bytes` from `start`, and says where it ends; it may write beyond that.
+    /// Writes a command to `bytes` at `start`, and returns its end. It may overwrite up to [`SLACK`] bytes after the end.
     #[inline]
     pub(super) fn encode(&mut self, command: &RenderCommand, bytes: &mut [u8], start: usize) -> usize {
         let mut end = start + 1;
@@ -61,11 +62,11 @@ impl Coder {
         };
         let difference = command.key.bits().wrapping_sub(self.last.key.bits());
         let key_length = length(difference);
-        let without_zeros = difference != 0 && difference.trailing_zeros() >= ZEROS;
-        let mut first = if without_zeros {
-            let shorter = key_length - ZEROS as u8 / 8;
-            put(difference >> ZEROS, shorter);
-            KEY_WITHOUT_ZEROS + shorter
+        let is_shifted = difference != 0 && difference.trailing_zeros() >= KEY_SHIFT;
+        let mut first = if is_shifted {
+            let shorter = key_length - KEY_SHIFT as u8 / 8;
+            put(difference >> KEY_SHIFT, shorter);
+            SHIFTED_KEY + shorter
         } else {
             put(difference, key_length);
             key_length
@@ -79,14 +80,14 @@ impl Coder {
             length(folded)
         } << 4;
 
-        let expected = self.expected(command.key);
-        let is_expected =
-            (command.mesh, command.material, command.state) == (expected.mesh, expected.material, expected.state);
-        if !is_expected {
-            first |= SURPRISE;
-            let mesh = fold(command.mesh.wrapping_sub(expected.mesh));
-            let material = fold(command.material.wrapping_sub(expected.material));
-            let state = if command.state == expected.state { 0 } else { STATE };
+        let prediction = self.predicted(command.key);
+        let is_predicted =
+            (command.mesh, command.material, command.state) == (prediction.mesh, prediction.material, prediction.state);
+        if !is_predicted {
+            first |= EXPLICIT;
+            let mesh = fold(command.mesh.wrapping_sub(prediction.mesh));
+            let material = fold(command.material.wrapping_sub(prediction.material));
+            let state = if command.state == prediction.state { 0 } else { STATE };
             put(u64::from(length(mesh) | length(material) << 3 | state), 1);
             put(mesh, length(mesh));
             put(material, length(material));
@@ -97,30 +98,30 @@ impl Coder {
         end
     }
 
-    /// Takes the next command off the front of `rest`.
+    /// Reads the next command from the front of `rest`, and removes it.
     ///
     /// # Errors
-    /// If there is none.
+    /// If `rest` does not begin with a coded command.
     #[inline]
     pub(super) fn decode(&mut self, rest: &mut &[u8]) -> Result<RenderCommand, Fault> {
         let first = take(rest, 1)? as u8;
-        let (key_length, zeros) = match first & 0xf {
-            code @ ..=KEY_WITHOUT_ZEROS => (code, 0),
-            code @ ..=13 => (code - KEY_WITHOUT_ZEROS, ZEROS),
+        let (key_length, shift) = match first & 0xf {
+            length @ ..=SHIFTED_KEY => (length, 0),
+            length @ ..=13 => (length - SHIFTED_KEY, KEY_SHIFT),
             _ => return Err(Fault::Malformed),
         };
-        let difference = take(rest, key_length)? << zeros;
+        let difference = take(rest, key_length)? << shift;
         let key = SortKey::from_bits(self.last.key.bits().wrapping_add(difference));
-        let step = match (first & !SURPRISE) >> 4 {
+        let step = match (first & !EXPLICIT) >> 4 {
             SAME_STEP => self.step,
-            code => unfold(take(rest, at_most_4(code)?)?),
+            length => unfold(take(rest, at_most_4(length)?)?),
         };
         let object = self.last.object.wrapping_add(step);
 
-        let Expected { mut mesh, mut material, mut state } = self.expected(key);
-        if first & SURPRISE != 0 {
+        let Prediction { mut mesh, mut material, mut state } = self.predicted(key);
+        if first & EXPLICIT != 0 {
             let second = take(rest, 1)? as u8;
-            if second & SURPRISE != 0 {
+            if second & EXPLICIT != 0 {
                 return Err(Fault::Malformed);
             }
             mesh = mesh.wrapping_add(unfold(take(rest, at_most_4(second & 7)?)?));
@@ -134,21 +135,21 @@ impl Coder {
         Ok(command)
     }
 
-    /// What a command with this key is likely to draw.
-    fn expected(&self, key: SortKey) -> Expected {
+    /// Predicts mesh, material and state of a command with this key.
+    fn predicted(&self, key: SortKey) -> Prediction {
         let RenderCommand { mesh, material, state, .. } = self.last;
         let (state, mesh) = key.state_and_mesh().unwrap_or((state, mesh));
-        Expected { mesh, material, state }
+        Prediction { mesh, material, state }
     }
 }
 
-struct Expected {
+struct Prediction {
     mesh: u32,
     material: u32,
     state: DrawState,
 }
 
-/// A number of so many bytes, 8 at most.
+/// Reads a number of `length` bytes, at most 8, from the front of `rest`, and removes it.
 #[inline]
 fn take(rest: &mut &[u8], length: u8) -> Result<u64, Fault> {
     const MASKS: [u64; 9] =
@@ -166,12 +167,12 @@ fn at_most_4(length: u8) -> Result<u8, Fault> {
     if length <= 4 { Ok(length) } else { Err(Fault::Malformed) }
 }
 
-/// How many bytes hold the value.
+/// The number of bytes that the value needs.
 fn length(value: u64) -> u8 {
     (u64::BITS - value.leading_zeros()).div_ceil(8) as u8
 }
 
-/// Small numbers for small differences in both directions: 0, −1, 1, −2 ... become 0, 1, 2, 3 ...
+/// Zigzag coding, which maps small differences of either sign to small numbers: 0, −1, 1, −2 ... become 0, 1, 2, 3 ...
 fn fold(difference: u32) -> u64 {
     let signed = difference as i32;
     u64::from((signed << 1 ^ signed >> 31) as u32)

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::command::{DrawState, SortKey};
 
-/// Any command at all: keys that repeat nothing of what they should, slots of 32 bits, and their neighbours.
+/// Arbitrary commands: keys that do not match mesh and state, extreme slots, and similar values.
 fn any_command() -> impl Strategy<Value = RenderCommand> {
     let key = prop_oneof![
         any::<u64>(),
@@ -24,8 +24,8 @@ fn any_command() -> impl Strategy<Value = RenderCommand> {
     })
 }
 
-/// Commands as frames have them, sorted.
-fn usual_commands(most: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
+/// Sorted commands like those of frames.
+fn typical_commands(max: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
     let command = (0..200_u32, 0..30_u32, 0.1..100.0_f32, 0..10_u8).prop_map(|(mesh, material, depth, kind)| {
         let state = DrawState::from_byte(kind % 3);
         let key = match kind {
@@ -34,7 +34,7 @@ fn usual_commands(most: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
         };
         RenderCommand { key, object: 0, mesh, material, state }
     });
-    prop::collection::vec(command, 0..most).prop_map(|mut commands| {
+    prop::collection::vec(command, 0..max).prop_map(|mut commands| {
         for (object, command) in commands.iter_mut().enumerate() {
             command.object = object as u32;
         }
@@ -46,8 +46,8 @@ fn usual_commands(most: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
 fn commands() -> impl Strategy<Value = Vec<RenderCommand>> {
     prop_oneof![
         prop::collection::vec(any_command(), 0..100),
-        usual_commands(100),
-        // Some of them several times over.
+        typical_commands(100),
+        // With repeated commands.
         prop::collection::vec((any_command(), 1..4_usize), 0..30).prop_map(|runs| {
             runs.into_iter().flat_map(|(command, count)| std::iter::repeat_n(command, count)).collect()
         }),
@@ -56,11 +56,11 @@ fn commands() -> impl Strategy<Value = Vec<RenderCommand>> {
 
 proptest! {
     #[test]
-    fn any_commands_come_back_as_they_were(commands in commands()) {
+    fn decoding_restores_all_commands(commands in commands()) {
         let coded = DeltaCommands::encode(&commands);
         prop_assert_eq!((coded.len(), coded.is_empty()), (commands.len(), commands.is_empty()));
         prop_assert_eq!(coded.iter().len(), commands.len());
-        prop_assert!(coded.bytes().len() <= HEADER + commands.len() * LONGEST);
+        prop_assert!(coded.bytes().len() <= HEADER + commands.len() * MAX_LENGTH);
         prop_assert_eq!(coded.iter().collect::<Vec<_>>(), &commands[..]);
         let received = DeltaCommands::from_bytes(coded.into_bytes()).unwrap();
         prop_assert_eq!(received.len(), commands.len());
@@ -68,12 +68,12 @@ proptest! {
     }
 
     #[test]
-    fn it_makes_no_difference_how_commands_are_appended(
+    fn the_bytes_do_not_depend_on_how_commands_are_appended(
         (commands, parts) in (commands(), prop::collection::vec(0..100_usize, 0..6)),
-        forgotten in commands(),
+        cleared in commands(),
     ) {
         let expected = DeltaCommands::encode(&commands);
-        let mut coded = DeltaCommands::encode(&forgotten);
+        let mut coded = DeltaCommands::encode(&cleared);
         coded.clear();
         let nothing = DeltaCommands::new();
         prop_assert_eq!((coded.len(), coded.bytes()), (0, nothing.bytes()));
@@ -82,7 +82,7 @@ proptest! {
             let (now, later) = rest.split_at(part.min(rest.len()));
             coded.extend_from_slice(now);
             rest = later;
-            // What was received is appended to like what was coded here.
+            // Received commands can be appended to as well.
             coded = DeltaCommands::from_bytes(coded.into_bytes()).unwrap();
         }
         rest.iter().for_each(|command| coded.push(*command));
@@ -91,24 +91,24 @@ proptest! {
     }
 
     #[test]
-    fn a_damaged_byte_is_found(
-        (commands, place, other) in (commands(), any::<prop::sample::Index>(), 1..=u8::MAX),
+    fn a_damaged_byte_is_detected(
+        (commands, position, change) in (commands(), any::<prop::sample::Index>(), 1..=u8::MAX),
     ) {
         let mut bytes = DeltaCommands::encode(&commands).into_bytes();
-        let place = place.index(bytes.len());
-        bytes[place] ^= other;
+        let position = position.index(bytes.len());
+        bytes[position] ^= change;
         let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len()).unwrap_err();
-        prop_assert_eq!(error == DeltaError::Foreign, place < MARK.len());
+        prop_assert_eq!(error == DeltaError::Foreign, position < MAGIC.len());
     }
 
     #[test]
-    fn missing_bytes_and_bytes_too_many_are_found(
-        (commands, place) in (commands(), any::<prop::sample::Index>()),
-        more in prop::collection::vec(any::<u8>(), 1..20),
+    fn missing_and_excess_bytes_are_detected(
+        (commands, position) in (commands(), any::<prop::sample::Index>()),
+        excess in prop::collection::vec(any::<u8>(), 1..20),
     ) {
         let whole = DeltaCommands::encode(&commands).into_bytes();
         let error = |bytes: &[u8]| DeltaCommands::from_bytes(bytes.to_vec()).map(|coded| coded.len()).unwrap_err();
-        let kept = place.index(whole.len());
+        let kept = position.index(whole.len());
         let expected_count = commands.len() as u64;
         match error(&whole[..kept]) {
             DeltaError::Foreign => prop_assert!(kept < HEADER),
@@ -117,15 +117,15 @@ proptest! {
             }
             other => prop_assert!(false, "{other}"),
         }
-        prop_assert_eq!(error(&[&whole[..], &more].concat()), DeltaError::TooLong { bytes: more.len() });
+        prop_assert_eq!(error(&[&whole[..], &excess].concat()), DeltaError::TooLong { bytes: excess.len() });
     }
 
-    /// Whatever they are, they begin with some commands. Those, with a header that fits, are commands like any others.
+    /// Random bytes begin with some valid commands. With a header of their count and checksum, they are accepted.
     #[test]
-    fn made_up_bytes_are_commands_or_an_error(
+    fn random_bytes_are_commands_or_an_error(
         body in prop::collection::vec(prop_oneof![any::<u8>(), 0..=13_u8, Just(0x50)], 0..300),
     ) {
-        let mut bytes = [&MARK, &[0; 4][..], &[0xff; 8], &body].concat();
+        let mut bytes = [&MAGIC, &[0; 4][..], &[0xff; 8], &body].concat();
         let error = |bytes: &[u8]| DeltaCommands::from_bytes(bytes.to_vec()).map(|coded| coded.len()).unwrap_err();
         let (DeltaError::Truncated { index: count, .. } | DeltaError::Malformed { index: count }) = error(&bytes) else {
             panic!("{}", error(&bytes));
@@ -143,11 +143,11 @@ proptest! {
     }
 
     #[test]
-    fn usual_commands_are_short(commands in usual_commands(200)) {
+    fn typical_commands_are_short(commands in typical_commands(200)) {
         let coded = DeltaCommands::encode(&commands);
         let opaque = commands.iter().filter(|command| command.key < SortKey::blended(u32::MAX)).count();
-        // A byte says how long the others are. Of an opaque command the key changes in up to 7 bytes, the object in 2, the
-        // material in 1 behind another that says so. Of a blended one mesh and state are there as well.
+        // An opaque command takes up to 12 bytes: the first byte, 7 for the key, 2 for the object, the second byte, and 1 for the
+        // material. A blended one also has mesh and state.
         prop_assert!(coded.bytes().len() <= HEADER + opaque * 12 + (commands.len() - opaque) * 14);
     }
 }
@@ -166,11 +166,11 @@ fn a_huge_count_takes_no_memory_and_no_time() {
 }
 
 #[test]
-fn ways_to_code_that_there_are_not_are_found() {
+fn invalid_lengths_are_detected() {
     for body in [&[0x0e][..], &[0x0f], &[0x60], &[0x70], &[0xd0, 0x05], &[0xd0, 5 << 3], &[0xd0, 0x80]] {
         let mut bytes = DeltaCommands::new().into_bytes();
         bytes[8] = 1;
-        // However many bytes would be read of it.
+        // Enough bytes for any length.
         bytes.extend([body, &[0; 30]].concat());
         let error = DeltaCommands::from_bytes(bytes).map(|coded| coded.len());
         assert_eq!(error, Err(DeltaError::Malformed { index: 0 }), "{body:x?}");
@@ -178,7 +178,7 @@ fn ways_to_code_that_there_are_not_are_found() {
 }
 
 #[test]
-fn copies_of_an_object_are_a_byte_each() {
+fn copies_of_an_object_take_a_byte_each() {
     let key = SortKey::opaque(DrawState::PLAIN, 300_000, 4 << 20);
     let copy = |index: u32| RenderCommand {
         key,
