@@ -13,6 +13,19 @@ use crate::view::ObjectTable;
 ///
 /// The order within a frame: `begin`; then `upload_objects` for every block of objects; for every pass `prepare`, `record` for
 /// each range of its parts, and `finish`; later, on the device thread, `submit`.
+///
+/// What a backend must honour:
+///
+/// - Depth is reversed: 1 at the near plane, and 0 at the far plane or at infinity. Depth targets are cleared to 0, and
+///   what is nearer has a greater depth.
+/// - Views with [`RenderView::is_cached`](crate::view::RenderView::is_cached) have no passes in the frame, but processes of other
+///   views sample their targets. So the targets of a view keep their content from frame to frame.
+/// - Batches whose state has a [subdivision level](crate::command::DrawState::subdivision_level) above 0 draw their mesh
+///   [subdivided](crate::scene::Mesh::subdivided), as a triangle list whose longest edge is that of the mesh, halved that often.
+///   Objects whose mesh cannot be subdivided that far are drawn nevertheless, and counted as
+///   [`CoarseEdges`](crate::view::RejectionReason::CoarseEdges).
+/// - Partial batches draw only the triangles in [`DrawList::remaining`](crate::command::DrawList::remaining).
+/// - Batches are drawn in the order of their list, and passes in that of the queues.
 pub trait Backend: Send + Sync + 'static {
     /// The state of a frame in flight, from `begin` to `submit`.
     type Frame: Send + Sync;
@@ -52,7 +65,7 @@ pub trait Backend: Send + Sync + 'static {
     /// Prepares a pass of commands for recording: uploads the indices of its objects, and creates missing pipelines.
     ///
     /// # Errors
-    /// If the device refuses. Compile errors of the process' shader are reported here at the latest.
+    /// If the device refuses. Compile errors of the process's shader are reported here at the latest.
     fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
 
     /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant throughout a
@@ -72,8 +85,8 @@ pub trait Backend: Send + Sync + 'static {
         emit: &mut dyn FnMut(Self::Part),
     ) -> Result<(), BackendError>;
 
-    /// Finishes a pass from its parts, or records it if it has none. The list of a pass without commands is empty. The caller drops
-    /// the remaining parts and reuses the memory of their list.
+    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty. The backend
+    /// may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
     ///
     /// # Errors
     /// If the device refuses the pass.

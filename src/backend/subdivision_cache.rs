@@ -129,7 +129,7 @@ fn subdivided(mesh: &Mesh, level: u32) -> (Mesh, bool) {
     (subdivided, is_coarse)
 }
 
-/// The error for a batch without a mesh: a bug of Drawloom's.
+/// The error for a batch without a mesh. This is a bug in Drawloom.
 pub(super) fn missing_mesh_error() -> BackendError {
     BackendError::BrokenRule { rule: "a batch draws an existing mesh".to_owned() }
 }

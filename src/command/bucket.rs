@@ -1,4 +1,4 @@
-//! A bucket of a pass' commands, and the batches they merge into.
+//! A bucket of a pass's commands, and the batches they merge into.
 
 use super::{DrawState, RenderCommand};
 

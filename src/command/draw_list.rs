@@ -13,7 +13,7 @@ pub struct DrawList {
     bucket_count: usize,
     /// The batches in draw order.
     pub batches: Vec<Batch>,
-    /// The object index of each command: the 4 bytes per object that a view uploads.
+    /// The object index of each command: the 4 bytes per object that a pass uploads.
     pub objects: Vec<u32>,
     /// The corners of the remaining triangles of partial batches, three per triangle.
     remaining_indices: Vec<u32>,

@@ -1,5 +1,5 @@
-//! What a view draws, from command to batch: one draw each, independent of any device, small enough to sort by the million
-//! (M 10.3); sorted by bucket, merged into instanced draws, and joined to a draw list a pass (M 10.5).
+//! Commands, each of which draws one object, independent of any device and small enough to sort by the million (M 10.3). They
+//! are sorted in buckets, merged into batches (instanced draws), and joined to one draw list per pass (M 10.5).
 
 mod bucket;
 mod delta;

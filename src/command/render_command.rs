@@ -2,10 +2,10 @@
 
 use super::{DrawState, SortKey};
 
-/// One draw of one object for one view, independent of any device (M 10.3). It refers to what it needs and owns nothing.
+/// One draw of one object in one pass, independent of any device (M 10.3). It refers to what it needs and owns nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RenderCommand {
-    /// Its position in the pass' order.
+    /// Its position in the pass's order.
     pub key: SortKey,
     /// The object's index in the scene.
     pub object: u32,

@@ -55,21 +55,21 @@ pub(crate) fn sort(
 /// Below this number of commands a comparison sort is faster than counting digits.
 const RADIX_SORT_THRESHOLD: usize = 512;
 
-fn collect(commands: &ChunkedArray<RenderCommand>, count: usize, range: KeyRange, collected: &mut Vec<RenderCommand>) {
-    collected.clear();
-    let mut held = [RenderCommand::EMPTY; ChunkedArray::<RenderCommand>::BLOCK_SIZE];
-    for (block, entries) in ChunkedArray::<RenderCommand>::block_ranges(0..count) {
-        let filled = &commands.read(block)[..entries.len()];
-        if range.is_all() && filled.iter().all(|command| command.key != SortKey::LAST) {
-            collected.extend_from_slice(filled);
+fn collect(commands: &ChunkedArray<RenderCommand>, count: usize, range: KeyRange, output: &mut Vec<RenderCommand>) {
+    output.clear();
+    let mut selected = [RenderCommand::EMPTY; ChunkedArray::<RenderCommand>::BLOCK_SIZE];
+    for (block_index, entries) in ChunkedArray::<RenderCommand>::block_ranges(0..count) {
+        let block = &commands.read(block_index)[..entries.len()];
+        if range.is_all() && block.iter().all(|command| command.key != SortKey::LAST) {
+            output.extend_from_slice(block);
             continue;
         }
         // Branchless: a mispredicted branch costs more than a wasted store.
-        let mut held_count = 0;
-        for command in filled {
-            held[held_count] = *command;
-            held_count += usize::from(range.contains(command.key));
+        let mut selected_count = 0;
+        for command in block {
+            selected[selected_count] = *command;
+            selected_count += usize::from(range.contains(command.key));
         }
-        collected.extend_from_slice(&held[..held_count]);
+        output.extend_from_slice(&selected[..selected_count]);
     }
 }

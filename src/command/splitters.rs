@@ -1,9 +1,9 @@
-//! Splitters: keys that divide a pass' commands into buckets, which are sorted and merged in parallel.
+//! Splitters: keys that divide a pass's commands into buckets, which are sorted and merged in parallel.
 
 use super::{RenderCommand, SortKey};
 use crate::chunked_array::ChunkedArray;
 
-/// The splitters of a sample sort: keys that divide a pass' commands into buckets of about equal size, one job each (Blelloch
+/// The splitters of a sample sort: keys that divide a pass's commands into buckets of about equal size, one job each (Blelloch
 /// et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).
 ///
 /// They decide which job sorts a command, never the result.

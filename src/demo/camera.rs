@@ -8,7 +8,7 @@ use crate::scene::{Camera, Projection, SceneRef};
 
 /// A camera called `main` that shows the scene, whose size may be 1 µm to 10,000 km, at any distance from the world's origin.
 ///
-/// Rays classify the scene. If its bvh face points inside and not points outside, it is an interior: the camera stands
+/// Rays classify the scene. If its triangles face points inside and not points outside, it is an interior: the camera stands
 /// in it at eye height, looking along the longest free line of sight, or looks in through a missing wall. Otherwise it is an
 /// object, shown from outside and slightly above. The scene is upright along +Y. The near plane is at a thousandth of the
 /// scene's radius.

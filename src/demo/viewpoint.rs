@@ -14,10 +14,11 @@ pub(super) struct Viewpoint {
     pub field_of_view: f32,
 }
 
-/// In an interior, at least this share of rays from some point inside hits front faces.
+/// The test for an interior: from some point inside the bounds, at least this share of rays in all directions hits front faces.
 const INTERIOR_SHARE: f32 = 0.6;
 
-/// On an object, even a hollow one, at least this share of rays from outside that hit anything hits front faces.
+/// The test for an object, even a hollow one: of the rays from outside inwards that hit anything, at least this share hits front
+/// faces.
 const OBJECT_SHARE: f32 = 0.5;
 
 /// The number of rays from a point.

@@ -3,7 +3,7 @@
 use super::Format;
 use crate::scene::ViewKind;
 
-/// Collects what a process reads and writes. Targets have names. Each view of the process' kind has targets of its own,
+/// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
 /// of the size of its picture.
 #[derive(Debug, Default)]
 pub struct Declare {

@@ -23,7 +23,7 @@ pub enum Draws<'a> {
     Raw(&'a dyn RawPass),
 }
 
-/// The objects that a view sees: culled, sorted, merged into instanced batches and recorded into bundles.
+/// The objects that a view sees: culled, sorted, merged into instanced batches and recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommandDraws<'a> {
     /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `vertex`.

@@ -6,7 +6,7 @@ use crate::scene::ViewKind;
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
-/// It is called on a worker, once per frame and view of its process' kind.
+/// It is called on a worker, once per frame and view of its process's kind.
 pub trait RawPass: Send + Sync {
     /// Encodes the pass.
     ///

@@ -51,7 +51,7 @@ pub trait RenderProcess: Send + Sync {
     /// blending needs new pipelines.
     fn draws(&self) -> Draws<'_>;
 
-    /// What the software backend runs in place of the process' WGSL. Without one, frames with this process return an
+    /// What the software backend runs in place of the process's WGSL. Without one, frames with this process return an
     /// error on that backend. Called once per frame, by the software backend only.
     #[cfg(feature = "software")]
     fn cpu_shader(&self) -> Option<super::CpuShader> {

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use super::silhouettes::{Silhouette, Silhouettes};
 
-/// For each tile of a picture, the least nearness within the tile of the nearest silhouettes that cover it entirely
+/// For each tile of a picture, a conservative (farthest) depth of the occluders that fully cover the tile
 /// (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area,
 /// where theirs is by samples).
 ///
-/// A tile is covered if each of its cells is inside all lines of some [silhouette](Silhouettes). Lines and planes are
+/// Depth is stored as nearness, and occluders are drawn as [silhouettes](Silhouettes). A tile is covered if each of its
+/// cells is inside all lines of some silhouette. Lines and planes are
 /// linear, so they are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is
 /// hidden in the whole tile. Silhouettes that cover some cells are merged until they cover all; the merged nearness is
 /// the least of theirs. Drawing silhouettes nearest first keeps it as great as possible.

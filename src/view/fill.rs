@@ -11,8 +11,8 @@ use crate::command::{DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
 
-/// Fills the commands of one pass. It computes no state: it copies what the object table holds, so workers contend for
-/// nothing.
+/// Fills the commands of one pass. Mesh, material and draw state are copied from the object table, which workers only
+/// read. The depth is computed for each view, and so is the state's subdivision level if the view is a paraboloid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fill<'a> {
     /// The frame's objects.
@@ -51,7 +51,7 @@ impl Fill<'_> {
             // Visible objects come in order, so a block stays open for many of them.
             let mut open = None;
             self.visible.visit(part, |rank, word, bits| {
-                let first = word * VisibleSet::WORD;
+                let first = word * VisibleSet::OBJECTS_PER_WORD;
                 let index = first / ObjectTable::BLOCK_SIZE;
                 let (_, objects) = match open.take() {
                     Some((current, guard)) if current == index => open.insert((current, guard)),

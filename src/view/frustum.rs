@@ -32,7 +32,8 @@ pub struct Frustum {
 /// lies between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SidePlanes {
-    /// Perpendicular to `forward`. Its length is the cosine of half the field of view; 1 without perspective.
+    /// The part of the planes' unit normals that is perpendicular to `forward`: the normals are
+    /// `slope · forward ± across`. Its length is the cosine of half the field of view; 1 without perspective.
     across: Vec3,
     /// The sine of half the field of view; 0 without perspective.
     slope: f32,

@@ -30,7 +30,7 @@ impl LightClass {
     /// The number of classes: every [`LightClass::index`] is below it.
     pub const COUNT: usize = 2 * LightKind::ALL.len();
 
-    /// The class of a light. Without `shadows`, no light is shadowed.
+    /// The class of a light. If `shadows` is false, no light is shadowed.
     pub fn of(light: &Light, shadows: bool) -> Self {
         Self { kind: light.kind(), shadowed: shadows && light.casts_shadow() }
     }
@@ -48,7 +48,7 @@ impl LightClass {
 
 impl LightTable {
     /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a
-    /// class, lights keep the order of the scene. With `shadows`, lights that cast shadows have classes of their own,
+    /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their own,
     /// and a shadow map if one of `views` draws it. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
         self.gpu_lights.clear();

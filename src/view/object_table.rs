@@ -28,7 +28,7 @@ pub struct ObjectTable {
     /// The culling volume from the next [`ObjectTable::reset`] on.
     culling: CullingVolume,
     /// The culling volume that the blocks' boxes are for.
-    boxes_for: CullingVolume,
+    boxes_volume: CullingVolume,
 }
 
 /// [`ObjectTable::BLOCK_SIZE`] objects of the table; object `index` is at `index % BLOCK_SIZE`.
@@ -46,8 +46,8 @@ pub struct ObjectBlock {
 
 impl ObjectBlock {
     /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
-    /// the objects that a view may see; bit 0 is `entries.start`. The test is conservative: a visible object is never
-    /// missing. Rejected objects always are.
+    /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no rejected
+    /// one; it may contain a few invisible ones.
     ///
     /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only
     /// the others' boxes are tested.
@@ -118,11 +118,11 @@ impl ObjectTable {
         let blocks = self.block_count().max(old_count);
         self.blocks.resize_with(blocks, RwLock::default);
         // Blocks whose boxes are already right stay untouched.
-        let up_to_date = if self.boxes_for == self.culling { old_count } else { 0 };
+        let up_to_date = if self.boxes_volume == self.culling { old_count } else { 0 };
         for block in &mut self.blocks[up_to_date..] {
             block.get_mut().boxes = BoundingBoxes::new(self.culling);
         }
-        self.boxes_for = self.culling;
+        self.boxes_volume = self.culling;
         // Entries after the last object are tested with it, and must not be visible.
         if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK_SIZE) {
             let spheres = &mut last.get_mut().spheres;

@@ -1,4 +1,4 @@
-//! The visible set of a view, tested in parallel and compacted by prefix sum.
+//! The visible set of a view, filled in parallel and compacted by prefix sum.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,8 +9,8 @@ use crate::chunked_array::block_ranges;
 
 /// The objects that a view sees: a bit for each object, and a prefix sum over words of 64.
 ///
-/// Any worker may test any object; the result does not depend on which. So the compacted order is always that of the
-/// objects.
+/// Frustum culling sets bits and occlusion culling clears them. Any worker may do either for any object; the result does
+/// not depend on which. So the compacted order is always that of the objects.
 #[derive(Debug, Default)]
 pub struct VisibleSet {
     words: Vec<AtomicU64>,
@@ -26,13 +26,13 @@ impl VisibleSet {
         self.offsets.get_mut().clear();
     }
 
-    /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::WORD`]
+    /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::OBJECTS_PER_WORD`]
     /// objects, and returns a mask whose bit 0 is the first object of the part; excess bits are ignored. Ranges tested
     /// at the same time must not share objects, but may share words.
     pub fn test(&self, objects: Range<usize>, is_visible: impl Fn(Range<usize>) -> u64) {
-        for (word, part) in block_ranges(objects, Self::WORD) {
-            let mask = u64::MAX >> (Self::WORD - part.len());
-            let bits = (is_visible(part.clone()) & mask) << (part.start % Self::WORD);
+        for (word, part) in block_ranges(objects, Self::OBJECTS_PER_WORD) {
+            let mask = u64::MAX >> (Self::OBJECTS_PER_WORD - part.len());
+            let bits = (is_visible(part.clone()) & mask) << (part.start % Self::OBJECTS_PER_WORD);
             // Relaxed: jobs that read the bits depend on this job.
             self.words[word].fetch_or(bits, Ordering::Relaxed);
         }
@@ -44,11 +44,11 @@ impl VisibleSet {
     /// share words.
     pub fn remove_hidden(&self, objects: Range<usize>, is_hidden: impl Fn(usize, u64) -> u64) -> usize {
         let mut count = 0;
-        for (word, part) in block_ranges(objects, Self::WORD) {
-            let mask = (u64::MAX >> (Self::WORD - part.len())) << (part.start % Self::WORD);
+        for (word, part) in block_ranges(objects, Self::OBJECTS_PER_WORD) {
+            let mask = (u64::MAX >> (Self::OBJECTS_PER_WORD - part.len())) << (part.start % Self::OBJECTS_PER_WORD);
             let visible = self.words[word].load(Ordering::Relaxed) & mask;
             if visible != 0 {
-                let hidden = is_hidden(word * Self::WORD, visible) & visible;
+                let hidden = is_hidden(word * Self::OBJECTS_PER_WORD, visible) & visible;
                 self.words[word].fetch_and(!hidden, Ordering::Relaxed);
                 count += hidden.count_ones() as usize;
             }
@@ -56,15 +56,16 @@ impl VisibleSet {
         count
     }
 
-    /// A mask of the visible objects from `word` × [`VisibleSet::WORD`] on; 0 beyond the last word.
+    /// A mask of the visible objects from `word` × [`VisibleSet::OBJECTS_PER_WORD`] on; 0 beyond the last word.
     pub fn word(&self, word: usize) -> u64 {
         self.words.get(word).map_or(0, |bits| bits.load(Ordering::Relaxed))
     }
 
     /// The number of objects in a word.
-    pub const WORD: usize = u64::BITS as usize;
+    pub const OBJECTS_PER_WORD: usize = u64::BITS as usize;
 
-    /// Computes the prefix sum over words. Call it once, after all objects have been tested.
+    /// Computes the prefix sum over words. Call it once, after all objects have been tested and hidden
+    /// ones removed.
     pub fn compact(&self) {
         let mut offsets = self.offsets.write();
         offsets.clear();
@@ -82,7 +83,7 @@ impl VisibleSet {
     }
 
     /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the
-    /// visible objects) is in `ranks`. Bit `b` is object `word × WORD + b`; the lowest set bit has the rank `rank`.
+    /// visible objects) is in `ranks`. Bit `b` is object `word × OBJECTS_PER_WORD + b`; the lowest set bit has the rank `rank`.
     /// Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
         let offsets = self.offsets.read();
@@ -148,7 +149,7 @@ mod tests {
             for start in (0..visible.len() + 1).step_by(ranks) {
                 set.visit(start..start + ranks, |rank, word, bits| {
                     assert_eq!(rank, found.len());
-                    found.extend(set_bits(bits).map(|bit| word * VisibleSet::WORD + bit));
+                    found.extend(set_bits(bits).map(|bit| word * VisibleSet::OBJECTS_PER_WORD + bit));
                 });
                 prop_assert_eq!(found.len(), expected.len().min(start + ranks));
             }

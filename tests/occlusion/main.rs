@@ -26,7 +26,9 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     });
     let bits = |visible: &VisibleSet| {
         (0..count)
-            .map(|object| visible.word(object / VisibleSet::WORD) >> (object % VisibleSet::WORD) & 1 == 1)
+            .map(|object| {
+                visible.word(object / VisibleSet::OBJECTS_PER_WORD) >> (object % VisibleSet::OBJECTS_PER_WORD) & 1 == 1
+            })
             .collect()
     };
     let visible_before: Vec<bool> = bits(&visible);

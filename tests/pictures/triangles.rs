@@ -25,7 +25,7 @@ pub const CASES: &[Case] = &[
 
 type Make = fn() -> Result<Scene, Failed>;
 
-/// Scenes, and the step between their cullable meshes.
+/// Scenes, each with an n: every n-th mesh is cullable.
 const SCENES: [(Make, usize); 4] =
     [(|| Ok(everything()), 1), (|| Ok(field(300)), 1), (small_colonnade, 1), (|| Ok(many_batches()), 2)];
 

@@ -23,7 +23,7 @@ const PROTOCOL: u32 = 82;
 const WELCOME: u8 = 1;
 const PROTOCOL_MISMATCH: u8 = 2;
 
-/// Letters in an order that occurs nowhere else, so that Tracy's compression does not change them.
+/// A unique string, so that Tracy's compression does not change it.
 const NODE: &str = "Wq7x#jvKz9";
 const SPAN: &str = "Yb3u@fnGd5";
 const SECRETS: [&str; 4] = ["Ph8c!mtRs2", "Lk6e%ovXa4", "Uz1i&wyJr0", "Dg5o~hqBn3"];

@@ -66,15 +66,15 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
 /// One worker, so that the times compare the sum of the work.
 const WORKERS: usize = 1;
 
-/// The order in which walls are drawn.
+/// The order in which walls are added to the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     FrontToBack,
     BackToFront,
 }
 
-/// Thirty walls one behind the other. Each fills the picture. Objects are sorted by material first and by depth second, so
-/// the materials determine the order.
+/// Thirty walls one behind the other. Each fills the picture. `order` is that of the objects in the scene. Commands of one
+/// mesh and state are sorted by depth, so both scenes are drawn front to back.
 fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     const WALLS: usize = 30;
     let mut scene = Scene::new();

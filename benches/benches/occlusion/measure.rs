@@ -115,8 +115,9 @@ impl<'a> CameraCase<'a> {
             let spans = [chosen - start, drawn - chosen, drawn.elapsed()];
             times.iter_mut().zip(spans).for_each(|(times, span)| times.push(span.as_secs_f64()));
         }
-        let is_visible =
-            |object: usize| visible.word(object / VisibleSet::WORD) >> (object % VisibleSet::WORD) & 1 == 1;
+        let is_visible = |object: usize| {
+            visible.word(object / VisibleSet::OBJECTS_PER_WORD) >> (object % VisibleSet::OBJECTS_PER_WORD) & 1 == 1
+        };
         let hidden: Vec<_> = (0..count).map(|object| in_frustum[object] && !is_visible(object)).collect();
         let naive = naive::hidden(scene, &view.camera, side, in_frustum);
         let number = |of: &dyn Fn(usize) -> bool| (0..count).filter(|&object| of(object)).count();

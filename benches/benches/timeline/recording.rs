@@ -76,7 +76,7 @@ impl Timed {
         if is_on {
             timeline.start();
         }
-        // The capacity of a worker's ring, less a quarter for its idle times.
+        // Three quarters of the ring's capacity; the rest is for idle times.
         let max_frames = ((1 << 16) * 3 / 4 / self.chunks).max(1);
         let (start, mut frames) = (Instant::now(), 0);
         while frames < max_frames && start.elapsed() < RUN {

@@ -131,7 +131,7 @@ impl<R: Precision> OpenAttachments<'_, R> {
     }
 }
 
-/// One tile of a pass' attachments.
+/// One tile of a pass's attachments.
 pub(super) struct TileAttachments<'a, R> {
     pub(super) bounds: PixelBounds,
     colors: Vec<&'a mut [R]>,

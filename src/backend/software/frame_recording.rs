@@ -28,7 +28,7 @@ pub(super) trait FrameRecording: Send + Sync {
     /// Subdivides the meshes that a pass draws subdivided.
     ///
     /// # Errors
-    /// If a batch's mesh does not exist: an error of Drawloom's own.
+    /// If a batch's mesh does not exist. This is a bug in Drawloom.
     fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
 
     /// Draws all passes.

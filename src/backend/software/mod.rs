@@ -1,6 +1,6 @@
 //! The software backend: it draws on the CPU what the other backends draw on a device.
 //!
-//! It executes the same commands with each process' [`CpuShader`](crate::process::CpuShader) in place of its WGSL. In
+//! It executes the same commands with each process's [`CpuShader`](crate::process::CpuShader) in place of its WGSL. In
 //! f32 it runs on all workers of a scheduler, so that a machine without a graphics adapter has a picture too; in f64 it
 //! runs on one thread, as the reference that the other backends are compared with.
 //!

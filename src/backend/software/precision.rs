@@ -18,7 +18,7 @@ pub(super) trait Precision: Real {
     /// Whether targets round their values to their formats.
     const ROUNDS: bool;
 
-    /// A process' CPU shader in this precision.
+    /// A process's CPU shader in this precision.
     fn shader(shader: &CpuShader) -> &TypedCpuShader<Self>;
 
     /// Storage for a frame's objects.

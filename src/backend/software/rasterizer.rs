@@ -145,7 +145,7 @@ fn software_pass<R: Precision>(
 }
 
 /// # Errors
-/// If a target is missing: an error of Drawloom's own.
+/// If a target is missing. This is a bug in Drawloom.
 fn attachments<R: Precision>(
     request: &FrameRequest<'_>,
     pass: Pass,

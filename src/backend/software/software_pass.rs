@@ -11,7 +11,7 @@ use crate::scene::Blend;
 /// A pass of a frame: one process in one view.
 pub(super) struct SoftwarePass<R: Precision> {
     pub(super) pass: Pass,
-    /// The process' name.
+    /// The process's name.
     pub(super) process: String,
     pub(super) draws: SoftwareDraws<R>,
     pub(super) attachments: Attachments<R>,

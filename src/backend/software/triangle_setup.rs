@@ -1,4 +1,4 @@
-//! Triangle setup: a pass' triangles are shaded, set up and binned into tiles, a chunk a job, before tiles are drawn.
+//! Triangle setup: a pass's triangles are shaded, set up and binned into tiles, a chunk a job, before tiles are drawn.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::raster::{Real, Vector4};
 
-/// A process' shader on the CPU, which the software backend runs in place of its WGSL, in f32 and in f64: see
+/// A process's shader on the CPU, which the software backend runs in place of its WGSL, in f32 and in f64: see
 /// [`RenderProcess::cpu_shader`](crate::process::RenderProcess::cpu_shader). It computes the same numbers as the WGSL.
 #[derive(Clone)]
 pub struct CpuShader {

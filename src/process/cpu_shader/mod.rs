@@ -1,4 +1,4 @@
-//! CPU shaders: the same shaders in Rust, which the software backend runs in place of a process' WGSL.
+//! CPU shaders: Rust versions of the WGSL shaders, which the software backend runs in their place.
 //!
 //! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`,
 //! and `built_in` those of WGSL itself.

@@ -37,7 +37,7 @@ impl GeometryBuffer {
     }
 
     /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over
-    /// it: all of them are recorded at the same time.
+    /// them: all shares are recorded at the same time.
     pub fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
         let name = if share.of <= 1 {
             String::from("geometry buffer")

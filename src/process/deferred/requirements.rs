@@ -15,7 +15,7 @@ pub struct Requirements {
 const _: () = assert!(LightClass::COUNT <= 8);
 
 impl Requirements {
-    /// What a scene with these valid lights and assets requires. Without `shadows`, lights count as casting none.
+    /// What a scene with these valid lights and assets requires. If `shadows` is false, lights count as casting none.
     pub fn of(lights: &[Light], assets: &Assets, shadows: bool) -> Self {
         let mut requirements = Self::default();
         for light in lights {

@@ -37,11 +37,11 @@ pub(super) fn order_constraints(
     }
     for own in added {
         for before in &own.declaration.after {
-            let known = find(slot_names, added, before, |wanted, slot| slot <= wanted);
+            let known = find(slot_names, added, before, |empty, filled| filled <= empty);
             orders.extend(known.map_err(|error| error.in_process(own, before))?.map(|before| (before, own.id)));
         }
         for after in &own.declaration.before {
-            let known = find(slot_names, added, after, |wanted, slot| slot >= wanted);
+            let known = find(slot_names, added, after, |empty, filled| filled >= empty);
             orders.extend(known.map_err(|error| error.in_process(own, after))?.map(|after| (own.id, after)));
         }
     }
@@ -60,8 +60,8 @@ pub(super) fn order_constraints(
     Ok(orders)
 }
 
-/// The process of this name; if it is an empty slot of the chain, the process in the nearest slot for which
-/// `is_on_side` holds, which is given the empty slot and the other.
+/// The process of this name; if it is an empty slot of the chain, the process in the nearest filled slot for which
+/// `is_on_side(empty, filled)` holds.
 ///
 /// # Errors
 /// If neither a process nor a slot has this name.
@@ -74,9 +74,9 @@ fn find(
     if let Some(found) = added.iter().find(|other| other.name == name) {
         return Ok(Some(found.id));
     }
-    let wanted = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
+    let empty = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
     let in_chain = added.iter().filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
-    let nearest = in_chain.filter(|(slot, _)| is_on_side(wanted, *slot)).min_by_key(|(slot, _)| slot.abs_diff(wanted));
+    let nearest = in_chain.filter(|(slot, _)| is_on_side(empty, *slot)).min_by_key(|(slot, _)| slot.abs_diff(empty));
     Ok(nearest.map(|(_, id)| id))
 }
 

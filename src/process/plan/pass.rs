@@ -3,7 +3,7 @@
 /// One process in one view: recorded as a unit, and finished on one worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pass {
-    /// The process' index in [`FramePlan::processes`](super::FramePlan::processes).
+    /// The process's index in [`FramePlan::processes`](super::FramePlan::processes).
     pub process_index: usize,
     /// The view's index among the frame's views.
     pub view_index: usize,

@@ -15,7 +15,7 @@ pub struct PlannedProcess {
 }
 
 impl PlannedProcess {
-    /// Calls a process' `declare`, once.
+    /// Calls a process's `declare`, once.
     ///
     /// # Errors
     /// If `declare` panics, or declares more than one depth target.

@@ -19,8 +19,7 @@ pub struct ViewGroup {
 pub enum ViewOrder {
     /// One view after the other, each with its whole queue (M listing 10.7).
     ViewByView,
-    /// One process after the other, each in all views: the exception, for views that read what others of the group write while
-    /// those read what they write.
+    /// One process after the other, each in all views: the exception, for views that depend on each other.
     ProcessByProcess,
 }
 

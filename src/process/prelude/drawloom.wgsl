@@ -1,8 +1,8 @@
-// The prelude of every shader. A process' own WGSL follows it and may use all of it.
+// The prelude of every shader. A process's own WGSL follows it and may use all of it.
 //
 //   @group(0)  the frame and the view: below
 //   @group(1)  materials and their textures: below
-//   @group(2)  the process' own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order
+//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order
 //
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 

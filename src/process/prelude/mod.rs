@@ -1,4 +1,4 @@
-//! What every shader begins with, in WGSL, and the geometry that its vertex shader for lights is drawn with.
+//! The WGSL prelude of every shader, and the light volume meshes.
 
 #[cfg(feature = "wgpu")]
 mod light_volume;

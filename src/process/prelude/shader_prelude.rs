@@ -1,6 +1,6 @@
 //! The WGSL that every shader begins with.
 
-/// The bindings, structures and functions that Drawloom provides to every shader. A process' own WGSL is appended to
+/// The bindings, structures and functions that Drawloom provides to every shader. A process's own WGSL is appended to
 /// it. See `drawloom.wgsl` for what a process may use.
 ///
 /// It does not compile by itself. `const ABSOLUTE_TRANSFORMS: bool = false;` goes before it, or `true` for

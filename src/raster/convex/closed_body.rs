@@ -3,8 +3,8 @@
 use super::welded_mesh::{WeldedMesh, edges};
 use super::{ConvexPart, Plane};
 
-/// Returns a connected component as a closed convex body, if it is one: every edge has a triangle on either side, and
-/// no corner is farther outside any triangle's plane than the tolerance.
+/// Converts a connected component; `None` if it is not closed and convex. It is closed if every edge has a triangle on
+/// either side, and convex if no corner is farther outside any triangle's plane than the tolerance.
 ///
 /// **The outline's error.** Let no corner be farther outside any face than δ. From any viewpoint, an edge of the
 /// outline lies between a front face with the normal n₁ and a back face with n₂. The plane through the eye and the edge

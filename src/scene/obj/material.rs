@@ -76,7 +76,7 @@ fn correct_opacity(definitions: &mut [Definition], warnings: &mut Vec<ObjWarning
     }
 }
 
-/// TextureCache by path, shared between materials.
+/// Textures by path, shared between materials.
 struct TextureCache<'a> {
     fetch: &'a dyn Fn(&str) -> io::Result<Vec<u8>>,
     by_path: HashMap<String, Result<Handle<Texture>, String>>,

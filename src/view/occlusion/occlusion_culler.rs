@@ -81,9 +81,9 @@ impl OcclusionCuller {
         let occluders = &mut *self.occluders.write();
         for block in 0..table.block_count() {
             let objects = table.block(block);
-            for first in (0..ObjectTable::BLOCK_SIZE).step_by(VisibleSet::WORD) {
+            for first in (0..ObjectTable::BLOCK_SIZE).step_by(VisibleSet::OBJECTS_PER_WORD) {
                 let start = block * ObjectTable::BLOCK_SIZE + first;
-                for bit in set_bits(visible.word(start / VisibleSet::WORD)) {
+                for bit in set_bits(visible.word(start / VisibleSet::OBJECTS_PER_WORD)) {
                     let (entry, object) = (first + bit, start + bit);
                     let bounds = objects.spheres.get(entry);
                     let center = camera.camera_from_world(bounds.center);
@@ -130,7 +130,7 @@ impl OcclusionCuller {
     }
 
     /// Tests the objects of a word whose bits in `visible` are set; bit 0 is `first`, a multiple of
-    /// [`VisibleSet::WORD`]. Returns a mask of the hidden objects. Call it after all strips have been drawn.
+    /// [`VisibleSet::OBJECTS_PER_WORD`]. Returns a mask of the hidden objects. Call it after all strips have been drawn.
     pub fn hidden(&self, scene: &SceneRef<'_>, table: &ObjectTable, first: usize, visible: u64) -> u64 {
         let Some(camera) = self.camera.as_ref().filter(|_| visible != 0) else { return 0 };
         let objects = table.block(first / ObjectTable::BLOCK_SIZE);

@@ -170,7 +170,7 @@ impl Objects {
             let touching = oracle.touching(any_planes(random), reaches, any_along(random), any_aside(random));
             oracle.world(touching * (1.0 + if random.below(2) == 0 { step } else { 0.0 }) - anchor)
         });
-        // A large object that touches may have to be out of reach.
+        // The touching position of a large object may be out of reach.
         let touching_position = touching_position.filter(|&position| FixedPosition::new(position).is_some());
         let position =
             touching_position.unwrap_or_else(|| oracle.world(random.direction() * magnitude(random, -2.0, 7.0)));

@@ -5,7 +5,7 @@ use crate::backend::wgpu::strategy::{EncodingStrategy, RecordingStrategy};
 /// How one pass of the frame that was submitted last was recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WgpuPassStatistics {
-    /// The render process' name.
+    /// The render process's name.
     pub process: String,
     /// The view's index.
     pub view: usize,

@@ -26,11 +26,11 @@ pub(crate) struct BatchRecorder<'a> {
 }
 
 impl<'a> BatchRecorder<'a> {
-    /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` draws each run of
-    /// whole batches of one state whose meshes lie in the arenas.
+    /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` is
+    /// called for consecutive unculled, unsubdivided batches of one state, and draws them.
     ///
     /// # Errors
-    /// If a resource of a batch is missing: a bug of Drawloom's.
+    /// If a resource of a batch is missing. This is a bug in Drawloom.
     pub(crate) fn draw<E: RenderEncoder<'a>>(
         &self,
         encoder: &mut E,
@@ -100,7 +100,7 @@ impl<'a> BatchRecorder<'a> {
     /// Draws each batch of a run with a draw call of its own.
     ///
     /// # Errors
-    /// If a mesh is missing: a bug of Drawloom's.
+    /// If a mesh is missing. This is a bug in Drawloom.
     pub(crate) fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         for batch in run {
             let mesh = self.frame.assets.mesh_range(batch)?;

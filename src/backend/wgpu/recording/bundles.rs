@@ -22,7 +22,7 @@ pub(crate) fn cached_bundle(frame: &WgpuFrame, pass: usize, list: &DrawList, bun
 /// Records one bundle of a pass, or reuses the cached one.
 ///
 /// # Errors
-/// If a resource of a batch is missing: a bug of Drawloom's.
+/// If a resource of a batch is missing. This is a bug in Drawloom.
 pub(crate) fn record_bundle(
     device: &wgpu::Device,
     frame: &WgpuFrame,

@@ -13,10 +13,10 @@ use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, Pass, RawPass, RawPassResources};
 
-/// Records a segment of a pass without bundles: the batches of a range of bundles.
+/// Records the batches of a segment directly into the pass.
 ///
 /// # Errors
-/// If a resource of a batch is missing: a bug of Drawloom's.
+/// If a resource of a batch is missing. This is a bug in Drawloom.
 pub(crate) fn record_batches(
     encoder: &mut wgpu::CommandEncoder,
     frame: &WgpuFrame,
@@ -72,7 +72,7 @@ pub(crate) fn replay_bundles<'a>(
 /// Records a pass that draws lights, or a full-screen triangle.
 ///
 /// # Errors
-/// If a resource of the pass is missing: a bug of Drawloom's.
+/// If a resource of the pass is missing. This is a bug in Drawloom.
 pub(crate) fn record_without_commands(
     encoder: &mut wgpu::CommandEncoder,
     frame: &WgpuFrame,

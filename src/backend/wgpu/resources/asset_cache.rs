@@ -30,7 +30,7 @@ impl AssetSnapshot {
     /// The range of a batch's mesh in the arenas.
     ///
     /// # Errors
-    /// If there is no such mesh: a bug of Drawloom's.
+    /// If there is no such mesh. This is a bug in Drawloom.
     pub(crate) fn mesh_range(&self, batch: &Batch) -> Result<MeshRange, BackendError> {
         let mesh = self.meshes.get(batch.mesh as usize).copied().flatten();
         mesh.ok_or_else(missing_mesh_error)

@@ -54,8 +54,8 @@ impl PassStrategy {
         }
     }
 
-    /// The number of parts that are recorded before the pass is finished. A part is an encoder if the pass has several, and a
-    /// bundle otherwise.
+    /// The number of parts that are recorded before the pass is finished: the pass's encoders, if it has several; its bundles,
+    /// if it has one encoder that replays bundles; otherwise none.
     pub(crate) fn part_count(self, list: &DrawList) -> usize {
         let bundles = list.bundle_count();
         match (self.encoder_count(bundles), self.recording) {

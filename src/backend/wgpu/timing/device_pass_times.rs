@@ -14,7 +14,7 @@ pub struct DevicePassTimes {
 /// When the device drew a pass.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DevicePassTime {
-    /// The render process' name.
+    /// The render process's name.
     pub process: String,
     /// The view's name.
     pub view: String,

@@ -16,7 +16,7 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - position);
     }
-    // Within the filter's pixels, the surface comes nearer to the light by up to this.
+    // The bias times an upper bound of the depth change within the filter.
     let offset = SHADOW_BIAS * shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
 
     // An offset towards the light does not change where in the map the position is.

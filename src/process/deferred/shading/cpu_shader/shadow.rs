@@ -33,7 +33,7 @@ impl ShadowFilter {
             _ => normalize(light.position - position),
         };
         let side = maps.size()[0];
-        // Within the filter's pixels, the surface comes nearer to the light by up to the slope times this.
+        // Slope times this, in pixels' widths, is an upper bound of the depth change within the filter.
         let reach = R::of(f64::from(self.filter + 1));
         let offset = R::of(f64::from(self.bias))
             * shadow_map_point(side, light, position).pixel
