@@ -37,7 +37,6 @@ impl<T: Clone> ChunkedArray<T> {
     /// Locks a block to read it; entry `index` of the array is at `index % BLOCK_SIZE`.
     ///
     /// # Panics
-    ///
     /// If the block does not exist.
     pub fn read(&self, block: usize) -> RwLockReadGuard<'_, Box<[T]>> {
         self.blocks[block].read()
@@ -46,7 +45,6 @@ impl<T: Clone> ChunkedArray<T> {
     /// Locks a block to write it; entry `index` of the array is at `index % BLOCK_SIZE`.
     ///
     /// # Panics
-    ///
     /// If the block does not exist.
     pub fn write(&self, block: usize) -> RwLockWriteGuard<'_, Box<[T]>> {
         self.blocks[block].write()

@@ -68,7 +68,8 @@ mod native {
 
 #[cfg(any(drawloom_loom, drawloom_shuttle))]
 mod modelled {
-    use std::{collections::VecDeque, sync::PoisonError};
+    use std::collections::VecDeque;
+    use std::sync::PoisonError;
 
     use crossbeam_deque::Steal;
 
@@ -153,7 +154,8 @@ mod modelled {
 /// A random clock and random interleavings.
 #[cfg(drawloom_shuttle)]
 mod randomised {
-    use std::{ops::Add, time::Duration};
+    use std::ops::Add;
+    use std::time::Duration;
 
     use shuttle::rand::{Rng, thread_rng};
 
@@ -195,10 +197,8 @@ mod randomised {
     /// Bugs", 2010).
     #[cfg(test)]
     pub(crate) fn check(run: impl Fn() + Send + Sync + 'static) {
-        use shuttle::{
-            Config, Runner,
-            scheduler::{PctScheduler, RandomScheduler},
-        };
+        use shuttle::scheduler::{PctScheduler, RandomScheduler};
+        use shuttle::{Config, Runner};
 
         const INTERLEAVINGS: usize = 2_000;
         const SWITCHES: usize = 3;

@@ -3,12 +3,9 @@
 //! A panic is caught where the engine's code is called, and becomes an error there. Where an unwind would free memory that another
 //! thread still uses, an [`AbortOnUnwind`] guards the code as well. So soundness does not depend on every call being caught.
 
-use std::{
-    any::Any,
-    mem,
-    panic::{AssertUnwindSafe, catch_unwind},
-    process,
-};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::{mem, process};
 
 use thiserror::Error;
 
@@ -46,7 +43,6 @@ impl JobPanic {
 /// ```
 ///
 /// # Errors
-///
 /// Returns a [`JobPanic`] with the message of the panic. With `panic = "abort"` the process ends instead.
 #[inline]
 pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
@@ -102,7 +98,9 @@ impl Drop for AbortOnUnwind {
 
 #[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
 mod tests {
-    use std::{env, panic::panic_any, process::Command};
+    use std::env;
+    use std::panic::panic_any;
+    use std::process::Command;
 
     use super::{AbortOnUnwind, catch, emit};
 

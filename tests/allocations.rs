@@ -6,22 +6,16 @@
 //! Queues keep their memory, and allocate only when they hold more jobs than ever before. If a worker is late, that may happen in
 //! any frame. So the test first fills each queue with more jobs than the frames could put there.
 
-use std::{
-    alloc::System,
-    hint::black_box,
-    ops::Range,
-    sync::{
-        Barrier, Mutex,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
-    time::Duration,
-};
+use std::alloc::System;
+use std::hint::black_box;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
+use std::thread;
+use std::time::Duration;
 
-use drawloom::{
-    graph::{Closure, FrameGraph, NodeId, Schedule},
-    task::{Scheduler, Worker, catch},
-};
+use drawloom::graph::{Closure, FrameGraph, NodeId, Schedule};
+use drawloom::task::{Scheduler, Worker, catch};
 use fastrand::Rng;
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 

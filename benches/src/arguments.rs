@@ -1,7 +1,5 @@
 //! Command line arguments that benchmarks share.
 
-#[cfg(feature = "wgpu")]
-use clap::Args;
 use clap::Parser;
 
 #[cfg(feature = "wgpu")]
@@ -27,7 +25,7 @@ impl ExtentArguments {
 
 /// The extent of the measurement, and its wgpu backends.
 #[cfg(feature = "wgpu")]
-#[derive(Args)]
+#[derive(clap::Args)]
 pub struct BackendArguments {
     #[command(flatten)]
     extent: ExtentArguments,

@@ -4,7 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Parser, ValueEnum, error::ErrorKind};
+use clap::error::ErrorKind;
+use clap::{Parser, ValueEnum};
 use drawloom::Granularity;
 use drawloom::backend::RecordingStrategy;
 use drawloom::glam::DVec3;

@@ -9,7 +9,7 @@ use std::iter::FusedIterator;
 use crc32fast::Hasher;
 
 use super::RenderCommand;
-use code::{Coder, Fault, MAX_LENGTH};
+use self::code::{Coder, Fault, MAX_LENGTH};
 
 /// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is lossless for
 /// any commands, and compact for sorted ones.

@@ -1,23 +1,17 @@
 //! Instrumentation that records a run in the scheduler's timeline and sends it to subscribers of tracing spans.
 
-use std::{ops::Range, sync::Arc};
+use std::ops::Range;
+use std::sync::Arc;
 
-use tracing::{
-    Level, Span,
-    level_filters::{LevelFilter, STATIC_MAX_LEVEL},
-    span::EnteredSpan,
-};
+use tracing::level_filters::{LevelFilter, STATIC_MAX_LEVEL};
+use tracing::span::EnteredSpan;
+use tracing::{Level, Span};
 
-use crate::{
-    sync::{AtomicUsize, Ordering},
-    task::Worker,
-    timeline::{ChunkTimer, Graph, NodeInfo, OpenRun, RunEnd},
-};
-
-use super::{
-    instrument::{Instrument, NodeSpan},
-    shared_span::{Opened, SharedSpan},
-};
+use super::instrument::{Instrument, NodeSpan};
+use super::shared_span::{Opened, SharedSpan};
+use crate::sync::{AtomicUsize, Ordering};
+use crate::task::Worker;
+use crate::timeline::{ChunkTimer, Graph, NodeInfo, OpenRun, RunEnd};
 
 /// The target of all spans and events of runs.
 const TARGET: &str = "drawloom::graph";

@@ -1,14 +1,11 @@
 //! The graph while an engine builds it.
 
-use std::{
-    collections::{HashMap, VecDeque},
-    fmt,
-    sync::atomic::{AtomicUsize, Ordering},
-};
-
-use crate::timeline::Labels;
+use std::collections::{HashMap, VecDeque};
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::error::GraphProblem;
+use crate::timeline::Labels;
 
 /// Nodes, the resources they read and write, and the order that follows from that.
 ///

@@ -1,29 +1,23 @@
 //! Compiles a graph to a schedule: orders the nodes, drops the unneeded ones, checks the rest, and flattens it.
 
-use std::{
-    collections::{HashMap, HashSet},
-    fmt,
-};
+use std::collections::{HashMap, HashSet};
+use std::fmt;
 
-use petgraph::{
-    Direction,
-    graph::{DiGraph, NodeIndex},
-    visit::EdgeRef,
-};
+use petgraph::Direction;
+use petgraph::graph::{DiGraph, NodeIndex};
+use petgraph::visit::EdgeRef;
 use thiserror::Error;
 
-use super::{
-    adjacency::{Adjacency, RankedAdjacency},
-    builder::FrameGraph,
-    costs::NodeCosts,
-    edges::{self, Edges, Relation, Roles},
-    error::GraphProblem,
-    execution_policy::ExecutionPolicy,
-    order::{find_cycle, ranks, topological_order},
-    progress::Progress,
-    schedule::Schedule,
-    traversal::Traversal,
-};
+use super::adjacency::{Adjacency, RankedAdjacency};
+use super::builder::FrameGraph;
+use super::costs::NodeCosts;
+use super::edges::{self, Edges, Relation, Roles};
+use super::error::GraphProblem;
+use super::execution_policy::ExecutionPolicy;
+use super::order::{find_cycle, ranks, topological_order};
+use super::progress::Progress;
+use super::schedule::Schedule;
+use super::traversal::Traversal;
 
 /// A graph that does not compile, and why.
 #[derive(Error)]
@@ -46,7 +40,6 @@ impl<P> FrameGraph<P> {
     /// Orders the nodes, drops those that lead to no output, and checks the rest.
     ///
     /// # Errors
-    ///
     /// Returns [`CompileError`] with the graph and its first [`GraphProblem`], in the order of the variants. Names and cycles are
     /// checked in the whole graph. A missing producer and unordered writers are only reported if the nodes concerned are
     /// kept.

@@ -2,18 +2,14 @@
 
 use std::fmt::Write;
 
-use petgraph::{
-    adj::UnweightedList,
-    algo::tred::dag_transitive_reduction_closure,
-    visit::{EdgeRef, IntoEdgeReferences},
-};
+use petgraph::adj::UnweightedList;
+use petgraph::algo::tred::dag_transitive_reduction_closure;
+use petgraph::visit::{EdgeRef, IntoEdgeReferences};
 
-use super::{
-    builder::FrameGraph,
-    edges::{self, Roles},
-    order::{ranks, topological_order},
-    schedule::Schedule,
-};
+use super::builder::FrameGraph;
+use super::edges::{self, Roles};
+use super::order::{ranks, topological_order};
+use super::schedule::Schedule;
 
 impl<P> FrameGraph<P> {
     /// The graph in DOT: nodes as boxes, resources as ellipses, an arrow for each read and write, a dotted arrow for each explicit

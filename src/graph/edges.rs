@@ -4,16 +4,12 @@
 //! edge to one *junction*, and the junction has an edge to each reader. A junction is a vertex but not a node: traversals
 //! pass through it, and results leave it out.
 
-use petgraph::{
-    Direction,
-    graph::{DiGraph, NodeIndex},
-    visit::EdgeRef,
-};
+use petgraph::Direction;
+use petgraph::graph::{DiGraph, NodeIndex};
+use petgraph::visit::EdgeRef;
 
-use super::{
-    builder::{Access, FrameGraph},
-    traversal::Traversal,
-};
+use super::builder::{Access, FrameGraph};
+use super::traversal::Traversal;
 
 /// An edge for each reason to wait, from the dependency to the dependent. The first vertices are the graph's nodes, by index;
 /// junctions follow.
@@ -174,9 +170,8 @@ pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use crate::graph::FrameGraph;
-
     use super::{Roles, derive};
+    use crate::graph::FrameGraph;
 
     #[test]
     fn the_number_of_edges_is_linear_in_the_number_of_accesses() {

@@ -1,23 +1,21 @@
 //! Runs a schedule: chooses the run mode, executes the run, and returns its outcome.
 
-use std::{mem, ops::Range, sync::Arc, time::Duration};
+use std::mem;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
 
-use crate::{
-    sync::{AtomicBool, Instant, Mutex, Ordering},
-    task::{Chunks, Scheduler, Worker},
-    timeline::{Graph, NodeInfo, RunEnd},
-    unwind::{JobPanic, catch, discard},
-};
-
-use super::{
-    active_instrument::ActiveInstrument,
-    costs::CostTimer,
-    error::{NodeError, RunError},
-    execution_policy::RunMode,
-    instrument::{Instrument, NoInstrument, NodeSpan},
-    node::Node,
-    schedule::Schedule,
-};
+use super::active_instrument::ActiveInstrument;
+use super::costs::CostTimer;
+use super::error::{NodeError, RunError};
+use super::execution_policy::RunMode;
+use super::instrument::{Instrument, NoInstrument, NodeSpan};
+use super::node::Node;
+use super::schedule::Schedule;
+use crate::sync::{AtomicBool, Instant, Mutex, Ordering};
+use crate::task::{Chunks, Scheduler, Worker};
+use crate::timeline::{Graph, NodeInfo, RunEnd};
+use crate::unwind::{JobPanic, catch, discard};
 
 impl<P> Schedule<P> {
     /// Runs every node after all its dependencies, and waits for the last one.
@@ -27,7 +25,6 @@ impl<P> Schedule<P> {
     /// allocates no memory.
     ///
     /// # Errors
-    ///
     /// Returns [`RunError`] if a node failed or panicked. The rest of the run is cancelled: chunks that have begun are finished,
     /// and no others start. The next run starts over. With `panic = "abort"`, a panic ends the program instead.
     pub fn run<C>(&mut self, scheduler: &Scheduler, context: &C) -> Result<(), RunError>

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use crate::{task::Worker, timeline::RunEnd};
-
 use super::shared_span::SharedSpan;
+use crate::task::Worker;
+use crate::timeline::RunEnd;
 
 /// What observes a run.
 pub(super) trait Instrument: Sync {

@@ -35,10 +35,8 @@
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
 //!
-//! use drawloom::{
-//!     graph::{Closure, FrameGraph},
-//!     task::Scheduler,
-//! };
+//! use drawloom::graph::{Closure, FrameGraph};
+//! use drawloom::task::Scheduler;
 //!
 //! struct World {
 //!     heights: Vec<f32>,
@@ -83,10 +81,8 @@
 //! ```
 //! use std::ops::Range;
 //!
-//! use drawloom::{
-//!     graph::{FrameGraph, Node, NodeError},
-//!     task::{Scheduler, Worker},
-//! };
+//! use drawloom::graph::{FrameGraph, Node, NodeError};
+//! use drawloom::task::{Scheduler, Worker};
 //!
 //! struct World<'frame> {
 //!     heights: &'frame [f32],
@@ -145,16 +141,13 @@ mod traversal;
 #[cfg(all(test, drawloom_shuttle))]
 mod shuttle_tests;
 
-pub use self::{
-    builder::{FrameGraph, NodeId, ResourceId},
-    compile::CompileError,
-    error::{GraphProblem, NodeError, RunError},
-    node::{Closure, Node},
-    schedule::Schedule,
-};
+pub use builder::{FrameGraph, NodeId, ResourceId};
+pub use compile::CompileError;
+pub use error::{GraphProblem, NodeError, RunError};
+pub use node::{Closure, Node};
+pub use schedule::Schedule;
 
 #[cfg(feature = "report")]
-pub(crate) use self::{
-    adjacency::RankedAdjacency,
-    execution_policy::{ExecutionPolicy, RunMode},
-};
+pub(crate) use adjacency::RankedAdjacency;
+#[cfg(feature = "report")]
+pub(crate) use execution_policy::{ExecutionPolicy, RunMode};

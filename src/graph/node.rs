@@ -1,10 +1,10 @@
 //! Nodes that can be run.
 
-use std::{fmt, ops::Range};
-
-use crate::task::Worker;
+use std::fmt;
+use std::ops::Range;
 
 use super::error::NodeError;
+use crate::task::Worker;
 
 /// A node that can be run: a number of items, which workers process in chunks.
 ///
@@ -41,7 +41,6 @@ pub trait Node<C: ?Sized>: Send + Sync {
     /// [`Schedule::always_parallel`](super::Schedule::always_parallel)).
     ///
     /// # Errors
-    ///
     /// An error stops the run: no further chunk starts, no dependent of the node runs, and the run returns the error with the
     /// node's name.
     fn run(&self, context: &C, range: Range<usize>, worker: &Worker) -> Result<(), NodeError>;

@@ -1,11 +1,10 @@
 //! Topological order of a graph, and a cycle of a graph that has none.
 
-use std::{cmp::Reverse, collections::BinaryHeap};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
-use petgraph::{
-    Direction,
-    graph::{DiGraph, NodeIndex},
-};
+use petgraph::Direction;
+use petgraph::graph::{DiGraph, NodeIndex};
 
 /// The vertices in topological order. Vertices on a cycle, or behind one, are left out.
 ///

@@ -14,26 +14,20 @@
 
 use std::ops::Range;
 
-use crate::{
-    sync::Instant,
-    task::{Chunks, JobPanic, Priority, TicketSize, TokenContext, Tokens, Worker, run_tokens},
-};
-
-use super::{
-    execute::Run,
-    instrument::{Instrument, NodeSpan},
-    node::Node,
-    progress::OpenNode,
-    schedule::Schedule,
-    serial::Suspended,
-    token::Token,
-};
+use super::execute::Run;
+use super::instrument::{Instrument, NodeSpan};
+use super::node::Node;
+use super::progress::OpenNode;
+use super::schedule::Schedule;
+use super::serial::Suspended;
+use super::token::Token;
+use crate::sync::Instant;
+use crate::task::{Chunks, JobPanic, Priority, TicketSize, TokenContext, Tokens, Worker, run_tokens};
 
 impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     /// Runs all nodes.
     ///
     /// # Errors
-    ///
     /// Returns the panic if something panicked outside of every node.
     pub(super) fn run_parallel(&self, worker: &Worker) -> Result<(), JobPanic> {
         self.start_parallel(worker);
@@ -52,7 +46,6 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     /// Runs the rest of a suspended serial run.
     ///
     /// # Errors
-    ///
     /// As [`run_parallel`](Self::run_parallel).
     pub(super) fn resume_parallel(&self, suspended: Suspended<I::Span<'_>>, worker: &Worker) -> Result<(), JobPanic> {
         let Suspended { node: current, chunks, done, span } = suspended;

@@ -10,12 +10,10 @@
 
 use crossbeam_utils::CachePadded;
 
-use crate::{
-    sync::{AtomicU32, AtomicUsize, Mutex, Ordering},
-    task::{Chunks, Tickets},
-};
-
-use super::{adjacency::RankedAdjacency, shared_span::SharedSpan};
+use super::adjacency::RankedAdjacency;
+use super::shared_span::SharedSpan;
+use crate::sync::{AtomicU32, AtomicUsize, Mutex, Ordering};
+use crate::task::{Chunks, Tickets};
 
 pub(super) struct Progress {
     /// Per node, how many of its dependencies are not complete.
@@ -106,11 +104,12 @@ impl OpenNode {
 
 #[cfg(all(test, drawloom_loom))]
 mod loom_tests {
-    use loom::{cell::UnsafeCell, model, thread};
-
-    use crate::{sync::Arc, task::Chunks};
+    use loom::cell::UnsafeCell;
+    use loom::{model, thread};
 
     use super::{OpenNode, Progress, RankedAdjacency};
+    use crate::sync::Arc;
+    use crate::task::Chunks;
 
     /// Each thread writes one cell, and the last thread reads all. loom checks them for races.
     struct Cells<const COUNT: usize>([UnsafeCell<usize>; COUNT]);

@@ -1,16 +1,16 @@
 //! A compiled graph.
 
-use std::{collections::HashMap, fmt, sync::Arc, time::Duration};
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
 
+use super::adjacency::{Adjacency, RankedAdjacency};
+use super::builder::NodeId;
+use super::costs::NodeCosts;
+use super::execution_policy::ExecutionPolicy;
+use super::progress::Progress;
 use crate::timeline::{Graph, Labels};
-
-use super::{
-    adjacency::{Adjacency, RankedAdjacency},
-    builder::NodeId,
-    costs::NodeCosts,
-    execution_policy::ExecutionPolicy,
-    progress::Progress,
-};
 
 /// A compiled graph: checked, in execution order, and stored in flat arrays. It is compiled once and [run](Self::run) every
 /// frame.

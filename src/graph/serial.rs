@@ -3,17 +3,12 @@
 
 use std::time::Duration;
 
-use crate::{
-    sync::Instant,
-    task::{Chunks, Worker},
-};
-
-use super::{
-    error::NodeError,
-    execute::{Location, Run},
-    instrument::{Instrument, NodeSpan},
-    node::Node,
-};
+use super::error::NodeError;
+use super::execute::{Location, Run};
+use super::instrument::{Instrument, NodeSpan};
+use super::node::Node;
+use crate::sync::Instant;
+use crate::task::{Chunks, Worker};
 
 /// Where a serial run stopped because it exceeded its limit. All nodes before this one are complete.
 pub(super) struct Suspended<S> {

@@ -2,16 +2,17 @@
 //!
 //! Each node counts how often each of its items has run, and checks that all items of its dependencies have run.
 
-use std::{iter, ops::Range, panic::resume_unwind, sync::Arc, time::Duration};
+use std::iter;
+use std::ops::Range;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::time::Duration;
 
 use tracing::{Dispatch, Event, Metadata, Subscriber, dispatcher, span};
 
-use crate::{
-    sync::{AtomicUsize, Ordering, check, thread},
-    task::{Scheduler, SchedulerBuilder, Worker},
-};
-
 use super::{FrameGraph, Node, NodeError, RunError, Schedule};
+use crate::sync::{AtomicUsize, Ordering, check, thread};
+use crate::task::{Scheduler, SchedulerBuilder, Worker};
 
 /// Between the usual and the longest duration of these schedules by shuttle's random clock, so that some serial runs stay within
 /// their limit and some exceed it.

@@ -1,10 +1,8 @@
 //! Traversal of the vertices that a set of start vertices reaches.
 
-use petgraph::{
-    Direction,
-    graph::{DiGraph, NodeIndex},
-    visit::EdgeRef,
-};
+use petgraph::Direction;
+use petgraph::graph::{DiGraph, NodeIndex};
+use petgraph::visit::EdgeRef;
 
 /// Finds the vertices that can be reached from others. It is reusable: clearing the visited marks is free.
 #[derive(Default)]

@@ -5,7 +5,6 @@ use std::fmt::Display;
 use crate::timeline::{Log, Run};
 
 /// # Errors
-///
 /// Returns a message if one of the log's runs or spans refers to something that does not exist.
 pub(super) fn check_log(log: &Log) -> Result<(), String> {
     for (index, run) in log.runs.iter().enumerate() {
@@ -20,7 +19,6 @@ pub(super) fn check_log(log: &Log) -> Result<(), String> {
 /// Checks a run on this many workers. Messages call it `name`.
 ///
 /// # Errors
-///
 /// Returns a message if the run refers to something that does not exist.
 pub(super) fn check_run(run: &Run, name: impl Display, workers: usize) -> Result<(), String> {
     let nodes = run.graph.nodes.len();

@@ -1,6 +1,8 @@
 //! Intervals of time, and which of them a frame consists of.
 
-use std::{cmp::Reverse, ops::Range, time::Duration};
+use std::cmp::Reverse;
+use std::ops::Range;
+use std::time::Duration;
 
 use crate::timeline::{Log, Run};
 

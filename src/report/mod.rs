@@ -6,12 +6,11 @@
 //! [costs](SchedulerCosts). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
 //!
 //! ```
-//! use drawloom::{
-//!     graph::{Closure, FrameGraph},
-//!     report::{SchedulerCosts, Replay},
-//!     task::Scheduler,
-//! };
 //! use std::hint::black_box;
+//!
+//! use drawloom::graph::{Closure, FrameGraph};
+//! use drawloom::report::{Replay, SchedulerCosts};
+//! use drawloom::task::Scheduler;
 //!
 //! let mut graph = FrameGraph::new();
 //! let cull = Closure::new(|_: &(), range, _worker| {
@@ -47,10 +46,8 @@ mod intervals;
 mod page;
 mod simulation;
 
-pub use self::{
-    chrome_trace::write_chrome_trace,
-    error::ReportError,
-    frame_report::{FrameReport, HeldBy, PathShare, QueueWait, Slack, Step, WhatIf, WorkerReport},
-    page::write_page,
-    simulation::{Replay, ReplayedFrame, SchedulerCosts},
-};
+pub use chrome_trace::write_chrome_trace;
+pub use error::ReportError;
+pub use frame_report::{FrameReport, HeldBy, PathShare, QueueWait, Slack, Step, WhatIf, WorkerReport};
+pub use page::write_page;
+pub use simulation::{Replay, ReplayedFrame, SchedulerCosts};

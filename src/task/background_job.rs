@@ -1,16 +1,11 @@
 //! Jobs that no frame waits for: streaming, baking, anything that may take longer than a frame.
 
-use std::{
-    fmt,
-    sync::{Arc, Weak},
-};
-
-use crate::{
-    sync::{Condvar, Mutex},
-    unwind::{JobPanic, catch, discard, emit},
-};
+use std::fmt;
+use std::sync::{Arc, Weak};
 
 use super::background_queue::{BackgroundQueue, QueuedJob};
+use crate::sync::{Condvar, Mutex};
+use crate::unwind::{JobPanic, catch, discard, emit};
 
 /// A job that runs when no frame needs its worker, and its result. [`Scheduler::background`](super::Scheduler::background) makes
 /// it.
@@ -50,7 +45,6 @@ impl<T: Send + 'static> BackgroundJob<T> {
     /// others, waits for ever.
     ///
     /// # Errors
-    ///
     /// Returns the [`JobPanic`] if the job panicked.
     pub fn wait(self) -> Result<T, JobPanic> {
         // If the scheduler was dropped, the queue was too.

@@ -1,11 +1,11 @@
 //! Background jobs that have not begun, the oldest first. Any of them can be removed.
 
-use std::{collections::BTreeMap, mem, sync::Arc};
+use std::collections::BTreeMap;
+use std::mem;
+use std::sync::Arc;
 
-use crate::{
-    sync::{AtomicUsize, Mutex, Ordering},
-    unwind::discard,
-};
+use crate::sync::{AtomicUsize, Mutex, Ordering};
+use crate::unwind::discard;
 
 /// A background job, without the type of its result.
 pub(super) trait QueuedJob: Send + Sync {

@@ -1,23 +1,21 @@
 //! Builds schedulers.
 
-use std::{fmt, io, iter, mem, sync::mpsc, thread::available_parallelism, time::Duration};
+use std::sync::mpsc;
+use std::thread::available_parallelism;
+use std::time::Duration;
+use std::{fmt, io, iter, mem};
 
-use crate::{
-    sync::{Arc, thread},
-    timeline::{Timeline, TimelineSettings},
-    unwind::catch,
-};
-
-use super::{
-    affinity::AffinityMask,
-    queues::Queues,
-    scheduler::Scheduler,
-    scheduler_error::SchedulerError,
-    shared::Shared,
-    shuffle::Shuffle,
-    wake_up_cost,
-    worker_thread::{Hook, WorkerThread},
-};
+use super::affinity::AffinityMask;
+use super::queues::Queues;
+use super::scheduler::Scheduler;
+use super::scheduler_error::SchedulerError;
+use super::shared::Shared;
+use super::shuffle::Shuffle;
+use super::wake_up_cost;
+use super::worker_thread::{Hook, WorkerThread};
+use crate::sync::{Arc, thread};
+use crate::timeline::{Timeline, TimelineSettings};
+use crate::unwind::catch;
 
 /// The settings of a scheduler: see [`Scheduler::builder`].
 ///
@@ -50,7 +48,6 @@ impl Scheduler {
     /// the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
     ///
     /// # Errors
-    ///
     /// Returns [`SchedulerError::NoWorkers`] if `workers` is 0, and [`SchedulerError::TooManyWorkers`] if it exceeds
     /// [`MAX_WORKERS`](Self::MAX_WORKERS). Returns [`SchedulerError::Spawn`] if the system does not start a thread; threads that
     /// were started by then have ended.
@@ -61,7 +58,6 @@ impl Scheduler {
     /// A scheduler with as many workers as the process can run threads at once.
     ///
     /// # Errors
-    ///
     /// Returns [`SchedulerError::UnknownParallelism`] if the system does not report that number, and [`SchedulerError::Spawn`] as
     /// [`new`](Self::new) does.
     pub fn with_available_parallelism() -> Result<Self, SchedulerError> {
@@ -154,7 +150,6 @@ impl SchedulerBuilder {
     /// Starts the threads.
     ///
     /// # Errors
-    ///
     /// Returns the [`SchedulerError`] whose condition holds. Threads that were started by then have ended.
     pub fn build(self) -> Result<Scheduler, SchedulerError> {
         self.build_with(|builder, body| builder.spawn(body))
@@ -238,7 +233,8 @@ impl fmt::Debug for SchedulerBuilder {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use std::{io, sync::mpsc};
+    use std::io;
+    use std::sync::mpsc;
 
     use super::SchedulerError;
     use crate::task::Scheduler;

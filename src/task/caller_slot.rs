@@ -1,8 +1,8 @@
 //! The slot of worker 0, which one thread from outside can take at a time.
 
+use super::queues::Queues;
+use super::region::JobContext;
 use crate::sync::{Condvar, Mutex};
-
-use super::{queues::Queues, region::JobContext};
 
 /// Makes the thread that calls a scheduler its worker 0 for the length of the call.
 pub(super) struct CallerSlot<W: JobContext> {

@@ -3,10 +3,8 @@
 //! A closure that captures little lives in the job itself. So ten thousand small jobs a frame cost no allocations, each of
 //! which one worker would make and another free. That more than halves the cost of a small job.
 
-use std::{
-    fmt,
-    mem::{ManuallyDrop, MaybeUninit},
-};
+use std::fmt;
+use std::mem::{ManuallyDrop, MaybeUninit};
 
 /// Space for the captures of a closure, or for a box that holds it.
 type Storage = MaybeUninit<[usize; 4]>;
@@ -22,7 +20,6 @@ impl<Region: 'static, Worker> Closure<Region, Worker> {
     /// Erases the type and the lifetime of a closure.
     ///
     /// # Safety
-    ///
     /// The closure must be called or dropped before the lifetime of anything that it borrows ends.
     pub(super) unsafe fn new<F>(closure: F) -> Self
     where
@@ -78,7 +75,6 @@ const fn fits<F>() -> bool {
 }
 
 /// # Safety
-///
 /// The storage must hold an `F` that nobody uses after this call.
 unsafe fn call<F, Region: 'static, Worker>(storage: *mut Storage, region: &'static Region, worker: &Worker)
 where
@@ -90,7 +86,6 @@ where
 }
 
 /// # Safety
-///
 /// The storage must hold an `F` that nobody uses after this call.
 unsafe fn discard<F>(storage: *mut Storage) {
     // SAFETY: The storage must hold an `F`, and it must be dropped only once. The caller guarantees both.

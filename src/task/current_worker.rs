@@ -5,11 +5,12 @@
 //! another, so its workers form a list, the newest first. The links of the list are in the workers themselves, which lie on the
 //! thread's stack: every call of every frame comes through here and must not allocate.
 
-use std::{cell::Cell, ptr};
+use std::cell::Cell;
+use std::ptr;
 
+use super::shared::Shared;
+use super::worker::Worker;
 use crate::sync::{Arc, thread_local};
-
-use super::{shared::Shared, worker::Worker};
 
 thread_local! {
     /// The newest worker that this thread is, or null. It has no destructor, so a scheduler can be called from the destructor of

@@ -6,12 +6,12 @@
 
 use std::time::Duration;
 
-use crate::{
-    sync::{Instant, spin_loop},
-    timeline::IdleKind,
-};
-
-use super::{priority::Priority, region::JobContext, shared::Shared, sleep::WakeFor};
+use super::priority::Priority;
+use super::region::JobContext;
+use super::shared::Shared;
+use super::sleep::WakeFor;
+use crate::sync::{Instant, spin_loop};
+use crate::timeline::IdleKind;
 
 /// How long workers stay awake after the end of a frame.
 const SPIN_BETWEEN_FRAMES: Duration = Duration::from_micros(10);

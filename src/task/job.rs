@@ -1,11 +1,8 @@
 //! A job, as queues hold it.
 
+use super::closure::Closure;
+use super::region::{JobContext, Region};
 use crate::unwind::catch;
-
-use super::{
-    closure::Closure,
-    region::{JobContext, Region},
-};
 
 /// What a job does.
 pub(super) enum Work<W: JobContext> {

@@ -64,7 +64,8 @@ mod tests {
 
 #[cfg(all(test, drawloom_loom))]
 mod loom_tests {
-    use loom::{cell::UnsafeCell, model, thread};
+    use loom::cell::UnsafeCell;
+    use loom::{model, thread};
 
     use super::Latch;
     use crate::sync::Arc;

@@ -9,15 +9,13 @@
 //! the regions of that level use one after another. A region finds it empty, because the region before ended when all of its jobs
 //! had run.
 
-use std::{collections::VecDeque, fmt};
+use std::collections::VecDeque;
+use std::fmt;
 
+use super::job::Job;
+use super::priority::Priority;
+use super::region::{JobContext, Region};
 use crate::sync::{AtomicUsize, Mutex, Ordering};
-
-use super::{
-    job::Job,
-    priority::Priority,
-    region::{JobContext, Region},
-};
 
 /// The jobs of a worker's open regions that are in no worker's queues.
 pub(super) struct Mailbox<W: JobContext> {

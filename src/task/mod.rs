@@ -59,7 +59,8 @@
 //! Work that only the thread of the window or the device may do goes into a pinned job. Any job can spawn one.
 //!
 //! ```
-//! use std::{cell::Cell, thread};
+//! use std::cell::Cell;
+//! use std::thread;
 //! use drawloom::task::Scheduler;
 //!
 //! thread_local! { static SUBMITTED: Cell<usize> = const { Cell::new(0) }; }

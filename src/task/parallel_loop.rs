@@ -14,18 +14,13 @@ use std::ops::Range;
 
 use crossbeam_utils::CachePadded;
 
-use crate::{
-    sync::Instant,
-    unwind::{JobPanic, catch},
-};
-
-use super::{
-    chunks::Chunks,
-    priority::Priority,
-    tickets::{TicketSize, Tickets},
-    tokens::{TokenContext, Tokens, run_tokens},
-    worker::Worker,
-};
+use super::chunks::Chunks;
+use super::priority::Priority;
+use super::tickets::{TicketSize, Tickets};
+use super::tokens::{TokenContext, Tokens, run_tokens};
+use super::worker::Worker;
+use crate::sync::Instant;
+use crate::unwind::{JobPanic, catch};
 
 /// A loop with this many chunks for each worker may begin serially: running one chunk before the other workers join makes the loop
 /// longer by no more than this fraction.

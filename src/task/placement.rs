@@ -19,10 +19,8 @@ mod linux {
     use parking_lot::Mutex;
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
-    use crate::{
-        sync::{AtomicBool, AtomicUsize, Ordering},
-        unwind::emit,
-    };
+    use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+    use crate::unwind::emit;
 
     /// The processors that the threads of a scheduler may run on.
     pub(in crate::task) struct Placement {

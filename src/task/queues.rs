@@ -9,19 +9,18 @@
 //! The count of the overflow is a hint, so it is relaxed. For the owner it is exact unless thieves took something. A thief that
 //! misses a job finds it when it looks once more before it sleeps, after a fence. The deque and the lock order the jobs.
 
-use std::{array, cell::Cell, collections::VecDeque};
+use std::array;
+use std::cell::Cell;
+use std::collections::VecDeque;
 
 use crossbeam_utils::CachePadded;
 
+use super::job::Job;
+use super::locked_queue::LockedQueue;
+use super::priority::Priority;
+use super::region::{JobContext, Region};
+use super::shuffle::Shuffle;
 use crate::sync::{Arc, Deque, Steal, Stealer};
-
-use super::{
-    job::Job,
-    locked_queue::LockedQueue,
-    priority::Priority,
-    region::{JobContext, Region},
-    shuffle::Shuffle,
-};
 
 /// The most jobs in a deque. Crossbeam's deque starts with room for 64, and grows when that is full.
 const MAX_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 60 };
@@ -290,10 +289,12 @@ impl<W: JobContext> Overflow<W> {
 
 #[cfg(all(test, drawloom_loom))]
 mod loom_tests {
-    use loom::{model::Builder, thread};
+    use loom::model::Builder;
+    use loom::thread;
 
     use super::{Job, Priority};
-    use crate::task::{Scheduler, TokenContext, Tokens, Worker, job::Work};
+    use crate::task::job::Work;
+    use crate::task::{Scheduler, TokenContext, Tokens, Worker};
 
     type Queues = super::Queues<Worker>;
     type Region = super::Region<Worker>;

@@ -10,12 +10,9 @@ use std::ptr;
 
 use crossbeam_utils::CachePadded;
 
-use crate::{
-    sync::{Arc, Mutex},
-    unwind::JobPanic,
-};
-
 use super::latch::Latch;
+use crate::sync::{Arc, Mutex};
+use crate::unwind::JobPanic;
 
 /// The worker that runs a job, as far as jobs, regions and queues know it: they only pass it on. So they depend on nothing above
 /// them.

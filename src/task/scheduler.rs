@@ -1,30 +1,23 @@
 //! The pool of workers, and the ways to give it work.
 
-use std::{
-    fmt, mem,
-    ops::Range,
-    panic::{self, AssertUnwindSafe},
-    time::Duration,
-};
+use std::ops::Range;
+use std::panic::{self, AssertUnwindSafe};
+use std::time::Duration;
+use std::{fmt, mem};
 
-use crate::{
-    sync::{Arc, Instant, thread},
-    timeline::Timeline,
-    unwind::{JobPanic, catch, discard},
-};
-
-use super::{
-    background_job::BackgroundJob,
-    current_worker,
-    mailbox::Mailbox,
-    parallel_loop::ParallelLoop,
-    priority::Priority,
-    queues::Queues,
-    scope::{self, Scope},
-    shared::Shared,
-    sleep::{self, WakeFor},
-    worker::Worker,
-};
+use super::background_job::BackgroundJob;
+use super::current_worker;
+use super::mailbox::Mailbox;
+use super::parallel_loop::ParallelLoop;
+use super::priority::Priority;
+use super::queues::Queues;
+use super::scope::{self, Scope};
+use super::shared::Shared;
+use super::sleep::{self, WakeFor};
+use super::worker::Worker;
+use crate::sync::{Arc, Instant, thread};
+use crate::timeline::Timeline;
+use crate::unwind::{JobPanic, catch, discard};
 
 /// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it manages threads.
 ///
@@ -86,7 +79,6 @@ impl Scheduler {
     /// and graphs inside of it.
     ///
     /// # Errors
-    ///
     /// Returns the first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler works as
     /// before.
     pub fn scope<'scope, R>(&self, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
@@ -102,7 +94,6 @@ impl Scheduler {
     /// for a scope or a loop of its own, does not enter `body` again for this loop.
     ///
     /// # Errors
-    ///
     /// Returns the first [`JobPanic`] if `body` panicked. Chunks that had not begun by then are skipped.
     pub fn parallel_for(
         &self,
@@ -234,7 +225,9 @@ impl fmt::Debug for WorkerState<'_> {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use std::{sync::mpsc, thread, time::Duration};
+    use std::sync::mpsc;
+    use std::thread;
+    use std::time::Duration;
 
     use super::Scheduler;
 

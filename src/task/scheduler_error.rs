@@ -4,9 +4,9 @@ use std::io;
 
 use thiserror::Error;
 
+use super::affinity::AffinityMask;
+use super::sleep::MAX_WORKERS;
 use crate::unwind::JobPanic;
-
-use super::{affinity::AffinityMask, sleep::MAX_WORKERS};
 
 /// A scheduler could not be built.
 #[derive(Debug, Error)]

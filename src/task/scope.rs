@@ -1,18 +1,16 @@
 //! Scopes: jobs that borrow, and a thread that waits for them.
 
-use std::{fmt, marker::PhantomData};
+use std::fmt;
+use std::marker::PhantomData;
 
+use super::closure::Closure;
+use super::current_worker;
+use super::job::{Job, Work};
+use super::priority::Priority;
+use super::region::Region;
+use super::tokens::{TokenContext, Tokens};
+use super::worker::Worker;
 use crate::unwind::JobPanic;
-
-use super::{
-    closure::Closure,
-    current_worker,
-    job::{Job, Work},
-    priority::Priority,
-    region::Region,
-    tokens::{TokenContext, Tokens},
-    worker::Worker,
-};
 
 /// Spawns jobs that may borrow anything that outlives the call of [`Scheduler::scope`](super::Scheduler::scope).
 ///

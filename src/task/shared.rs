@@ -4,20 +4,15 @@ use std::time::Duration;
 
 use crossbeam_utils::CachePadded;
 
-use crate::{
-    sync::{AtomicBool, AtomicUsize, Ordering},
-    timeline::Timeline,
-};
-
-use super::{
-    background_queue::BackgroundQueue,
-    caller_slot::CallerSlot,
-    mailbox::Mailbox,
-    placement::Placement,
-    queues::{Queues, Stealers},
-    region::JobContext,
-    sleep::Sleep,
-};
+use super::background_queue::BackgroundQueue;
+use super::caller_slot::CallerSlot;
+use super::mailbox::Mailbox;
+use super::placement::Placement;
+use super::queues::{Queues, Stealers};
+use super::region::JobContext;
+use super::sleep::Sleep;
+use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+use crate::timeline::Timeline;
 
 /// The workers' queues as others see them, their mailboxes, and the state of the scheduler.
 pub(super) struct Shared<W: JobContext> {

@@ -3,11 +3,13 @@
 //! The tests assert that each job runs once, on a worker that may run it. Shuttle asserts that no wake-up is lost: if a call never
 //! returns, all threads sleep, which shuttle reports as a failure.
 
-use std::{iter, panic::resume_unwind, sync::Arc, time::Duration};
-
-use crate::sync::{AtomicUsize, Ordering, check, thread};
+use std::iter;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::time::Duration;
 
 use super::{JobPanic, Scheduler};
+use crate::sync::{AtomicUsize, Ordering, check, thread};
 
 fn counters(count: usize) -> Vec<AtomicUsize> {
     iter::repeat_with(|| AtomicUsize::new(0)).take(count).collect()

@@ -73,9 +73,9 @@
 
 use crossbeam_utils::CachePadded;
 
+use super::parker::Parker;
+use super::priority::Priority;
 use crate::sync::{AtomicUsize, Mutex, Ordering, fence};
-
-use super::{parker::Parker, priority::Priority};
 
 /// What a sleeper is woken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
-
 use super::chunks::Chunks;
+use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
 
 /// Hands out the chunks of a loop or a node to the workers that have joined it. A ticket is a claim on some chunks.
 ///

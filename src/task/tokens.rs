@@ -1,13 +1,10 @@
 //! Regions whose jobs are tokens: loops and the runs of graphs.
 
+use super::job::Work;
+use super::priority::Priority;
+use super::region::{Region, RunToken};
+use super::worker::Worker;
 use crate::unwind::JobPanic;
-
-use super::{
-    job::Work,
-    priority::Priority,
-    region::{Region, RunToken},
-    worker::Worker,
-};
 
 /// What the tokens of a region stand for.
 pub(crate) trait Tokens: Sync {
@@ -64,7 +61,6 @@ impl<'worker> TokenContext<'worker> {
 /// Calls `start`, and returns when all tokens that it pushed, and that those pushed, have run. Does not unwind.
 ///
 /// # Errors
-///
 /// Returns the first [`JobPanic`] of `start` or of a token. All other tokens have run nevertheless.
 pub(crate) fn run_tokens(
     worker: &Worker,

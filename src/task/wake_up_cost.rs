@@ -1,10 +1,11 @@
 //! Measures how long it takes to wake a worker, on the machine and with the scheduler that will pay it.
 
-use std::{sync::OnceLock, time::Duration};
+use std::sync::OnceLock;
+use std::time::Duration;
 
+use super::placement::Placement;
+use super::scheduler::Scheduler;
 use crate::sync::{Instant, spin_loop, thread};
-
-use super::{placement::Placement, scheduler::Scheduler};
 
 /// How many wake-ups are measured. Other work on the machine makes some longer, never shorter, so the second shortest counts.
 const TRIES: usize = 5;

@@ -1,24 +1,23 @@
 //! What a worker does: it runs jobs, looks for jobs, and sleeps.
 
-use std::{cell::Cell, fmt, marker::PhantomData, mem, ptr, rc::Rc, time::Duration};
+use std::cell::Cell;
+use std::marker::PhantomData;
+use std::rc::Rc;
+use std::time::Duration;
+use std::{fmt, mem, ptr};
 
-use crate::{
-    sync::Arc,
-    timeline::Timeline,
-    unwind::{AbortOnUnwind, JobPanic, catch, discard},
-};
-
-use super::{
-    background_queue::QueuedJob,
-    idle::Idle,
-    job::{Job, Work},
-    prepaid_count::PrepaidCount,
-    priority::Priority,
-    queues::{Popped, Queues},
-    region::{JobContext, Region, RegionKind, RunToken},
-    shared::Shared,
-    sleep::WakeFor,
-};
+use super::background_queue::QueuedJob;
+use super::idle::Idle;
+use super::job::{Job, Work};
+use super::prepaid_count::PrepaidCount;
+use super::priority::Priority;
+use super::queues::{Popped, Queues};
+use super::region::{JobContext, Region, RegionKind, RunToken};
+use super::shared::Shared;
+use super::sleep::WakeFor;
+use crate::sync::Arc;
+use crate::timeline::Timeline;
+use crate::unwind::{AbortOnUnwind, JobPanic, catch, discard};
 
 /// Proof that code runs as a job of a scheduler: a reference to a worker exists only there, and stays on its thread.
 ///
@@ -191,7 +190,6 @@ impl Worker {
     /// Opens a region, runs `body` in it, and works until all jobs of the region have run. Does not unwind.
     ///
     /// # Errors
-    ///
     /// Returns the first [`JobPanic`] of `body` or of a job. All jobs have run nevertheless.
     pub(super) fn open_region<R>(
         &self,

@@ -2,20 +2,15 @@
 
 use std::sync::mpsc;
 
-use crate::{
-    sync::Arc,
-    unwind::{AbortOnUnwind, catch, emit},
-};
-
-use super::{
-    affinity::AffinityMask,
-    current_worker,
-    placement::Placement,
-    queues::Queues,
-    scheduler_error::SchedulerError,
-    shared::Shared,
-    worker::{ExitCondition, Worker},
-};
+use super::affinity::AffinityMask;
+use super::current_worker;
+use super::placement::Placement;
+use super::queues::Queues;
+use super::scheduler_error::SchedulerError;
+use super::shared::Shared;
+use super::worker::{ExitCondition, Worker};
+use crate::sync::Arc;
+use crate::unwind::{AbortOnUnwind, catch, emit};
 
 /// A function of the engine's that runs on each thread, with the index of its worker.
 ///

@@ -2,12 +2,9 @@
 
 use std::ops::Range;
 
+use super::clock::ClockReader;
+use super::track::{ChunkKind, Track};
 use crate::sync::{AtomicU64, Ordering};
-
-use super::{
-    clock::ClockReader,
-    track::{ChunkKind, Track},
-};
 
 /// Writes an event for each chunk that a worker runs of a node. The end of a chunk is the beginning of the next, so each chunk
 /// takes one reading of the clock.

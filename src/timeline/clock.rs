@@ -2,14 +2,13 @@
 //!
 //! Workers record raw *timestamps*. They are converted to nanoseconds, all at the same rate, when a log is taken.
 
-use std::{sync::OnceLock, thread, time::Duration};
-
-use crate::{
-    sync::{AtomicU64, Instant, Ordering},
-    unwind::{JobPanic, catch, emit},
-};
+use std::sync::OnceLock;
+use std::thread;
+use std::time::Duration;
 
 use super::ticks;
+use crate::sync::{AtomicU64, Instant, Ordering};
+use crate::unwind::{JobPanic, catch, emit};
 
 /// The source of timestamps.
 pub(super) enum Clock {
@@ -188,14 +187,10 @@ fn nanoseconds(time: Duration) -> u64 {
 
 #[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
 mod tests {
-    use std::{
-        sync::{
-            Arc,
-            atomic::{AtomicU64, Ordering},
-        },
-        thread,
-        time::{Duration, Instant},
-    };
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::thread;
+    use std::time::{Duration, Instant};
 
     use super::{Clock, EngineClock};
 

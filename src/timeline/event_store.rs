@@ -1,6 +1,9 @@
 //! The frames, runs, spans and counters of a timeline. They are few, so they are stored behind a lock.
 
-use std::{collections::HashSet, mem, ops::Range, thread, time::Duration};
+use std::collections::HashSet;
+use std::ops::Range;
+use std::time::Duration;
+use std::{mem, thread};
 
 use super::log::{Counter, Frame, Log, Run, Span};
 

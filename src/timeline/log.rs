@@ -1,6 +1,8 @@
 //! A recording, as plain data.
 
-use std::{ops::Range, sync::Arc, time::Duration};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
 
 /// Everything recorded since the timeline was started, or since the last log was taken. All times are measured from
 /// the construction of the scheduler.

@@ -5,10 +5,8 @@
 //! data: frames, runs of schedules, and every chunk of each run.
 //!
 //! ```
-//! use drawloom::{
-//!     graph::{Closure, FrameGraph},
-//!     task::Scheduler,
-//! };
+//! use drawloom::graph::{Closure, FrameGraph};
+//! use drawloom::task::Scheduler;
 //!
 //! let mut graph = FrameGraph::new();
 //! let cull = graph.add("cull", Closure::new(|_: &(), _range, _worker| Ok(())).with_width(|_| 100).with_chunk(10));
@@ -42,15 +40,10 @@ mod ring;
 mod ticks;
 mod track;
 
-pub(crate) use self::{
-    chunk_timer::ChunkTimer,
-    recorder::{OpenRun, RunEnd, TimelineSettings},
-};
+pub(crate) use chunk_timer::ChunkTimer;
+pub(crate) use recorder::{OpenRun, RunEnd, TimelineSettings};
 
-pub use self::{
-    log::{
-        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span,
-        WorkerLog,
-    },
-    recorder::{OpenSpan, Timeline},
+pub use log::{
+    Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog,
 };
+pub use recorder::{OpenSpan, Timeline};

@@ -1,25 +1,20 @@
 //! The recorder: workers and calling threads write to it, and a log takes out what they wrote.
 
-use std::{
-    borrow::Cow,
-    collections::{HashMap, HashSet},
-    fmt,
-    marker::PhantomData,
-    sync::{Arc, OnceLock},
-    time::Duration,
-};
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+use std::marker::PhantomData;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use crossbeam_utils::CachePadded;
 
+use super::chunk_timer::ChunkTimer;
+use super::clock::{Clock, ClockReader, EngineClock};
+use super::event_store::{EventStore, Events, FrameSource, frames_of};
+use super::log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog};
+use super::track::{Entry, Track};
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
-
-use super::{
-    chunk_timer::ChunkTimer,
-    clock::{Clock, ClockReader, EngineClock},
-    event_store::{EventStore, Events, FrameSource, frames_of},
-    log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog},
-    track::{Entry, Track},
-};
 
 /// Whether the build can record at all. It cannot under loom, which has enough state to explore without recording, and in the
 /// build that the cost of a switched-off timeline is measured against.

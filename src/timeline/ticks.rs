@@ -3,10 +3,8 @@
 
 #[cfg(all(target_arch = "x86_64", not(any(drawloom_loom, drawloom_shuttle, miri))))]
 mod counter {
-    use std::{
-        arch::x86_64::{__cpuid, _mm_lfence, _rdtsc},
-        fs,
-    };
+    use std::arch::x86_64::{__cpuid, _mm_lfence, _rdtsc};
+    use std::fs;
 
     /// Whether the counter runs at a constant rate and is synchronized between cores.
     pub(in crate::timeline) fn is_reliable() -> bool {

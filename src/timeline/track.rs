@@ -1,14 +1,12 @@
 //! One worker's track: its chunks and idle intervals.
 
-use std::{ops::Range, time::Duration};
+use std::ops::Range;
+use std::time::Duration;
 
+use super::clock::Clock;
+use super::log::{Chunk, Idle, IdleKind};
+use super::ring::{Event, Ring};
 use crate::sync::{AtomicU64, Ordering};
-
-use super::{
-    clock::Clock,
-    log::{Chunk, Idle, IdleKind},
-    ring::{Event, Ring},
-};
 
 /// What one worker writes. Only one thread at a time is that worker.
 pub(super) struct Track {
@@ -146,9 +144,9 @@ fn kind_of(tag: u64) -> Option<IdleKind> {
 mod loom_tests {
     use loom::{model, thread};
 
-    use crate::{sync::Arc, timeline::clock::EngineClock};
-
     use super::{Clock, Duration, Entry, IdleKind, Track};
+    use crate::sync::Arc;
+    use crate::timeline::clock::EngineClock;
 
     #[test]
     fn an_open_idle_interval_is_read_after_the_closed_ones_before_it() {

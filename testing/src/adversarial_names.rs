@@ -1,6 +1,7 @@
 //! Names with special characters of HTML, JSON and Unicode, which break writers that do not escape, and a log of them.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
+use std::time::Duration;
 
 use drawloom::timeline::{Chunk, DeviceLog, DevicePass, Frame, Graph, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 

@@ -1,24 +1,16 @@
 //! Empty runs, long runs, and runs inside runs.
 
-use std::{
-    cell::Cell,
-    ops::Range,
-    sync::{
-        Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-    thread,
-};
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
 
-use drawloom::{
-    graph::{Closure, FrameGraph},
-    task::Worker,
-};
+use drawloom::graph::{Closure, FrameGraph};
+use drawloom::task::Worker;
 
-use crate::{
-    SCHEDULERS,
-    run::{run, single},
-};
+use crate::SCHEDULERS;
+use crate::run::{run, single};
 
 #[test]
 fn an_empty_schedule_runs() {

@@ -1,7 +1,8 @@
 //! The rules of a graph, implemented naively with matrices.
 
 use drawloom::graph::{FrameGraph, NodeId};
-use proptest::{collection::vec, prelude::*};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 /// A relation of nodes as a matrix: `[before][after]`.
 pub type Relation = Vec<Vec<bool>>;

@@ -1,24 +1,17 @@
 //! A run processes every item once, after its dependencies, on all workers.
 
-use std::{
-    ops::Range,
-    sync::{
-        Barrier, Mutex,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
-};
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
+use std::thread;
 
-use drawloom::{
-    graph::{Closure, FrameGraph, Node, NodeError, Schedule},
-    task::{Scheduler, Worker},
-};
-use proptest::{collection::vec, prelude::*};
+use drawloom::graph::{Closure, FrameGraph, Node, NodeError, Schedule};
+use drawloom::task::{Scheduler, Worker};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
-use crate::{
-    SCHEDULERS,
-    oracle::{Oracle, valid_graph},
-};
+use crate::SCHEDULERS;
+use crate::oracle::{Oracle, valid_graph};
 
 /// How often each item of each node was processed.
 type ItemCounts = Vec<Vec<AtomicUsize>>;

@@ -1,17 +1,11 @@
 //! Failing runs: the chunks that are cancelled, the reported error, and the next run, which is unaffected.
 
-use std::{
-    ops::Range,
-    sync::{
-        Barrier, Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
 
-use drawloom::{
-    graph::{Closure, FrameGraph, Node, NodeError, RunError, Schedule},
-    task::Worker,
-};
+use drawloom::graph::{Closure, FrameGraph, Node, NodeError, RunError, Schedule};
+use drawloom::task::Worker;
 
 use crate::SCHEDULERS;
 

@@ -3,20 +3,14 @@
 //! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release --test graph stress` tests further seeds
 //! for that many seconds.
 
-use std::{
-    ops::Range,
-    sync::{
-        Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-    thread::{self, ThreadId},
-    time::{Duration, Instant},
-};
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::{self, ThreadId};
+use std::time::{Duration, Instant};
 
-use drawloom::{
-    graph::{FrameGraph, Node, NodeError, NodeId, RunError, Schedule},
-    task::{Scheduler, Worker},
-};
+use drawloom::graph::{FrameGraph, Node, NodeError, NodeId, RunError, Schedule};
+use drawloom::task::{Scheduler, Worker};
 use fastrand::Rng;
 
 /// A node of a random graph. It depends on nodes with lower indices.

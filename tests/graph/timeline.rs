@@ -1,24 +1,18 @@
 //! The timeline of a run: every item of every node is in one chunk, in an order that respects all dependencies.
 
-use std::{
-    hint::black_box,
-    ops::Range,
-    sync::{
-        Arc, Barrier, LazyLock, Mutex,
-        atomic::{AtomicU64, Ordering},
-        mpsc,
-    },
-    thread,
-    time::Duration,
-};
+use std::hint::black_box;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Barrier, LazyLock, Mutex, mpsc};
+use std::thread;
+use std::time::Duration;
 
-use drawloom::{
-    graph::{Closure, FrameGraph, Node, NodeError, Schedule},
-    report::{FrameReport, SchedulerCosts},
-    task::{Scheduler, Worker},
-    timeline::{Chunk, IdleKind, Log},
-};
-use proptest::{collection::vec, prelude::*};
+use drawloom::graph::{Closure, FrameGraph, Node, NodeError, Schedule};
+use drawloom::report::{FrameReport, SchedulerCosts};
+use drawloom::task::{Scheduler, Worker};
+use drawloom::timeline::{Chunk, IdleKind, Log};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 use crate::oracle::valid_graph;
 

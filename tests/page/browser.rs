@@ -1,18 +1,13 @@
 //! A headless Chromium that opens pages.
 
-use std::{
-    env,
-    fs::{self, File},
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-    thread,
-    time::{Duration, Instant},
-};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use std::{env, thread};
 
-use drawloom::{
-    report::{SchedulerCosts, write_page},
-    timeline::Log,
-};
+use drawloom::report::{SchedulerCosts, write_page};
+use drawloom::timeline::Log;
 use libtest_mimic::Failed;
 
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];

@@ -1,12 +1,12 @@
 //! Logs to show.
 
-use std::{hint::black_box, sync::Arc, time::Duration};
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Duration;
 
-use drawloom::{
-    graph::{Closure, FrameGraph},
-    task::Scheduler,
-    timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
-};
+use drawloom::graph::{Closure, FrameGraph};
+use drawloom::task::Scheduler;
+use drawloom::timeline::{Chunk, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 use fastrand::Rng;
 use libtest_mimic::Failed;
 

@@ -5,7 +5,8 @@
 mod browser;
 mod logs;
 
-use std::{env, process::ExitCode};
+use std::env;
+use std::process::ExitCode;
 
 use drawloom::timeline::Log;
 use drawloom_testing::adversarial_names;

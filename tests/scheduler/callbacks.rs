@@ -1,17 +1,14 @@
 //! Panics of the engine's hooks, clocks and captures are returned or reported, and no job, worker or borrow is lost.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
-    time::Duration,
-};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use drawloom::task::{AffinityMask, Scheduler, SchedulerError};
 
-use crate::{assert_intact, waits::assert_ends};
+use crate::assert_intact;
+use crate::waits::assert_ends;
 
 /// A clock that panics from reading number `first` on, and the number of its readings so far.
 fn clock_that_panics(first: usize) -> (impl Fn() -> Duration + Send + Sync, Arc<AtomicUsize>) {

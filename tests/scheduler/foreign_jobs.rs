@@ -1,19 +1,13 @@
 //! A thread that waits inside a job runs jobs that belong to that job, and no foreign jobs.
 
-use std::{
-    cell::RefCell,
-    ops::Range,
-    sync::{
-        Barrier, Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-    thread,
-};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
+use std::thread;
 
-use drawloom::{
-    graph::{Closure, FrameGraph},
-    task::{Scheduler, Scope, Worker},
-};
+use drawloom::graph::{Closure, FrameGraph};
+use drawloom::task::{Scheduler, Scope, Worker};
 
 use crate::{eventually, scheduler};
 

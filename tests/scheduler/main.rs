@@ -8,16 +8,12 @@ mod pools;
 mod stress;
 mod waits;
 
-use std::{
-    collections::HashSet,
-    ops::Range,
-    sync::{
-        Barrier, Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-    },
-    thread::{self, ThreadId},
-    time::Duration,
-};
+use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Barrier, Mutex};
+use std::thread::{self, ThreadId};
+use std::time::Duration;
 
 use drawloom::task::{Scheduler, SchedulerError, Scope};
 use proptest::prelude::{ProptestConfig, prop_assert, prop_assert_eq, proptest};

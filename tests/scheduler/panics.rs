@@ -1,13 +1,9 @@
 //! Each panic in a job becomes an error with its message, and the scheduler keeps working.
 
-use std::{
-    panic::panic_any,
-    sync::{
-        Barrier,
-        atomic::{AtomicUsize, Ordering},
-    },
-    time::Duration,
-};
+use std::panic::panic_any;
+use std::sync::Barrier;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use drawloom::task::{JobPanic, Scheduler, Scope, Worker, catch};
 

@@ -1,9 +1,7 @@
 //! How schedulers are built and dropped: their threads' names, affinities and hooks, and failures of these.
 
-use std::{
-    sync::{Arc, Mutex, mpsc},
-    thread::{self, ThreadId},
-};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread::{self, ThreadId};
 
 use drawloom::task::{AffinityMask, Scheduler, SchedulerBuilder, SchedulerError};
 

@@ -1,9 +1,7 @@
 //! Random trees of spawned jobs, pinned jobs, scopes and loops, compared with a plain recursion.
 
-use std::{
-    ops::Range,
-    sync::atomic::{AtomicUsize, Ordering},
-};
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::task::{Scheduler, Scope, Worker};
 use fastrand::Rng;

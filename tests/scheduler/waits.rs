@@ -1,16 +1,11 @@
 //! Jobs that wait for their own scopes, for background jobs and for locks. No job waits for ever, and no foreign job runs on top of
 //! one that waits.
 
-use std::{
-    cell::Cell,
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
-        mpsc,
-    },
-    thread,
-    time::Duration,
-};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread;
+use std::time::Duration;
 
 use drawloom::task::{BackgroundJob, Scheduler};
 

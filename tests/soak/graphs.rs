@@ -1,23 +1,15 @@
 //! Random graphs inside of random programs: every item runs once, after its dependencies, also in runs after a failure.
 
-use std::{
-    ops::Range,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
-};
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use drawloom::{
-    graph::{FrameGraph, Node, NodeError, RunError, Schedule},
-    task::Worker,
-};
+use drawloom::graph::{FrameGraph, Node, NodeError, RunError, Schedule};
+use drawloom::task::Worker;
 use fastrand::Rng;
 
-use crate::{
-    program::{World, items, panic_as_planned, run_items},
-    watchdog::{Activity, during},
-};
+use crate::program::{World, items, panic_as_planned, run_items};
+use crate::watchdog::{Activity, during};
 
 /// The maximum width of a node.
 const MAX_WIDTH: usize = if cfg!(miri) { 4 } else { 20 };

@@ -16,11 +16,9 @@ mod race;
 mod rounds;
 mod watchdog;
 
-use std::{
-    env, panic,
-    sync::atomic::{AtomicUsize, Ordering},
-    time::{Duration, Instant},
-};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+use std::{env, panic};
 
 use indicatif::{ProgressBar, ProgressStyle};
 

@@ -4,23 +4,17 @@
 //! part waits for a background job, or holds a lock, only for parts of lower height, which take only the locks of lower
 //! heights. So no program can deadlock.
 
-use std::{
-    ops::Range,
-    panic::resume_unwind,
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicU64, Ordering},
-    },
-    thread,
-};
+use std::ops::Range;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
 
 use drawloom::task::{BackgroundJob, JobPanic, Scheduler, Scope, Worker};
 use fastrand::Rng;
 
-use crate::{
-    graphs,
-    watchdog::{Activity, during, progress},
-};
+use crate::graphs;
+use crate::watchdog::{Activity, during, progress};
 
 /// The maximum height of a program. Miri is some thousand times slower.
 pub const MAX_HEIGHT: usize = if cfg!(miri) { 2 } else { 5 };

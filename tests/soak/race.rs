@@ -1,10 +1,8 @@
 //! An intentional data race. `.ci/run` checks that the thread sanitizer reports it, so its silence about the
 //! soak is evidence.
 
-use std::{
-    cell::UnsafeCell,
-    sync::atomic::{AtomicUsize, Ordering},
-};
+use std::cell::UnsafeCell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::task::Scheduler;
 

@@ -1,26 +1,17 @@
 //! A round runs programs of a few threads on one scheduler.
 
-use std::{
-    fmt,
-    ops::AddAssign,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-    thread,
-    time::{Duration, Instant},
-};
+use std::ops::AddAssign;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use std::{fmt, thread};
 
-use drawloom::{
-    task::{Scheduler, SchedulerBuilder},
-    timeline::Log,
-};
+use drawloom::task::{Scheduler, SchedulerBuilder};
+use drawloom::timeline::Log;
 use fastrand::Rng;
 
-use crate::{
-    program::{MAX_HEIGHT, World, panic_as_planned, run as run_program, value},
-    watchdog::{self, Activity, during},
-};
+use crate::program::{MAX_HEIGHT, World, panic_as_planned, run as run_program, value};
+use crate::watchdog::{self, Activity, during};
 
 /// Counts of what has run.
 #[derive(Default)]

@@ -3,18 +3,13 @@
 //! Every thread keeps a stack of its current activities in relaxed atomics. These order nothing, so they hide no race from a
 //! sanitizer.
 
-use std::{
-    cell::OnceCell,
-    fmt::Write,
-    io::{self, Write as _},
-    process,
-    sync::{
-        Arc, Mutex, OnceLock, Weak,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
-    },
-    thread,
-    time::Duration,
-};
+use std::cell::OnceCell;
+use std::fmt::Write;
+use std::io::{self, Write as _};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
+use std::time::Duration;
+use std::{process, thread};
 
 use crate::program::World;
 

@@ -9,7 +9,8 @@ use std::time::Duration;
 use drawloom::graph::{FrameGraph, Node, NodeError, Schedule};
 use drawloom::task::{Scheduler, SchedulerBuilder, Worker};
 use drawloom::timeline::Labels;
-use proptest::{collection::vec, prelude::*};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 /// A node with some work: its number, its width, and whether it is pinned.
 #[derive(Clone, Copy, Debug)]

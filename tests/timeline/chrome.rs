@@ -1,19 +1,16 @@
 //! Chrome traces of real runs, checked against their logs.
 
-use std::{
-    collections::HashSet,
-    hint::black_box,
-    ops::Range,
-    sync::{LazyLock, Mutex},
-    time::Duration,
-};
+use std::collections::HashSet;
+use std::hint::black_box;
+use std::ops::Range;
+use std::sync::{LazyLock, Mutex};
+use std::time::Duration;
 
-use drawloom::{
-    graph::{FrameGraph, Node, NodeError, Schedule},
-    task::{Scheduler, Worker},
-    timeline::{Chunk, Idle, IdleKind, Log, Run},
-};
-use proptest::{collection::vec, prelude::*};
+use drawloom::graph::{FrameGraph, Node, NodeError, Schedule};
+use drawloom::task::{Scheduler, Worker};
+use drawloom::timeline::{Chunk, Idle, IdleKind, Log, Run};
+use proptest::collection::vec;
+use proptest::prelude::*;
 use serde_json::json;
 
 use crate::trace::{Event, Trace, nanoseconds};

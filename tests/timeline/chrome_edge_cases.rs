@@ -1,21 +1,18 @@
 //! Chrome traces of hand-made logs, with cases that are rare in real runs.
 
-use std::{
-    io::{self, Write},
-    sync::Arc,
-    time::Duration,
-};
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::time::Duration;
 
-use drawloom::{
-    report::write_chrome_trace,
-    timeline::{
-        Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span,
-        WorkerLog,
-    },
+use drawloom::report::write_chrome_trace;
+use drawloom::timeline::{
+    Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog,
 };
-use proptest::{collection::vec, prelude::*};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
-use crate::{chrome::check, trace::Trace};
+use crate::chrome::check;
+use crate::trace::Trace;
 
 fn at(nanoseconds: u64) -> Duration {
     Duration::from_nanos(nanoseconds)

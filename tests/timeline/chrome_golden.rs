@@ -1,16 +1,12 @@
 //! A whole trace, compared byte by byte. `UPDATE_EXPECT=1` renews the golden file.
 
-use std::{
-    sync::atomic::{AtomicU64, Ordering},
-    thread,
-    time::Duration,
-};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
 
-use drawloom::{
-    graph::{Closure, FrameGraph},
-    report::write_chrome_trace,
-    task::Scheduler,
-};
+use drawloom::graph::{Closure, FrameGraph};
+use drawloom::report::write_chrome_trace;
+use drawloom::task::Scheduler;
 use expect_test::expect_file;
 
 #[test]

@@ -1,13 +1,13 @@
 //! All data of a log can be read back from its page, and no name in it ends a script element early.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
+use std::time::Duration;
 
-use drawloom::{
-    report::{SchedulerCosts, write_page},
-    timeline::{Chunk, Idle, IdleKind, Log},
-};
+use drawloom::report::{SchedulerCosts, write_page};
+use drawloom::timeline::{Chunk, Idle, IdleKind, Log};
 use drawloom_testing::adversarial_names::{adversarial_names, log_of};
-use proptest::{collection::vec, prelude::*};
+use proptest::collection::vec;
+use proptest::prelude::*;
 use serde_json::Value;
 
 fn page_of(log: &Log) -> String {

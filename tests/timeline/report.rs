@@ -1,11 +1,11 @@
 //! Reports of hand-made frames with known results.
 
-use std::{ops::Range, sync::Arc, time::Duration};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
 
-use drawloom::{
-    report::{FrameReport, HeldBy, ReportError, SchedulerCosts},
-    timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog},
-};
+use drawloom::report::{FrameReport, HeldBy, ReportError, SchedulerCosts};
+use drawloom::timeline::{Chunk, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog};
 use expect_test::expect_file;
 
 fn micros(count: u64) -> Duration {

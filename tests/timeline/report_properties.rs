@@ -1,22 +1,18 @@
 //! Reports of real runs of any graph, checked against naive oracles.
 
-use std::{
-    collections::BTreeSet,
-    hint::black_box,
-    sync::{
-        Arc, LazyLock, Mutex,
-        atomic::{AtomicU64, Ordering},
-    },
-    time::Duration,
-};
+use std::collections::BTreeSet;
+use std::hint::black_box;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock, Mutex};
+use std::time::Duration;
 
-use drawloom::{
-    graph::{Closure, FrameGraph, Schedule},
-    report::{FrameReport, HeldBy, Replay, SchedulerCosts, Slack, Step},
-    task::Scheduler,
-    timeline::{Chunk, Labels, Log, Run},
-};
-use proptest::{collection::vec, prelude::*, sample::Index};
+use drawloom::graph::{Closure, FrameGraph, Schedule};
+use drawloom::report::{FrameReport, HeldBy, Replay, SchedulerCosts, Slack, Step};
+use drawloom::task::Scheduler;
+use drawloom::timeline::{Chunk, Labels, Log, Run};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::Index;
 
 /// A node: its dependencies, its number of items, the time of each, and its group.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! Parses a Chrome trace.
 
-use drawloom::{report::write_chrome_trace, timeline::Log};
+use drawloom::report::write_chrome_trace;
+use drawloom::timeline::Log;
 use serde_json::Value;
 
 /// The trace of a log, parsed.

@@ -3,17 +3,17 @@
 //!     cargo run --release -p drawloom-tracy --example frame_tracy
 //!     cargo run --release -p drawloom-tracy --example frame_tracy -- --frames 60 --no-wait
 
-use std::{error::Error, num::NonZeroUsize, sync::Arc, thread, time::Duration};
+use std::error::Error;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 
 use clap::Parser;
-use drawloom::{
-    Renderer,
-    backend::{Backend, WgpuBackend},
-    demo,
-    process::{Deferred, Fxaa, ToneMapping},
-    task::Scheduler,
-    wgpu,
-};
+use drawloom::backend::{Backend, WgpuBackend};
+use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, demo, wgpu};
 use drawloom_testing::adapter;
 use drawloom_tracy::Zones;
 use indicatif::{ProgressBar, ProgressStyle};

@@ -24,14 +24,18 @@ mod plots;
 mod spans;
 
 use thiserror::Error;
-use tracing::{Metadata, Subscriber, level_filters::LevelFilter, subscriber::set_global_default};
-use tracing_subscriber::{Layer, Registry, filter::FilterFn, layer::SubscriberExt, registry::LookupSpan};
-use tracing_tracy::{TracyLayer, client::Client};
+use tracing::level_filters::LevelFilter;
+use tracing::subscriber::set_global_default;
+use tracing::{Metadata, Subscriber};
+use tracing_subscriber::filter::FilterFn;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::{Layer, Registry};
+use tracing_tracy::TracyLayer;
+use tracing_tracy::client::Client;
 
-use crate::{
-    plots::Plots,
-    spans::{NameOnly, NodeZones, is_chunk, is_node},
-};
+use crate::plots::Plots;
+use crate::spans::{NameOnly, NodeZones, is_chunk, is_node};
 
 /// The target of Drawloom's spans and events of runs.
 const RUNS: &str = "drawloom::graph";
@@ -71,7 +75,6 @@ where
 /// Makes the [layer] the global subscriber, in a program that has none.
 ///
 /// # Errors
-///
 /// Returns [`InstallError`] if the program already has a global subscriber. Add the [layer] to that one instead.
 pub fn install(zones: Zones) -> Result<(), InstallError> {
     set_global_default(Registry::default().with(layer(zones))).map_err(|_| InstallError)

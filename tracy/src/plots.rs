@@ -1,17 +1,13 @@
 //! Plots of the counters in Drawloom's events.
 
-use std::{
-    cell::Cell,
-    collections::BTreeMap,
-    fmt::Debug,
-    sync::{Mutex, PoisonError},
-    thread,
-};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
 
-use tracing::{
-    Event, Metadata, Subscriber,
-    field::{Field, Visit},
-};
+use tracing::field::{Field, Visit};
+use tracing::{Event, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer};
 use tracing_tracy::client::{Client, PlotName, plot_name};
 
@@ -99,16 +95,12 @@ fn plot_of(thread: &str) -> PlotName {
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use drawloom::{
-        graph::{Closure, FrameGraph},
-        task::Scheduler,
-    };
+    use drawloom::graph::{Closure, FrameGraph};
+    use drawloom::task::Scheduler;
     use tracing::{Event, Subscriber};
-    use tracing_subscriber::{
-        Registry,
-        filter::FilterFn,
-        layer::{Context, Layer, SubscriberExt},
-    };
+    use tracing_subscriber::Registry;
+    use tracing_subscriber::filter::FilterFn;
+    use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 
     use super::{Counters, counters_of, is_counters, plot_of};
 

@@ -1,25 +1,18 @@
 //! Shows spans as zones. The zone of a node has the node's name, that of any other span the span's name.
 
-use std::{
-    cell::RefCell,
-    fmt::{self, Debug},
-};
+use std::cell::RefCell;
+use std::fmt::{self, Debug};
 
-use tracing::{
-    Metadata, Subscriber,
-    field::{Field, Visit},
-    span::{Attributes, Id},
-};
-use tracing_subscriber::{
-    field::RecordFields,
-    fmt::{FormatFields, format::Writer},
-    layer::{Context, Layer},
-    registry::LookupSpan,
-};
-use tracing_tracy::{
-    Config,
-    client::{Client, Span},
-};
+use tracing::field::{Field, Visit};
+use tracing::span::{Attributes, Id};
+use tracing::{Metadata, Subscriber};
+use tracing_subscriber::field::RecordFields;
+use tracing_subscriber::fmt::FormatFields;
+use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::layer::{Context, Layer};
+use tracing_subscriber::registry::LookupSpan;
+use tracing_tracy::Config;
+use tracing_tracy::client::{Client, Span};
 
 use crate::RUNS;
 
@@ -148,22 +141,16 @@ impl Visit for NameField {
 
 #[cfg(test)]
 mod tests {
-    use std::{
-        collections::BTreeSet,
-        sync::{Arc, Mutex},
-    };
+    use std::collections::BTreeSet;
+    use std::sync::{Arc, Mutex};
 
-    use tracing::{
-        Subscriber, debug_span, info_span,
-        span::{Attributes, Id},
-        trace_span,
-    };
-    use tracing_subscriber::{
-        Registry,
-        field::RecordFields,
-        fmt::{FormatFields, format::Writer},
-        layer::{Context, Layer, SubscriberExt},
-    };
+    use tracing::span::{Attributes, Id};
+    use tracing::{Subscriber, debug_span, info_span, trace_span};
+    use tracing_subscriber::Registry;
+    use tracing_subscriber::field::RecordFields;
+    use tracing_subscriber::fmt::FormatFields;
+    use tracing_subscriber::fmt::format::Writer;
+    use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
     use tracing_tracy::Config;
 
     use super::{MAX_NAME_BYTES, NameOnly, is_chunk, is_node, name_of};

@@ -1,19 +1,14 @@
 //! The data that a program sends to a viewer on the same machine.
 
-use std::{
-    env,
-    io::{Read, Write},
-    net::{TcpListener, TcpStream},
-    process::{Child, Command},
-    thread,
-    time::{Duration, Instant},
-};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+use std::{env, thread};
 
-use drawloom::{
-    graph::{Closure, FrameGraph},
-    task::Scheduler,
-    timeline::Labels,
-};
+use drawloom::graph::{Closure, FrameGraph};
+use drawloom::task::Scheduler;
+use drawloom::timeline::Labels;
 use drawloom_tracy::Zones;
 use tracing::{debug_span, trace_span};
 

@@ -1,10 +1,8 @@
 //! Writes events of the Trace Event Format, one after another.
 
-use std::{
-    fmt,
-    io::{self, Write},
-    time::Duration,
-};
+use std::fmt;
+use std::io::{self, Write};
+use std::time::Duration;
 
 use serde::Serialize;
 

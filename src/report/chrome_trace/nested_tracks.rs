@@ -27,9 +27,11 @@ pub(super) fn nested_tracks(slices: impl IntoIterator<Item = (Duration, Duration
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use std::{cmp::Reverse, time::Duration};
+    use std::cmp::Reverse;
+    use std::time::Duration;
 
-    use proptest::{collection::vec, prelude::*};
+    use proptest::collection::vec;
+    use proptest::prelude::*;
 
     use super::nested_tracks;
 

@@ -1,6 +1,7 @@
 //! The spans of a run's nodes: when each could have been opened, when it was, and which dependency arrows begin and end at it.
 
-use std::{iter, time::Duration};
+use std::iter;
+use std::time::Duration;
 
 use crate::timeline::{Chunk, Run};
 

@@ -1,6 +1,7 @@
 //! The counter of ready nodes.
 
-use std::{io, time::Duration};
+use std::io;
+use std::time::Duration;
 
 use super::events::{EventWriter, Track};
 

@@ -1,22 +1,15 @@
 //! Writes a log as a trace.
 
-use std::{
-    cmp::Reverse,
-    io::{self, BufWriter},
-    time::Duration,
-};
+use std::cmp::Reverse;
+use std::io::{self, BufWriter};
+use std::time::Duration;
 
-use crate::{
-    report::consistency::check_log,
-    timeline::{Chunk, DeviceLog, IdleKind, Log, NodeInfo, Run},
-};
-
-use super::{
-    events::{EventWriter, Track, microseconds},
-    nested_tracks::nested_tracks,
-    node_spans::{NodeSpan, NodeSpans, slices},
-    ready_nodes::ReadyNodes,
-};
+use super::events::{EventWriter, Track, microseconds};
+use super::nested_tracks::nested_tracks;
+use super::node_spans::{NodeSpan, NodeSpans, slices};
+use super::ready_nodes::ReadyNodes;
+use crate::report::consistency::check_log;
+use crate::timeline::{Chunk, DeviceLog, IdleKind, Log, NodeInfo, Run};
 
 /// The processes of a trace, in the terms of the format: one for workers and threads, and one for the device.
 const CPU: usize = 1;
@@ -48,11 +41,9 @@ const DEVICE: usize = 2;
 /// Events are written one by one, so the trace is never in memory as a whole.
 ///
 /// ```
-/// use drawloom::{
-///     graph::{Closure, FrameGraph},
-///     report::write_chrome_trace,
-///     task::Scheduler,
-/// };
+/// use drawloom::graph::{Closure, FrameGraph};
+/// use drawloom::report::write_chrome_trace;
+/// use drawloom::task::Scheduler;
 ///
 /// let mut graph = FrameGraph::new();
 /// let cull = graph.add("cull", Closure::new(|_: &(), _range, _worker| Ok(())).with_width(|_| 100));
@@ -68,7 +59,6 @@ const DEVICE: usize = 2;
 /// ```
 ///
 /// # Errors
-///
 /// Returns the error of `writer`, or [`InvalidInput`](io::ErrorKind::InvalidInput) if the log refers to a node, a worker or a
 /// thread that it does not list, or if a node waits for a later one.
 pub fn write_chrome_trace(log: &Log, writer: impl io::Write) -> io::Result<()> {

@@ -1,17 +1,15 @@
 //! The critical path of a frame: those of its runs, and what its threads did before, between and after them.
 
-use std::{cmp::Reverse, collections::BinaryHeap, ops::Range, time::Duration};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+use std::time::Duration;
 
-use crate::{
-    report::intervals::{difference, union},
-    timeline::{Log, Span},
-};
-
-use super::{
-    run_spans::RunSpans,
-    step::{HeldBy, Step},
-    worker_spans::WorkerSpan,
-};
+use super::run_spans::RunSpans;
+use super::step::{HeldBy, Step};
+use super::worker_spans::WorkerSpan;
+use crate::report::intervals::{difference, union};
+use crate::timeline::{Log, Span};
 
 /// The name of the step from the end of a run's last node to the end of the run: workers find that nothing is left, and the
 /// calling thread is woken if it sleeps.

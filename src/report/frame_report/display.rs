@@ -1,19 +1,15 @@
 //! The text of a frame's report, for a terminal.
 
-use std::{
-    cmp::Reverse,
-    fmt::{self, Display, Formatter},
-    time::Duration,
-};
+use std::cmp::Reverse;
+use std::fmt::{self, Display, Formatter};
+use std::time::Duration;
 
-use super::{
-    queue_wait::QueueWait,
-    report::FrameReport,
-    slack::Slack,
-    step::{HeldBy, Step},
-    what_if::WhatIf,
-    worker_report::WorkerReport,
-};
+use super::queue_wait::QueueWait;
+use super::report::FrameReport;
+use super::slack::Slack;
+use super::step::{HeldBy, Step};
+use super::what_if::WhatIf;
+use super::worker_report::WorkerReport;
 
 /// How many lines a list has, for a person to read it.
 const MAX_LINES: usize = 10;

@@ -12,12 +12,10 @@ mod what_if;
 mod worker_report;
 mod worker_spans;
 
-pub use self::{
-    queue_wait::QueueWait,
-    report::FrameReport,
-    share::PathShare,
-    slack::Slack,
-    step::{HeldBy, Step},
-    what_if::WhatIf,
-    worker_report::WorkerReport,
-};
+pub use queue_wait::QueueWait;
+pub use report::FrameReport;
+pub use share::PathShare;
+pub use slack::Slack;
+pub use step::{HeldBy, Step};
+pub use what_if::WhatIf;
+pub use worker_report::WorkerReport;

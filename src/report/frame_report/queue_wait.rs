@@ -1,6 +1,8 @@
 //! Which nodes waited longest for a worker, and what workers did meanwhile.
 
-use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::Duration;
 
 use super::run_spans::RunSpans;
 

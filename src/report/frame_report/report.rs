@@ -2,25 +2,18 @@
 
 use std::time::Duration;
 
-use crate::{
-    report::{
-        error::ReportError,
-        intervals::{frame_intervals, outermost_runs, total_length},
-        simulation::{Replay, SchedulerCosts},
-    },
-    timeline::Log,
-};
-
-use super::{
-    critical_path::critical_path,
-    queue_wait::{QueueWait, queue_waits},
-    run_spans::RunSpans,
-    share::{PathShare, shares},
-    slack::{Slack, slack},
-    step::Step,
-    what_if::{WhatIf, what_if},
-    worker_report::{WorkerReport, worker_reports},
-};
+use super::critical_path::critical_path;
+use super::queue_wait::{QueueWait, queue_waits};
+use super::run_spans::RunSpans;
+use super::share::{PathShare, shares};
+use super::slack::{Slack, slack};
+use super::step::Step;
+use super::what_if::{WhatIf, what_if};
+use super::worker_report::{WorkerReport, worker_reports};
+use crate::report::error::ReportError;
+use crate::report::intervals::{frame_intervals, outermost_runs, total_length};
+use crate::report::simulation::{Replay, SchedulerCosts};
+use crate::timeline::Log;
 
 /// Why a frame took as long as it did. Points in time are on the axis of the [`Log`]. Its `Display` is a text for a
 /// terminal.
@@ -62,11 +55,9 @@ impl FrameReport {
     /// Reports on the frame with that number. `costs` are those of this machine, for the [replay](Replay).
     ///
     /// ```
-    /// use drawloom::{
-    ///     graph::{Closure, FrameGraph},
-    ///     report::{FrameReport, SchedulerCosts},
-    ///     task::Scheduler,
-    /// };
+    /// use drawloom::graph::{Closure, FrameGraph};
+    /// use drawloom::report::{FrameReport, SchedulerCosts};
+    /// use drawloom::task::Scheduler;
     ///
     /// let mut graph = FrameGraph::new();
     /// let cull = graph.add("cull", Closure::new(|_: &(), _range, _worker| Ok(())));
@@ -83,7 +74,6 @@ impl FrameReport {
     /// ```
     ///
     /// # Errors
-    ///
     /// As [`Replay::of_frame`].
     pub fn new(log: &Log, frame: u64, costs: &SchedulerCosts) -> Result<Self, ReportError> {
         let replay = Replay::of_frame(log, frame, *costs)?;

@@ -1,8 +1,7 @@
 //! A run with the spans of its nodes and workers.
 
-use crate::timeline::{Log, Run};
-
 use super::worker_spans::{NodeSpan, WorkerSpan, node_and_worker_spans};
+use crate::timeline::{Log, Run};
 
 /// A run with the spans of its nodes and workers.
 pub(super) struct RunSpans<'log> {

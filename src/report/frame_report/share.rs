@@ -1,6 +1,8 @@
 //! How much of the critical path each group takes.
 
-use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::Duration;
 
 use super::step::Step;
 

@@ -1,10 +1,11 @@
 //! What a frame would take without the work of one group.
 
-use std::{cmp::Reverse, collections::HashMap, time::Duration};
-
-use crate::report::simulation::Replay;
+use std::cmp::Reverse;
+use std::collections::HashMap;
+use std::time::Duration;
 
 use super::run_spans::RunSpans;
+use crate::report::simulation::Replay;
 
 /// How long a frame would take if the nodes of one group had nothing to do.
 #[derive(Clone, Debug, PartialEq, Eq)]

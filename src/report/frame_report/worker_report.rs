@@ -1,11 +1,10 @@
 //! How each worker spent a frame.
 
-use std::{ops::Range, time::Duration};
+use std::ops::Range;
+use std::time::Duration;
 
-use crate::{
-    report::intervals::{total_length, union},
-    timeline::{Chunk, IdleKind, Log, Run, WorkerLog},
-};
+use crate::report::intervals::{total_length, union};
+use crate::timeline::{Chunk, IdleKind, Log, Run, WorkerLog};
 
 /// How a worker spent a frame. The four times add up to the frame's [duration](super::FrameReport::duration).
 #[derive(Clone, Debug, PartialEq, Eq)]

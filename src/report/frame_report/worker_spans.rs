@@ -1,10 +1,10 @@
 //! What each worker did in a run, span by span: which node it ran, from when to when, and what held it up.
 
-use std::{collections::HashMap, time::Duration};
-
-use crate::timeline::{Chunk, Run};
+use std::collections::HashMap;
+use std::time::Duration;
 
 use super::step::HeldBy;
+use crate::timeline::{Chunk, Run};
 
 /// The time in which a worker runs chunks of one node, and of no other node of the run in between.
 pub(super) struct WorkerSpan {

@@ -1,13 +1,15 @@
 //! The data of the page: the log in few bytes.
 
-use std::{collections::HashMap, io, sync::Arc, time::Duration};
+use std::collections::HashMap;
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::{
-    report::{FrameReport, SchedulerCosts, consistency::check_log},
-    timeline::{self, Chunk, Graph, IdleKind, Log, NodeInfo, WorkerLog},
-};
+use crate::report::consistency::check_log;
+use crate::report::{FrameReport, SchedulerCosts};
+use crate::timeline::{self, Chunk, Graph, IdleKind, Log, NodeInfo, WorkerLog};
 
 /// A log and its reports, as `model.js` reads them. Strings are indices of `texts`. Times are in nanoseconds: points in time
 /// since the first one of the log, and durations. Long lists are flat, with a fixed number of numbers for each entry.

@@ -3,11 +3,12 @@
 use std::io::{self, BufWriter, Write};
 
 use serde::Serialize;
-use serde_json::{Serializer, ser::Formatter};
-
-use crate::{report::SchedulerCosts, timeline::Log};
+use serde_json::Serializer;
+use serde_json::ser::Formatter;
 
 use super::data::Data;
+use crate::report::SchedulerCosts;
+use crate::timeline::Log;
 
 /// The document, with placeholders in braces.
 const DOCUMENT: &str = include_str!("page.html");
@@ -27,7 +28,6 @@ const SCRIPTS: [&str; 5] = [
 /// frame some 4 KiB.
 ///
 /// # Errors
-///
 /// Returns the error of `writer`, or [`InvalidData`](io::ErrorKind::InvalidData) if the log refers to a node, a worker or a
 /// thread that it does not list. A [`Timeline`](crate::timeline::Timeline) records no such log.
 pub fn write_page(log: &Log, costs: &SchedulerCosts, writer: impl Write) -> io::Result<()> {

@@ -1,13 +1,12 @@
 //! A recorded run as the simulation needs it: how long its chunks took.
 
-use std::{iter, ops::Range, time::Duration};
-
-use crate::{
-    task::Chunks,
-    timeline::{Chunk, Run},
-};
+use std::iter;
+use std::ops::Range;
+use std::time::Duration;
 
 use super::scheduler_costs::SchedulerCosts;
+use crate::task::Chunks;
+use crate::timeline::{Chunk, Run};
 
 /// The nodes of a run, and how long their chunks took.
 #[derive(Clone, Debug)]

@@ -10,7 +10,5 @@ mod workers;
 #[cfg(all(test, not(drawloom_loom)))]
 mod test_run;
 
-pub use self::{
-    replay::{Replay, ReplayedFrame},
-    scheduler_costs::SchedulerCosts,
-};
+pub use replay::{Replay, ReplayedFrame};
+pub use scheduler_costs::SchedulerCosts;

@@ -2,22 +2,15 @@
 
 use std::time::Duration;
 
-use crate::{
-    graph::{ExecutionPolicy, RankedAdjacency, RunMode},
-    report::{
-        consistency::check_run,
-        error::ReportError,
-        intervals::{frame_intervals, outermost_runs, total_length, union},
-    },
-    task::Scheduler,
-    timeline::{Log, Run},
-};
-
-use super::{
-    measured_run::MeasuredRun,
-    run::{Outcome, Simulation},
-    scheduler_costs::SchedulerCosts,
-};
+use super::measured_run::MeasuredRun;
+use super::run::{Outcome, Simulation};
+use super::scheduler_costs::SchedulerCosts;
+use crate::graph::{ExecutionPolicy, RankedAdjacency, RunMode};
+use crate::report::consistency::check_run;
+use crate::report::error::ReportError;
+use crate::report::intervals::{frame_intervals, outermost_runs, total_length, union};
+use crate::task::Scheduler;
+use crate::timeline::{Log, Run};
 
 /// A recorded frame, to be replayed by any number of workers: by the scheduler's rules, on a simulated clock. The same record
 /// and costs always give the same times.
@@ -58,7 +51,6 @@ impl Replay {
     /// A replay of one run of a schedule.
     ///
     /// # Errors
-    ///
     /// Returns [`ReportError::Incomplete`], [`ReportError::Failed`] or [`ReportError::Contradictory`] if the run is.
     pub fn new(run: &Run, costs: SchedulerCosts) -> Result<Self, ReportError> {
         Self::of_runs([run], Duration::ZERO, costs)
@@ -67,7 +59,6 @@ impl Replay {
     /// A replay of the frame of that number: its runs one after another, and what its threads did outside of them.
     ///
     /// # Errors
-    ///
     /// Returns a [`ReportError`] under the conditions that its variants describe.
     pub fn of_frame(log: &Log, frame: u64, costs: SchedulerCosts) -> Result<Self, ReportError> {
         let runs = outermost_runs(log, frame);

@@ -1,19 +1,15 @@
 //! The simulation of one run: which tokens its workers push, and how chunks are handed out. This follows `graph/parallel.rs`,
 //! and uses the tickets, ranks and chunks of real runs.
 
-use std::{ops::Range, time::Duration};
+use std::ops::Range;
+use std::time::Duration;
 
-use crate::{
-    graph::RankedAdjacency,
-    sync::Instant,
-    task::{Priority, TicketSize, Tickets},
-};
-
-use super::{
-    measured_run::{MeasuredRun, nanoseconds},
-    scheduler_costs::SchedulerCosts,
-    workers::{Event, SimulatedWorkers},
-};
+use super::measured_run::{MeasuredRun, nanoseconds};
+use super::scheduler_costs::SchedulerCosts;
+use super::workers::{Event, SimulatedWorkers};
+use crate::graph::RankedAdjacency;
+use crate::sync::Instant;
+use crate::task::{Priority, TicketSize, Tickets};
 
 /// Simulates runs of one schedule, one after another.
 pub(super) struct Simulation<'replay> {

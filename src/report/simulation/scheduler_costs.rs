@@ -1,13 +1,14 @@
 //! What the scheduler's own operations cost on this machine.
 
-use std::{hint::black_box, sync::OnceLock, thread, time::Duration};
+use std::hint::black_box;
+use std::sync::OnceLock;
+use std::thread;
+use std::time::Duration;
 
-use crate::{
-    graph::{Closure, FrameGraph, Schedule},
-    sync::{Instant, spin_loop},
-    task::{Chunks, Scheduler, SchedulerError, Tickets},
-    timeline::Run,
-};
+use crate::graph::{Closure, FrameGraph, Schedule};
+use crate::sync::{Instant, spin_loop};
+use crate::task::{Chunks, Scheduler, SchedulerError, Tickets};
+use crate::timeline::Run;
 
 /// What the scheduler's own operations cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +69,6 @@ impl SchedulerCosts {
     /// Measures them on this machine, which takes some 20 ms. It starts a scheduler of two workers for that, and stops it.
     ///
     /// # Errors
-    ///
     /// As [`Scheduler::new`].
     pub fn measure() -> Result<Self, SchedulerError> {
         let scheduler = Scheduler::new(2)?;

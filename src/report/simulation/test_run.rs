@@ -1,12 +1,13 @@
 //! Runs made by hand, for tests of the simulation.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
+use std::time::Duration;
 
-use proptest::{collection::vec, prelude::*};
-
-use crate::timeline::{Chunk, Graph, NodeInfo, Run};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 use super::SchedulerCosts;
+use crate::timeline::{Chunk, Graph, NodeInfo, Run};
 
 /// A graph with the costs of its chunks.
 #[derive(Clone, Debug, Default)]

@@ -5,14 +5,12 @@
 //! time, so it reacts as soon as a token is pushed. All tokens lie in queues, as in a run that a thread outside
 //! of the scheduler calls for. Mailboxes, through which workers of a run inside a job pass on tokens, are not simulated.
 
-use std::{
-    cmp::Reverse,
-    collections::{BinaryHeap, VecDeque},
-};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
 
+use super::measured_run::nanoseconds;
+use super::scheduler_costs::SchedulerCosts;
 use crate::task::Priority;
-
-use super::{measured_run::nanoseconds, scheduler_costs::SchedulerCosts};
 
 /// How long a worker looks for work at most once it counts as searching, in nanoseconds, whatever a wake-up costs.
 const MAX_SPIN: u64 = 100_000;

@@ -2,13 +2,13 @@
 
 use std::mem;
 
-use loom::{model as check, model::Builder, thread};
+use loom::model::Builder;
+use loom::{model as check, thread};
 
 use super::{Sleep, WakeFor};
-use crate::{
-    sync::{Arc, AtomicBool, AtomicUsize, Ordering},
-    task::{latch::Latch, priority::Priority},
-};
+use crate::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
+use crate::task::latch::Latch;
+use crate::task::priority::Priority;
 
 /// What the threads of a model share. Jobs are relaxed counts, so that only the fences of the protocol order them.
 struct Model {

@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DQuat, DVec3, Quat, Vec3};
-use drawloom::scene::{Camera, Light, Material, Projection, RenderObject, Scene, Topology, Vertex};
-use drawloom::scene::{Mesh, SceneError};
+use drawloom::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Topology, Vertex};
 use drawloom::view::{GpuObject, ObjectTable, ShadowMaps};
 
 use super::vertex::Case;

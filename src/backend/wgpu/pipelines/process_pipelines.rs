@@ -9,8 +9,7 @@ use crate::backend::wgpu::resources::{
     BindGroupLayouts, SampledTarget, process_layout, texture_format, vertex_attributes, vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategyTuner;
-use crate::command::Batch;
-use crate::command::{Cull, DrawState};
+use crate::command::{Batch, Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology, ViewKind};

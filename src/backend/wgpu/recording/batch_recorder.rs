@@ -11,8 +11,7 @@ use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
 use crate::backend::wgpu::resources::SubdividedMesh;
-use crate::command::DrawState;
-use crate::command::{Batch, DrawList};
+use crate::command::{Batch, DrawList, DrawState};
 
 /// Records the batches of a pass.
 pub(crate) struct BatchRecorder<'a> {

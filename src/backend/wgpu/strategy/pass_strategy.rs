@@ -81,8 +81,7 @@ impl PassStrategy {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::command::Batch;
-    use crate::command::DrawState;
+    use crate::command::{Batch, DrawState};
 
     fn list(batches: u32) -> DrawList {
         let batch = |first| Batch { mesh: 0, state: DrawState::PLAIN, first, count: 1 };
