@@ -103,7 +103,8 @@ impl RankedAdjacency {
         self.is_critical[node as usize]
     }
 
-    /// Ranks the nodes by the longest path through the graph that contains them. `costs` has the nanoseconds of each node.
+    /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end. `costs` has the
+    /// nanoseconds of each node.
     pub(crate) fn rank(&mut self, costs: &[u64]) {
         self.cost_from_start.fill(0);
         for (node, &cost) in costs.iter().enumerate() {
@@ -153,7 +154,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nodes_are_ranked_by_the_longest_path_through_them(
+        fn dependents_are_sorted_by_cost_to_the_end_and_the_longest_paths_are_critical(
             picks in prop::collection::vec((prop::collection::vec(any::<prop::sample::Index>(), 0..4), 0_u64..1000), 1..12),
         ) {
             let costs: Vec<u64> = picks.iter().map(|(_, cost)| *cost).collect();

@@ -14,7 +14,7 @@ use super::costs::NodeCosts;
 use super::edges::{self, Edges, Relation, Roles};
 use super::error::GraphProblem;
 use super::execution_policy::ExecutionPolicy;
-use super::order::{find_cycle, ranks, topological_order};
+use super::order::{find_cycle, positions, topological_order};
 use super::progress::Progress;
 use super::schedule::Schedule;
 use super::traversal::Traversal;
@@ -74,10 +74,10 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
         let nodes = cycle.into_iter().map(|vertex| name(graph, vertex)).collect();
         return Err(GraphProblem::Cycle { nodes });
     }
-    let rank = ranks(order.len(), &order);
-    edges::add_versions(&mut edges, &roles, &rank);
+    let position = positions(order.len(), &order);
+    edges::add_versions(&mut edges, &roles, &position);
     let needed = edges::needed(graph, &roles, &edges);
-    let analysis = Analysis { graph, roles: &roles, edges: &edges, needed: &needed, rank: &rank };
+    let analysis = Analysis { graph, roles: &roles, edges: &edges, needed: &needed, position: &position };
     analysis.check_producers()?;
     analysis.check_writers()?;
     let dependencies = analysis.dependencies();
@@ -118,8 +118,8 @@ struct Analysis<'a, P> {
     roles: &'a [Roles],
     edges: &'a Edges,
     needed: &'a [bool],
-    /// Per vertex, its index in the topological order, which includes dropped nodes.
-    rank: &'a [usize],
+    /// Per vertex, its position in the topological order, which includes dropped nodes.
+    position: &'a [usize],
 }
 
 impl<P> Analysis<'_, P> {
@@ -128,8 +128,8 @@ impl<P> Analysis<'_, P> {
         self.needed.get(vertex.index()).is_some_and(|&needed| needed)
     }
 
-    fn rank(&self, vertex: NodeIndex) -> usize {
-        self.rank[vertex.index()]
+    fn position(&self, vertex: NodeIndex) -> usize {
+        self.position[vertex.index()]
     }
 
     fn check_producers(&self) -> Result<(), GraphProblem> {
@@ -157,15 +157,15 @@ impl<P> Analysis<'_, P> {
         Ok(())
     }
 
-    /// The makers of a resource are ordered if each of them, by rank, has a path to the next.
+    /// The makers of a resource are ordered if, in topological order, each of them has a path to the next.
     fn check_writers(&self) -> Result<(), GraphProblem> {
         let mut traversal = Traversal::new();
         for (resource, roles) in self.graph.resources.iter().zip(self.roles) {
             let mut makers: Vec<NodeIndex> = roles.makers().filter(|&maker| self.is_needed(maker)).collect();
-            makers.sort_unstable_by_key(|&maker| self.rank(maker));
+            makers.sort_unstable_by_key(|&maker| self.position(maker));
             for pair in makers.windows(2) {
-                let end = self.rank(pair[1]);
-                traversal.run(self.edges, &[pair[0]], Direction::Outgoing, |vertex, _| self.rank(vertex) <= end);
+                let end = self.position(pair[1]);
+                traversal.run(self.edges, &[pair[0]], Direction::Outgoing, |vertex, _| self.position(vertex) <= end);
                 if !traversal.has_visited(pair[1]) {
                     return Err(GraphProblem::UnorderedWriters {
                         resource: resource.name.clone(),
@@ -213,7 +213,7 @@ impl<P> Analysis<'_, P> {
         let last_maker = |vertex: NodeIndex| {
             let is_junction = vertex.index() >= self.needed.len();
             let makers = self.edges.neighbors_directed(vertex, Direction::Incoming).filter(|_| is_junction);
-            makers.max_by_key(|&maker| self.rank(maker))
+            makers.max_by_key(|&maker| self.position(maker))
         };
         self.edges.node_indices().map(last_maker).collect()
     }
@@ -225,7 +225,7 @@ impl<P> Analysis<'_, P> {
             if let Relation::Data(resource) = *edge.weight() {
                 let source = of_junction[edge.source().index()].unwrap_or(edge.source());
                 let maker = last.entry(resource).or_insert(source);
-                if self.rank(source) > self.rank(*maker) {
+                if self.position(source) > self.position(*maker) {
                     *maker = source;
                 }
             }

@@ -8,7 +8,7 @@ use petgraph::visit::{EdgeRef, IntoEdgeReferences};
 
 use super::builder::FrameGraph;
 use super::edges::{self, Roles};
-use super::order::{ranks, topological_order};
+use super::order::{positions, topological_order};
 use super::schedule::Schedule;
 
 impl<P> FrameGraph<P> {
@@ -20,8 +20,8 @@ impl<P> FrameGraph<P> {
     pub fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
-        let rank = ranks(edges.node_count(), &topological_order(&edges, self.nodes.len()));
-        edges::add_versions(&mut edges, &roles, &rank);
+        let position = positions(edges.node_count(), &topological_order(&edges, self.nodes.len()));
+        edges::add_versions(&mut edges, &roles, &position);
         let needed = edges::needed(self, &roles, &edges);
 
         let mut dot = Dot::new();

@@ -106,9 +106,10 @@ fn link(edges: &mut Edges, traversal: &mut Traversal, resource: usize, sources: 
 
 /// Makes each modifier depend on the version it modifies: the last makers before it.
 ///
-/// The accesses do not order modifiers. Which of them come before others is only known once all other edges are, and `rank` is
-/// the topological order of those. These edges add no new order; they are a reason to keep the earlier modifier.
-pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], rank: &[usize]) {
+/// The accesses do not order modifiers. Which of them come before others is only known once all other edges are, and `position`
+/// has the topological order of those. The edges add no new order. They only prevent the earlier modifier
+/// from being dropped.
+pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize]) {
     let mut traversal = Traversal::new();
     let mut made = vec![usize::MAX; edges.node_count()];
     for (resource, roles) in roles.iter().enumerate() {
@@ -124,7 +125,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], rank: &[usize]) {
                 last.extend(is_maker.then_some(before));
                 !is_maker
             });
-            last.sort_unstable_by_key(|maker| rank[maker.index()]);
+            last.sort_unstable_by_key(|maker| position[maker.index()]);
             last.dedup();
             for (index, &maker) in last.iter().enumerate() {
                 // Writers have their edge already. Lists of roles are ascending.
@@ -134,7 +135,7 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], rank: &[usize]) {
                 // The traversal may have found a maker along one path although another maker follows it on another path.
                 let later = &last[index + 1..];
                 if let Some(end) = later.last() {
-                    let is_between = |vertex: NodeIndex, _| rank[vertex.index()] <= rank[end.index()];
+                    let is_between = |vertex: NodeIndex, _| position[vertex.index()] <= position[end.index()];
                     traversal.run(edges, &[maker], Direction::Outgoing, is_between);
                 }
                 if !later.iter().any(|&other| traversal.has_visited(other)) {

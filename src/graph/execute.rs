@@ -135,7 +135,7 @@ impl<P> Schedule<P> {
     /// Prepares the schedule for the next run after a panic outside of every node.
     fn reset(&mut self) {
         for node in 0..self.adjacency.len() as u32 {
-            self.progress.arm(node, self.adjacency.dependency_count(node));
+            self.progress.set_pending_dependencies(node, self.adjacency.dependency_count(node));
             // If a subscriber panicked, a node's span may not have been closed.
             discard(self.progress.open_node(node).span.take());
         }

@@ -43,9 +43,11 @@ const PARALLEL_EVERY: u32 = 128;
 /// sign that the frame's work has changed.
 const EXCEEDED_RUNS: u32 = 8;
 
-/// The weight of the latest run in a moving average, and the largest multiple of the average that it counts as: now and then
-/// the operating system preempts a run, which says nothing about the next one.
+/// The weight of the latest run in a moving average.
 const WEIGHT: f64 = 0.125;
+
+/// A run that took more than this multiple of the average counts as this multiple: now and then the operating system preempts a
+/// run, which says nothing about the next one.
 const OUTLIER: f64 = 2.0;
 
 /// Hysteresis: the current mode is kept until it takes this many times as long as the other one.

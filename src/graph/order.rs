@@ -29,13 +29,13 @@ pub(super) fn topological_order<E>(graph: &DiGraph<(), E>, nodes: usize) -> Vec<
     order
 }
 
-/// Per vertex, its rank: its index in a topological order, or `usize::MAX` if the order lacks it.
-pub(super) fn ranks(vertices: usize, order: &[NodeIndex]) -> Vec<usize> {
-    let mut ranks = vec![usize::MAX; vertices];
-    for (rank, vertex) in order.iter().enumerate() {
-        ranks[vertex.index()] = rank;
+/// Per vertex, its position in a topological order, or `usize::MAX` if the order lacks it.
+pub(super) fn positions(vertices: usize, order: &[NodeIndex]) -> Vec<usize> {
+    let mut positions = vec![usize::MAX; vertices];
+    for (position, vertex) in order.iter().enumerate() {
+        positions[vertex.index()] = position;
     }
-    ranks
+    positions
 }
 
 /// The nodes of one cycle, starting at the lowest. The graph must have a cycle; its first `nodes` vertices are nodes, and

@@ -9,8 +9,8 @@
 //! chunks by ticket, and a token invites another worker to join. The worker that finishes the last chunk completes the
 //! node.
 //!
-//! After a failure the run is *drained*: nodes are completed without being run, which returns all counters to their initial
-//! values.
+//! After a failure the run is *drained*: the remaining nodes are skipped. Skipped nodes still decrement counters, so that these
+//! are reset for the next run.
 
 use std::ops::Range;
 
@@ -55,10 +55,10 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         run_tokens(worker, self, |context| {
             // The span of a complete node is dropped before any of its dependents begins.
             let half_done = is_half_done.then_some(span);
-            // All nodes are armed before any of them can be counted down.
+            // All counters are set before any of them can be counted down.
             let rest = current + 1..self.schedule.adjacency.len() as u32;
             for node in rest.clone() {
-                self.schedule.progress.arm(node, self.pending_dependencies(node, first_pending));
+                self.schedule.progress.set_pending_dependencies(node, self.pending_dependencies(node, first_pending));
             }
             for node in rest.filter(|&node| self.pending_dependencies(node, first_pending) == 0) {
                 self.push_start(node, context);
@@ -118,7 +118,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         let worker = context.worker();
         let mut next = Some((node, is_pinned));
         while let Some((node, is_pinned)) = next {
-            self.schedule.progress.arm(node, self.schedule.adjacency.dependency_count(node));
+            self.schedule.progress.set_pending_dependencies(node, self.schedule.adjacency.dependency_count(node));
             self.timer.start(node);
             self.instrument.count_taken(worker);
             let is_done = self.run_node_parallel(node, is_pinned, context);

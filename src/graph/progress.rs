@@ -4,7 +4,7 @@
 //!
 //! A node's writes must be visible to all its dependents. The worker that completes a node counts down each dependent's
 //! dependencies with release and acquire. Read-modify-writes continue a release sequence, so the worker that counts down
-//! the last dependency, or sees that its own is the only one left, has acquired from all others. A node's counter is armed
+//! the last dependency, or sees that its own is the only one left, has acquired from all others. A node's counter is set
 //! again when the node starts. By then, no other worker counts it down in this run; in the next run only workers do that
 //! are ordered after the end of this one.
 
@@ -36,7 +36,7 @@ impl Progress {
     }
 
     /// Sets how many dependencies the node waits for, in the next run or in the rest of this one.
-    pub(super) fn arm(&self, node: u32, dependencies: u32) {
+    pub(super) fn set_pending_dependencies(&self, node: u32, dependencies: u32) {
         // Relaxed: see the module's documentation.
         self.pending_dependencies[node as usize].store(dependencies, Ordering::Relaxed);
     }
@@ -45,7 +45,7 @@ impl Progress {
     pub(super) fn complete_dependency(&self, node: u32) -> bool {
         let pending = &self.pending_dependencies[node as usize];
         // Each dependency counts down once, so the last one can skip the subtraction: nobody else looks at the counter
-        // before it is armed again. It acquires as the subtraction would.
+        // before it is set again. It acquires as the subtraction would.
         pending.load(Ordering::Acquire) == 1 || pending.fetch_sub(1, Ordering::AcqRel) == 1
     }
 
@@ -162,7 +162,7 @@ mod loom_tests {
             self.cells.write(index, 1);
             let is_last = self.progress.complete_dependency(COUNT as u32);
             if is_last {
-                self.progress.arm(COUNT as u32, COUNT as u32);
+                self.progress.set_pending_dependencies(COUNT as u32, COUNT as u32);
                 assert_eq!(self.cells.values(), [1; COUNT]);
             }
             is_last

@@ -100,6 +100,10 @@ impl DepthKey {
         DepthQuantizer { curve, unused }
     }
 
+    /// Checks the number of bits and the curve.
+    ///
+    /// # Errors
+    /// Returns [`QualityError::OutOfRange`] if one of them is out of range.
     pub(super) fn check(&self, setting: &'static str, max_bits: u32) -> Result<(), QualityError> {
         if !(1..=max_bits).contains(&self.bits) {
             let range = if max_bits == Self::MAX_OPAQUE_BITS { "1 to 20 bits" } else { "1 to 32 bits" };

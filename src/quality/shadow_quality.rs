@@ -36,6 +36,10 @@ impl ShadowQuality {
     /// The largest [`ShadowQuality::filter`]: it reads 100 pixels of the map for each pixel of the picture.
     pub const MAX_FILTER: u32 = 4;
 
+    /// Checks all settings.
+    ///
+    /// # Errors
+    /// Returns [`QualityError::OutOfRange`] if a setting is out of range.
     pub(super) fn check(&self) -> Result<(), QualityError> {
         let Self { side, filter, bias, interval, widest_edge } = *self;
         let check = |holds, setting, value: String, range| {

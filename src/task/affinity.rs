@@ -24,6 +24,9 @@ impl AffinityMask {
     }
 
     /// Restricts the calling thread to these processors.
+    ///
+    /// # Errors
+    /// Returns the system's error, or that the system does not support affinities.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     pub(super) fn apply(&self) -> io::Result<()> {
         use rustix::thread::{CpuSet, sched_setaffinity};
@@ -37,6 +40,9 @@ impl AffinityMask {
     }
 
     /// Restricts the calling thread to these processors.
+    ///
+    /// # Errors
+    /// Returns the system's error, or that the system does not support affinities.
     #[cfg(not(any(target_os = "linux", target_os = "android")))]
     pub(super) fn apply(&self) -> io::Result<()> {
         Err(io::Error::new(io::ErrorKind::Unsupported, "thread affinity is not supported on this system"))

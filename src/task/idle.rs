@@ -17,7 +17,7 @@ use crate::timeline::IdleKind;
 const SPIN_BETWEEN_FRAMES: Duration = Duration::from_micros(10);
 
 /// How long they look for jobs at most, whatever a wake-up costs.
-const MAX_SPIN: Duration = Duration::from_micros(100);
+pub(crate) const MAX_SPIN: Duration = Duration::from_micros(100);
 
 /// The most pause instructions between two looks.
 const MAX_PAUSES: u32 = 8;
@@ -55,7 +55,7 @@ impl Idle {
             self.sleep(worker, shared, wake_for, sees_work);
             return;
         }
-        (0..(1 << self.looks.min(8)).min(MAX_PAUSES)).for_each(|_| spin_loop());
+        (0..pauses(self.looks)).for_each(|_| spin_loop());
         self.looks = self.looks.saturating_add(1);
         if self.looks > UNCOUNTED_LOOKS && self.has_looked_enough(shared) {
             self.sleep(worker, shared, wake_for, sees_work);
@@ -118,4 +118,15 @@ impl Idle {
         // The worker was woken for something, so it looks for a while again.
         *self = Self { looks: 1, is_searcher, since: None };
     }
+}
+
+/// The pause instructions after this many looks.
+fn pauses(looks: u32) -> u32 {
+    (1 << looks.min(8)).min(MAX_PAUSES)
+}
+
+/// How many pause instructions a worker executes before it counts as a searcher.
+#[cfg(feature = "report")]
+pub(crate) fn uncounted_pauses() -> u32 {
+    (0..=UNCOUNTED_LOOKS).map(pauses).sum()
 }

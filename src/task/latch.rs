@@ -28,7 +28,7 @@ impl Latch {
         Self { outstanding: AtomicUsize::new(outstanding) }
     }
 
-    /// Waits for `jobs` more. The caller must be counted itself, and must not have finished.
+    /// Adds `jobs` to the number that the latch waits for. The caller must be counted itself, and must not have finished.
     #[inline]
     pub(super) fn add(&self, jobs: usize) {
         self.outstanding.fetch_add(jobs, Ordering::Relaxed);

@@ -178,7 +178,7 @@
 //! sleep and use no processor time. [The cost of a wake-up](Scheduler::wake_up_cost) is measured when the scheduler is built. A
 //! loop should be worth more than that, and a graph that is not runs on the calling thread alone.
 
-// In layers: each group uses only groups above it, and no two files import each other in a circle.
+// Each group uses only the groups above it, and no two files import each other in a circle.
 
 // Data structures, which know neither workers nor schedulers.
 mod affinity;
@@ -233,6 +233,8 @@ pub use worker::Worker;
 pub use crate::unwind::{JobPanic, catch};
 
 pub(crate) use chunks::Chunks;
+#[cfg(feature = "report")]
+pub(crate) use idle::{MAX_SPIN, uncounted_pauses};
 pub(crate) use priority::Priority;
 pub(crate) use tickets::{TicketSize, Tickets};
 pub(crate) use tokens::{TokenContext, Tokens, run_tokens};

@@ -2,7 +2,7 @@
 //!
 //! A loop of a thousand chunks is not a thousand jobs. It is a counter of claimed chunks and one token in some queue. A worker that
 //! takes the token joins the loop: it claims chunks until there are none, and queues the token again for the next worker as long
-//! as some have not joined. So workers join one after another, as long as there is work.
+//! as not all workers have joined. So workers join one after another, as long as there is work.
 //!
 //! If a worker would have to be woken, the caller begins a loop of many chunks serially. A few chunks show whether the loop is
 //! worth a wake-up.

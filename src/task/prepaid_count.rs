@@ -15,8 +15,8 @@ const BATCH: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 
 
 /// The count that a worker holds of one region's latch.
 pub(super) struct PrepaidCount<W: JobContext> {
-    /// How many counts of the latch belong to no job. While it is not zero, the region waits for it. While it is zero and there
-    /// is a region, a job of the region is running on this worker.
+    /// Reserved, unused units; they keep the latch closed. While there are none and there is a region, a job of the region is
+    /// running on this worker.
     count: Cell<usize>,
     region: Cell<Option<&'static Region<W>>>,
 }

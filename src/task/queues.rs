@@ -33,8 +33,7 @@ pub(super) struct Queues<W: JobContext> {
     queues: [Queue<W>; Priority::ALL.len()],
     /// Chooses the next job at random, instead of by age.
     shuffle: Option<Shuffle>,
-    /// For each priority, how many jobs have been pushed here since the innermost wait inside a job began, and have not been
-    /// popped here.
+    /// For each priority, the number of jobs pushed since the current nested wait began, and not popped.
     pushed_since_wait: [Cell<usize>; Priority::ALL.len()],
 }
 

@@ -89,9 +89,9 @@ impl Scheduler {
     /// all calls have returned.
     ///
     /// The ranges are `chunk` indices long; the last one may be shorter. A chunk of 0 counts as 1, and a `length` of more than
-    /// `isize::MAX` may get chunks of up to 3. With a single worker or a single chunk all calls happen on the calling
-    /// thread. So they do if the first chunks show that the loop is not worth waking a worker. A worker that waits inside `body`,
-    /// for a scope or a loop of its own, does not enter `body` again for this loop.
+    /// `isize::MAX` may get chunks of up to 3. With a single worker or a single chunk all calls happen on the calling thread. The
+    /// same happens if the first chunks show that the loop is not worth waking a worker. A worker that waits inside `body`, for a
+    /// scope or a loop of its own, does not enter `body` again for this loop.
     ///
     /// # Errors
     /// Returns the first [`JobPanic`] if `body` panicked. Chunks that had not begun by then are skipped.

@@ -44,7 +44,7 @@ pub enum SchedulerError {
         panic: JobPanic,
     },
     /// The hook that chooses affinities panicked.
-    #[error("the hook that places the thread of worker {worker} failed: {}", panic.message)]
+    #[error("the affinity hook of worker {worker} failed: {}", panic.message)]
     AffinityHook {
         /// The [index](super::Worker::index) of the worker.
         worker: usize,

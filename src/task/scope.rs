@@ -96,6 +96,9 @@ impl fmt::Debug for Scope<'_> {
 }
 
 /// Opens a scope on the worker, runs `body` in it, and works until all of its jobs have run. Does not unwind.
+///
+/// # Errors
+/// Returns the panic if the body or a job panicked.
 pub(super) fn open<'scope, R>(worker: &Worker, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
     worker.open_region(&NoTokens, |region| body(&Scope::new(region)))
 }

@@ -4,9 +4,11 @@
 //!
 //! # Protocol
 //!
-//! *Work* is anything that a worker can wait for: a job in some queue or mailbox, a released latch, the shutdown flag. A *sleeper*
-//! takes any work or, if it waits inside a job, only work of the region that it waits for. A *searcher* is awake, has nothing to
-//! do, and will look into all queues and mailboxes once more before it stops being a searcher.
+//! - *Work*: a job in some queue or mailbox, a released latch, or the shutdown flag.
+//! - *Sleeper*: a worker that sleeps or is about to. An *unrestricted* sleeper takes any work. A sleeper that waits inside a job
+//!   takes only work of the region that it waits for.
+//! - *Searcher*: a worker that is awake and has nothing to do. It looks into all queues and mailboxes once more before it stops
+//!   being a searcher.
 //!
 //! ```text
 //!  sleeper                                        waker
@@ -91,17 +93,20 @@ pub(super) const MAX_WORKERS: usize = 1000;
 
 /// A parker for each worker, the list of sleepers, and the counts of sleepers and searchers.
 pub(super) struct Sleep {
-    /// A sum of [`SLEEPER`], [`ANY_SLEEPER`] and [`SEARCHER`], read without the lock.
+    /// A sum of [`SLEEPER`], [`UNRESTRICTED_SLEEPER`] and [`SEARCHER`], read without the lock.
     counts: CachePadded<AtomicUsize>,
     /// The workers that sleep or are about to. The last one is woken first, because its caches are the warmest.
     sleepers: Mutex<Vec<(usize, WakeFor)>>,
     parkers: Box<[CachePadded<Parker>]>,
 }
 
-/// Each count has bits of its own, enough for all workers, so that one load reads all counts.
+// Each count has bits of its own, enough for all workers, so that one load reads all counts.
+
+/// One sleeper in the count of all sleepers.
 const SLEEPER: usize = 1;
-/// A sleeper that takes any work.
-const ANY_SLEEPER: usize = 1 << BITS;
+/// One sleeper in the count of unrestricted sleepers, who count as sleepers too.
+const UNRESTRICTED_SLEEPER: usize = 1 << BITS;
+/// One searcher in the count of searchers.
 const SEARCHER: usize = 1 << (2 * BITS);
 const BITS: u32 = usize::BITS / 3;
 const MASK: usize = (1 << BITS) - 1;
@@ -126,7 +131,7 @@ impl Sleep {
     pub(super) fn end_search(&self, sees_more_work: impl Fn(&[Priority]) -> bool) {
         let before = self.counts.fetch_sub(SEARCHER, Ordering::Relaxed);
         fence(Ordering::SeqCst);
-        if any_sleepers(self.counts.load(Ordering::Relaxed)) == 0 {
+        if unrestricted_sleepers(self.counts.load(Ordering::Relaxed)) == 0 {
             return;
         }
         if searchers(before) == 1 && sees_more_work(&Priority::FRAME) {
@@ -137,8 +142,8 @@ impl Sleep {
         }
     }
 
-    /// Sleeps until woken, unless `sees_work`, which is called when wakers can see the worker on the list. Returns whether the
-    /// worker, which may be a searcher before, is one after: every worker that takes any work is.
+    /// Sleeps until woken, unless `sees_work`, which is called when wakers can see the worker on the list. `is_searcher` says
+    /// whether the worker counts as a searcher now. Returns whether it does on return.
     pub(super) fn sleep(
         &self,
         worker: usize,
@@ -159,7 +164,7 @@ impl Sleep {
     pub(super) fn wake_any(&self) {
         fence(Ordering::SeqCst);
         let counts = self.counts.load(Ordering::Relaxed);
-        if any_sleepers(counts) > 0 && searchers(counts) == 0 {
+        if unrestricted_sleepers(counts) > 0 && searchers(counts) == 0 {
             self.wake(|&(_, wake_for)| wake_for == WakeFor::Any);
         }
     }
@@ -168,7 +173,7 @@ impl Sleep {
     /// and worker 0 may be one, which does not look for background jobs. The job must have been published.
     pub(super) fn wake_despite_searchers(&self, priority: Priority) {
         fence(Ordering::SeqCst);
-        if any_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
+        if unrestricted_sleepers(self.counts.load(Ordering::Relaxed)) > 0 {
             self.wake(|&sleeper| takes(sleeper, priority));
         }
     }
@@ -183,7 +188,7 @@ impl Sleep {
             return;
         }
         // As in `wake_any` and `wake_despite_searchers`, the fence is after the job and before the load of the counts.
-        if any_sleepers(counts) > 0 && (priority == Priority::Background || searchers(counts) == 0) {
+        if unrestricted_sleepers(counts) > 0 && (priority == Priority::Background || searchers(counts) == 0) {
             self.wake(|&sleeper| takes(sleeper, priority));
         }
     }
@@ -248,7 +253,7 @@ fn takes((worker, wake_for): (usize, WakeFor), priority: Priority) -> bool {
 
 fn weight(wake_for: WakeFor) -> usize {
     match wake_for {
-        WakeFor::Any => SLEEPER + ANY_SLEEPER,
+        WakeFor::Any => SLEEPER + UNRESTRICTED_SLEEPER,
         WakeFor::Region { .. } => SLEEPER,
     }
 }
@@ -257,7 +262,7 @@ fn sleepers(counts: usize) -> usize {
     counts & MASK
 }
 
-fn any_sleepers(counts: usize) -> usize {
+fn unrestricted_sleepers(counts: usize) -> usize {
     (counts >> BITS) & MASK
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Tickets {
     has_invitation: AtomicBool,
     /// How many workers have joined.
     joined: AtomicUsize,
-    /// The ticket size of the worker that last found no more chunks, in this execution or an earlier one.
+    /// The initial ticket size, learnt from the previous execution.
     initial_size: AtomicUsize,
 }
 

@@ -1,11 +1,11 @@
-//! The tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
+//! The tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`, and name tests that exist.
 
 use std::collections::BTreeSet;
 use std::fs;
 
 use proc_macro2::TokenTree;
 
-use crate::sources::{Module, Source, modules_without_tests, read_crate};
+use crate::sources::{Module, Source, modules_without_tests, read_all, read_crate};
 use crate::tokens::{is, is_for_tests, item, trees_of};
 
 #[test]
@@ -13,6 +13,42 @@ fn the_tables_of_memory_orderings_list_every_atomic() {
     let architecture = fs::read_to_string("ARCHITECTURE.md").expect("ARCHITECTURE.md can be read");
     let problems = wrong_atomics(&architecture, &read_crate());
     assert!(problems.is_empty(), "{} atomics:\n{}", problems.len(), problems.join("\n"));
+}
+
+#[test]
+fn the_tables_of_memory_orderings_name_tests_that_exist() {
+    let architecture = fs::read_to_string("ARCHITECTURE.md").expect("ARCHITECTURE.md can be read");
+    let unknown = unknown_tests(&architecture, &read_all(&["src", "tests"]));
+    assert!(unknown.is_empty(), "neither src nor tests have these functions: {unknown:?}");
+}
+
+/// The tests in the tables of memory orderings that are no function of the sources.
+fn unknown_tests(architecture: &str, sources: &[Source]) -> Vec<String> {
+    let mut functions = BTreeSet::new();
+    for trees in sources.iter().filter(|source| source.is_rust()).filter_map(|source| source.parse().ok()) {
+        add_functions(&trees, &mut functions);
+    }
+    let listed = covering_tests(architecture);
+    listed.into_iter().filter(|test| !functions.contains(test)).collect()
+}
+
+/// The backticked names in the columns "covered by", which are the last. A cell like "as `field`" refers to another row.
+fn covering_tests(architecture: &str) -> Vec<String> {
+    let cells = memory_orderings(architecture).lines().filter_map(|line| line.strip_suffix('|')?.rsplit('|').next());
+    let cells = cells.map(str::trim).filter(|cell| !cell.starts_with("as "));
+    cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(str::to_owned).collect()
+}
+
+fn add_functions(trees: &[TokenTree], functions: &mut BTreeSet<String>) {
+    for (at, tree) in trees.iter().enumerate() {
+        match (tree, trees.get(at + 1)) {
+            (TokenTree::Group(group), _) => add_functions(&trees_of(group.stream()), functions),
+            (TokenTree::Ident(word), Some(TokenTree::Ident(name))) if word == "fn" => {
+                functions.insert(name.to_string());
+            }
+            _ => {}
+        }
+    }
 }
 
 /// The atomics that are only in the sources, or only in the tables of memory orderings.
@@ -30,9 +66,7 @@ fn wrong_atomics(architecture: &str, sources: &[Source]) -> Vec<String> {
 
 /// The names `file::field` in the first columns of the section. `::field` is in the file named before it.
 fn listed_atomics(architecture: &str) -> BTreeSet<String> {
-    let mut sections = architecture.split("\n## ");
-    let section = sections.find(|section| section.starts_with("Memory orderings\n")).unwrap_or_default();
-    let cells = section.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
+    let cells = memory_orderings(architecture).lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
     // Code is between every other pair of backticks.
     let names = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter_map(|name| name.split_once("::"));
     let mut file = "";
@@ -41,6 +75,12 @@ fn listed_atomics(architecture: &str) -> BTreeSet<String> {
         format!("{file}::{field}")
     });
     whole.collect()
+}
+
+/// The section of that title.
+fn memory_orderings(architecture: &str) -> &str {
+    let mut sections = architecture.split("\n## ");
+    sections.find(|section| section.starts_with("Memory orderings\n")).unwrap_or_default()
 }
 
 /// The names of fields and statics with types that mention an atomic, and of tuple structs, enums and type aliases that mention
@@ -140,4 +180,12 @@ fn a_row_without_an_atomic_is_found() {
         let problems = atomics_with("low.rs", text, "| `low.rs::a` |");
         assert!(problems.contains(&removed.to_owned()), "{text}\n{problems:?}");
     }
+}
+
+#[test]
+fn a_row_whose_test_does_not_exist_is_found() {
+    let row = "| `low.rs::a` | loom: `a_test`; shuttle: `another` |\n| `low.rs::b` | as `a` |\n| `low.rs::c` | — |";
+    let architecture = format!("# A\n\n## Memory orderings\n\n{row}\n\n## B\n\n| `other` |\n");
+    let source = Source::new("low.rs", "mod tests { proptest! { #[test] fn a_test() {} } }");
+    assert_eq!(unknown_tests(&architecture, &[source]), ["another"]);
 }

@@ -1,4 +1,4 @@
-//! The files of `src`.
+//! The files of `src` and `tests`.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -36,8 +36,15 @@ impl Source {
 
 /// The files of the crate under test.
 pub fn read_crate() -> Vec<Source> {
+    read_all(&["src"])
+}
+
+/// The files of these folders.
+pub fn read_all(folders: &[&str]) -> Vec<Source> {
     let mut sources = Vec::new();
-    read_folder(Path::new("src"), &mut sources).expect("src can be read");
+    for folder in folders {
+        read_folder(Path::new(folder), &mut sources).expect("the folder can be read");
+    }
     sources.sort_by(|one, other| one.path.cmp(&other.path));
     sources
 }

@@ -73,7 +73,7 @@ fn a_hook_that_panics_while_the_scheduler_is_built_is_an_error_that_names_it() {
     let affinity = |worker| if worker == 2 { panic!("no affinity for {worker}") } else { AffinityMask::new(0..1024) };
     let error = builder().affinity(affinity).build().unwrap_err();
     assert!(matches!(&error, SchedulerError::AffinityHook { worker: 2, .. }));
-    assert_eq!(error.to_string(), "the hook that places the thread of worker 2 failed: no affinity for 2");
+    assert_eq!(error.to_string(), "the affinity hook of worker 2 failed: no affinity for 2");
     assert_eq!(ended.load(Ordering::Relaxed), 1, "the thread that was started has ended");
 }
 

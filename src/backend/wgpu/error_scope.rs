@@ -4,6 +4,9 @@ use crate::backend::BackendError;
 use crate::task::catch;
 
 /// Does `work` inside error scopes of this thread, and returns the first error that the device reports.
+///
+/// # Errors
+/// Returns the device's first error.
 pub(crate) fn with_error_scope<R>(
     device: &wgpu::Device,
     label: &str,
@@ -26,6 +29,9 @@ pub(crate) fn with_error_scope<R>(
 }
 
 /// Does work whose errors wgpu reports by a panic instead of an error scope: finishing bundles.
+///
+/// # Errors
+/// Returns the panic as the error that it reports.
 pub(crate) fn catch_wgpu_panic<R>(label: &str, work: impl FnOnce() -> R) -> Result<R, BackendError> {
     catch(work).map_err(|panic| refused(label, panic.message))
 }

@@ -11,6 +11,10 @@ use super::site::Site;
 use crate::scene::SceneError;
 
 impl Site {
+    /// Adds the lawn and the floor.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn ground(&mut self) -> Result<(), SceneError> {
         let SharedAssets { block, slab, lawn, checker, .. } = self.assets;
         // In squares, so that edges near a lamp are short enough for its paraboloid shadow map.
@@ -30,6 +34,9 @@ impl Site {
     }
 
     /// Adds four rows of columns, each with arches and a cornice.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn rows(&mut self) -> Result<(), SceneError> {
         let SharedAssets { base, shaft, capital, arch, block, stones, .. } = self.assets;
         for (row, x) in rows().enumerate() {
@@ -50,6 +57,9 @@ impl Site {
     }
 
     /// Adds roof beams from row to row, and a banner under every second one.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn aisles(&mut self) -> Result<(), SceneError> {
         let SharedAssets { block, banner, wood, banners, .. } = self.assets;
         for side in [-1.0, 1.0] {
@@ -67,6 +77,9 @@ impl Site {
     }
 
     /// Adds urns on pedestals between the columns, with plants in some.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn nave(&mut self) -> Result<(), SceneError> {
         let SharedAssets { block, urn, plant, stones, bronze, leaves, .. } = self.assets;
         for side in [-1.0, 1.0] {
@@ -86,6 +99,9 @@ impl Site {
     }
 
     /// Adds the podium, steps and walls around the box, and buttresses against them.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn shrine(&mut self) -> Result<(), SceneError> {
         let SharedAssets { block, buttress, urn, stones, bronze, .. } = self.assets;
         for (step, reach) in [0.0, 0.35, 0.7].into_iter().enumerate() {
@@ -111,6 +127,9 @@ impl Site {
     }
 
     /// Adds two avenues of cypresses on the lawn beside the colonnade, and a row behind it.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn cypresses(&mut self) -> Result<(), SceneError> {
         let avenue = (0..16).flat_map(|tree| {
             let z = 6.0 - 3.6 * tree as f32;

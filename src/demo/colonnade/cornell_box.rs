@@ -20,6 +20,9 @@ const RADIANCE: Vec3 = Vec3::new(24.0, 17.0, 8.5);
 
 /// Adds the box with its two blocks and its lamp. The opening faces +Z, and the middle of its lower edge is at `position`.
 /// The faces of the box point inward.
+///
+/// # Errors
+/// As [`colonnade`](super::colonnade).
 pub(super) fn add(scene: &mut Scene, position: DVec3) -> Result<(), SceneError> {
     let floor = quad([552.8, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 559.2], [549.6, 0.0, 559.2]);
     let back = quad([549.6, 0.0, 559.2], [0.0, 0.0, 559.2], [0.0, 548.8, 559.2], [556.0, 548.8, 559.2]);

@@ -31,6 +31,9 @@ struct FireAssets {
 
 impl Site {
     /// Fires in three urns, and a censer on the podium.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn fires(&mut self) -> Result<(), SceneError> {
         let assets = self.fire_assets()?;
         let bay = bays().nth(1).unwrap_or_default();

@@ -34,6 +34,9 @@ const STANDING: [([f32; 2], f32, usize); 5] = [
 
 impl Site {
     /// Adds all panes and their frames.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn glass(&mut self) -> Result<(), SceneError> {
         let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let corners = [corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];

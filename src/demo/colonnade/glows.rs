@@ -24,6 +24,9 @@ const GLOW_WORM: Vec3 = Vec3::new(0.55, 1.0, 0.12);
 
 impl Site {
     /// Adds lanterns under the arches, candles on the steps and the candlesticks, and glow-worms over the lawn.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn glows(&mut self) -> Result<(), SceneError> {
         self.lanterns()?;
         self.candles()?;

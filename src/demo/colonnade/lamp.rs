@@ -19,6 +19,9 @@ const INTENSITY: Vec3 = Vec3::new(64.0, 48.0, 30.0);
 
 impl Site {
     /// Adds a lampshade that hangs from a beam across the nave, lit from below, and candlesticks on the floor around it.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn lamp(&mut self) -> Result<(), SceneError> {
         let shade = shade().add_to(&mut self.scene, "lamp shade")?;
         let candlestick = candlestick().add_to(&mut self.scene, "candlestick")?;

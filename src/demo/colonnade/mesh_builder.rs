@@ -15,6 +15,10 @@ pub(super) struct MeshBuilder {
 }
 
 impl MeshBuilder {
+    /// Adds the mesh to a scene.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Mesh::new`] and [`Scene::add`].
     pub(super) fn add_to(self, scene: &mut Scene, name: &str) -> Result<Handle<Mesh>, SceneError> {
         scene.add(Mesh::new(name, Topology::TriangleList, self.vertices, self.indices)?)
     }
@@ -137,6 +141,9 @@ impl Revolution {
 }
 
 /// Cloth that hangs from the X axis in folds, 1 wide and `length` long, as one triangle strip facing +Z.
+///
+/// # Errors
+/// Returns the error of [`Mesh::new`].
 pub(super) fn banner(length: f32) -> Result<Mesh, SceneError> {
     const ROWS: u32 = 32;
     let vertices = (0..=ROWS).flat_map(|row| {

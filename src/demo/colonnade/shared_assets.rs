@@ -42,6 +42,10 @@ pub(super) struct SharedAssets {
 }
 
 impl SharedAssets {
+    /// Adds the assets to a scene.
+    ///
+    /// # Errors
+    /// As [`colonnade`](super::colonnade).
     pub(super) fn new(scene: &mut Scene) -> Result<Self, SceneError> {
         let checker = scene.add(checker(256)?)?;
         let mut material = |name: &str, diffuse: [f32; 3]| {

@@ -14,6 +14,9 @@ pub(super) struct Site {
 
 impl Site {
     /// Adds an object that is not rotated.
+    ///
+    /// # Errors
+    /// Returns the error of [`Scene::add_object`].
     pub(super) fn add_upright(
         &mut self,
         mesh: Handle<Mesh>,
@@ -24,6 +27,10 @@ impl Site {
         self.add(mesh, material, position, Quat::IDENTITY, scale)
     }
 
+    /// Adds an object.
+    ///
+    /// # Errors
+    /// Returns the error of [`Scene::add_object`].
     pub(super) fn add(
         &mut self,
         mesh: Handle<Mesh>,

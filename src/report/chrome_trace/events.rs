@@ -20,12 +20,19 @@ pub(super) struct Track {
 }
 
 impl<W: Write> EventWriter<W> {
+    /// Begins a trace.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn new(mut writer: W) -> io::Result<Self> {
         writer.write_all(b"{\"displayTimeUnit\":\"ns\",\"traceEvents\":[")?;
         Ok(Self { writer, is_empty: true })
     }
 
     /// Begins an event. The caller ends it.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn event(
         &mut self,
         kind: &str,
@@ -41,6 +48,9 @@ impl<W: Write> EventWriter<W> {
     }
 
     /// Begins a complete event, which has a start and a duration. The caller ends it.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn slice(
         &mut self,
         category: &str,
@@ -54,17 +64,26 @@ impl<W: Write> EventWriter<W> {
     }
 
     /// Writes a counter event.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn counter(&mut self, name: &str, track: Track, at: Duration, value: impl Serialize) -> io::Result<()> {
         let event = self.event("C", "counter", name, track)?.time("ts", at)?;
         event.object("args", |arguments| arguments.value("value", value))?.end()
     }
 
     /// Writes a metadata event about a process or a thread: `thread_name`, for example.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn metadata(&mut self, name: &str, track: Track, key: &str, value: impl Serialize) -> io::Result<()> {
         self.event("M", "__metadata", name, track)?.object("args", |arguments| arguments.value(key, value))?.end()
     }
 
     /// Ends the trace, with an object about the trace as a whole.
+    ///
+    /// # Errors
+    /// Returns the error of the writer or of `other_data`.
     pub(super) fn finish(
         mut self,
         other_data: impl FnOnce(ObjectWriter<'_, W>) -> io::Result<ObjectWriter<'_, W>>,
@@ -89,18 +108,30 @@ impl<'writer, W: Write> ObjectWriter<'writer, W> {
         Ok(Self { writer, is_empty: true })
     }
 
+    /// Adds a value.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn value(mut self, key: &str, value: impl Serialize) -> io::Result<Self> {
         self.key(key)?;
         serde_json::to_writer(&mut *self.writer, &value)?;
         Ok(self)
     }
 
+    /// Adds a time.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn time(mut self, key: &str, time: Duration) -> io::Result<Self> {
         self.key(key)?;
         write!(self.writer, "{}", microseconds(time))?;
         Ok(self)
     }
 
+    /// Adds an object that `fill` writes.
+    ///
+    /// # Errors
+    /// Returns the error of the writer or of `fill`.
     pub(super) fn object(
         mut self,
         key: &str,
@@ -111,6 +142,10 @@ impl<'writer, W: Write> ObjectWriter<'writer, W> {
         Ok(self)
     }
 
+    /// Closes the object.
+    ///
+    /// # Errors
+    /// Returns the writer's error.
     pub(super) fn end(self) -> io::Result<()> {
         self.writer.write_all(b"}")
     }

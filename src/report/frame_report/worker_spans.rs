@@ -16,7 +16,7 @@ pub(super) struct WorkerSpan {
     pub(super) held_by: HeldBy,
     /// The span whose end it waited for last, unless that is the start of the run.
     pub(super) holder: Option<usize>,
-    /// When the holder ended.
+    /// When `holder` ended, or the run began.
     pub(super) ready: Duration,
     /// When its first chunk began: no earlier than `ready`.
     pub(super) started: Duration,

@@ -77,6 +77,10 @@ struct Device {
 }
 
 impl Data {
+    /// Collects the data of a log.
+    ///
+    /// # Errors
+    /// Returns [`io::ErrorKind::InvalidData`] if the log is inconsistent, and the error of writing JSON.
     pub(super) fn new(log: &Log, costs: &SchedulerCosts) -> io::Result<Self> {
         check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidData, problem))?;
         let start = first_time(log);

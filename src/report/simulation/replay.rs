@@ -122,7 +122,7 @@ impl Replay {
         let serial_time = run.serial_time(&self.costs);
         if workers > 1 {
             let parallel = self.simulate(run, workers);
-            if run.always_parallel || !becomes_serial(serial_time, parallel.time, &self.costs) {
+            if run.always_parallel || !chooses_serial(serial_time, parallel.time, &self.costs) {
                 return replayed(false, parallel.time, parallel.busy);
             }
         }
@@ -149,8 +149,8 @@ fn replayed(serial: bool, time: u64, busy: Vec<u64>) -> ReplayedFrame {
     ReplayedFrame { time: Duration::from_nanos(time), serial, busy }
 }
 
-/// Whether a schedule becomes serial that takes this many nanoseconds on one thread, and on all workers.
-fn becomes_serial(serial: u64, parallel: u64, costs: &SchedulerCosts) -> bool {
+/// Whether the policy chooses serial execution for these two times, in nanoseconds.
+fn chooses_serial(serial: u64, parallel: u64, costs: &SchedulerCosts) -> bool {
     let [serial, parallel] = [serial, parallel].map(Duration::from_nanos);
     let mut policy = ExecutionPolicy::default();
     let mut is_serial = false;

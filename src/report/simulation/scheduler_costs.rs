@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::graph::{Closure, FrameGraph, Schedule};
 use crate::sync::{Instant, spin_loop};
-use crate::task::{Chunks, Scheduler, SchedulerError, Tickets};
+use crate::task::{Chunks, Scheduler, SchedulerError, Tickets, uncounted_pauses};
 use crate::timeline::Run;
 
 /// What the scheduler's own operations cost.
@@ -46,11 +46,8 @@ const WORK_STEPS: usize = 32;
 /// After this time without work a worker certainly sleeps.
 const FALL_ASLEEP: Duration = Duration::from_micros(200);
 
-/// How long to wait for a worker that does not come.
+/// Timeout for a worker to start.
 const TIMEOUT: Duration = Duration::from_millis(1);
-
-/// How many pause instructions a worker executes before it counts as searching.
-const UNCOUNTED_PAUSES: usize = 119;
 
 impl SchedulerCosts {
     /// A scheduler that costs nothing, as on paper.
@@ -74,6 +71,7 @@ impl SchedulerCosts {
         let scheduler = Scheduler::new(2)?;
         let single = Scheduler::new(1)?;
         let steal = steal_time(&scheduler);
+        let pauses = uncounted_pauses();
         let chunk = first_quartile((0..SAMPLES).filter_map(|_| run_time(&single, &mut wide_node(0)?))) / CHUNKS as u32;
         let node = |scheduler: &Scheduler| {
             let mut schedule = chain()?;
@@ -84,9 +82,7 @@ impl SchedulerCosts {
             wake: scheduler.wake_up_cost(),
             waker: first_quartile((0..SAMPLES).filter_map(|_| waker_time(&scheduler))).min(scheduler.wake_up_cost()),
             steal,
-            uncounted_search: first_quartile(
-                (0..SAMPLES).map(|_| time(|| (0..UNCOUNTED_PAUSES).for_each(|_| spin_loop()))),
-            ),
+            uncounted_search: first_quartile((0..SAMPLES).map(|_| time(|| (0..pauses).for_each(|_| spin_loop())))),
             // The ticket counter comes from another core's cache: half of a steal, which is a round trip.
             ticket: ticket_time() + steal / 2,
             chunk,
@@ -212,7 +208,7 @@ fn wait_until(condition: impl Fn() -> bool) -> bool {
 mod tests {
     use std::time::Duration;
 
-    use super::SchedulerCosts;
+    use super::{SchedulerCosts, uncounted_pauses};
 
     #[test]
     fn measured_costs_have_the_expected_order_of_magnitude() {
@@ -224,7 +220,7 @@ mod tests {
         assert!(is_within(costs.wake, 500, 200_000), "{costs:?}");
         assert!(costs.waker <= costs.wake, "{costs:?}");
         assert!(costs.steal <= Duration::from_millis(1), "{costs:?}");
-        assert!(is_within(costs.uncounted_search, 119, 100_000), "{costs:?}");
+        assert!(is_within(costs.uncounted_search, u64::from(uncounted_pauses()), 100_000), "{costs:?}");
         assert!(is_within(costs.chunk, 1, 20_000), "{costs:?}");
         for cost in [costs.node, costs.node_serial, costs.recording] {
             assert!(cost <= Duration::from_micros(20), "{costs:?}");

@@ -10,10 +10,7 @@ use std::collections::{BinaryHeap, VecDeque};
 
 use super::measured_run::nanoseconds;
 use super::scheduler_costs::SchedulerCosts;
-use crate::task::Priority;
-
-/// How long a worker looks for work at most once it counts as searching, in nanoseconds, whatever a wake-up costs.
-const MAX_SPIN: u64 = 100_000;
+use crate::task::{MAX_SPIN, Priority};
 
 /// The workers, and the clock. Times are in nanoseconds since the run began. `T` is what lies in the queues, `A` what a
 /// worker does.
@@ -51,7 +48,7 @@ enum State<A> {
     /// It is busy, and then does this.
     Busy(A),
     /// It is busy or waking up, and then looks for work.
-    Coming,
+    WillSearch,
     /// It searches for work, and then goes to sleep.
     Searching,
     Asleep,
@@ -108,7 +105,7 @@ impl<T, A> SimulatedWorkers<T, A> {
     pub(super) fn is_idle(&self) -> bool {
         let is_idle = |worker: &SimulatedWorker<T, A>| match worker.state {
             State::Busy(_) => false,
-            State::Coming => worker.is_called,
+            State::WillSearch => worker.is_called,
             State::Searching | State::Asleep => true,
         };
         self.workers.iter().all(is_idle) && !self.has_pinned() && self.workers.iter().all(|worker| worker.is_empty())
@@ -133,7 +130,7 @@ impl<T, A> SimulatedWorkers<T, A> {
             self.now = time;
             match std::mem::replace(&mut self.workers[worker].state, State::Asleep) {
                 State::Busy(action) => return Some((worker, Event::Act(action))),
-                State::Coming => return Some((worker, self.look_for_work(worker))),
+                State::WillSearch => return Some((worker, self.look_for_work(worker))),
                 State::Searching => self.fall_asleep(worker),
                 State::Asleep => {}
             }
@@ -142,7 +139,7 @@ impl<T, A> SimulatedWorkers<T, A> {
 
     /// The worker is busy for `spent`, and then does `then`. If that is `None`, it looks for work.
     pub(super) fn resume(&mut self, worker: usize, spent: u64, then: Option<A>) {
-        let state = then.map_or(State::Coming, State::Busy);
+        let state = then.map_or(State::WillSearch, State::Busy);
         self.schedule(worker, state, self.now + spent);
     }
 
@@ -152,7 +149,7 @@ impl<T, A> SimulatedWorkers<T, A> {
         let spent = self.wake_one();
         let searching = self.workers.iter().position(|worker| matches!(worker.state, State::Searching));
         if let Some(searching) = searching {
-            self.schedule(searching, State::Coming, self.now);
+            self.schedule(searching, State::WillSearch, self.now);
         }
         spent
     }
@@ -161,7 +158,7 @@ impl<T, A> SimulatedWorkers<T, A> {
     pub(super) fn push_pinned(&mut self, worker: usize, token: T) -> u64 {
         self.pinned.push_back(token);
         match self.workers[0].state {
-            State::Searching => self.schedule(0, State::Coming, self.now),
+            State::Searching => self.schedule(0, State::WillSearch, self.now),
             State::Asleep if worker != 0 => {
                 self.sleepers.retain(|&sleeper| sleeper != 0);
                 return self.wake(0);
@@ -186,7 +183,8 @@ impl<T, A> SimulatedWorkers<T, A> {
     fn look_for_work(&mut self, worker: usize) -> Event<T, A> {
         let Some((token, is_stolen)) = self.find(worker) else {
             let since = *self.workers[worker].idle_since.get_or_insert(self.now);
-            self.schedule(worker, State::Searching, since + self.uncounted_search + self.wake.min(MAX_SPIN));
+            let spin = self.uncounted_search + self.wake.min(nanoseconds(MAX_SPIN));
+            self.schedule(worker, State::Searching, since + spin);
             return Event::Idle;
         };
         let was_searching = self.is_searching(&self.workers[worker]);
@@ -232,7 +230,7 @@ impl<T, A> SimulatedWorkers<T, A> {
 
     fn wake(&mut self, sleeper: usize) -> u64 {
         self.workers[sleeper].is_called = true;
-        self.schedule(sleeper, State::Coming, self.now + self.wake);
+        self.schedule(sleeper, State::WillSearch, self.now + self.wake);
         self.waker
     }
 

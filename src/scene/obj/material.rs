@@ -16,6 +16,9 @@ use crate::scene::{Blend, Material, Scene, SceneError, Texture};
 const INVERTED_SHARE: f64 = 0.8;
 
 /// Adds the materials that an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default material.
+///
+/// # Errors
+/// Returns the error of [`Scene::add`].
 pub(super) fn add_materials(
     scene: &mut Scene,
     file: &Preprocessed,

@@ -70,6 +70,10 @@ const ORIGIN_STEP: f64 = 4096.0;
 const MAX_ORIGIN: f64 = 1e10;
 
 impl Preprocessed {
+    /// Reads the statements of a file.
+    ///
+    /// # Errors
+    /// Returns the first line that is malformed.
     pub(super) fn new(source: &str) -> Result<Self, MalformedLine> {
         let mut preprocessed = Self { text: String::from(PLACEHOLDERS), ..Self::default() };
         for (line, statement) in statements(source) {
