@@ -8,8 +8,8 @@ use std::iter::FusedIterator;
 
 use crc32fast::Hasher;
 
-use super::RenderCommand;
 use self::code::{Coder, Fault, MAX_LENGTH};
+use super::RenderCommand;
 
 /// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is lossless for
 /// any commands, and compact for sorted ones.
