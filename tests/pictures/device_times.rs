@@ -9,7 +9,7 @@ use drawloom::backend::{
     WgpuSubmission,
 };
 use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess,
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess, ViewOrder,
 };
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
@@ -47,14 +47,18 @@ fn timing() -> Result<Option<WgpuBackend>, Failed> {
 
 /// The names of process and view of every pass of a frame, in submission order.
 fn names_of(fixture: &Fixture, recorded: &Recorded<WgpuBackend>) -> Vec<(String, String)> {
-    let mut passes: Vec<_> =
-        recorded.queues().iter().flat_map(|queue| queue.passes.iter().map(|(pass, _)| *pass)).collect();
-    passes.sort();
-    let processes = fixture.renderer.plan().processes();
     let views = &recorded.statistics().views;
+    // One view after the other, in the order of their groups.
+    let groups = fixture.renderer.plan().view_groups();
+    assert!(groups.iter().all(|group| group.order == ViewOrder::ViewByView));
+    let queues = groups
+        .iter()
+        .flat_map(|group| recorded.queues().iter().filter(|queue| group.kinds.contains(&views[queue.view].kind)));
+    let processes = fixture.renderer.plan().processes();
     let names =
         |(process, view): (usize, usize)| (processes[process].process.name().to_owned(), views[view].name.clone());
-    passes.into_iter().map(|pass| names((pass.process_index, pass.view_index))).collect()
+    let passes = queues.flat_map(|queue| &queue.passes);
+    passes.map(|(pass, _)| names((pass.process_index, pass.view_index))).collect()
 }
 
 fn names_in(times: &DevicePassTimes) -> Vec<(String, String)> {
