@@ -8,11 +8,11 @@ use super::view_queue::ViewQueue;
 use crate::task::Worker;
 use crate::view::ObjectTable;
 
-/// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded, most of
-/// them by several workers at once. Those take the worker as proof that they run in a job (M 10.3 asserts it).
+/// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
+/// most of them by several workers at once. Those take the worker as proof that they run in a job (M 10.3 asserts it).
 ///
-/// The order within a frame: `begin`; then `upload_objects` for every block of objects; for every pass `prepare`, `record` for
-/// each range of its parts, and `finish`; later, on the device thread, `submit`.
+/// The order within a frame: `begin`; then `upload_objects` for every block of objects; for every pass of commands
+/// `prepare` and `record` for each range of its parts; for every pass `finish`; later, on the device thread, `submit`.
 ///
 /// What a backend must honour:
 ///
@@ -68,8 +68,8 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device refuses. Compile errors of the process's shader are reported here at the latest.
     fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
 
-    /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant throughout a
-    /// frame.
+    /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant
+    /// throughout a frame.
     fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize;
 
     /// Records a range of a pass's parts, and calls `emit` with each of them, in order.
@@ -85,8 +85,8 @@ pub trait Backend: Send + Sync + 'static {
         emit: &mut dyn FnMut(Self::Part),
     ) -> Result<(), BackendError>;
 
-    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty. The backend
-    /// may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
+    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty.
+    /// The backend may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
     ///
     /// # Errors
     /// If the device refuses the pass.
@@ -100,8 +100,8 @@ pub trait Backend: Send + Sync + 'static {
 
     /// Submits a frame's queues one after the other. Called only on the device thread.
     ///
-    /// A view has one queue, unless its plan has it submitted
-    /// [process by process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
+    /// A view has one queue, unless its plan has it submitted [process by
+    /// process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
     ///
     /// # Errors
     /// If the device refuses.

@@ -18,7 +18,8 @@ use crate::view::{GpuView, ObjectTable};
 /// Draws nothing. It returns an error if the frame breaks one of the rules between frame and backend:
 ///
 /// - each object of the scene is uploaded once, and no others;
-/// - each pass of the frame is prepared once, with a sorted list that has one object per command, all of them in the scene;
+/// - each pass of commands is prepared once at most, with a sorted list that has one object per command, all of them in
+///   the scene;
 /// - each bundle is recorded once, and has 1 to [`DrawList::BATCHES_PER_BUNDLE`] batches;
 /// - batches are not empty, draw existing meshes, and follow each other without gaps or overlaps;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;

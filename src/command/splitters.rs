@@ -3,8 +3,8 @@
 use super::{RenderCommand, SortKey};
 use crate::chunked_array::ChunkedArray;
 
-/// The splitters of a sample sort: keys that divide a pass's commands into buckets of about equal size, one job each (Blelloch
-/// et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).
+/// The splitters of a sample sort: keys that divide a pass's commands into buckets of about equal size, one job each
+/// (Blelloch et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).
 ///
 /// They decide which job sorts a command, never the result.
 #[derive(Clone, Debug, Default)]
@@ -23,14 +23,14 @@ pub(crate) struct KeyRange {
 }
 
 impl Splitters {
-    /// The fewest commands that get a bucket of their own.
+    /// Commands per bucket, on average, at least. Sampling makes some buckets smaller.
     pub const MIN_COMMANDS_PER_BUCKET: usize = 1024;
 
     /// The most buckets. The job of each reads every key of the pass.
     pub const MAX_BUCKETS: usize = 32;
 
-    /// Chooses the splitters of `buckets` buckets for the first `count` commands, or of fewer where buckets would be smaller than
-    /// [`Splitters::MIN_COMMANDS_PER_BUCKET`].
+    /// Chooses the splitters of `buckets` buckets for the first `count` commands, or of fewer where buckets would be
+    /// smaller than [`Splitters::MIN_COMMANDS_PER_BUCKET`].
     pub(crate) fn choose(&mut self, commands: &ChunkedArray<RenderCommand>, count: usize, buckets: usize) {
         self.keys.clear();
         let buckets = buckets.min(count / Self::MIN_COMMANDS_PER_BUCKET).clamp(1, Self::MAX_BUCKETS);
@@ -69,8 +69,8 @@ impl Splitters {
 /// With this many samples the largest bucket is seldom more than a quarter larger than the mean.
 const SAMPLES_PER_BUCKET: usize = 64;
 
-/// The index of the command that one of `samples` samples reads. It lies anywhere within the sample's share of the `count`
-/// commands: samples at equal distances would miss meshes that repeat with the same period in the scene.
+/// The index of the command that one of `samples` samples reads. It lies anywhere within the sample's share of the
+/// `count` commands: samples at equal distances would miss meshes that repeat with the same period in the scene.
 fn sampled_index(sample: usize, samples: usize, count: usize) -> usize {
     // A bit mixer without a pattern that a scene could share: the last step of Appleby's MurmurHash3.
     let mut mixed = (sample as u32).wrapping_add(1).wrapping_mul(0x9e37_79b9);

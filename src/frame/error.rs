@@ -67,8 +67,8 @@ pub enum FrameError {
         /// How many.
         objects: usize,
     },
-    /// The device could not start the frame.
-    #[error("the frame could not be started")]
+    /// The backend could not begin the frame, or a pass was not finished.
+    #[error("the backend refused the frame: {0}")]
     Backend(#[from] BackendError),
     /// A stage failed.
     #[error("{stage} failed: {source}")]
@@ -78,8 +78,8 @@ pub enum FrameError {
         /// Why.
         source: NodeError,
     },
-    /// A stage panicked, in the code of a process or in Drawloom's own. Where the program is built with `panic = "abort"` the process ends
-    /// instead, as no panic can be caught.
+    /// A stage panicked, in the code of a process or in Drawloom's own. Where the program is built with `panic =
+    /// "abort"` the process ends instead, as no panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
         /// The process, the view and the stage.

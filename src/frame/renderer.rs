@@ -102,8 +102,9 @@ impl<B: Backend> Renderer<B> {
     /// `tracing` when their number changes.
     ///
     /// # Errors
-    /// If the scene has no camera, an invalid camera, or slices of different lengths; if the device refuses something; if a
-    /// process fails or panics. The next frame is not affected.
+    /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, too many
+    /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
+    /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
@@ -214,8 +215,8 @@ impl<B: Backend> Renderer<B> {
         &self.quality
     }
 
-    /// What one process drew in one view, by index, in the latest frame; empty if that frame failed. `None` where the process draws no
-    /// commands in that view, or its picture was cached.
+    /// What one process drew in one view, by index, in the latest frame; empty if that frame failed. `None` where the
+    /// process draws no commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
         let name = |pass: &Pass| graph.plan.processes()[pass.process_index].process.name();

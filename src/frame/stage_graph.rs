@@ -67,8 +67,8 @@ impl GraphKey {
 }
 
 impl<B: Backend> StageGraph<B> {
-    /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass run one
-    /// after the other. Nothing else waits: the order of passes binds submission, not recording.
+    /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass
+    /// run one after the other. Nothing else waits: the order of passes binds submission, not recording.
     ///
     /// # Errors
     /// If no process draws in a view.
@@ -98,7 +98,8 @@ impl<B: Backend> StageGraph<B> {
                 tests_occlusion: occlusion[pass.view_index].is_possible(),
                 culls_triangles: key.options.culls_triangles,
             };
-            // The stages of a view stand right before those of its first pass: a serial run has what they write in its caches.
+            // The stages of a view stand right before those of its first pass: a serial run has what they write in its
+            // caches.
             let pass_scope = if needs.draws_commands {
                 let view_scope = view_scopes[pass.view_index].get_or_insert_with(|| {
                     builder.add(
@@ -151,12 +152,13 @@ impl<B: Backend> StageGraph<B> {
 /// The graph under construction.
 struct GraphBuilder<B: Backend> {
     graph: FrameGraph<StageNode<B>>,
-    /// A stage of one process has the same cost kind in all views, whatever its nodes. The index is [`NodeCosts::kind`].
+    /// A stage of one process has the same cost kind in all views, whatever its nodes. The index is
+    /// [`NodeCosts::kind`].
     cost_kinds: Vec<(&'static str, Option<usize>)>,
     node_count: usize,
 }
 
-/// What a node belongs to: the frame, a view or a pass.
+/// What a node belongs to: the frame, a view or a pass. Not the job system's `Scope`.
 #[derive(Clone, Debug, Default)]
 struct Scope {
     view: Option<String>,
@@ -225,7 +227,8 @@ impl<B: Backend> GraphBuilder<B> {
     }
 }
 
-/// The graphs of recent frames, the latest first. A scene changes what it requires and changes back, and finds its graph again.
+/// The graphs of recent frames, the latest first. A scene changes what it requires and changes back, and finds its
+/// graph again.
 pub(super) struct StageGraphCache<B: Backend> {
     latest_first: Vec<StageGraph<B>>,
 }

@@ -26,8 +26,8 @@ pub struct ShadowQuality {
     /// 1)·v·Δt metres. Cost: the maps' share of a frame, divided by this.
     pub interval: u32,
     /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight
-    /// line, above 0 and up to 90: longer edges are subdivided. The error of a straight edge is 38 pixels of a map of
-    /// 1024 at 45°, 7.7 at 20°, 1.9 at 10°, 0.48 at 5° and 0.08 at 2° (Brabec et al. 2002). Cost: each subdivision
+    /// line, above 0 and up to 90: longer edges are subdivided. The error of a straight edge is 39 pixels of a map of
+    /// 1024 at 45°, 7.8 at 20°, 1.95 at 10°, 0.49 at 5° and 0.08 at 2° (Brabec et al. 2002). Cost: each subdivision
     /// level multiplies triangles by four.
     pub widest_edge: f32,
 }

@@ -51,7 +51,9 @@ pub enum SceneError {
         material: String,
     },
     /// A texture with an invalid size, or with a number of bytes that does not match its size.
-    #[error("texture `{texture}`: {width}x{height} pixels in {bytes} bytes")]
+    #[error(
+        "texture `{texture}` has {width}x{height} pixels in {bytes} bytes; both sides must be 1 to 8192, with 4 bytes a pixel"
+    )]
     InvalidTexture {
         /// Its name.
         texture: String,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Everything recorded since the timeline was started, or since the last log was taken. All times are measured from
-/// the construction of the scheduler.
+/// the construction of the scheduler, or are those of the engine's clock.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
     /// One for each worker. Worker 0 is whichever thread called the scheduler.
@@ -16,7 +16,7 @@ pub struct Log {
     pub frames: Vec<Frame>,
     /// The runs of schedules, by when they ended.
     pub runs: Vec<Run>,
-    /// What threads did outside of all runs, by when it ended.
+    /// What threads called their work, by when it ended.
     pub spans: Vec<Span>,
     /// The readings of counters, oldest first.
     pub counters: Vec<Counter>,
@@ -24,8 +24,8 @@ pub struct Log {
     pub device: Option<DeviceLog>,
     /// How many frames, runs, spans and readings were dropped because there was no room.
     pub dropped: u64,
-    /// The message with which the engine's [clock](crate::task::SchedulerBuilder::timeline_clock) panicked, if it did. All
-    /// later times are its last reading.
+    /// The message with which the engine's [clock](crate::task::SchedulerBuilder::timeline_clock) panicked, if it did.
+    /// All later times are its last reading.
     pub clock_panic: Option<String>,
 }
 
@@ -43,7 +43,7 @@ pub struct WorkerLog {
 /// A frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
-    /// Its number, counted from 0 since the scheduler was built.
+    /// Its number. Only frames that the timeline records are counted, from 0 since the scheduler was built.
     pub number: u64,
     /// When it began.
     pub began: Duration,
@@ -68,11 +68,13 @@ pub struct Run {
     pub parallel_from: Option<Duration>,
     /// Whether the schedule is [always parallel](crate::graph::Schedule::always_parallel), however little work it is.
     pub always_parallel: bool,
-    /// Whether it was started by a background job, which no frame waits for. Then its frame is the one in which it began.
+    /// Whether it was started by a background job, which no frame waits for. Then its frame is the one in which it
+    /// began.
     pub in_background: bool,
     /// Whether a node failed, so that the rest was cancelled. A chunk that panicked is not among the chunks.
     pub failed: bool,
-    /// Whether every chunk that ran is here: there was room for all of them, and none was taken out before the run had ended.
+    /// Whether every chunk that ran is here: there was room for all of them, and none was taken out before the run had
+    /// ended.
     pub complete: bool,
     /// All chunks, by node, and those of one node by their items.
     pub chunks: Vec<Chunk>,
@@ -150,7 +152,7 @@ pub enum IdleKind {
     Asleep,
 }
 
-/// What a thread did outside of all runs.
+/// A named stretch of a thread's work. It may contain runs, as `record` does; reports count what is outside of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Span {
     /// The name of the work.
@@ -244,7 +246,8 @@ impl Run {
 }
 
 impl NodeInfo {
-    /// The group in which reports count the node: its render process, or its stage if it has none, or else its own name.
+    /// The group in which reports count the node: its render process, or its stage if it has none, or else its own
+    /// name.
     pub fn group(&self) -> &str {
         self.labels.process.as_ref().or(self.labels.stage.as_ref()).unwrap_or(&self.name)
     }

@@ -72,7 +72,7 @@ impl Frustum {
             Projection::Paraboloid => ([[0.0, 1.0]; 2], [f64::from(camera.far); 2]),
         };
         let near = match camera.projection {
-            // Objects before the near plane of a shadow map cast shadows too.
+            // Objects in front of the near plane of a shadow map cast shadows too.
             Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => f32::INFINITY,
             // Filtering at the disc's rim reads a few texels beyond it.
             Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,

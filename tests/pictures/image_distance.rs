@@ -9,13 +9,15 @@ use libtest_mimic::Failed;
 pub struct Distance {
     /// Root mean square error over all pixels of the channel where it is largest, 0 to 1.
     pub root_mean_square: f64,
-    /// The same in the tile of 20 × 20 pixels where it is largest. It shows a missing small object.
+    /// Root mean square error over all channels of the tile of 20 × 20 pixels where it is largest. It shows a missing
+    /// small object.
     pub worst_tile: f64,
 }
 
 impl Distance {
-    /// Whether two adapters may differ this much on one scene. Their rounding differs. Where it decides which of two surfaces
-    /// a pixel on an edge shows, the whole pixel differs: in a tile, two of its 400 pixels may differ by half of the range.
+    /// Whether two adapters may differ this much on one scene. Their rounding differs. Where it decides which of two
+    /// surfaces a pixel on an edge shows, the whole pixel differs: in a tile, two of its 400 pixels may differ by half
+    /// of the range.
     pub fn is_within_bound(self) -> bool {
         self.root_mean_square <= 0.01 && self.worst_tile <= 0.04
     }

@@ -1,5 +1,5 @@
-//! The error of each knob in its own unit, and its bound. Bounds are derived here or in the knob's documentation from the
-//! knob's definition, never from measurements.
+//! The error of each knob in its own unit, and its bound. Bounds are derived here or in the knob's documentation from
+//! the knob's definition, never from measurements.
 
 use std::f64::consts::PI;
 
@@ -99,14 +99,16 @@ impl Case<'_> {
         KnobError { error: Some(self.measured.differing[1]), metric, bound: None, oracle: "exact" }
     }
 
-    /// The greatest depth difference of two objects in the wrong order. The order applies to opaque objects of one mesh and state, and
-    /// to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: about ten roundings of 2⁻²⁴ each.
+    /// The greatest depth difference of two objects in the wrong order. The order applies to opaque objects of one mesh
+    /// and state, and to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: about
+    /// ten roundings of 2⁻²⁴ each.
     fn order(&self, key: DepthKey, commands: &[RenderCommand], blend: Blend) -> KnobError {
         let is_opaque = blend == Blend::None;
         let runs = commands.chunk_by(|one, other| !is_opaque || (one.mesh, one.state) == (other.mesh, other.state));
         let mut worst: Option<f64> = None;
         for run in runs {
-            // Opaque objects are sorted front to back, so each is compared with the farthest before it; blended ones back to front.
+            // Opaque objects are sorted front to back, so each is compared with the farthest before it; blended ones
+            // back to front.
             let mut extreme: Option<f64> = None;
             for command in run {
                 let depth = self.depth_of(command.object as usize);
@@ -137,9 +139,10 @@ impl Case<'_> {
 
     /// The greatest angle between a pixel's normal and that of `exact`, ignoring the side. Both cover the same pixels.
     ///
-    /// `exact` has the error of its own format. A packed vertex's normal has the error δ. An interpolation of three normals at right
-    /// angles at most is at least 1/√3 as long as they are, so its direction has the error √3·δ at most. No bound is known if a triangle
-    /// has larger angles, or if an object is scaled non-uniformly, which rotates normals farther.
+    /// `exact` has the error of its own format. A packed vertex's normal has the error δ. An interpolation of three
+    /// normals at right angles at most is at least 1/√3 as long as they are, so its direction has the error √3·δ at
+    /// most. No bound is known if a triangle has larger angles, or if an object is scaled non-uniformly, which rotates
+    /// normals farther.
     fn normals(&self, knob: Knob) -> Result<KnobError, Failure> {
         let own = directions(&self.measured.contents.normal, self.quality.normals)?;
         let exact = directions(&self.exact.contents.normal, Quality::exact().normals)?;
@@ -162,9 +165,9 @@ impl Case<'_> {
 
     /// The greatest difference of a pixel's diffuse colour from that of `exact`, in steps of sRGB bytes.
     ///
-    /// The bound is half a step from rounding to bytes, a tenth of a step for devices (Direct3D 11.3 functional specification, 3.2.3.6),
-    /// and 255 · 0.44 · 2⁻¹⁰ from the half float of `exact`: truncation has a relative error of 2⁻¹⁰, and the curve magnifies it by
-    /// 1.055 / 2.4 at most.
+    /// The bound is half a step from rounding to bytes, a tenth of a step for devices (Direct3D 11.3 functional
+    /// specification, 3.2.3.6), and 255 · 0.44 · 2⁻¹⁰ from the half float of `exact`: truncation has a relative error
+    /// of 2⁻¹⁰, and the curve magnifies it by 1.055 / 2.4 at most.
     fn diffuse(&self) -> Result<KnobError, Failure> {
         let (own, exact) = (colors(&self.measured.contents.diffuse)?, colors(&self.exact.contents.diffuse)?);
         let steps = own.iter().zip(&exact).flat_map(|(one, other)| {
@@ -176,10 +179,10 @@ impl Case<'_> {
 
     /// The greatest difference of a pixel's radiance from that of `exact`.
     ///
-    /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]). A surface reflects its diffuse
-    /// share of that, over π. Alpha-blended objects in front reduce it, and each additive or subtractive object may add as much again.
-    /// Truncation to half floats adds 2⁻¹⁰ of the radiance per light. No bound is known if such a light casts shadows: its map ends
-    /// with its range, so a shadow's edge may move.
+    /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]). A surface reflects its
+    /// diffuse share of that, over π. Alpha-blended objects in front reduce it, and each additive or subtractive object
+    /// may add as much again. Truncation to half floats adds 2⁻¹⁰ of the radiance per light. No bound is known if such
+    /// a light casts shadows: its map ends with its range, so a shadow's edge may move.
     fn light_cut_off(&self) -> Result<KnobError, Failure> {
         let (own, exact) = (colors(&self.measured.contents.radiance)?, colors(&self.exact.contents.radiance)?);
         let differences = own
@@ -211,15 +214,15 @@ impl Case<'_> {
         })
     }
 
-    /// The distance of a drawn edge from its paraboloid projection, in pixels of a map of 1024. The bounds are those of Brabec et al.
-    /// (2002) for edges of that angle.
+    /// The distance of a drawn edge from its paraboloid projection, in pixels of a map of 1024. The bounds are 512 (1 −
+    /// cos(angle / 2)), the sagitta of an edge of that angle in the map of Brabec et al. (2002), rounded up.
     fn shadow_edges(&self) -> KnobError {
         let bound = match self.quality.shadows.widest_edge {
             edge if edge <= 2.0 => 0.08,
-            edge if edge <= 5.0 => 0.48,
-            edge if edge <= 10.0 => 1.9,
-            edge if edge <= 20.0 => 7.7,
-            _ => 38.0,
+            edge if edge <= 5.0 => 0.488,
+            edge if edge <= 10.0 => 1.95,
+            edge if edge <= 20.0 => 7.78,
+            _ => 38.98,
         };
         let error = paraboloid::greatest_error(self.scene, &self.measured.contents.shadow_maps);
         KnobError { error, metric: "pixels of a map of 1024", bound: Some(bound), oracle: "f64 along each edge" }

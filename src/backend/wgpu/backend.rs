@@ -19,13 +19,13 @@ use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
 ///
-/// Drawloom builds wgpu with Vulkan, Metal, DX12 and `noop`, and WGSL. An engine that depends on wgpu 30 itself can enable
-/// more of it.
+/// Drawloom builds wgpu with Vulkan, Metal, DX12 and `noop`, and WGSL. An engine that depends on wgpu 30 itself can
+/// enable more of it.
 ///
 /// Errors in what Drawloom records are returned. Other device errors are not: for those an engine sets its own
-/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`. Submitting to a lost device reports nothing; the next
-/// [`WgpuSubmission::wait`](super::WgpuSubmission::wait) or [`WgpuSubmission::read`](super::WgpuSubmission::read) returns the
-/// error, and so does the next frame.
+/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`. Submitting to a lost device reports nothing;
+/// the next [`WgpuSubmission::wait`](super::WgpuSubmission::wait) or
+/// [`WgpuSubmission::read`](super::WgpuSubmission::read) returns the error, and so does the next frame.
 pub struct WgpuBackend {
     pub(super) device: wgpu::Device,
     pub(super) uploads: UploadQueue,
@@ -42,7 +42,7 @@ pub struct WgpuBackend {
     pub(super) frames: AtomicU64,
     /// The number of workers that have recorded so far.
     pub(super) workers: AtomicUsize,
-    /// Of the passes of commands of the frame that was submitted last.
+    /// How each pass with commands was recorded in the frame that was submitted last.
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
     /// `None` if passes are not timed.
     pub(super) device_timing: Option<DeviceTiming>,
@@ -55,8 +55,8 @@ impl WgpuBackend {
     /// Optional features, used by [`RecordingStrategy::Indirect`].
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
 
-    /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times raw passes
-    /// as well.
+    /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times
+    /// raw passes as well.
     pub const TIMING_FEATURES: wgpu::Features =
         wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
@@ -83,7 +83,8 @@ impl WgpuBackend {
         let layouts = with_error_scope(&device, "Drawloom's bind group layouts", || BindGroupLayouts::new(&device))?;
         let supports_indirect =
             device.features().contains(Self::OPTIONAL_FEATURES) && supports_indirect_buffers(&device);
-        // On the noop backend wgpu panics over the arguments' alignment, unless its check of indirect calls is switched off.
+        // On the noop backend wgpu panics over the arguments' alignment, unless its check of indirect calls is switched
+        // off.
         let tunes_indirect = supports_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
         Ok(Self {
             device,
@@ -123,8 +124,9 @@ impl WgpuBackend {
     }
 
     /// Has the device write timestamps at the begin and end of each pass: see
-    /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a timeline's
-    /// log. [Raw passes](crate::process::RawPass) are timed only if the device has `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
+    /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a
+    /// timeline's log. [Raw passes](crate::process::RawPass) are timed only if the device has
+    /// `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
     ///
     /// # Errors
     /// If the device lacks `TIMESTAMP_QUERY`, or is wgpu's `noop` backend, which claims it and writes nothing.
@@ -155,8 +157,8 @@ impl WgpuBackend {
         WgpuResources { pipelines, targets, target_bytes, buffer_bytes: self.buffers.bytes() }
     }
 
-    /// Reads the device's clock. It waits for all earlier submissions, so do not call it amid a frame; and it takes several
-    /// submissions, so do not call it every frame.
+    /// Reads the device's clock. It waits for all earlier submissions, so do not call it amid a frame; and it takes
+    /// several submissions, so do not call it every frame.
     ///
     /// # Errors
     /// If the device lacks `TIMESTAMP_QUERY`, is wgpu's `noop` backend, refuses or is lost.
@@ -164,7 +166,8 @@ impl WgpuBackend {
         DeviceClock::read(&self.device, self.queue(), self.adapter_name(), timeline)
     }
 
-    /// Drops all cached resources, because a device error may have left some unusable. The next frame creates them again.
+    /// Drops all cached resources but pipelines, because a device error may have left some unusable. The next frame
+    /// creates them again.
     pub(super) fn clear(&self) {
         *self.assets.lock() = AssetCache::default();
         *self.light_meshes.lock() = None;
@@ -189,6 +192,7 @@ pub struct WgpuResources {
     pub targets: usize,
     /// The size of these textures in bytes.
     pub target_bytes: u64,
-    /// The size in bytes of all buffers for objects, views, lights, parameters and triangles that no frame in flight uses.
+    /// The size in bytes of all buffers for objects, views, lights, parameters and triangles that no frame in flight
+    /// uses.
     pub buffer_bytes: u64,
 }

@@ -1,4 +1,4 @@
-//! The begin of a frame: uploads, cached resources, and the strategy of each pass.
+//! The beginning of a frame: uploads, cached resources, and the strategy of each pass.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -46,7 +46,8 @@ impl WgpuBackend {
         })?
     }
 
-    /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have none.
+    /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may
+    /// have none.
     ///
     /// # Errors
     /// If the device is lost.

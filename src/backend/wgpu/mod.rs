@@ -1,17 +1,19 @@
 //! The wgpu backend.
 //!
-//! Vertices and indices lie in shared arenas, all objects lie in one storage buffer, and state is set once per batch.
+//! Vertices and indices lie in shared arenas, all objects lie in one storage buffer, and state is set once per run of
+//! batches that share it.
 //! Measurements chose this layout: recording it is cheap and scales with threads.
 //!
-//! A pass can be recorded and encoded in several ways: see [`RecordingStrategy`] and [`EncodingStrategy`]. A wgpu bundle is
-//! not a device object: wgpu replays and encodes it inside `CommandEncoder::finish`. So a bundle that is replayed once costs
-//! more than recording straight into the pass, and a cached bundle costs a tenth of that. But only bundles, or several
-//! encoders, let several workers record one pass. The cheapest strategy depends on the adapter and the scene, so each pass
-//! tunes its own by measurement (`strategy`), unless the engine fixes it. All strategies draw the same picture.
+//! A pass can be recorded and encoded in several ways: see [`RecordingStrategy`] and [`EncodingStrategy`]. A wgpu
+//! bundle is not a device object: wgpu replays and encodes it inside `CommandEncoder::finish`. So a bundle that is
+//! replayed once costs more than recording straight into the pass, and a cached bundle costs a tenth of that. But only
+//! bundles, or several encoders, let several workers record one pass. The cheapest strategy depends on the adapter and
+//! the scene, so each pass tunes its own by measurement (`strategy`), unless the engine fixes it. All strategies draw
+//! the same picture.
 //!
-//! Each frame in flight has buffers of its own. Its bind groups, bundles and indirect arguments are cached with these buffers
-//! from frame to frame. A cached object is reused only if everything that it was made from compares equal. After an error all
-//! caches are cleared.
+//! Each frame in flight has buffers of its own. Its bind groups, bundles and indirect arguments are cached with these
+//! buffers from frame to frame. A cached object is reused only if everything that it was made from compares equal. An
+//! error clears the caches that it may have left unusable.
 
 mod backend;
 mod backend_impl;

@@ -82,7 +82,7 @@ impl<B: Backend> Stage<B> for Occluders {
     }
 }
 
-/// Draws the occluders into the view's coarse depth buffer. An item is a strip of tiles.
+/// Draws the occluders into the view's coarse depth buffer. An item is a strip: a row of blocks of tiles.
 pub(super) struct CoarseDepth {
     pub(super) view: usize,
 }

@@ -11,7 +11,7 @@ pub enum PlanError {
     #[error(transparent)]
     Graph(#[from] GraphProblem),
     /// A process is declared to come after or before one that the graph does not have.
-    #[error("process {process:?} is to come after or before {other:?}, which is not in the graph")]
+    #[error("process {process:?} is to come after or before {other:?}, which the plan does not have")]
     UnknownProcess {
         /// The process.
         process: String,
@@ -39,7 +39,9 @@ pub enum PlanError {
         format: Format,
     },
     /// A target is drawn as a layer of a texture array by one process, and used as a texture of its own by another.
-    #[error("process {process:?} uses {target:?} as a layered target; others use it per view, or vice versa")]
+    #[error(
+        "process {process:?} and another disagree whether target {target:?} is one for all views, in layers, or one for each view"
+    )]
     LayeringMismatch {
         /// The process.
         process: String,
@@ -88,7 +90,9 @@ pub enum ProcessError {
     },
     /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
     /// one by commands of its own.
-    #[error("process {process:?} does not use target {target:?} in the way that it declares")]
+    #[error(
+        "process {process:?} declares target {target:?} for a raw pass and draws without one, or the other way round"
+    )]
     Misdeclared {
         /// The process.
         process: String,

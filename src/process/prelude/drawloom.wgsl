@@ -9,7 +9,8 @@
 struct View {
     // From world axes relative to the camera to clip space; depth is reversed.
     clip_from_relative: mat4x4<f32>,
-    // The camera's position, in fixed point like an object's.
+    // The origin that vertices are relative to, in fixed point like an object's: the camera's position, or for a
+    // directional light's shadow map a point midway between its near and far planes.
     position_low: vec3<u32>,
     light_count: u32,
     position_high: vec3<i32>,

@@ -17,9 +17,10 @@ pub struct SchedulerCosts {
     pub wake: Duration,
     /// The part of that in which the waking thread is busy.
     pub waker: Duration,
-    /// From pushing a job until a worker begins with it that was already searching for one.
+    /// From pushing a job until a worker that was already searching begins it.
     pub steal: Duration,
-    /// How long an idle worker looks for work before it counts as searching. While one counts, no other worker is woken.
+    /// How long an idle worker looks for work before it counts as searching. While one counts, no other worker is
+    /// woken.
     pub uncounted_search: Duration,
     /// To take chunks of a node by ticket, where another worker has taken some.
     pub ticket: Duration,
@@ -63,7 +64,8 @@ impl SchedulerCosts {
         recording: Duration::ZERO,
     };
 
-    /// Measures them on this machine, which takes some 20 ms. It starts a scheduler of two workers for that, and stops it.
+    /// Measures them on this machine, which takes some 20 ms. It starts a scheduler of two workers for that, and stops
+    /// it.
     ///
     /// # Errors
     /// As [`Scheduler::new`].

@@ -131,8 +131,8 @@ impl WgpuPassState {
         }
     }
 
-    /// The pass's cost in a frame whose passes cost `all` nanoseconds in total, on `workers` workers. If the pass's critical path
-    /// is longer than the other passes keep the workers busy, the idle time counts as its cost.
+    /// The pass's cost in a frame whose passes cost `all` nanoseconds in total, on `workers` workers. If the other
+    /// passes cannot keep the workers busy for as long as the pass's critical path, the idle time counts as its cost.
     pub(crate) fn cost_sample(&self, all: f64, workers: usize) -> CostSample {
         let own = self.timing.total();
         let cost = own.max(self.timing.critical_path(workers) * workers as f64 - (all - own));

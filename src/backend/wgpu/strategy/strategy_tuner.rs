@@ -5,9 +5,9 @@ use crate::command::DrawList;
 
 /// Chooses the strategy of one pass from frame to frame.
 ///
-/// Every frame measures the strategy in use. At first, and when the pass changes much, the tuner tries each other strategy for
-/// a few frames. Later it tries one of them for a single frame now and then, less often the more often it lost. The tuner
-/// switches only to a strategy that is cheaper by a margin in several frames (hysteresis).
+/// Every frame measures the strategy in use. At first, and when the pass changes much, the tuner tries each other
+/// strategy for a few frames. Later it tries one of them for a single frame now and then, less often the more often it
+/// lost. The tuner switches only to a strategy that is cheaper by a margin in several frames (hysteresis).
 pub(crate) struct StrategyTuner {
     /// One for each strategy of the set.
     candidates: Vec<Candidate>,
@@ -58,9 +58,9 @@ const MAX_LEARNING_PAUSE: u64 = 8192;
 const MAX_TRIAL_FRAMES: u64 = 16;
 /// A candidate replaces the current strategy if its cost is below this ratio of the current cost.
 const SWITCH_RATIO: f64 = 0.9;
-/// Learning restarts if the current cost rises above this ratio of the usual cost,
+/// Learning restarts if the current cost is above this multiple of the usual cost for [`REGRESSION_FRAMES`] frames.
 const REGRESSION_RATIO: f64 = 1.6;
-/// for this many frames: another program may take the processor for a few frames in a row.
+/// Another program may take the processor for a few frames in a row; this is more.
 const REGRESSION_FRAMES: u32 = 8;
 
 impl StrategyTuner {
@@ -81,8 +81,8 @@ impl StrategyTuner {
         }
     }
 
-    /// Chooses a frame's strategy: its index in `strategies`, and whether this is a trial. A frame has at most one trial outside
-    /// of learning: the trial takes `may_try`.
+    /// Chooses a frame's strategy: its index in `strategies`, and whether this is a trial. A frame has at most one
+    /// trial outside of learning: the trial takes `may_try`.
     pub(crate) fn choose(&mut self, strategies: &[PassStrategy], frame: u64, may_try: &mut bool) -> (usize, bool) {
         if let Some(Trial { candidate, begun }) = self.trial {
             if frame < begun + MAX_TRIAL_FRAMES {
