@@ -1,4 +1,5 @@
-//! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend draws it.
+//! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend
+//! draws it.
 //!
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record cached --frames 100
@@ -184,7 +185,8 @@ fn draw<B: Backend>(
     let mut last = None;
     for number in 0..frames {
         let first_recorded_frame = timeline::first_recorded_frame(arguments);
-        // The first recorded frame describes the graph and touches the rings' memory, so it is dropped if there are more.
+        // One frame more is recorded first, and dropped: it describes the graph and touches the rings' memory. If there
+        // are no more frames than are reported, the first one stays.
         if first_recorded_frame.is_some_and(|first| first.saturating_sub(1) == number) {
             timeline.start();
         }

@@ -11,8 +11,9 @@ use crate::view::ObjectTable;
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
 /// most of them by several workers at once. Those take the worker as proof that they run in a job (M 10.3 asserts it).
 ///
-/// The order within a frame: `begin`; then `upload_objects` for every block of objects; for every pass of commands
-/// `prepare` and `record` for each range of its parts; for every pass `finish`; later, on the device thread, `submit`.
+/// The order within a frame: `begin`; then, at the same time as what follows, `upload_objects` for every block of
+/// objects; for every pass of commands `prepare` and `record` for each range of its parts; for every pass `finish`;
+/// later, on the device thread, `submit`.
 ///
 /// What a backend must honour:
 ///

@@ -2,8 +2,8 @@
 
 use super::SortKey;
 
-/// Packs the bits of sort keys that are not the same in all of them. Packed keys have the same order and are short: a view's
-/// commands have a handful of states and meshes, and depths of a few powers of two.
+/// Packs the bits of sort keys that are not the same in all of them. Packed keys have the same order and are short: a
+/// view's commands have a handful of states and meshes, and depths of a few powers of two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct KeyPacker {
     runs: [Run; Self::MAX_RUNS],
@@ -22,7 +22,8 @@ struct Run {
 }
 
 impl KeyPacker {
-    /// A key has at most this many fields. If the differing bits form more runs, the gaps between the nearest ones are packed too.
+    /// The most runs. A key has no more fields; if its differing bits form more runs, the gaps between the nearest ones
+    /// are packed too.
     const MAX_RUNS: usize = 4;
 
     /// A packer for keys that differ only in the bits set in `differing`.

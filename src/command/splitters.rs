@@ -59,7 +59,7 @@ impl Splitters {
     /// The keys of one bucket.
     ///
     /// # Panics
-    /// If `bucket` is more than [`Splitters::bucket_count`].
+    /// If `bucket` is [`Splitters::bucket_count`] or more.
     pub(crate) fn key_range(&self, bucket: usize) -> KeyRange {
         let first = bucket.checked_sub(1).map_or(SortKey::FIRST, |before| self.keys[before]);
         KeyRange::between(first, self.keys.get(bucket).copied().unwrap_or(SortKey::LAST))

@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use crate::scene::{Mesh, SceneRef, Topology};
 
-/// The triangles in normalised coordinates: the centre of their bounding box is the origin, and its corners are at distance
-/// 1. So f32 is precise enough for scenes of any size, anywhere.
+/// The triangles in normalised coordinates: the centre of their bounding box is the origin, and its corners are at
+/// distance 1. So f32 is precise enough for scenes of any size, anywhere.
 pub(super) struct Bvh {
     /// The centre of the box in the world, in metres.
     pub center: DVec3,
@@ -21,7 +21,7 @@ pub(super) struct Bvh {
 /// The nearest intersection of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
-    /// Normalised.
+    /// In units of [`Bvh::radius`].
     pub distance: f32,
     /// Whether the surface faces the ray's origin, by its normals.
     pub front_facing: bool,
@@ -47,7 +47,8 @@ struct Node {
 /// The most triangles of a leaf.
 const MAX_LEAF_TRIANGLES: usize = 6;
 
-/// Of more triangles only every second, third ... is kept, which is enough to tell an interior from an object.
+/// The most triangles of a hierarchy. Of more only every second, third ... is kept, which is enough to tell an interior
+/// from an object.
 const MAX_TRIANGLES: usize = 2_000_000;
 
 impl Bvh {

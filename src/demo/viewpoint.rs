@@ -14,11 +14,12 @@ pub(super) struct Viewpoint {
     pub field_of_view: f32,
 }
 
-/// The test for an interior: from some point inside the bounds, at least this share of rays in all directions hits front faces.
+/// A scene may be an interior if from some point inside the bounds at least this share of rays in all directions hits
+/// front faces.
 const INTERIOR_SHARE: f32 = 0.6;
 
-/// The test for an object, even a hollow one: of the rays from outside inwards that hit anything, at least this share hits front
-/// faces.
+/// A scene is an object, even a hollow one, if of the rays from outside inwards that hit anything at least this share
+/// hits front faces.
 const OBJECT_SHARE: f32 = 0.5;
 
 /// The number of rays from a point.
@@ -185,8 +186,8 @@ fn eye_above_floor(bvh: &Bvh, point: Vec3) -> Option<Vec3> {
     is_clear.then_some(eye)
 }
 
-/// The score of a view and its free distance. The score is the mean length of rays all over the picture; rays that leave
-/// the scene or hit back faces count as short.
+/// The score of a view and its free distance. The score is the mean length of rays all over the picture; rays that
+/// leave the scene or hit back faces count as short.
 fn line_of_sight(bvh: &Bvh, eye: Vec3, forward: Vec3) -> (f32, f32) {
     let right = forward.cross(Vec3::Y);
     let mut sum = 0.0;

@@ -94,7 +94,7 @@ pub enum FrameError {
     #[error(transparent)]
     Job(#[from] JobPanic),
     /// The job graph has no order: a bug in Drawloom.
-    #[error("the job graph has a cycle: {0}")]
+    #[error("the stages of the frame make no graph: {0}")]
     Jobs(GraphProblem),
 }
 

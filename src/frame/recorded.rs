@@ -61,9 +61,9 @@ impl<B: Backend> Submitter<B> {
         Self { backend, timeline, not_send: PhantomData }
     }
 
-    /// Submits a frame: one view after the other, each with its whole queue, in the order of the plan's
-    /// [view groups](crate::process::FramePlan::view_groups) (M listing 10.7). Frames are submitted in the order in which they were
-    /// recorded.
+    /// Submits a frame: one view after the other, each with its whole queue, in the order of the plan's [view
+    /// groups](crate::process::FramePlan::view_groups) (M listing 10.7). The engine submits frames in the order in
+    /// which they were recorded; nothing checks that.
     ///
     /// # Errors
     /// If the frame is another renderer's, or the device refuses it.
@@ -88,8 +88,8 @@ impl<B: Backend> Submitter<B> {
     }
 }
 
-/// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes alternate with
-/// those of other views.
+/// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes
+/// alternate with those of other views.
 fn in_submission_order<T>(queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
     let mut remaining: Vec<_> = queues.into_iter().map(|queue| queue.passes.into_iter()).collect();
     let passes_by_view = order.chunk_by(|one, next| one.view_index == next.view_index);

@@ -1,4 +1,5 @@
-//! The edges of a schedule as compressed adjacency lists: one array of targets, and where each node's list starts in it.
+//! The edges of a schedule as compressed adjacency lists: one array of targets, and where each node's list starts in
+//! it.
 
 /// The lists of all nodes, one after another in one array (compressed sparse rows).
 pub(super) struct Adjacency {
@@ -26,10 +27,11 @@ impl Adjacency {
     }
 }
 
-/// What a run needs to know about the edges: each node's number of dependencies, and its dependents, the most critical first.
+/// What a run needs to know about the edges: each node's number of dependencies, and its dependents, the most critical
+/// first.
 ///
-/// Nodes are identified by their index in the schedule, which is a topological order. An index takes 32 bits: a graph with
-/// more nodes or edges than that would not have fitted into memory while it was built.
+/// Nodes are identified by their index in the schedule, which is a topological order. An index takes 32 bits: a graph
+/// with more nodes or edges than that would not have fitted into memory while it was built.
 pub(crate) struct RankedAdjacency {
     /// Where each node's list starts in `dependents`, and where the last one ends.
     starts: Box<[u32]>,
@@ -38,10 +40,11 @@ pub(crate) struct RankedAdjacency {
     dependency_counts: Box<[u32]>,
     /// The nodes without dependencies, by descending cost to the end.
     roots: Box<[u32]>,
-    /// Whether the node is on a critical path: the longest path through the node is about as long as the longest of all.
+    /// Whether the node is on a critical path: the longest path through the node is about as long as the longest of
+    /// all.
     is_critical: Box<[bool]>,
-    /// Per node, the nanoseconds from its start to the end of the run, and from the start of the run to its own, if no node has
-    /// to wait for a worker: the bottom level and the top level of list scheduling.
+    /// Per node, the nanoseconds from its start to the end of the run, and from the start of the run to its own, if no
+    /// node has to wait for a worker: the bottom level and the top level of list scheduling.
     cost_to_end: Box<[u64]>,
     cost_from_start: Box<[u64]>,
 }
@@ -103,8 +106,8 @@ impl RankedAdjacency {
         self.is_critical[node as usize]
     }
 
-    /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end. `costs` has the
-    /// nanoseconds of each node.
+    /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end.
+    /// `costs` has the nanoseconds of each node.
     pub(crate) fn rank(&mut self, costs: &[u64]) {
         self.cost_from_start.fill(0);
         for (node, &cost) in costs.iter().enumerate() {
@@ -154,6 +157,7 @@ mod tests {
 
     proptest! {
         #[test]
+        #[cfg_attr(miri, ignore = "proptest reads files")]
         fn dependents_are_sorted_by_cost_to_the_end_and_the_longest_paths_are_critical(
             picks in prop::collection::vec((prop::collection::vec(any::<prop::sample::Index>(), 0..4), 0_u64..1000), 1..12),
         ) {

@@ -1,8 +1,8 @@
 //! Dependency edges: the rules of [`FrameGraph`], applied.
 //!
-//! If every maker of a resource had an edge to every reader, the number of edges would be their product. So all makers have an
-//! edge to one *junction*, and the junction has an edge to each reader. A junction is a vertex but not a node: traversals
-//! pass through it, and results leave it out.
+//! If every maker of a resource had an edge to every reader, the number of edges would be their product. So all makers
+//! have an edge to one *junction*, and the junction has an edge to each reader. A junction is a vertex but not a node:
+//! traversals pass through it, and results leave it out.
 
 use petgraph::Direction;
 use petgraph::graph::{DiGraph, NodeIndex};
@@ -11,8 +11,8 @@ use petgraph::visit::EdgeRef;
 use super::builder::{Access, FrameGraph};
 use super::traversal::Traversal;
 
-/// An edge for each reason to wait, from the dependency to the dependent. The first vertices are the graph's nodes, by index;
-/// junctions follow.
+/// An edge for each reason to wait, from the dependency to the dependent. The first vertices are the graph's nodes, by
+/// index; junctions follow.
 pub(super) type Edges = DiGraph<(), Relation>;
 
 /// Why a node waits for another.
@@ -20,7 +20,7 @@ pub(super) type Edges = DiGraph<(), Relation>;
 pub(super) enum Relation {
     /// [`FrameGraph::order`] says so.
     Order,
-    /// It needs what the other node writes to this resource.
+    /// It needs what the other node writes to the resource of this index.
     Data(usize),
 }
 
@@ -78,7 +78,8 @@ pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
     edges
 }
 
-/// Makes every sink wait for every source, except for pairs in which the sink is already ordered before the source.
+/// Makes every sink (a modifier or reader of the resource) wait for every source (a maker of it), except for pairs in
+/// which the sink is already ordered before the source.
 fn link(edges: &mut Edges, traversal: &mut Traversal, resource: usize, sources: &[NodeIndex], sinks: &[NodeIndex]) {
     if sources.is_empty() || sinks.is_empty() {
         return;
@@ -106,8 +107,8 @@ fn link(edges: &mut Edges, traversal: &mut Traversal, resource: usize, sources: 
 
 /// Makes each modifier depend on the version it modifies: the last makers before it.
 ///
-/// The accesses do not order modifiers. Which of them come before others is only known once all other edges are, and `position`
-/// has the topological order of those. The edges add no new order. They only prevent the earlier modifier
+/// The accesses do not order modifiers. Which of them come before others is only known once all other edges are, and
+/// `position` has the topological order of those. The edges add no new order. They only prevent the earlier modifier
 /// from being dropped.
 pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize]) {
     let mut traversal = Traversal::new();
@@ -132,7 +133,8 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize
                 if roles.modifiers.binary_search(&maker).is_err() {
                     continue;
                 }
-                // The traversal may have found a maker along one path although another maker follows it on another path.
+                // The traversal may have found a maker along one path although another maker follows it on another
+                // path.
                 let later = &last[index + 1..];
                 if let Some(end) = later.last() {
                     let is_between = |vertex: NodeIndex, _| position[vertex.index()] <= position[end.index()];

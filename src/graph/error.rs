@@ -11,20 +11,20 @@ pub type NodeError = Box<dyn Error + Send + Sync>;
 
 /// What is wrong with a graph.
 ///
-/// The variants are declared in the order in which they are checked. Invalid calls come first, because later problems may only
-/// follow from them; then names, because all other problems are reported by name; then cycles, because a graph with a
-/// cycle has no order; then what the kept nodes lack.
+/// The variants are declared in the order in which they are checked. Invalid calls come first, because later problems
+/// may only follow from them; then names, because all other problems are reported by name; then cycles, because a graph
+/// with a cycle has no order; then what the kept nodes lack.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum GraphProblem {
     /// A call was given a node of another graph, or a removed one. The call did nothing, and is reported here once.
-    #[error("the node that stands as `?` in `{call}` does not belong to this graph")]
+    #[error("in `{call}`, `?` stands for a node that does not belong to this graph or was removed from it")]
     UnknownNode {
         /// The call with the names of its arguments, and `?` for the unknown ones.
         call: String,
     },
     /// A call was given a resource of another graph. The call did nothing, and is reported here once.
-    #[error("the resource that stands as `?` in `{call}` does not belong to this graph")]
+    #[error("in `{call}`, `?` stands for a resource that does not belong to this graph")]
     UnknownResource {
         /// The call with the names of its arguments, and `?` for the unknown ones.
         call: String,
@@ -38,8 +38,8 @@ pub enum GraphProblem {
     /// Nodes wait for each other. Some of them may be nodes that would be dropped.
     #[error("nodes wait for each other in a cycle: {}", cycle(nodes))]
     Cycle {
-        /// The nodes of one cycle: each must run before the next, and the last before the first. The list starts at the node
-        /// that was added first.
+        /// The nodes of one cycle: each must run before the next, and the last before the first. The list starts at the
+        /// node that was added first.
         nodes: Vec<String>,
     },
     /// Nothing writes a resource before it is needed, and it is not imported.
@@ -82,8 +82,8 @@ fn missing_producer(resource: &str, output: bool, readers: &[String]) -> String 
 
 /// Why a run failed.
 ///
-/// If several nodes fail, the run reports the one that comes first in the schedule, and of one node's chunks the one with the
-/// lowest items. Which other failures happen can depend on timing, since the first failure cancels the rest.
+/// If several nodes fail, the run reports the one that comes first in the schedule, and of one node's chunks the one
+/// with the lowest items. Which other failures happen can depend on timing, since the first failure cancels the rest.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RunError {

@@ -3,10 +3,10 @@
 //! # Memory ordering
 //!
 //! A node's writes must be visible to all its dependents. The worker that completes a node counts down each dependent's
-//! dependencies with release and acquire. Read-modify-writes continue a release sequence, so the worker that counts down
-//! the last dependency, or sees that its own is the only one left, has acquired from all others. A node's counter is set
-//! again when the node starts. By then, no other worker counts it down in this run; in the next run only workers do that
-//! are ordered after the end of this one.
+//! dependencies with release and acquire. Read-modify-writes continue a release sequence, so the worker that counts
+//! down the last dependency, or sees that its own is the only one left, has acquired from all others. A node's counter
+//! is set again when the node starts. By then, no other worker counts it down in this run; those that do in the next
+//! run are ordered after the end of this one.
 
 use crossbeam_utils::CachePadded;
 
@@ -18,8 +18,8 @@ use crate::task::{Chunks, Tickets};
 pub(super) struct Progress {
     /// Per node, how many of its dependencies are not complete.
     pending_dependencies: Box<[AtomicU32]>,
-    /// Ready nodes on their way to a worker. Each node has a slot for each of its dependents, written at most once a run. The
-    /// roots' slots come last.
+    /// Ready nodes on their way to a worker. Each node has a slot for each of its dependents, written at most once a
+    /// run. The roots' slots come last.
     ready_slots: Box<[AtomicU32]>,
     open_nodes: Box<[CachePadded<OpenNode>]>,
 }
@@ -120,14 +120,14 @@ mod loom_tests {
         }
 
         fn write(&self, index: usize, value: usize) {
-            // SAFETY: No other access may run at the same time: each thread writes its own cell, before it counts down. loom
-            // checks that.
+            // SAFETY: No other access may run at the same time: each thread writes its own cell, before it counts down.
+            // loom checks that.
             self.0[index].with_mut(|cell| unsafe { *cell = value });
         }
 
         fn values(&self) -> [usize; COUNT] {
-            // SAFETY: No write may run at the same time: the cells are read after all threads have counted down. loom checks
-            // that.
+            // SAFETY: No write may run at the same time: the cells are read after all threads have counted down. loom
+            // checks that.
             self.0.each_ref().map(|cell| cell.with(|cell| unsafe { *cell }))
         }
     }

@@ -49,6 +49,7 @@ mod tests {
 
     proptest! {
         #[test]
+        #[cfg_attr(miri, ignore = "proptest reads files")]
         fn a_decoded_token_equals_the_encoded_one(low in 0..=MASK as u32, high in 0..=MASK as u32) {
             for token in [Token::Ready(low..high), Token::Start(low), Token::StartPinned(low), Token::Join(low)] {
                 prop_assert_eq!(Token::decode(token.clone().encode()), token);

@@ -4,7 +4,8 @@ use petgraph::Direction;
 use petgraph::graph::{DiGraph, NodeIndex};
 use petgraph::visit::EdgeRef;
 
-/// Finds the vertices that can be reached from others. It is reusable: clearing the visited marks is free.
+/// Finds the vertices that can be reached from others. It is reusable: marks are numbers of traversals, so none has to
+/// be cleared.
 #[derive(Default)]
 pub(super) struct Traversal {
     /// Per vertex, the last traversal that visited it.

@@ -20,7 +20,8 @@ pub struct ShadowQuality {
     /// Maps are drawn every `interval` frames, at least 1. They are also drawn at once if a light with a map is added
     /// or removed, if the quality or the plan changes, or if a directional light's map no longer fits what cameras see:
     /// if its centre is off by a quarter of its radius, or its radius is a quarter too small. In between, a light with
-    /// a map keeps its position and range.
+    /// a map keeps its position, direction and range, so if it becomes brighter, it still ends where its old brightness
+    /// fell to [`light_cut_off`](super::Quality::light_cut_off), and the bound of that is exceeded.
     ///
     /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` −
     /// 1)·v·Δt metres. Cost: the maps' share of a frame, divided by this.

@@ -9,11 +9,11 @@ use super::silhouettes::{Silhouette, Silhouettes};
 /// (after Hasselgren, Andersson and Akenine-Möller, "Masked software occlusion culling", 2016; conservative by area,
 /// where theirs is by samples).
 ///
-/// Depth is stored as nearness, and occluders are drawn as [silhouettes](Silhouettes). A tile is covered if each of its
-/// cells is inside all lines of some silhouette. Lines and planes are
-/// linear, so they are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is
-/// hidden in the whole tile. Silhouettes that cover some cells are merged until they cover all; the merged nearness is
-/// the least of theirs. Drawing silhouettes nearest first keeps it as great as possible.
+/// Depth is stored as nearness, and occluders are drawn as [silhouettes](Silhouettes). A tile is divided into up to 4 ×
+/// 4 cells, and is covered if each of them is inside all lines of some silhouette. Lines and planes are linear, so they
+/// are evaluated at the worst corner of a cell only. Whatever is farther than a tile's nearness is hidden in the whole
+/// tile. Silhouettes that cover some cells are merged until they cover all; the merged nearness is the least of theirs.
+/// Drawing silhouettes nearest first keeps it as great as possible.
 ///
 /// Different strips may be drawn at the same time. The buffer may be tested after all strips have been drawn.
 #[derive(Debug, Default)]
@@ -251,7 +251,7 @@ impl CoarseDepth {
     }
 }
 
-/// The maximum width of a tile in cells. A layer's mask has room for 5.
+/// The maximum width of a tile in cells. A layer's mask of 32 bits has room for 5 × 5.
 const MAX_CELLS: usize = 4;
 
 #[cfg(all(test, not(drawloom_loom)))]

@@ -18,8 +18,8 @@ pub struct Camera {
     pub projection: Projection,
     /// The distance of the near plane, in metres, 1e-27 or more.
     pub near: f32,
-    /// The distance of the far plane, in metres. In perspective it may be infinite, depth does not depend on it, and only
-    /// objects that are entirely beyond it are culled.
+    /// The distance of the far plane, in metres. In perspective it may be infinite, depth does not depend on it, and
+    /// only objects that are entirely beyond it are culled.
     pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
@@ -38,14 +38,15 @@ pub enum Projection {
     },
     /// Parallel projection.
     ///
-    /// In a [`ViewKind::Shadow`] view, depth is clamped to the near plane: an object in front of it still casts a shadow.
+    /// In a [`ViewKind::Shadow`] view, depth is clamped to the near plane: an object in front of it still casts a
+    /// shadow.
     Orthographic {
         /// The height of the view volume, in metres, 1e-6 or more.
         height: f32,
     },
-    /// Paraboloid projection: the half space before the camera becomes a disc as wide as the picture (Brabec et al. 2002;
-    /// the shadow map of L 4.2.2). Rasterised edges are straight although the projection curves them, so meshes are
-    /// subdivided as far as the angle of their edges requires. Only for [`ViewKind::Shadow`].
+    /// Paraboloid projection: the half space before the camera becomes a disc as wide as the picture (Brabec et al.
+    /// 2002; the shadow map of L 4.2.2). Rasterised edges are straight although the projection curves them, so meshes
+    /// are subdivided as far as the angle of their edges requires. Only for [`ViewKind::Shadow`].
     Paraboloid,
 }
 
@@ -79,8 +80,8 @@ impl ViewKind {
 }
 
 impl Camera {
-    /// A camera at `position` that looks at `target`, upright (+Y), with a vertical field of view of 60°, a near plane at
-    /// 5 cm and a picture of 960 × 540 pixels.
+    /// A camera at `position` that looks at `target`, upright (+Y), with a vertical field of view of 60°, a near plane
+    /// at 5 cm and a picture of 960 × 540 pixels.
     pub fn looking_at(name: impl Into<String>, position: DVec3, target: DVec3) -> Self {
         let forward = (target - position).normalize_or(DVec3::NEG_Z).as_vec3();
         // Looking straight up or down, any perpendicular serves as the right vector.
@@ -103,7 +104,8 @@ impl Camera {
         self.size[0] as f32 / self.size[1] as f32
     }
 
-    /// Checks all fields but `size`: a minimised window reports a size of 0 × 0, which the frame handles.
+    /// Checks all fields but `size`: a size of 0 × 0, as of a minimised window, has an error of its own,
+    /// `FrameError::EmptyTarget`.
     ///
     /// # Errors
     /// If a number is not finite or out of its range.
@@ -143,13 +145,14 @@ impl Camera {
     }
 }
 
-/// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to 1.5e10 m
-/// across: with a near plane below 2e-28 m, depth would underflow in f32.
+/// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to
+/// 1.5e10 m across: with a near plane below 2e-28 m, depth would underflow in f32.
 const MIN_NEAR: f32 = 1e-27;
 
-/// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would be
-/// larger than a pixel.
+/// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would
+/// be larger than a pixel.
 const MIN_HEIGHT: f32 = 1e-6;
 
-/// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of f32.
+/// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of
+/// f32.
 const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;

@@ -9,8 +9,8 @@ use super::transform::is_unit;
 
 /// A light source. Colours are linear. Directions have unit length, are in world space, and point away from the light.
 ///
-/// Lights with a position fall off with the square of the distance, and the factor (1 − (d/range)⁴)² brings them smoothly
-/// to 0 at their `range`.
+/// Lights with a position fall off with the square of the distance, and the factor (1 − (d/range)⁴)² brings them
+/// smoothly to 0 at their `range`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Light {
@@ -50,8 +50,8 @@ pub enum Light {
         /// there are no shadows.
         casts_shadow: bool,
     },
-    /// A small emissive surface that faces `direction`: intensity falls off with the cosine of the angle from the axis, and
-    /// is 0 behind the surface (the light of L 4.2.2).
+    /// A small emissive surface that faces `direction`: intensity falls off with the cosine of the angle from the axis,
+    /// and is 0 behind the surface (the light of L 4.2.2).
     Hemispherical {
         /// In the world, in metres.
         position: DVec3,
@@ -92,8 +92,8 @@ impl Light {
         }
     }
 
-    /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional light,
-    /// which reaches everything.
+    /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional
+    /// light, which reaches everything.
     pub fn bounding_sphere(&self) -> Option<(DVec3, f32)> {
         match *self {
             Self::Directional { .. } => None,
@@ -103,9 +103,9 @@ impl Light {
         }
     }
 
-    /// The same light, but ending where the illuminance of its brightest channel has fallen to `cut_off`, if that is nearer
-    /// than its range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0 changes
-    /// nothing, and none changes a directional light, which does not fall off.
+    /// The same light, but ending where the illuminance of its brightest channel has fallen to `cut_off`, if that is
+    /// nearer than its range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0
+    /// changes nothing, and none changes a directional light, which does not fall off.
     pub(crate) fn cut_off_at(mut self, cut_off: f32) -> Self {
         if let Self::Point { intensity, range, .. }
         | Self::Spot { intensity, range, .. }
@@ -186,7 +186,8 @@ fn direction_problem(direction: Vec3) -> Option<&'static str> {
 }
 
 fn color_problem(color: Vec3) -> Option<&'static str> {
-    (!color.is_finite() || color.min_element() < 0.0).then_some("its intensity is negative or not finite")
+    (!color.is_finite() || color.min_element() < 0.0)
+        .then_some("its intensity or illuminance is negative or not finite")
 }
 
 fn position_problem(position: DVec3, range: f32) -> Option<&'static str> {
@@ -213,7 +214,8 @@ mod tests {
 
     use super::*;
 
-    /// The illuminance of a surface that faces the light on its axis: `illuminance_from` in `illumination.wgsl`, in f64.
+    /// The illuminance of a surface that faces the light on its axis: `illuminance_from` in `illumination.wgsl`, in
+    /// f64.
     fn illuminance(intensity: f64, range: f64, distance: f64) -> f64 {
         if distance >= range {
             return 0.0;

@@ -7,11 +7,11 @@ use super::background_queue::{BackgroundQueue, QueuedJob};
 use crate::sync::{Condvar, Mutex};
 use crate::unwind::{JobPanic, catch, discard, emit};
 
-/// A job that runs when no frame needs its worker, and its result. [`Scheduler::background`](super::Scheduler::background) makes
-/// it.
+/// A job that runs when no frame needs its worker, and its result.
+/// [`Scheduler::background`](super::Scheduler::background) makes it.
 ///
-/// Dropping it drops the result, but not the job, which runs nevertheless. If the job panics and nobody waits for it, the panic is
-/// reported to [`tracing`] as an error.
+/// Dropping it drops the result, but not the job, which runs nevertheless, unless the scheduler is dropped before it
+/// has begun. If the job panics and nobody waits for it, the panic is reported to [`tracing`] as an error.
 #[must_use = "dropping it drops the result of the job"]
 pub struct BackgroundJob<T> {
     state: Arc<JobState<T>>,
@@ -39,10 +39,10 @@ impl<T: Send + 'static> BackgroundJob<T> {
 
     /// Returns the result of the job.
     ///
-    /// If the job has not begun, this thread runs it at once, before all jobs that were queued earlier, and removes it from the
-    /// queue. Otherwise this thread blocks until the job has run, and runs no other job meanwhile. It may be called anywhere: in a
-    /// frame's jobs, in background jobs, and on threads that are no workers. A job that waits for itself, directly or through
-    /// others, waits for ever.
+    /// If the job has not begun, this thread runs it at once, before all jobs that were queued earlier, and removes it
+    /// from the queue. Otherwise this thread blocks until the job has run, and runs no other job meanwhile. It may be
+    /// called anywhere: in a frame's jobs, in background jobs, and on threads that are no workers. A job that waits for
+    /// itself, directly or through others, waits for ever.
     ///
     /// # Errors
     /// Returns the [`JobPanic`] if the job panicked.

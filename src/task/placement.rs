@@ -1,10 +1,10 @@
 //! Keeps worker threads off the processor of the thread that calls them, if the system does not.
 //!
-//! A worker that is woken should run beside the thread that wakes it, not on the same processor. Systems look for an idle
-//! processor then. But on some virtual machines every idle processor looks as if the host had taken it away, so the system puts the
-//! worker on the waker's own processor, and the two take turns for a whole frame. The measurement of the wake-up cost finds out
-//! whether a machine does that. If it does, the threads of the scheduler are kept off the processor that the caller runs on, until
-//! a later call comes from another processor.
+//! A worker that is woken should run beside the thread that wakes it, not on the same processor. Systems look for an
+//! idle processor then. But on some virtual machines every idle processor looks as if the host had taken it away, so
+//! the system puts the worker on the waker's own processor, and the two take turns for a whole frame. The measurement
+//! of the wake-up cost finds out whether a machine does that. If it does, the threads of the scheduler are kept off the
+//! processor that the caller runs on, until a later call comes from another processor.
 
 // Miri has no processors to choose from.
 #[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
@@ -47,8 +47,8 @@ mod linux {
             sched_getaffinity(None).ok()
         }
 
-        /// Registers the calling thread, one of the scheduler's, unless the engine has changed its affinity since `before` was
-        /// read.
+        /// Registers the calling thread, one of the scheduler's, unless the engine has changed its affinity since
+        /// `before` was read.
         pub(in crate::task) fn add_current_thread(&self, before: Option<CpuSet>) {
             if let Some(allowed) = before
                 && Self::current_affinity() == before
@@ -62,8 +62,8 @@ mod linux {
             Some(sched_getcpu())
         }
 
-        /// Enables [`avoid_current_processor`](Self::avoid_current_processor), if each thread can have a processor of its own.
-        /// Returns whether it can.
+        /// Enables [`avoid_current_processor`](Self::avoid_current_processor), if each thread can have a processor of
+        /// its own. Returns whether it can.
         pub(in crate::task) fn enable(&self) -> bool {
             let threads = self.threads.lock();
             let is_room = threads.iter().all(|(_, allowed)| threads.len() < allowed.count() as usize);
@@ -82,7 +82,8 @@ mod linux {
             if self.avoided.swap(here, Ordering::Relaxed) != here
                 && let Err(error) = self.avoid(here)
             {
-                // The processors of the machine have changed. That only costs time.
+                // The processors of the machine have changed. From now on the system places the workers, which only
+                // costs time.
                 self.is_enabled.store(false, Ordering::Relaxed);
                 self.restore();
                 emit(|| tracing::debug!(%error, "workers cannot be kept off the processor of their caller"));

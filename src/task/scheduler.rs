@@ -19,21 +19,21 @@ use crate::sync::{Arc, Instant, thread};
 use crate::timeline::Timeline;
 use crate::unwind::{JobPanic, catch, discard};
 
-/// A pool of workers that run jobs: L's Graphics Manager (3.3), as far as it manages threads.
+/// A pool of workers that run jobs: the thread management of the Graphics Manager in L 3.3.
 ///
 /// The thread that calls [`scope`](Self::scope) or [`parallel_for`](Self::parallel_for) is a worker for the length of
 /// the call, so a scheduler of four workers starts three threads. They sleep while there is no work (L 3.3).
 ///
-/// Any number of threads may share a scheduler, but it serves only one thread from outside at a time: the next one waits until the
-/// call of the first has returned. A call inside a job, on any worker, does not wait for other calls. So a call waits for ever if
-/// the call before it waits for it in turn. That happens in three cases:
+/// Any number of threads may share a scheduler, but it serves only one thread from outside at a time: the next one
+/// waits until the call of the first has returned. A call inside a job, on any worker, does not wait for other calls.
+/// So a call waits for ever if the call before it waits for it in turn. That happens in three cases:
 ///
 /// - A body or a job starts a thread that calls the same scheduler, and waits for this thread.
 /// - A job of one scheduler calls a second one, and a job of the second calls the first from a thread of the second.
 /// - Two threads each call one of two schedulers inside a call of the other.
 ///
-/// Dropping the scheduler ends its threads and waits for them, so none of its jobs may wait for the thread that drops it. A
-/// background job may drop the last reference to its own scheduler.
+/// Dropping the scheduler ends its threads and waits for them, so none of its jobs may wait for the thread that drops
+/// it. A background job may drop the last reference to its own scheduler.
 ///
 /// ```
 /// # use drawloom::task::Scheduler;
@@ -61,8 +61,9 @@ impl Scheduler {
         self.shared.workers()
     }
 
-    /// The time from a call of [`Scope::spawn`] until a worker that slept begins the job. It is measured in a few tries while the
-    /// scheduler is built, and is 0 with a single worker. A graph with less work than this runs on the calling thread alone.
+    /// The time from a call of [`Scope::spawn`] until a worker that slept begins the job. It is measured in a few tries
+    /// while the scheduler is built, and is 0 with a single worker. A graph with less work than this runs on the
+    /// calling thread alone.
     pub fn wake_up_cost(&self) -> Duration {
         self.shared.wake_up_cost()
     }
@@ -72,26 +73,26 @@ impl Scheduler {
         self.shared.timeline()
     }
 
-    /// Calls `body` with a scope, and returns its result when all jobs of the scope have run and have been dropped. Jobs may borrow
-    /// anything that outlives the call.
+    /// Calls `body` with a scope, and returns its result when all jobs of the scope have run and have been dropped.
+    /// Jobs may borrow anything that outlives the call.
     ///
-    /// While the thread waits, it runs jobs. If it was called inside a job, it runs only jobs of this scope and of scopes, loops
-    /// and graphs inside of it.
+    /// While the thread waits, it runs jobs. If it was called inside a job, it runs only jobs of this scope and of
+    /// scopes, loops and graphs inside of it.
     ///
     /// # Errors
-    /// Returns the first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the scheduler works as
-    /// before.
+    /// Returns the first [`JobPanic`] if `body` or a job panicked. The other jobs have run nevertheless, and the
+    /// scheduler works as before.
     pub fn scope<'scope, R>(&self, body: impl FnOnce(&Scope<'scope>) -> R) -> Result<R, JobPanic> {
         self.with_worker(|worker| scope::open(worker, body))
     }
 
-    /// Calls `body` with ranges that cover each index of `0..length` once, on as many workers as there is work for. Returns when
-    /// all calls have returned.
+    /// Calls `body` with ranges that cover each index of `0..length` once, on as many workers as there is work for.
+    /// Returns when all calls have returned.
     ///
-    /// The ranges are `chunk` indices long; the last one may be shorter. A chunk of 0 counts as 1, and a `length` of more than
-    /// `isize::MAX` may get chunks of up to 3. With a single worker or a single chunk all calls happen on the calling thread. The
-    /// same happens if the first chunks show that the loop is not worth waking a worker. A worker that waits inside `body`, for a
-    /// scope or a loop of its own, does not enter `body` again for this loop.
+    /// The ranges are `chunk` indices long; the last one may be shorter. A chunk of 0 counts as 1, and a `length` of
+    /// more than `isize::MAX` may get chunks of up to 3. With a single worker or a single chunk all calls happen on the
+    /// calling thread. The same happens if the first chunks show that the loop is not worth waking a worker. A worker
+    /// that waits inside `body`, for a scope or a loop of its own, does not enter `body` again for this loop.
     ///
     /// # Errors
     /// Returns the first [`JobPanic`] if `body` panicked. Chunks that had not begun by then are skipped.
@@ -108,25 +109,25 @@ impl Scheduler {
         self.with_worker(|worker| parallel_loop.run(worker))
     }
 
-    /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a worker other
-    /// than 0 that has nothing else to do, in [`run_background`](Self::run_background), or in [`BackgroundJob::wait`]. With a
-    /// single worker only the last two run it.
+    /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a
+    /// worker other than 0 that has nothing else to do, in [`run_background`](Self::run_background), or in
+    /// [`BackgroundJob::wait`]. With a single worker only the last two run it.
     ///
-    /// The scopes and loops that it opens on this scheduler are background work as well. If a thread runs the job by waiting for
-    /// it, they are part of that thread's work instead. Jobs that have not begun when the scheduler is dropped run only if a
-    /// thread waits for them.
+    /// The scopes and loops that it opens on this scheduler are background work as well. If a thread runs the job by
+    /// waiting for it, they are part of that thread's work instead. Jobs that have not begun when the scheduler is
+    /// dropped run only if a thread waits for them.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let job = BackgroundJob::queued(self.shared.background(), job);
         self.shared.sleep().wake_despite_searchers(Priority::Background);
         job
     }
 
-    /// Runs background jobs on the calling thread, the oldest first, and returns how many. It begins no job after `budget` has
-    /// passed, so it returns late by the length of one job at most. While the scheduler serves another thread from outside, it
-    /// runs none.
+    /// Runs background jobs on the calling thread, the oldest first, and returns how many. It begins no job after
+    /// `budget` has passed, so it returns late by the length of one job at most. While the scheduler serves another
+    /// thread from outside, it runs none.
     ///
-    /// Call it between two frames. Inside a job it runs background jobs on top of that job, as if the job had called them: they
-    /// must not wait for anything that the job is part of.
+    /// Call it between two frames. Inside a job it runs background jobs on top of that job, as if the job had called
+    /// them: they must not wait for anything that the job is part of.
     pub fn run_background(&self, budget: Duration) -> usize {
         let start = Instant::now();
         let work = |worker: &Worker| worker.work_in_background(|| start.elapsed() >= budget);
@@ -148,8 +149,8 @@ impl Scheduler {
         &self.shared
     }
 
-    /// Calls `body` with the worker that this thread is. If it is none, the thread takes the caller slot for the length of the
-    /// call. `body` must not unwind.
+    /// Calls `body` with the worker that this thread is. If it is none, the thread takes the caller slot for the length
+    /// of the call. `body` must not unwind.
     pub(crate) fn with_worker<R>(&self, body: impl FnOnce(&Worker) -> R) -> R {
         current_worker::with_current(&self.shared, |current| match current {
             Some(worker) => body(worker),
@@ -171,13 +172,13 @@ impl Drop for Scheduler {
     fn drop(&mut self) {
         self.shared.shut_down();
         for thread in mem::take(&mut self.threads) {
-            // A background job may drop the last reference to its own scheduler. Its thread cannot wait for itself, and ends after
-            // the job.
+            // A background job may drop the last reference to its own scheduler. Its thread cannot wait for itself, and
+            // ends after the job.
             if thread.thread().id() == thread::current().id() {
                 continue;
             }
-            // Panics of jobs have been caught. What remains is the panic of a destructor of the engine's, such as that of a
-            // thread-local.
+            // Panics of jobs have been caught. What remains is the panic of a destructor of the engine's, such as that
+            // of a thread-local.
             if let Err(payload) = thread.join() {
                 discard(payload);
             }
@@ -185,8 +186,8 @@ impl Drop for Scheduler {
     }
 }
 
-/// Shows the queued jobs of each worker, its mailbox, and what it sleeps for, to investigate a hang. Any thread may print it at
-/// any time; it waits for no job.
+/// Shows the queued jobs of each worker, its mailbox, and what it sleeps for, to investigate a hang. Any thread may
+/// print it at any time; it waits for no job.
 impl fmt::Debug for Scheduler {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shared = &self.shared;

@@ -7,7 +7,8 @@ use super::placement::Placement;
 use super::scheduler::Scheduler;
 use crate::sync::{Instant, spin_loop, thread};
 
-/// How many wake-ups are measured. Other work on the machine makes some longer, never shorter, so the second shortest counts.
+/// How many wake-ups are measured. Other work on the machine makes some longer, never shorter, so a short one counts:
+/// the second shortest, because a single one may be short by chance.
 const TRIES: usize = 5;
 
 /// A wake-up that takes longer is not counted: the machine is busy, and it says nothing about the cost.
@@ -22,8 +23,8 @@ const DEFAULT: Duration = Duration::from_micros(50);
 /// How long a worker sleeps before it is woken, so that its processor sleeps too.
 const SLEEP_BEFORE: Duration = Duration::from_micros(20);
 
-/// Measures the time from the spawning of a job until a worker that slept begins it. If a worker begins on the processor of the
-/// spawning thread even once, workers are kept off there from then on, if they `may_move`.
+/// Measures the time from the spawning of a job until a worker that slept begins it. If a worker begins on the
+/// processor of the spawning thread even once, workers are kept off there from then on, if they `may_move`.
 pub(super) fn measure(scheduler: &Scheduler, may_move: bool) -> Duration {
     // Under a model checker or an interpreter, time does not pass as usual.
     if scheduler.workers() == 1 || cfg!(any(drawloom_loom, drawloom_shuttle, miri)) {

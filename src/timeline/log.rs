@@ -16,7 +16,7 @@ pub struct Log {
     pub frames: Vec<Frame>,
     /// The runs of schedules, by when they ended.
     pub runs: Vec<Run>,
-    /// What threads called their work, by when it ended.
+    /// The named stretches of threads' work, by when they ended.
     pub spans: Vec<Span>,
     /// The readings of counters, oldest first.
     pub counters: Vec<Counter>,
@@ -32,7 +32,7 @@ pub struct Log {
 /// What is recorded of a worker, besides the chunks it ran.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WorkerLog {
-    /// The name of its thread. Worker 0 is called after its role, as any thread may call the scheduler.
+    /// The name of its thread; for worker 0 `caller`, as any thread may call the scheduler.
     pub name: String,
     /// The intervals in which it had nothing to do, oldest first.
     pub idle: Vec<Idle>,

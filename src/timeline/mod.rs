@@ -1,8 +1,8 @@
 //! Records what ran when on which worker.
 //!
-//! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and can be switched on and off while the scheduler runs.
-//! Each worker writes to its own ring buffer, so no worker waits for another. A [`Log`] takes out what was recorded as plain
-//! data: frames, runs of schedules, and every chunk of each run.
+//! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and can be switched on and off while the
+//! scheduler runs. Each worker writes to its own ring buffer, so no worker waits for another. [`Timeline::take`] takes
+//! out what was recorded, as a [`Log`]: plain data: frames, runs of schedules, and every chunk of each run.
 //!
 //! ```
 //! use drawloom::graph::{Closure, FrameGraph};
@@ -26,10 +26,10 @@
 //!
 //! # What it costs
 //!
-//! While the timeline is off: one read of a flag for each run, and for each worker that falls asleep. While it is on: one reading
-//! of the clock for each chunk and one for each node (on x86-64, of the processor's counter), and 48 bytes per chunk in a
-//! ring buffer of [fixed size](crate::task::SchedulerBuilder::timeline_capacity). Events that do not fit are dropped and
-//! counted.
+//! While the timeline is off: one read of a flag for each run, and for each worker that falls asleep. While it is on:
+//! one reading of the clock for each chunk and one for each node (on x86-64, of the processor's counter), and 48 bytes
+//! per chunk in a ring buffer of [fixed size](crate::task::SchedulerBuilder::timeline_capacity). Events that do not fit
+//! are dropped and counted.
 
 mod chunk_timer;
 mod clock;

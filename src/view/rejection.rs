@@ -54,7 +54,7 @@ pub struct Rejection {
 pub enum RejectionReason {
     /// An object's position, orientation or scale is not finite, or its orientation is not a unit quaternion.
     InvalidTransform,
-    /// An object's bounds are not finite or negative, or too large once scaled.
+    /// An object's bounds are not finite, have a negative radius, or are too large once scaled.
     InvalidBounds,
     /// An object is farther from the world's origin than
     /// [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).

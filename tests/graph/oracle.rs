@@ -140,7 +140,7 @@ impl GraphModel {
     }
 }
 
-/// The consequences of the rules for a graph.
+/// What the rules of `FrameGraph` imply for a graph, by nodes and resources.
 pub struct Oracle {
     /// Whether a node depends on another one's write to a resource: `[resource][before][after]`.
     pub data: Vec<Relation>,

@@ -20,10 +20,10 @@ const _: () = assert!(MAX_LENGTH <= size_of::<RenderCommand>());
 /// if explicit  0        | state | material length | mesh length
 /// ```
 ///
-/// "Explicit": mesh, material or state differ from the prediction, and follow. Lengths are those of the differences, in bytes.
-/// Key length n > 8: n - 8 bytes of the difference, shifted left by 24 bits, because keys of blended commands end in 30 zeros.
-/// Object length 5: no bytes, and the same difference as last time, because copies of an object often have indices at equal
-/// distances.
+/// "Explicit": mesh, material or state differ from the prediction, and follow. Lengths are those of the differences, in
+/// bytes. Key length n from 9 to 13: n − 8 bytes, which are the difference shifted right by 24 bits, because keys of
+/// blended commands end in 30 zeros. Object length 5: no bytes, and the same difference as last time, because copies of
+/// an object often have indices at equal distances.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coder {
     last: RenderCommand,
@@ -52,7 +52,8 @@ impl Default for Coder {
 }
 
 impl Coder {
-    /// Writes a command to `bytes` at `start`, and returns its end. It may overwrite up to [`SLACK`] bytes after the end.
+    /// Writes a command to `bytes` at `start`, and returns its end. It may overwrite up to [`SLACK`] bytes after the
+    /// end.
     #[inline]
     pub(super) fn encode(&mut self, command: &RenderCommand, bytes: &mut [u8], start: usize) -> usize {
         let mut end = start + 1;

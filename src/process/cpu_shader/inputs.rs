@@ -115,7 +115,7 @@ pub struct ShaderObject<R> {
 pub struct VertexInput<R> {
     /// In object space.
     pub position: Vector3<R>,
-    /// In object space.
+    /// In object space, of any length; 0 for the geometric normal of the triangle.
     pub normal: Vector3<R>,
     /// Texture coordinates.
     pub uv: Vector2<R>,

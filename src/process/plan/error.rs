@@ -91,7 +91,7 @@ pub enum ProcessError {
     /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
     /// one by commands of its own.
     #[error(
-        "process {process:?} declares target {target:?} for a raw pass and draws without one, or the other way round"
+        "process {process:?} declares target {target:?} with an access of raw passes but draws no raw pass, or draws one with an access of drawn passes"
     )]
     Misdeclared {
         /// The process.

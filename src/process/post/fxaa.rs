@@ -19,8 +19,7 @@ use crate::process::{FullScreen, RenderProcess};
 /// [`Format::Rgba8Srgb`](crate::process::Format).
 ///
 /// Brightness is perceived brightness, the square root of luminance, from 0 to 1. Settings are clamped to 0 to 1; NaN
-/// counts as
-/// 0.
+/// counts as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fxaa {
     /// The least contrast of an edge, as a fraction of the greatest brightness among a pixel and its four neighbours.

@@ -53,7 +53,9 @@ use crate::quality::Quality;
 /// assert_eq!(step.process("mapped", "picture").name(), "negative");
 /// ```
 pub trait PostStep: Send + Sync {
-    /// The process of this step, which reads the target `source` and draws the target `target`.
+    /// The process of this step, which reads the target `source` and draws the target `target`. It is called again for
+    /// every plan, and with two empty names where only the process's name is asked for (see `Deferred::leave_out`), so
+    /// it should do no more than make the process.
     fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess>;
 
     /// The step for frames of a quality; `None`, the default, for this step itself.

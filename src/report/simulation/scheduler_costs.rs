@@ -64,8 +64,8 @@ impl SchedulerCosts {
         recording: Duration::ZERO,
     };
 
-    /// Measures them on this machine, which takes some 20 ms. It starts a scheduler of two workers for that, and stops
-    /// it.
+    /// Measures them on this machine, which takes some 20 ms. It starts schedulers of one and of two workers for that,
+    /// and stops it.
     ///
     /// # Errors
     /// As [`Scheduler::new`].
