@@ -90,12 +90,13 @@ impl<B: Backend> Submitter<B> {
 
 /// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes
 /// alternate with those of other views.
-fn in_submission_order<T>(queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
-    let mut remaining: Vec<_> = queues.into_iter().map(|queue| queue.passes.into_iter()).collect();
+fn in_submission_order<T>(mut queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
     let passes_by_view = order.chunk_by(|one, next| one.view_index == next.view_index);
     let take = |passes: &[Pass]| {
         let view = passes[0].view_index;
-        ViewQueue { view, passes: remaining[view].by_ref().take(passes.len()).collect() }
+        // A whole queue is moved, not copied: nothing is left to split off.
+        let later = queues[view].passes.split_off(passes.len());
+        ViewQueue { view, passes: std::mem::replace(&mut queues[view].passes, later) }
     };
     passes_by_view.map(take).collect()
 }
