@@ -15,43 +15,26 @@ use crate::paths::{Leaf, expand, from_root};
 use crate::sources::{Module, Source, modules_without_tests, read_crate};
 use crate::tokens::{is, is_for_tests, item, trees_of};
 
-/// The modules in which circles remain. Take a module off the list when its last circle is resolved.
-#[rustfmt::skip] // One a line, so that two changes do not conflict.
-const KNOWN_CIRCLES: &[&str] = &[
-];
-
 /// The maximum number of re-exports that are followed to the definition of one item.
 const MAX_REEXPORTS: usize = 8;
 
 #[test]
 fn files_do_not_import_each_other_in_circles() {
-    let problems = wrong_circles(&read_crate(), KNOWN_CIRCLES);
+    let problems = circles(&read_crate());
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
-/// The circles in modules that are not known to have any, and the known modules that have none.
-fn wrong_circles(sources: &[Source], known: &[&str]) -> Vec<String> {
-    let circles = circles(sources);
-    let new = circles.iter().filter(|(module, _)| !known.contains(&module.as_str()));
-    let new = new.flat_map(|(_, circles)| circles.iter().cloned());
-    let resolved = known.iter().filter(|module| !circles.contains_key(**module));
-    let resolved =
-        resolved.map(|module| format!("{module} has no circle any more: take it off the list KNOWN_CIRCLES"));
-    new.chain(resolved).collect()
-}
-
-/// The circles of each top-level module, in words. Where circles share files, only a shortest one is described.
-fn circles(sources: &[Source]) -> BTreeMap<String, Vec<String>> {
+/// The circles of all modules, in words. Where circles share files, only a shortest one is described.
+fn circles(sources: &[Source]) -> Vec<String> {
     let imports = Imports::new(modules_without_tests(sources));
-    let mut circles = BTreeMap::<_, Vec<_>>::new();
+    let mut circles = Vec::new();
     let mut described = BTreeSet::new();
     let mut shortest: Vec<_> = (0..imports.modules.len()).filter_map(|file| imports.circle_through(file)).collect();
     shortest.sort_by_key(Vec::len);
     for circle in shortest {
         let connected = imports.mutual(circle[0]);
         if described.insert(connected.clone()) {
-            let module = imports.modules[circle[0]].path[0].clone();
-            circles.entry(module).or_default().push(imports.describe(&circle, connected.len()));
+            circles.push(imports.describe(&circle, connected.len()));
         }
     }
     circles
@@ -259,7 +242,7 @@ fn words_outside_imports(trees: &[TokenTree], words: &mut BTreeSet<String>) {
 /// The circles of a crate with these files.
 fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let sources: Vec<_> = files.iter().map(|(path, text)| Source::new(path, text)).collect();
-    wrong_circles(&sources, &[])
+    circles(&sources)
 }
 
 #[test]
@@ -323,14 +306,4 @@ fn imports_without_a_circle_are_allowed() {
         let problems = circles_of(&[root, ("low/a.rs", a), ("low/b.rs", b), tests]);
         assert_eq!(problems, [""; 0], "{a}\n{b}");
     }
-}
-
-#[test]
-fn a_known_circle_must_leave_the_list_when_it_is_resolved() {
-    let sources = [("a", "use super::b;"), ("b", "use super::a;")];
-    let sources = sources.map(|(name, text)| Source::new(&format!("low/{name}.rs"), text));
-    let sources: Vec<_> = sources.into_iter().chain([Source::new("low/mod.rs", "mod a; mod b;")]).collect();
-    assert_eq!(wrong_circles(&sources, &["low"]), [""; 0]);
-    let problem = "high has no circle any more: take it off the list KNOWN_CIRCLES";
-    assert_eq!(wrong_circles(&sources, &["high", "low"]), [problem]);
 }
