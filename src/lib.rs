@@ -73,6 +73,7 @@
 mod sync;
 mod unwind;
 pub mod timeline;
+mod tuning;
 pub mod task;
 #[doc(hidden)]
 pub mod chunked_array;

@@ -1,11 +1,13 @@
 //! The interface between frames and devices.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::task::Worker;
+use crate::timeline::{Choice, Labels};
 use crate::view::ObjectTable;
 
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
@@ -98,6 +100,13 @@ pub trait Backend: Send + Sync + 'static {
         pass: &PassRequest<'_>,
         parts: &mut Vec<Self::Part>,
     ) -> Result<Self::Commands, BackendError>;
+
+    /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or made none by
+    /// measured cost. `labels` are those of the pass.
+    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<Choice> {
+        let _ = (frame, pass, labels);
+        None
+    }
 
     /// Submits a frame's queues one after the other. Called only on the device thread.
     ///

@@ -1,6 +1,6 @@
 //! What the jobs of a frame share.
 
-use super::cost_model::{CostModel, NodeCosts};
+use super::cost_model::CostModel;
 use super::granularity::Granularity;
 use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
@@ -61,8 +61,8 @@ impl<B: Backend> FrameContext<'_, B> {
     }
 
     /// The number of a node's `width` items that make a job.
-    pub(super) fn items_per_job(&self, costs: NodeCosts, width: usize, units_per_item: usize) -> usize {
-        let by_cost = || self.costs.items_per_job(costs, width, self.workers);
+    pub(super) fn items_per_job(&self, node: usize, width: usize, units_per_item: usize) -> usize {
+        let by_cost = || self.costs.items_per_job(node, width, self.workers);
         self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
     }
 }

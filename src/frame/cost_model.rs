@@ -1,47 +1,52 @@
 //! The cost model: what the items of each stage cost, measured every frame, and the job size that follows.
 
-use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use crate::tuning::{Estimate, Filter, Hysteresis};
 use crate::view::ObjectTable;
 
 /// What the items of a frame's stages cost. The nodes of one cost kind share an estimate; each node has its own width, and so a job
-/// size of its own.
+/// size of its own. Nodes are counted in the order of the stage graph.
 #[derive(Debug, Default)]
 pub(super) struct CostModel {
     /// By cost kind.
-    estimates: Vec<Estimate>,
-    /// For each node, the job size in items that was chosen last; 0 before the first choice.
-    chosen: Vec<AtomicUsize>,
+    costs: Vec<ItemCost>,
+    /// By node.
+    sizes: Vec<NodeSize>,
 }
 
-/// Where the cost model keeps what belongs to a node.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NodeCosts {
-    /// The index of its cost kind.
-    pub(super) kind: usize,
-    /// The index of the node.
-    pub(super) node: usize,
-}
-
-/// The estimated cost of an item.
+/// The cost of one kind of item.
 #[derive(Debug, Default)]
-struct Estimate {
-    /// Nanoseconds as the bits of an f32: an exponential average over recent frames. 0 before the first.
-    per_item: AtomicU32,
-    /// The number of frames in the average, up to [`AVERAGED_FRAMES`].
-    frames: u32,
+struct ItemCost {
+    /// Nanoseconds per item.
+    estimate: Estimate,
     /// The samples of the current frame: nanoseconds and items.
     time: AtomicU64,
     items: AtomicU64,
 }
 
-/// The time constant of the average in frames.
-const AVERAGED_FRAMES: u32 = 6;
+/// The job size of a node.
+#[derive(Debug, Default)]
+struct NodeSize {
+    /// The index of its cost kind.
+    kind: usize,
+    /// The number of its items in the current frame; 0 if it was not asked for.
+    width: AtomicUsize,
+    /// The job size in items that was chosen last; 0 before the first choice.
+    chosen: AtomicUsize,
+}
 
-/// A frame counts as at most this multiple of the average: now and then the system preempts a worker, which says nothing about the
-/// next frame.
-const OUTLIER_LIMIT: f32 = 2.0;
+/// A node's job size in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ChosenSize {
+    pub(super) node: usize,
+    pub(super) items: usize,
+    pub(super) items_per_job: usize,
+    pub(super) nanoseconds_per_item: Option<f32>,
+}
+
+const FILTER: Filter = Filter::frequent(6.0);
 
 /// Work that is worth a second job: more than it costs another worker to take the job and to fetch what the job reads into its
 /// caches.
@@ -54,21 +59,22 @@ const JOBS_PER_WORKER: f32 = 4.0;
 const MIN_JOB: Duration = Duration::from_micros(6);
 const MAX_JOB: Duration = Duration::from_micros(60);
 
-/// Hysteresis: a job size stays until it is wrong by this factor.
-const HYSTERESIS: f32 = 1.6;
+/// A job that is too long or too short by less costs next to nothing.
+const HYSTERESIS: Hysteresis = Hysteresis::new(1.6);
 
 impl CostModel {
-    /// An empty model for `kinds` cost kinds and `nodes` nodes.
-    pub(super) fn new(kinds: usize, nodes: usize) -> Self {
-        let mut model = Self::default();
-        model.estimates.resize_with(kinds, Estimate::default);
-        model.chosen.resize_with(nodes, AtomicUsize::default);
-        model
+    /// An empty model. For each node the index of its cost kind.
+    pub(super) fn new(kind_of_node: &[usize]) -> Self {
+        let kinds = kind_of_node.iter().max().map_or(0, |last| last + 1);
+        Self {
+            costs: (0..kinds).map(|_| ItemCost::default()).collect(),
+            sizes: kind_of_node.iter().map(|&kind| NodeSize { kind, ..NodeSize::default() }).collect(),
+        }
     }
 
-    /// Adds a sample: the time of a job over `items` items.
-    pub(super) fn add_sample(&self, costs: NodeCosts, items: usize, took: Duration) {
-        let cost = &self.estimates[costs.kind];
+    /// Adds a sample: the time of a job over `items` items of a node.
+    pub(super) fn add_sample(&self, node: usize, items: usize, took: Duration) {
+        let cost = &self.costs[self.sizes[node].kind];
         // Relaxed, here and below: sums, read after the run.
         cost.time.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
         cost.items.fetch_add(items as u64, Ordering::Relaxed);
@@ -76,26 +82,17 @@ impl CostModel {
 
     /// Updates the estimates with the samples of a frame.
     pub(super) fn update(&mut self) {
-        for cost in &mut self.estimates {
+        for cost in &mut self.costs {
             let (time, items) = (std::mem::take(cost.time.get_mut()), std::mem::take(cost.items.get_mut()));
-            if items == 0 {
-                continue;
+            if items > 0 {
+                cost.estimate.add((time as f32 / items as f32).max(f32::MIN_POSITIVE), FILTER);
             }
-            let latest = (time as f32 / items as f32).max(f32::MIN_POSITIVE);
-            let average = f32::from_bits(*cost.per_item.get_mut());
-            let average = match cost.frames {
-                // The first frame makes buffers and fills caches, so the second replaces it.
-                0 | 1 => latest,
-                frames => average + (latest.min(average * OUTLIER_LIMIT) - average) / frames as f32,
-            };
-            cost.frames = (cost.frames + 1).min(AVERAGED_FRAMES);
-            *cost.per_item.get_mut() = average.to_bits();
         }
     }
 
     /// Discards the samples of a frame that failed.
     pub(super) fn discard_frame(&mut self) {
-        for cost in &mut self.estimates {
+        for cost in &mut self.costs {
             *cost.time.get_mut() = 0;
             *cost.items.get_mut() = 0;
         }
@@ -105,32 +102,42 @@ impl CostModel {
     ///
     /// One job is best for little work, and for a single worker. Otherwise each worker gets several jobs, none shorter than
     /// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping.
-    pub(super) fn items_per_job(&self, costs: NodeCosts, width: usize, workers: usize) -> usize {
-        let NodeCosts { kind, node } = costs;
-        let per_item = f32::from_bits(self.estimates[kind].per_item.load(Ordering::Relaxed));
-        if workers == 1 {
-            return usize::MAX;
-        }
-        if per_item == 0.0 {
-            return FIRST_JOB_ITEMS;
-        }
-        let work = per_item * width as f32;
-        let nanoseconds = |time: Duration| time.as_nanos() as f32;
-        let chosen = self.chosen[node].load(Ordering::Relaxed);
-        let is_cut = chosen != 0 && chosen != usize::MAX;
-        let threshold = nanoseconds(PARALLEL_THRESHOLD) * if is_cut { 1.0 } else { HYSTERESIS };
-        let best = if work < threshold {
-            usize::MAX
-        } else {
-            let job = work / (JOBS_PER_WORKER * workers as f32);
-            let items = job.clamp(nanoseconds(MIN_JOB), nanoseconds(MAX_JOB)) / per_item;
-            if is_cut && items < chosen as f32 * HYSTERESIS && items * HYSTERESIS > chosen as f32 {
-                return chosen;
-            }
-            whole_blocks(items as usize)
+    pub(super) fn items_per_job(&self, node: usize, width: usize, workers: usize) -> usize {
+        let size = &self.sizes[node];
+        let previous = Some(size.chosen.load(Ordering::Relaxed)).filter(|&items| items != 0 && items != usize::MAX);
+        let best = match self.costs[size.kind].estimate.get() {
+            _ if workers == 1 => usize::MAX,
+            None => return FIRST_JOB_ITEMS,
+            Some(per_item) => best_size(per_item, width, workers, previous),
         };
-        self.chosen[node].store(best, Ordering::Relaxed);
+        size.width.store(width, Ordering::Relaxed);
+        size.chosen.store(best, Ordering::Relaxed);
         best
+    }
+
+    /// Takes out the job sizes of the latest frame. Nodes that did not ask for one are left out.
+    pub(super) fn take_sizes(&mut self) -> impl Iterator<Item = ChosenSize> {
+        self.sizes.iter_mut().enumerate().filter_map(|(node, size)| {
+            let items = std::mem::take(size.width.get_mut());
+            let items_per_job = (*size.chosen.get_mut()).min(items);
+            let nanoseconds_per_item = self.costs[size.kind].estimate.get();
+            (items > 0).then_some(ChosenSize { node, items, items_per_job, nanoseconds_per_item })
+        })
+    }
+}
+
+/// The best number of items per job, if the latest choice was to have jobs of `previous` items, or a single job.
+fn best_size(per_item: f32, width: usize, workers: usize, previous: Option<usize>) -> usize {
+    let nanoseconds = |time: Duration| time.as_nanos() as f32;
+    let work = per_item * width as f32;
+    if !HYSTERESIS.is_above(work, nanoseconds(PARALLEL_THRESHOLD), previous.is_some()) {
+        return usize::MAX;
+    }
+    let job = work / (JOBS_PER_WORKER * workers as f32);
+    let items = job.clamp(nanoseconds(MIN_JOB), nanoseconds(MAX_JOB)) / per_item;
+    match previous {
+        Some(previous) if HYSTERESIS.keeps(previous as f32, items) => previous,
+        _ => whole_blocks(items as usize),
     }
 }
 
@@ -145,8 +152,9 @@ fn whole_blocks(items: usize) -> usize {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
+    use crate::tuning::signal::{Requirements, check_controller};
 
-    const NODE: NodeCosts = NodeCosts { kind: 0, node: 0 };
+    const NODE: usize = 0;
 
     /// Runs a frame of one node whose items take `per_item` nanoseconds, and returns the job size.
     fn frame(model: &mut CostModel, width: usize, per_item: u64) -> usize {
@@ -169,7 +177,7 @@ mod tests {
     #[test]
     fn a_job_size_settles_within_thirty_frames_and_stays() {
         for (width, per_item) in [(10, 3), (1_000, 5), (40_000, 3), (1_000_000, 20), (64, 2_000), (7, 300_000)] {
-            let mut model = CostModel::new(1, 1);
+            let mut model = CostModel::new(&[0]);
             // The first frame runs with cold caches.
             frame(&mut model, width, per_item * 20);
             frames(29, &mut model, width, per_item);
@@ -193,8 +201,23 @@ mod tests {
     }
 
     #[test]
+    fn it_settles_does_not_flap_and_recovers() {
+        let requirements = Requirements { settles_within: 60, max_wrong: 0, max_changes: 2 };
+        let nanoseconds = |is_after| if is_after { 400.0 } else { 20.0 };
+        check_controller(
+            &requirements,
+            || CostModel::new(&[0]),
+            |model, is_after, signal| frame(model, 10_000, signal.sample(nanoseconds(is_after)) as u64),
+            |&items, is_after| {
+                let job = nanoseconds(is_after) * items as f32;
+                items <= 10_000 / 4 && (3_000.0..120_000.0).contains(&job)
+            },
+        );
+    }
+
+    #[test]
     fn the_job_size_follows_a_change_of_scene() {
-        let mut model = CostModel::new(1, 1);
+        let mut model = CostModel::new(&[0]);
         frames(30, &mut model, 10_000, 4);
         let before = frame(&mut model, 10_000, 4);
         frames(30, &mut model, 10_000, 400);
@@ -208,7 +231,7 @@ mod tests {
 
     #[test]
     fn work_near_the_parallel_threshold_does_not_flap() {
-        let mut model = CostModel::new(1, 1);
+        let mut model = CostModel::new(&[0]);
         let width_of = |nanoseconds: u128| (nanoseconds / 10) as usize;
         let threshold = PARALLEL_THRESHOLD.as_nanos();
         let chosen: Vec<_> =
@@ -218,7 +241,7 @@ mod tests {
 
     #[test]
     fn one_worker_has_one_job() {
-        let model = CostModel::new(1, 1);
+        let model = CostModel::new(&[0]);
         model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
         assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
     }

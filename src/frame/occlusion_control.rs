@@ -1,20 +1,39 @@
 //! Whether a view tests for occlusion, and what may occlude there.
 
+use std::sync::Arc;
+
 use super::occluders::occluders;
-use super::occlusion_tuner::OcclusionTuner;
 use super::tables::FrameTables;
 use crate::command::Selection;
 use crate::process::{Draws, FramePlan, Pass};
+use crate::timeline::{Alternative, Choice, Labels};
+use crate::tuning::{CostSample, Tuner};
 use crate::view::RenderView;
 
-/// Whether a view tests for occlusion, and what may occlude there.
+/// Whether a view tests for occlusion, and what may occlude there. The view tries frames with the test and frames without it, and
+/// keeps what is cheaper. The measure is the thread time of the test and of drawing what is left, divided by the number of objects
+/// in the frustum. The picture is the same either way.
 #[derive(Clone, Debug)]
 pub(super) struct OcclusionControl {
     /// The objects that may occlude others; `None` where the view cannot test for occlusion.
     pub(super) occluders: Option<Vec<Selection>>,
-    /// Whether the test is worth its time.
-    pub(super) tuner: OcclusionTuner,
+    tuner: Tuner,
+    /// The number of frames that were measured.
+    frames: u64,
+    /// The alternative of the next frame, and whether it is a trial.
+    chosen: usize,
+    is_trial: bool,
+    /// The alternative of the frame before.
+    previous: Option<usize>,
 }
+
+/// The alternatives, by index.
+const WITH_TEST: usize = 0;
+const WITHOUT_TEST: usize = 1;
+
+/// The longest pauses between two trials in frames. A trial without the test is the slow one where the test is worth its time, so
+/// it is rare. A trial with it is cheap, and comes soon after the camera has moved behind a wall.
+const MAX_PAUSES: [u64; 2] = [64, 512];
 
 impl OcclusionControl {
     /// The control of a view, by index, in a frame with these passes. `is_enabled` is the quality's setting.
@@ -26,7 +45,7 @@ impl OcclusionControl {
         view: (usize, &RenderView),
     ) -> Self {
         let occluders = is_enabled.then(|| occluders(plan, draws, passes, view)).flatten();
-        Self { occluders, tuner: OcclusionTuner::default() }
+        Self { occluders, tuner: Tuner::new(MAX_PAUSES), frames: 0, chosen: WITH_TEST, is_trial: false, previous: None }
     }
 
     /// Whether the view can test for occlusion.
@@ -36,14 +55,117 @@ impl OcclusionControl {
 
     /// Whether the view tests for occlusion in the next frame.
     pub(super) fn is_on(&self) -> bool {
-        self.is_possible() && self.tuner.is_on()
+        self.is_possible() && self.chosen == WITH_TEST
+    }
+
+    /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None` where the view
+    /// cannot test for occlusion.
+    fn choice(&self, labels: &Arc<Labels>) -> Option<Choice> {
+        let alternative = |(name, nanoseconds)| Alternative { name, nanoseconds };
+        self.is_possible().then(|| Choice {
+            subject: "occlusion test",
+            labels: Arc::clone(labels),
+            alternatives: ["on", "off"].into_iter().zip(self.tuner.costs()).map(alternative).collect(),
+            chosen: self.chosen,
+            is_trial: self.is_trial,
+            unit: "object",
+        })
+    }
+
+    /// Reports the thread time of the frame, which had `objects` in the view's frustum and tested them or not, and chooses for the
+    /// next frame.
+    fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
+        let used = if has_tested { WITH_TEST } else { WITHOUT_TEST };
+        let is_warm = self.previous == Some(used);
+        self.tuner.report(self.frames, used, CostSample { nanoseconds: nanoseconds as f64, units: objects, is_warm });
+        self.previous = Some(used);
+        self.frames += 1;
+        (self.chosen, self.is_trial) = self.tuner.choose(self.frames, may_try, |_, _| true);
     }
 }
 
-/// Updates the tuner of each view with the times of a frame that was recorded.
-pub(super) fn update_occlusion_tuners(controls: &mut [OcclusionControl], tables: &FrameTables) {
+/// The choices for a frame that was recorded, of views that have these labels.
+pub(super) fn occlusion_choices<'a>(
+    controls: &'a [OcclusionControl],
+    labels: &'a [Arc<Labels>],
+) -> impl Iterator<Item = Choice> + 'a {
+    controls.iter().zip(labels).filter_map(|(control, labels)| control.choice(labels))
+}
+
+/// Updates the control of each view with the times of a frame that was recorded.
+pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &FrameTables) {
+    let mut may_try = true;
     for (view, control) in controls.iter_mut().enumerate().filter(|(_, control)| control.is_possible()) {
         let occlusion = &tables.occlusion[view];
-        control.tuner.update(occlusion.nanoseconds(), tables.visible[view].count() + occlusion.hidden());
+        let objects = tables.visible[view].count() + occlusion.hidden();
+        control.update(occlusion.nanoseconds(), objects, occlusion.is_on(), &mut may_try);
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::tuning::signal::{Requirements, Signal, check_controller};
+
+    fn control() -> OcclusionControl {
+        OcclusionControl {
+            occluders: Some(Vec::new()),
+            tuner: Tuner::new(MAX_PAUSES),
+            frames: 0,
+            chosen: WITH_TEST,
+            is_trial: false,
+            previous: None,
+        }
+    }
+
+    /// Runs a frame that takes these times an object with and without the test, and returns whether it was with.
+    fn frame(control: &mut OcclusionControl, [with, without]: [f32; 2], signal: &mut Signal) -> bool {
+        let is_on = control.is_on();
+        let cost = signal.sample(if is_on { with } else { without });
+        control.update((cost * 1000.0) as u64, 1000, is_on, &mut true);
+        is_on
+    }
+
+    /// Returns how many of some frames were with the test.
+    fn frames_with(control: &mut OcclusionControl, frames: usize, costs: [f32; 2]) -> usize {
+        (0..frames).filter(|_| frame(control, costs, &mut Signal::new(1))).count()
+    }
+
+    #[test]
+    fn it_settles_does_not_flap_and_recovers() {
+        let requirements = Requirements { settles_within: 300, max_wrong: 60, max_changes: 60 };
+        check_controller(
+            &requirements,
+            control,
+            |control, is_after, signal| frame(control, if is_after { [300.0, 100.0] } else { [100.0, 300.0] }, signal),
+            |&is_on, is_after| is_on != is_after,
+        );
+    }
+
+    #[test]
+    fn both_ways_are_tried_at_first_and_the_cheaper_one_is_kept() {
+        let mut control = control();
+        assert_eq!(frames_with(&mut control, 10, [100.0, 300.0]), 6);
+        assert!(frames_with(&mut control, 5000, [100.0, 300.0]) > 4950);
+        let mut control = super::tests::control();
+        frames_with(&mut control, 10, [300.0, 100.0]);
+        let tried = frames_with(&mut control, 6000, [300.0, 100.0]);
+        assert!((150..300).contains(&tried), "2 in 66 are tried: {tried}");
+    }
+
+    #[test]
+    fn a_wall_in_front_of_the_camera_is_noticed_within_eighty_frames() {
+        let mut control = control();
+        frames_with(&mut control, 1000, [130.0, 100.0]);
+        // The frames without the test cost what they did.
+        frames_with(&mut control, 80, [20.0, 100.0]);
+        assert!(frames_with(&mut control, 60, [20.0, 100.0]) >= 58);
+    }
+
+    #[test]
+    fn an_empty_view_changes_nothing() {
+        let mut control = control();
+        (0..100).for_each(|_| control.update(1_000_000, 0, true, &mut true));
+        assert!(control.is_on() && control.tuner.costs().all(|cost| cost.is_none()));
     }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use parking_lot::RwLockReadGuard;
 
 use super::context::FrameContext;
-use super::occlusion_control::update_occlusion_tuners;
 use super::pass_recording::PassRecording;
 use super::plan_cache::PlanCache;
 use super::recorded::Recorded;
@@ -158,23 +157,23 @@ impl<B: Backend> Renderer<B> {
             backend_frame: &frame,
             recordings: &self.recordings,
             clock: &clock,
-            costs: &graph.costs,
-            occlusion: &graph.occlusion,
+            costs: &graph.tuning.costs,
+            occlusion: &graph.tuning.occlusion,
             culls_triangles,
             workers: self.scheduler.workers(),
         };
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
-            graph.costs.discard_frame();
+            graph.tuning.costs.discard_frame();
             return Err(error.into());
         }
-        graph.costs.update();
-        update_occlusion_tuners(&mut graph.occlusion, &self.tables);
+        let tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
+        self.scheduler.timeline().add_tuning(frame_number, &tuning);
 
         // Record → per-camera queues, for the submitter.
         let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
-        let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times());
+        let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times(), tuning);
         self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
         let in_flight = self.shadow_cache.store(shadow_maps);
         let submission_order = graph.passes.clone();

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::context::FrameContext;
-use super::cost_model::NodeCosts;
 use super::granularity::Granularity;
 use super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
@@ -88,14 +87,15 @@ pub(super) struct StageJob<'a> {
     pub(super) items: Range<usize>,
     /// The worker that runs the job.
     pub(super) worker: &'a Worker,
-    /// The index of the node's costs.
-    pub(super) costs: NodeCosts,
+    /// The index of the node in the cost model.
+    pub(super) node: usize,
 }
 
 /// A stage as a node of the frame's job graph.
 pub(super) struct StageNode<B> {
     pub(super) stage: Box<dyn Stage<B>>,
-    pub(super) costs: NodeCosts,
+    /// Its index in the cost model.
+    pub(super) node: usize,
     /// The view whose occlusion tuner counts the node's time, by index.
     pub(super) tuned_view: Option<usize>,
 }
@@ -109,13 +109,13 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         match self.stage.info().chunking {
             Chunking::PerItem => 1,
             Chunking::ByCost { units_per_item } => {
-                frame.items_per_job(self.costs, self.stage.width(frame), units_per_item)
+                frame.items_per_job(self.node, self.stage.width(frame), units_per_item)
             }
         }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
-        let job = StageJob { items: items.clone(), worker, costs: self.costs };
+        let job = StageJob { items: items.clone(), worker, node: self.node };
         let (result, took) = frame.clock.measure(self.stage.info().group, || self.stage.run(frame, job));
         if let Some(view) = self.tuned_view {
             frame.tables.occlusion[view].add_time(took);
@@ -123,7 +123,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         if frame.granularity == Granularity::Adaptive
             && let Some(measured) = self.stage.measured_items(frame, items)
         {
-            frame.costs.add_sample(self.costs, measured, took);
+            frame.costs.add_sample(self.node, measured, took);
         }
         Ok(result?)
     }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::FrameError;
-use super::cost_model::{CostModel, NodeCosts};
 use super::occlusion_control::OcclusionControl;
 use super::stage::{Stage, StageNeeds, StageNode};
+use super::stage_tuning::{StageTuning, TuningLabels};
 use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
 use super::tables::{FrameTables, PassTable};
 use crate::backend::Backend;
@@ -19,14 +19,12 @@ use crate::view::RenderView;
 /// The stages of a frame for one plan and one list of views, compiled to a schedule, with what is measured about them.
 pub(super) struct StageGraph<B: Backend> {
     pub(super) schedule: Schedule<StageNode<B>>,
-    pub(super) costs: CostModel,
+    pub(super) tuning: StageTuning,
     /// In submission order.
     pub(super) passes: Vec<Pass>,
     pub(super) plan: Arc<FramePlan>,
     /// What else the graph was built for.
     key: GraphKey,
-    /// One for each view.
-    pub(super) occlusion: Vec<OcclusionControl>,
 }
 
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
@@ -114,14 +112,14 @@ impl<B: Backend> StageGraph<B> {
             };
             builder.add(pass_scope, stages_of_pass(index), needs);
         }
-        let GraphBuilder { graph, cost_kinds, node_count } = builder;
+        let GraphBuilder { graph, kind_of_node, labels, .. } = builder;
+        let labels = TuningLabels::new(labels, plan, &passes, views);
         Ok(Self {
             schedule: graph.compile().map_err(|error| FrameError::Jobs(error.problem))?,
-            costs: CostModel::new(cost_kinds.len(), node_count),
+            tuning: StageTuning::new(&kind_of_node, occlusion, labels),
             passes,
             plan: Arc::clone(plan),
             key,
-            occlusion,
         })
     }
 
@@ -144,7 +142,7 @@ impl<B: Backend> StageGraph<B> {
             tables.occluder_meshes.sync(scene.assets);
         }
         for (index, view) in views.iter().enumerate() {
-            tables.occlusion[index].reset(view, tile.filter(|_| self.occlusion[index].is_on()));
+            tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
         }
     }
 }
@@ -152,10 +150,11 @@ impl<B: Backend> StageGraph<B> {
 /// The graph under construction.
 struct GraphBuilder<B: Backend> {
     graph: FrameGraph<StageNode<B>>,
-    /// A stage of one process has the same cost kind in all views, whatever its nodes. The index is
-    /// [`NodeCosts::kind`].
+    /// A stage of one process has the same cost kind in all views, whatever its nodes.
     cost_kinds: Vec<(&'static str, Option<usize>)>,
-    node_count: usize,
+    /// By node, in the order in which nodes were added: the index of its cost kind, and what it belongs to.
+    kind_of_node: Vec<usize>,
+    labels: Vec<Arc<Labels>>,
 }
 
 /// What a node belongs to: the frame, a view or a pass. Not the job system's `Scope`.
@@ -197,7 +196,7 @@ impl Scope {
 
 impl<B: Backend> Default for GraphBuilder<B> {
     fn default() -> Self {
-        Self { graph: FrameGraph::new(), cost_kinds: Vec::new(), node_count: 0 }
+        Self { graph: FrameGraph::new(), cost_kinds: Vec::new(), kind_of_node: Vec::new(), labels: Vec::new() }
     }
 }
 
@@ -211,11 +210,13 @@ impl<B: Backend> GraphBuilder<B> {
                 self.cost_kinds.push(cost_kind);
                 self.cost_kinds.len() - 1
             });
-            let costs = NodeCosts { kind, node: self.node_count };
-            self.node_count += 1;
+            let node = self.kind_of_node.len();
+            let labels = Labels { stage: Some(info.name.to_owned()), ..scope.labels.clone() };
+            self.kind_of_node.push(kind);
+            self.labels.push(Arc::new(labels.clone()));
             let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
-            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, costs, tuned_view });
-            self.graph.label(id, Labels { stage: Some(info.name.to_owned()), ..scope.labels.clone() });
+            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, node, tuned_view });
+            self.graph.label(id, labels);
             self.graph.keep(id);
             let find = |name: &&str| scope.stages.iter().rev().find(|(known, _)| known == name);
             if let Some((_, before)) = info.after.iter().find_map(find) {

@@ -6,6 +6,7 @@ use super::tables::FrameTables;
 use crate::backend::FrameRequest;
 use crate::raster::CulledTriangles;
 use crate::scene::ViewKind;
+use crate::timeline::FrameTuning;
 use crate::view::{Rejection, RenderView};
 
 /// Statistics of a frame.
@@ -23,6 +24,8 @@ pub struct FrameStatistics {
     pub stages: StageTimes,
     /// What was left out or cannot be drawn as asked, and why.
     pub rejections: Vec<Rejection>,
+    /// What was chosen by measurement, and by which costs.
+    pub tuning: FrameTuning,
 }
 
 /// Statistics of a view.
@@ -68,7 +71,13 @@ pub struct StageTimes {
 
 impl FrameStatistics {
     /// The statistics of a frame whose stages have run.
-    pub(super) fn new(request: &FrameRequest<'_>, tables: &FrameTables, uploaded: u64, stages: StageTimes) -> Self {
+    pub(super) fn new(
+        request: &FrameRequest<'_>,
+        tables: &FrameTables,
+        uploaded: u64,
+        stages: StageTimes,
+        tuning: FrameTuning,
+    ) -> Self {
         let views =
             request.views.iter().enumerate().map(|(index, view)| ViewStatistics::new(index, view, request, tables));
         Self {
@@ -78,6 +87,7 @@ impl FrameStatistics {
             uploaded,
             stages,
             rejections: request.rejections.list(),
+            tuning,
         }
     }
 }

@@ -108,10 +108,10 @@ impl RankedAdjacency {
 
     /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end.
     /// `costs` has the nanoseconds of each node.
-    pub(crate) fn rank(&mut self, costs: &[u64]) {
+    pub(crate) fn rank(&mut self, cost_of: impl Fn(usize) -> u64) {
         self.cost_from_start.fill(0);
-        for (node, &cost) in costs.iter().enumerate() {
-            let end = self.cost_from_start[node].saturating_add(cost);
+        for node in 0..self.len() {
+            let end = self.cost_from_start[node].saturating_add(cost_of(node));
             for edge in self.starts[node]..self.starts[node + 1] {
                 let dependent = self.dependents[edge as usize] as usize;
                 self.cost_from_start[dependent] = self.cost_from_start[dependent].max(end);
@@ -120,7 +120,7 @@ impl RankedAdjacency {
         for node in (0..self.len()).rev() {
             let dependents = self.starts[node] as usize..self.starts[node + 1] as usize;
             let rest = self.dependents[dependents].iter().map(|&dependent| self.cost_to_end[dependent as usize]).max();
-            self.cost_to_end[node] = costs[node].saturating_add(rest.unwrap_or(0));
+            self.cost_to_end[node] = cost_of(node).saturating_add(rest.unwrap_or(0));
         }
         let longest = self.cost_to_end.iter().copied().max().unwrap_or(0);
         // A tenth of the frame is within the variation of measured costs.
@@ -170,7 +170,7 @@ mod tests {
                 list
             }).collect();
             let mut adjacency = RankedAdjacency::new(&dependencies);
-            adjacency.rank(&costs);
+            adjacency.rank(|node| costs[node]);
             let paths: Vec<u64> = (0..costs.len()).map(|node| cost_to_end(&dependencies, &costs, node)).collect();
             let longest = *paths.iter().max().unwrap();
             for node in 0..costs.len() {

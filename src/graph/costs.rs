@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use crate::sync::{AtomicU32, AtomicUsize, Instant, Ordering};
+use crate::tuning::{Estimate, Filter};
 
 /// The measured costs, in nanoseconds.
 pub(super) struct NodeCosts {
-    /// Per node, from its start to its end: a moving average over the measured runs.
-    average: Box<[u64]>,
-    is_measured: bool,
+    /// Per node, from its start to its end.
+    estimates: Box<[Estimate]>,
     /// Per node, in the current run: when it started, by the run's clock, and how long it took.
     started: Box<[AtomicU32]>,
     took: Box<[AtomicU32]>,
@@ -16,30 +16,28 @@ pub(super) struct NodeCosts {
     work: AtomicUsize,
 }
 
-/// The latest run's weight in the average is one part in this many.
-const AVERAGE_PARTS: u64 = 4;
+const MEASURED_RUNS: Filter = Filter::rare(4.0);
 
 impl NodeCosts {
     pub(super) fn new(nodes: usize) -> Self {
         let zeros = || (0..nodes).map(|_| AtomicU32::new(0)).collect();
         Self {
-            average: vec![0; nodes].into(),
-            is_measured: false,
+            estimates: vec![Estimate::default(); nodes].into(),
             started: zeros(),
             took: zeros(),
             work: AtomicUsize::new(0),
         }
     }
 
-    /// Nanoseconds per node; all are 0 before the first measured run.
-    pub(super) fn averages(&self) -> &[u64] {
-        &self.average
+    /// Nanoseconds of a node; 0 before the first measured run.
+    pub(super) fn nanoseconds(&self, node: usize) -> u64 {
+        self.estimates[node].get().unwrap_or(0.0) as u64
     }
 
-    /// The node's average cost, if any run was measured.
+    /// The node's estimated cost, if there is such a node and any run was measured.
     pub(super) fn of(&self, node: usize) -> Option<Duration> {
-        let average = self.average.get(node)?;
-        self.is_measured.then(|| Duration::from_nanos(*average))
+        let nanoseconds = self.estimates.get(node)?.get()?;
+        Some(Duration::from_nanos(nanoseconds as u64))
     }
 
     /// Clears the work of a cancelled run.
@@ -47,14 +45,12 @@ impl NodeCosts {
         self.work.store(0, Ordering::Relaxed);
     }
 
-    /// Adds the measured run that has just ended to the averages, and returns how much work it was.
+    /// Adds the measured run that has just ended to the estimates, and returns how much work it was.
     pub(super) fn update(&mut self) -> Duration {
-        for (average, took) in self.average.iter_mut().zip(&self.took) {
+        for (estimate, took) in self.estimates.iter_mut().zip(&self.took) {
             // Relaxed: the run is over.
-            let took = u64::from(took.load(Ordering::Relaxed));
-            *average = if self.is_measured { (*average * (AVERAGE_PARTS - 1) + took) / AVERAGE_PARTS } else { took };
+            estimate.add(took.load(Ordering::Relaxed) as f32, MEASURED_RUNS);
         }
-        self.is_measured = true;
         let work = self.work.load(Ordering::Relaxed);
         self.work.store(0, Ordering::Relaxed);
         Duration::from_nanos(work as u64)
@@ -102,4 +98,27 @@ impl<'run> CostTimer<'run> {
 /// Saturates after about four seconds.
 fn nanoseconds(since: Instant) -> u32 {
     since.elapsed().as_nanos().try_into().unwrap_or(u32::MAX)
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::tuning::signal::{Requirements, check_controller};
+
+    #[test]
+    fn it_settles_does_not_flap_and_recovers() {
+        let requirements = Requirements { settles_within: 40, max_wrong: 150, max_changes: 120 };
+        check_controller(
+            &requirements,
+            || NodeCosts::new(2),
+            |costs, is_after, signal| {
+                for (took, cost) in costs.took.iter().zip([2000.0, if is_after { 9000.0 } else { 500.0 }]) {
+                    took.store(signal.sample(cost) as u32, Ordering::Relaxed);
+                }
+                costs.update();
+                costs.nanoseconds(1) > costs.nanoseconds(0)
+            },
+            |&is_costlier, is_after| is_costlier == is_after,
+        );
+    }
 }

@@ -6,19 +6,23 @@
 
 use std::time::Duration;
 
+use crate::tuning::{Estimate, Filter, Hysteresis};
+
 /// The measured runs of one schedule.
 #[derive(Debug, Default)]
 pub(crate) struct ExecutionPolicy {
-    /// Nanoseconds of a serial run: a moving average, or the work of the measured parallel runs.
-    serial: Option<f64>,
+    /// Nanoseconds of a serial run: measured as such, or as the work of the measured parallel runs.
+    serial: Estimate,
     /// Nanoseconds of a parallel run, over the measured ones.
-    parallel: Option<f64>,
+    parallel: Estimate,
     parallel_runs: u32,
     /// The number of runs since the last measured one.
     since_measured: u32,
     is_serial: bool,
     /// Rises with each serial run that exceeds its limit, and falls with each that does not.
     exceeded: u32,
+    /// The mode that was chosen last, and by which costs.
+    latest: Option<ModeChoice>,
 }
 
 /// How a run is executed.
@@ -28,6 +32,19 @@ pub(crate) enum RunMode {
     Serial { limit: Option<Duration> },
     /// By all workers.
     Parallel { is_measured: bool },
+}
+
+/// The mode that was chosen for a run, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeChoice {
+    /// Whether all workers take part from the beginning. A serial run that takes too long continues in parallel.
+    pub parallel: bool,
+    /// Whether the mode was chosen only to measure it.
+    pub is_trial: bool,
+    /// The estimated time of a serial run in nanoseconds, before the run; `None` if it was not measured yet.
+    pub serial_nanoseconds: Option<f32>,
+    /// The estimated time of a parallel run in nanoseconds, before the run; `None` if it was not measured yet.
+    pub parallel_nanoseconds: Option<f32>,
 }
 
 /// This many of the first parallel runs are measured, except for the very first, which warms the caches; and then one run in
@@ -43,36 +60,47 @@ const PARALLEL_EVERY: u32 = 128;
 /// sign that the frame's work has changed.
 const EXCEEDED_RUNS: u32 = 8;
 
-/// The weight of the latest run in a moving average.
-const WEIGHT: f64 = 0.125;
+const SERIAL_RUNS: Filter = Filter::frequent(8.0);
 
-/// A run that took more than this multiple of the average counts as this multiple: now and then the operating system preempts a
-/// run, which says nothing about the next one.
-const OUTLIER: f64 = 2.0;
+/// The latest run counts most but not alone, because alternate frames may do different things.
+const MEASURED_RUNS: Filter = Filter::rare(4.0 / 3.0);
 
-/// Hysteresis: the current mode is kept until it takes this many times as long as the other one.
-const HYSTERESIS: f64 = 1.25;
+const HYSTERESIS: Hysteresis = Hysteresis::new(1.25);
 
 impl ExecutionPolicy {
     /// Chooses the mode of the next run.
     pub(crate) fn choose(&mut self, wake_up_cost: Duration) -> RunMode {
-        let is_unknown = self.serial.is_none() && self.parallel_runs == 0 && self.exceeded == 0;
+        let (serial, parallel) = (self.serial.get(), self.parallel.get());
+        let (mode, is_trial) = self.choose_by(serial, parallel, wake_up_cost);
+        self.latest = Some(ModeChoice {
+            parallel: matches!(mode, RunMode::Parallel { .. }),
+            is_trial,
+            serial_nanoseconds: serial,
+            parallel_nanoseconds: parallel,
+        });
+        mode
+    }
+
+    /// Chooses by these estimates. Returns the mode, and whether it is a trial.
+    fn choose_by(&mut self, serial: Option<f32>, parallel: Option<f32>, wake_up_cost: Duration) -> (RunMode, bool) {
+        let is_unknown = serial.is_none() && self.parallel_runs == 0 && self.exceeded == 0;
         if is_unknown {
             // A run that takes less than a wake-up is worth no wake-up. Any other run loses no more time than one wake-up takes.
-            return RunMode::Serial { limit: Some(wake_up_cost) };
+            return (RunMode::Serial { limit: Some(wake_up_cost) }, true);
         }
-        let wake_up_cost = wake_up_cost.as_nanos() as f64;
-        let limit = self.parallel.unwrap_or(0.0).max(wake_up_cost);
-        self.is_serial = match self.serial {
+        let wake_up_cost = wake_up_cost.as_nanos() as f32;
+        let limit = parallel.unwrap_or(0.0).max(wake_up_cost);
+        self.is_serial = match serial {
             None => false,
-            Some(serial) if self.is_serial => serial <= limit * HYSTERESIS,
-            Some(serial) => serial * HYSTERESIS <= limit,
+            Some(serial) if self.is_serial => !HYSTERESIS.replaces(limit, serial),
+            Some(serial) => HYSTERESIS.replaces(serial, limit),
         };
-        let is_due = self.serial.is_some_and(|serial| serial > wake_up_cost) && self.since_measured >= PARALLEL_EVERY;
+        let is_due = serial.is_some_and(|serial| serial > wake_up_cost) && self.since_measured >= PARALLEL_EVERY;
         if self.is_serial && !is_due {
-            return RunMode::Serial { limit: Some(Duration::from_nanos((limit * 2.0 * HYSTERESIS) as u64)) };
+            let limit = limit * 2.0 * HYSTERESIS.factor();
+            return (RunMode::Serial { limit: Some(Duration::from_nanos(limit as u64)) }, false);
         }
-        self.parallel()
+        (self.parallel(), self.is_serial)
     }
 
     /// The mode of the next run if it must be parallel.
@@ -85,7 +113,7 @@ impl ExecutionPolicy {
     pub(crate) fn report_serial(&mut self, took: Duration) {
         self.exceeded = self.exceeded.saturating_sub(1);
         self.since_measured = self.since_measured.saturating_add(1);
-        average(&mut self.serial, took);
+        self.serial.add(took.as_nanos() as f32, SERIAL_RUNS);
     }
 
     /// Reports a serial run that exceeded its limit and continued in parallel.
@@ -93,7 +121,7 @@ impl ExecutionPolicy {
         self.exceeded += EXCEEDED_RUNS;
         if self.exceeded > EXCEEDED_RUNS {
             // Keeping `exceeded` makes the next runs parallel and measured; a policy that knows nothing would start serially.
-            *self = Self { exceeded: EXCEEDED_RUNS, ..Self::default() };
+            *self = Self { exceeded: EXCEEDED_RUNS, latest: self.latest, ..Self::default() };
         }
     }
 
@@ -104,23 +132,21 @@ impl ExecutionPolicy {
             self.since_measured = self.since_measured.saturating_add(1);
             return;
         };
-        let has_measured = self.since_measured < MEASURED_EVERY && self.parallel_runs > 2;
+        if self.since_measured >= MEASURED_EVERY {
+            // What was measured that long ago says nothing any more.
+            (self.serial, self.parallel) = (Estimate::default(), Estimate::default());
+        }
         self.since_measured = 0;
         // The same run estimates both modes: apart from the clock readings, a serial run takes as long as the work of all
-        // workers. The latest run counts most but not alone, because alternate frames may do different things.
-        for (known, latest) in [(&mut self.parallel, took), (&mut self.serial, work)] {
-            let latest = latest.as_nanos() as f64;
-            *known = Some(known.filter(|_| has_measured).map_or(latest, |known| (known + 3.0 * latest) / 4.0));
-        }
+        // workers.
+        self.parallel.add(took.as_nanos() as f32, MEASURED_RUNS);
+        self.serial.add(work.as_nanos() as f32, MEASURED_RUNS);
     }
-}
 
-fn average(average: &mut Option<f64>, latest: Duration) {
-    let latest = latest.as_nanos() as f64;
-    *average = Some(match *average {
-        None => latest,
-        Some(average) => average + WEIGHT * (latest.min(average * OUTLIER) - average),
-    });
+    /// The mode that was chosen last; `None` before the first choice.
+    pub(crate) fn latest(&self) -> Option<ModeChoice> {
+        self.latest
+    }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -128,6 +154,7 @@ mod tests {
     use std::time::Duration;
 
     use super::{ExecutionPolicy, RunMode};
+    use crate::tuning::signal::{Requirements, check_controller};
 
     const WAKE_UP_COST: Duration = Duration::from_micros(40);
 
@@ -148,6 +175,21 @@ mod tests {
             RunMode::Parallel { is_measured } => policy.report_parallel(parallel, is_measured.then_some(serial)),
         }
         false
+    }
+
+    #[test]
+    fn it_settles_does_not_flap_and_recovers() {
+        let requirements = Requirements { settles_within: 200, max_wrong: 100, max_changes: 60 };
+        check_controller(
+            &requirements,
+            ExecutionPolicy::default,
+            |policy, is_after, signal| {
+                let [serial, parallel] = if is_after { [2000.0, 1100.0] } else { [30.0, 60.0] };
+                let factor = signal.sample(1.0);
+                run_once(policy, (serial * factor) as u64, (parallel * factor) as u64)
+            },
+            |&is_serial, is_after| is_serial != is_after,
+        );
     }
 
     #[test]

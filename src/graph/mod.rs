@@ -144,6 +144,7 @@ mod shuttle_tests;
 pub use builder::{FrameGraph, NodeId, ResourceId};
 pub use compile::CompileError;
 pub use error::{GraphProblem, NodeError, RunError};
+pub use execution_policy::ModeChoice;
 pub use node::{Closure, Node};
 pub use schedule::Schedule;
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::adjacency::{Adjacency, RankedAdjacency};
 use super::builder::NodeId;
 use super::costs::NodeCosts;
-use super::execution_policy::ExecutionPolicy;
+use super::execution_policy::{ExecutionPolicy, ModeChoice};
 use super::progress::Progress;
 use crate::timeline::{Graph, Labels};
 
@@ -109,6 +109,13 @@ impl<P> Schedule<P> {
     /// tenth shorter than the longest path of the graph. Idle workers take critical nodes first.
     pub fn is_critical(&self, index: usize) -> bool {
         index < self.len() && self.adjacency.is_critical(index as u32)
+    }
+
+    /// The mode of the latest run that had a choice, and the estimates by which it was chosen; `None` before the first one. There
+    /// is no choice with a single worker, for a schedule that is [always parallel](Self::always_parallel), and if the scheduler
+    /// [shuffles](crate::task::SchedulerBuilder::shuffle).
+    pub fn run_mode(&self) -> Option<ModeChoice> {
+        self.policy.latest()
     }
 
     /// The names of the nodes that were dropped because no output needs them, in the order they were added.

@@ -1,16 +1,17 @@
-//! The frames, runs, spans and counters of a timeline. They are few, so they are stored behind a lock.
+//! The frames, runs, spans, counters and tuning of a timeline. They are few, so they are stored behind a lock.
 
 use std::collections::HashSet;
 use std::ops::Range;
 use std::time::Duration;
 use std::{mem, thread};
 
+use super::frame_tuning::FrameTuning;
 use super::log::{Counter, Frame, Log, Run, Span};
 
-/// The capacity for frames, runs, spans and counter readings, each, between two logs.
+/// The capacity for frames, runs, spans, counter readings and frames' tuning, each, between two logs.
 const MAX_EVENTS: usize = 1 << 16;
 
-/// The frames, runs, spans and counters since the last log.
+/// The frames, runs, spans, counters and tuning since the last log.
 #[derive(Default)]
 pub(super) struct EventStore {
     frame_source: FrameSource,
@@ -45,6 +46,8 @@ pub(super) struct Events {
     pub(super) runs: Vec<(u32, Run)>,
     pub(super) spans: Vec<Span>,
     pub(super) counters: Vec<Counter>,
+    /// With the frames' numbers.
+    pub(super) tuning: Vec<(u64, FrameTuning)>,
     pub(super) threads: Vec<String>,
     pub(super) dropped: u64,
 }

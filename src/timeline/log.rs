@@ -4,6 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::frame_tuning::FrameTuning;
+use super::labels::Labels;
+
 /// Everything recorded since the timeline was started, or since the last log was taken. All times are measured from
 /// the construction of the scheduler, or are those of the engine's clock.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,9 +23,11 @@ pub struct Log {
     pub spans: Vec<Span>,
     /// The readings of counters, oldest first.
     pub counters: Vec<Counter>,
+    /// What was chosen by measurement, by number of the frame that a [`Renderer`](crate::Renderer) recorded, oldest first.
+    pub tuning: Vec<(u64, FrameTuning)>,
     /// What the device did, if the engine added it.
     pub device: Option<DeviceLog>,
-    /// How many frames, runs, spans and readings were dropped because there was no room.
+    /// How many frames, runs, spans, readings and entries of [tuning](Self::tuning) were dropped because there was no room.
     pub dropped: u64,
     /// The message with which the engine's [clock](crate::task::SchedulerBuilder::timeline_clock) panicked, if it did.
     /// All later times are its last reading.
@@ -100,17 +105,6 @@ pub struct NodeInfo {
     pub dependencies: Vec<usize>,
     /// Whether it has to run on the calling thread.
     pub pinned: bool,
-}
-
-/// What a node belongs to, so that nodes can be grouped by render process, stage and view.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Labels {
-    /// The render process: `geometry buffer`.
-    pub process: Option<String>,
-    /// The stage of the frame: `visibility`, `record`.
-    pub stage: Option<String>,
-    /// The view that it is for.
-    pub view: Option<String>,
 }
 
 /// A range of a node's items, which one worker ran without interruption.

@@ -34,6 +34,8 @@
 mod chunk_timer;
 mod clock;
 mod event_store;
+mod frame_tuning;
+mod labels;
 mod log;
 mod recorder;
 mod ring;
@@ -43,7 +45,9 @@ mod track;
 pub(crate) use chunk_timer::ChunkTimer;
 pub(crate) use recorder::{OpenRun, RunEnd, TimelineSettings};
 
+pub use frame_tuning::{Alternative, Choice, FrameTuning, JobSize};
+pub use labels::Labels;
 pub use log::{
-    Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Labels, Log, NodeInfo, Run, Span, WorkerLog,
+    Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Log, NodeInfo, Run, Span, WorkerLog,
 };
 pub use recorder::{OpenSpan, Timeline};

@@ -12,6 +12,7 @@ use crossbeam_utils::CachePadded;
 use super::chunk_timer::ChunkTimer;
 use super::clock::{Clock, ClockReader, EngineClock};
 use super::event_store::{EventStore, Events, FrameSource, frames_of};
+use super::frame_tuning::FrameTuning;
 use super::log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog};
 use super::track::{Entry, Track};
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
@@ -148,14 +149,21 @@ impl Timeline {
         }
     }
 
+    /// Records what was chosen by measurement in a frame: none if the timeline was off when the frame began.
+    pub(crate) fn add_tuning(&self, frame: Option<u64>, tuning: &FrameTuning) {
+        if let Some(frame) = frame.filter(|_| self.is_on()) {
+            self.store.lock().push(|events| &mut events.tuning, (frame, tuning.clone()));
+        }
+    }
+
     /// Takes out what was recorded since the last call.
     ///
     /// This may be called at any time, and blocks no worker. It is best called between two frames: chunks of a run in progress are
     /// lost and counted as dropped, and that run is not [complete](Run::complete).
     pub fn take(&self) -> Log {
         let mut reported = self.reported.lock();
-        let Events { frames, runs, spans, counters, threads, dropped } = self.store.lock().take();
-        let mut log = Log { spans, counters, threads, dropped, ..Log::default() };
+        let Events { frames, runs, spans, counters, tuning, threads, dropped } = self.store.lock().take();
+        let mut log = Log { spans, counters, tuning, threads, dropped, ..Log::default() };
         let mut indices = HashMap::with_capacity(runs.len());
         let mut open_runs = HashSet::new();
         for (number, run) in runs {

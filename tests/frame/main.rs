@@ -11,6 +11,7 @@ mod quality;
 mod shadow_interval;
 mod timeline;
 mod triangles;
+mod tuning;
 #[cfg(feature = "wgpu")]
 mod uploads;
 mod views;

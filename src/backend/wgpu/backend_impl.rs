@@ -1,16 +1,18 @@
 //! The [`Backend`] implementation.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
-use super::strategy::{EncodingStrategy, RecordingStrategy};
+use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::Worker;
+use crate::timeline::{Alternative, Choice, Labels};
 use crate::view::ObjectTable;
 
 impl Backend for WgpuBackend {
@@ -136,6 +138,26 @@ impl Backend for WgpuBackend {
         };
         let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
+    }
+
+    fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<Choice> {
+        let strategies = self.strategies.strategies();
+        let state = frame.pass(pass);
+        if strategies.len() == 1 || state.command_pass_index.is_none() {
+            return None;
+        }
+        let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
+        let named = |(strategy, nanoseconds): (&PassStrategy, _)| Alternative { name: strategy.name(), nanoseconds };
+        let alternatives = pipelines
+            .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
+        Some(Choice {
+            subject: "recording",
+            labels: Arc::clone(labels),
+            alternatives,
+            chosen: state.strategy_index,
+            is_trial: state.is_trial,
+            unit: "batch",
+        })
     }
 
     fn submit(&self, frame: WgpuFrame, queues: Vec<ViewQueue<WgpuCommands>>) -> Result<WgpuSubmission, BackendError> {

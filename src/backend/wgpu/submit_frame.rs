@@ -6,9 +6,9 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
-use super::strategy::StrategyTuner;
 use super::submission::WgpuSubmission;
 use crate::backend::{BackendError, ViewQueue};
+use crate::tuning::Tuner;
 
 impl WgpuBackend {
     /// Finishes open encoders, and submits the frame.
@@ -58,15 +58,14 @@ impl WgpuBackend {
         let workers = self.workers.load(Ordering::Relaxed);
         let passes = frame.buffers.passes().iter().filter(|pass| pass.command_pass_index.is_some());
         let all = passes.clone().map(|pass| pass.timing.total()).sum();
-        let strategies = self.strategies.strategies().len();
         let mut latest = self.latest.lock();
         let mut count = 0;
         for pass in passes {
             let pipelines = frame.pipelines(pass.pass);
-            if strategies > 1 {
+            if self.strategies.strategies().len() > 1 {
                 let sample = pass.cost_sample(all, workers);
-                let report = |tuner: &mut StrategyTuner| tuner.report(frame.number, pass.strategy_index, sample);
-                pipelines.with_tuner(pass.pass.view_index, strategies, report);
+                let report = |tuner: &mut Tuner| tuner.report(frame.number, pass.strategy_index, sample);
+                pipelines.with_tuner(pass.pass.view_index, &self.strategies, report);
             }
             // Reuses the string of the frame before.
             let mut name = latest.get_mut(count).map_or_else(String::new, |before| std::mem::take(&mut before.process));

@@ -67,7 +67,7 @@ impl<B: Backend> Stage<B> for Split {
         let table = &frame.tables.passes[self.pass];
         let count = frame.visible_count(self.pass);
         // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
-        let buckets = count.div_ceil(frame.items_per_job(job.costs, count, 1)).min(frame.workers);
+        let buckets = count.div_ceil(frame.items_per_job(job.node, count, 1)).min(frame.workers);
         table.splitters.write().choose(&table.commands, count, buckets);
         Ok(())
     }

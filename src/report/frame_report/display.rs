@@ -10,6 +10,7 @@ use super::slack::Slack;
 use super::step::{HeldBy, Step};
 use super::what_if::WhatIf;
 use super::worker_report::WorkerReport;
+use crate::timeline::{Choice, FrameTuning, JobSize};
 
 /// How many lines a list has, for a person to read it.
 const MAX_LINES: usize = 10;
@@ -39,6 +40,7 @@ impl Display for FrameReport {
         self.write_worker_counts(formatter)?;
         self.write_slack(formatter)?;
         self.write_queue_waits(formatter)?;
+        self.write_tuning(formatter)?;
         self.write_workers(formatter)
     }
 }
@@ -201,6 +203,30 @@ impl FrameReport {
         Ok(())
     }
 
+    fn write_tuning(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        let Some(FrameTuning { choices, job_sizes }) = &self.tuning else { return Ok(()) };
+        if choices.is_empty() && job_sizes.is_empty() {
+            return Ok(());
+        }
+        writeln!(formatter, "\nchosen by measured cost")?;
+        let mut sizes: Vec<_> = job_sizes.iter().collect();
+        sizes.sort_by(|one, other| other.work().total_cmp(&one.work()));
+        let choices: Vec<_> = choices.iter().map(Choice::to_string).collect();
+        let sizes: Vec<_> = sizes.into_iter().map(JobSize::to_string).collect();
+        for (lines, kind) in
+            [(choices, ["choice", "choices"]), (sizes, ["node with less work", "nodes with less work"])]
+        {
+            for line in lines.iter().take(MAX_LINES) {
+                writeln!(formatter, "  {}", printable(&truncated(line, MAX_LINE_LENGTH - 2)))?;
+            }
+            match lines.len().saturating_sub(MAX_LINES) {
+                0 => (),
+                more => writeln!(formatter, "  and {}", counted(more, kind[0], kind[1]))?,
+            }
+        }
+        Ok(())
+    }
+
     fn write_workers(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         let listed = self.workers.iter().take(MAX_WORKERS);
         let listed: Vec<_> =
@@ -305,8 +331,13 @@ fn held_by_text(held_by: HeldBy) -> &'static str {
 
 /// A name that fits into a line: cut to [`MAX_NAME_LENGTH`], and without control characters.
 fn sanitized(name: &str) -> String {
+    printable(&truncated(name, MAX_NAME_LENGTH))
+}
+
+/// The text without control characters.
+fn printable(text: &str) -> String {
     let plain = |character: char| if character.is_control() { char::REPLACEMENT_CHARACTER } else { character };
-    truncated(name, MAX_NAME_LENGTH).chars().map(plain).collect()
+    text.chars().map(plain).collect()
 }
 
 /// At most `max` characters of the text. If it is longer, the last one is an ellipsis.

@@ -13,7 +13,7 @@ use super::worker_report::{WorkerReport, worker_reports};
 use crate::report::error::ReportError;
 use crate::report::intervals::{frame_intervals, outermost_runs, total_length};
 use crate::report::simulation::{Replay, SchedulerCosts};
-use crate::timeline::Log;
+use crate::timeline::{FrameTuning, Log};
 
 /// Why a frame took as long as it did. Points in time are on the axis of the [`Log`]. Its `Display` is a text for a
 /// terminal.
@@ -46,6 +46,8 @@ pub struct FrameReport {
     pub what_if: Vec<WhatIf>,
     /// How long a replay takes on other numbers of workers: 1, 2, 4, 8, 16.
     pub on_workers: Vec<(usize, Duration)>,
+    /// What was chosen by measurement, if a [`Renderer`](crate::Renderer) recorded the frame.
+    pub tuning: Option<FrameTuning>,
 }
 
 /// The numbers of workers that each frame is replayed on.
@@ -94,6 +96,7 @@ impl FrameReport {
             queue_waits: queue_waits(&runs),
             replayed,
             what_if: what_if(&runs, &replay, workers, replayed),
+            tuning: log.tuning.iter().find(|(number, _)| *number == frame).map(|(_, tuning)| tuning.clone()),
             on_workers: WORKER_COUNTS.map(|workers| (workers, replay.frame_time(workers))).to_vec(),
         })
     }

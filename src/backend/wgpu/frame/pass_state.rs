@@ -10,9 +10,10 @@ use super::pass_statistics::WgpuPassStatistics;
 use crate::backend::BackendError;
 use crate::backend::wgpu::pipelines::ProcessBindGroup;
 use crate::backend::wgpu::resources::{GrowingBuffer, UploadQueue};
-use crate::backend::wgpu::strategy::{CostSample, EncodingStrategy, PassStrategy, RecordingStrategy};
+use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::process::Pass;
+use crate::tuning::CostSample;
 
 /// One pass of a frame, and what it caches for the next frame that uses the same buffers.
 pub(crate) struct WgpuPassState {
@@ -30,8 +31,9 @@ pub(crate) struct WgpuPassState {
     /// `@group(2)`.
     pub(crate) process_bind_group: Option<ProcessBindGroup>,
     pub(crate) strategy: PassStrategy,
-    /// The strategy's index in the backend's set.
+    /// The strategy's index in the backend's set, and whether the frame only tries it.
     pub(crate) strategy_index: usize,
+    pub(crate) is_trial: bool,
     /// Whether the strategy's cache was there when the frame began.
     is_warm: bool,
     pub(crate) bundle_cache: BundleCache,
@@ -53,6 +55,7 @@ impl Default for WgpuPassState {
             process_bind_group: None,
             strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
             strategy_index: 0,
+            is_trial: false,
             is_warm: false,
             bundle_cache: BundleCache::default(),
             indirect_arguments: IndirectArguments::default(),
@@ -71,7 +74,7 @@ impl WgpuPassState {
 
     /// Sets the frame's strategy. Unless it is a trial, drops the caches of other strategies.
     pub(crate) fn set_strategy(&mut self, strategy: PassStrategy, strategy_index: usize, is_trial: bool) {
-        (self.strategy, self.strategy_index) = (strategy, strategy_index);
+        (self.strategy, self.strategy_index, self.is_trial) = (strategy, strategy_index, is_trial);
         self.is_warm = match strategy.recording {
             RecordingStrategy::CachedBundles => self.bundle_cache.is_warm(),
             RecordingStrategy::Indirect => self.indirect_arguments.is_warm(),
@@ -136,7 +139,7 @@ impl WgpuPassState {
     pub(crate) fn cost_sample(&self, all: f64, workers: usize) -> CostSample {
         let own = self.timing.total();
         let cost = own.max(self.timing.critical_path(workers) * workers as f64 - (all - own));
-        CostSample { cost, batches: self.timing.batches(), is_warm: self.is_warm }
+        CostSample { nanoseconds: cost, units: self.timing.batches(), is_warm: self.is_warm }
     }
 }
 

@@ -8,11 +8,12 @@ use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::{
     BindGroupLayouts, SampledTarget, process_layout, texture_format, vertex_attributes, vertex_stride,
 };
-use crate::backend::wgpu::strategy::StrategyTuner;
+use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology, ViewKind};
+use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
 pub(crate) struct ProcessPipelines {
@@ -25,7 +26,7 @@ pub(crate) struct ProcessPipelines {
     shader: Option<CompiledShader>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
     /// The tuner of each view's pass.
-    tuners: Mutex<Vec<Option<StrategyTuner>>>,
+    tuners: Mutex<Vec<Option<Tuner>>>,
 }
 
 /// The formats of the targets that a process draws into and samples.
@@ -192,18 +193,13 @@ impl ProcessPipelines {
         }
     }
 
-    /// Calls `work` with the tuner of one view's pass, of which each chooses among `strategies` strategies.
-    pub(crate) fn with_tuner<R>(
-        &self,
-        view: usize,
-        strategies: usize,
-        work: impl FnOnce(&mut StrategyTuner) -> R,
-    ) -> R {
+    /// Calls `work` with the tuner of one view's pass, which chooses among the strategies of the set.
+    pub(crate) fn with_tuner<R>(&self, view: usize, set: &StrategySet, work: impl FnOnce(&mut Tuner) -> R) -> R {
         let mut tuners = self.tuners.lock();
         if tuners.len() <= view {
             tuners.resize_with(view + 1, || None);
         }
-        work(tuners[view].get_or_insert_with(|| StrategyTuner::new(strategies)))
+        work(tuners[view].get_or_insert_with(|| set.tuner()))
     }
 
     /// The process's name.

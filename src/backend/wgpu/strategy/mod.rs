@@ -3,11 +3,9 @@
 mod pass_segment;
 mod pass_strategy;
 mod strategy_set;
-mod strategy_tuner;
 
 pub(crate) use pass_segment::PassSegment;
 pub(crate) use pass_strategy::PassStrategy;
 pub(crate) use strategy_set::StrategySet;
-pub(crate) use strategy_tuner::{CostSample, StrategyTuner};
 
 pub use pass_strategy::{EncodingStrategy, RecordingStrategy};

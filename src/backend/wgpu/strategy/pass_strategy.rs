@@ -46,6 +46,32 @@ impl PassStrategy {
     /// Each further encoder loads and stores the pass's targets once more.
     const MAX_ENCODERS: usize = 8;
 
+    /// Its name in reports.
+    pub(crate) fn name(self) -> &'static str {
+        use EncodingStrategy::{OnSubmit, PerPass, Split};
+        use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+        match (self.recording, self.encoding) {
+            (Direct, PerPass) => "direct",
+            (Direct, Split) => "split direct",
+            (Direct, OnSubmit) => "direct on submit",
+            (Bundles, PerPass) => "bundles",
+            (Bundles, Split) => "split bundles",
+            (Bundles, OnSubmit) => "bundles on submit",
+            (CachedBundles, PerPass) => "cached bundles",
+            (CachedBundles, Split) => "split cached bundles",
+            (CachedBundles, OnSubmit) => "cached bundles on submit",
+            (Indirect, PerPass) => "indirect",
+            (Indirect, Split) => "split indirect",
+            (Indirect, OnSubmit) => "indirect on submit",
+        }
+    }
+
+    /// Whether the strategy differs from one encoder per pass, for a pass of `batches` batches.
+    pub(crate) fn is_useful(self, batches: usize) -> bool {
+        self.encoding != EncodingStrategy::Split
+            || self.encoder_count(batches.div_ceil(DrawList::BATCHES_PER_BUNDLE)) > 1
+    }
+
     /// The number of encoders for a pass of `bundles` bundles.
     pub(crate) fn encoder_count(self, bundles: usize) -> usize {
         match self.encoding {

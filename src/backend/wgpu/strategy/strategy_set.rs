@@ -1,6 +1,7 @@
 //! The strategies that a backend may use.
 
 use super::pass_strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
+use crate::tuning::Tuner;
 
 /// The strategies that passes may be recorded with: one, or several of which each pass uses the cheapest.
 pub(crate) struct StrategySet {
@@ -12,6 +13,10 @@ pub(crate) struct StrategySet {
     tunes_indirect: bool,
     strategies: Vec<PassStrategy>,
 }
+
+/// The longest pause between two trials of a strategy, in frames: there are several others, and recording is a small part of the
+/// frame.
+const MAX_PAUSE: u64 = 2048;
 
 impl StrategySet {
     /// All strategies that a device supports.
@@ -35,6 +40,11 @@ impl StrategySet {
     /// In the order in which they are tried.
     pub(crate) fn strategies(&self) -> &[PassStrategy] {
         &self.strategies
+    }
+
+    /// A tuner that chooses among the strategies, by index.
+    pub(crate) fn tuner(&self) -> Tuner {
+        Tuner::new(self.strategies.iter().map(|_| MAX_PAUSE))
     }
 
     fn enumerated(self) -> Self {

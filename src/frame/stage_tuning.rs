@@ -1,0 +1,84 @@
+//! What is tuned by measurement in the frames of one stage graph.
+
+use std::sync::Arc;
+
+use super::cost_model::{ChosenSize, CostModel};
+use super::occlusion_control::{OcclusionControl, occlusion_choices, update_occlusion};
+use super::tables::FrameTables;
+use crate::backend::Backend;
+use crate::graph::ModeChoice;
+use crate::process::{FramePlan, Pass};
+use crate::timeline::{Alternative, Choice, FrameTuning, JobSize, Labels};
+use crate::view::RenderView;
+
+/// What is tuned by measurement in the frames of one stage graph, beside the run mode, which its schedule tunes.
+pub(super) struct StageTuning {
+    pub(super) costs: CostModel,
+    /// One for each view.
+    pub(super) occlusion: Vec<OcclusionControl>,
+    labels: TuningLabels,
+}
+
+/// What the parts of a frame are called in [`FrameTuning`].
+pub(super) struct TuningLabels {
+    /// By node of the cost model.
+    nodes: Vec<Arc<Labels>>,
+    passes: Vec<Arc<Labels>>,
+    views: Vec<Arc<Labels>>,
+}
+
+impl TuningLabels {
+    /// The labels of a graph. Those of nodes are in the order of the cost model.
+    pub(super) fn new(nodes: Vec<Arc<Labels>>, plan: &FramePlan, passes: &[Pass], views: &[RenderView]) -> Self {
+        let labels = |process: Option<&str>, view: &RenderView| {
+            let (process, view) = (process.map(str::to_owned), Some(view.name().to_owned()));
+            Arc::new(Labels { process, stage: None, view })
+        };
+        let name = |pass: &Pass| plan.processes()[pass.process_index].process.name();
+        Self {
+            nodes,
+            passes: passes.iter().map(|pass| labels(Some(name(pass)), &views[pass.view_index])).collect(),
+            views: views.iter().map(|view| labels(None, view)).collect(),
+        }
+    }
+}
+
+impl StageTuning {
+    /// The tuning of nodes whose cost kinds have these indices, and of views with these controls.
+    pub(super) fn new(kind_of_node: &[usize], occlusion: Vec<OcclusionControl>, labels: TuningLabels) -> Self {
+        Self { costs: CostModel::new(kind_of_node), occlusion, labels }
+    }
+
+    /// What was chosen for the frame that has run. Chooses for the next frame by what was measured.
+    pub(super) fn update<B: Backend>(
+        &mut self,
+        run_mode: Option<ModeChoice>,
+        tables: &FrameTables,
+        backend: &B,
+        frame: &B::Frame,
+    ) -> FrameTuning {
+        let occlusion = occlusion_choices(&self.occlusion, &self.labels.views);
+        let recording = |(pass, labels)| backend.recording_choice(frame, pass, labels);
+        let recording = self.labels.passes.iter().enumerate().filter_map(recording);
+        let choices = run_mode.map(run_mode_choice).into_iter().chain(occlusion).chain(recording).collect();
+        update_occlusion(&mut self.occlusion, tables);
+        self.costs.update();
+        let job_size = |size: ChosenSize| JobSize {
+            labels: Arc::clone(&self.labels.nodes[size.node]),
+            items: size.items,
+            items_per_job: size.items_per_job,
+            nanoseconds_per_item: size.nanoseconds_per_item,
+        };
+        FrameTuning { choices, job_sizes: self.costs.take_sizes().map(job_size).collect() }
+    }
+}
+
+fn run_mode_choice(choice: ModeChoice) -> Choice {
+    let ModeChoice { parallel, is_trial, serial_nanoseconds, parallel_nanoseconds } = choice;
+    let alternatives = vec![
+        Alternative { name: "serial", nanoseconds: serial_nanoseconds },
+        Alternative { name: "parallel", nanoseconds: parallel_nanoseconds },
+    ];
+    let chosen = usize::from(parallel);
+    Choice { subject: "run mode", labels: Arc::default(), alternatives, chosen, is_trial, unit: "run" }
+}

@@ -1,0 +1,179 @@
+//! What was chosen by measurement in a frame, as plain data.
+
+use std::fmt::{self, Display, Formatter};
+use std::sync::Arc;
+
+use super::labels::Labels;
+
+/// What was chosen by measurement in a frame, and the costs by which it was chosen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameTuning {
+    /// The choices among alternatives: the run mode of the frame's job graph, the occlusion test of each view that can test, and
+    /// how each pass is recorded. A choice that nothing can be measured for, or that the engine has made, is not among them.
+    pub choices: Vec<Choice>,
+    /// The sizes of jobs, for each node of the frame's job graph whose items are divided by cost. Empty unless the
+    /// [granularity](crate::Granularity) is adaptive.
+    pub job_sizes: Vec<JobSize>,
+}
+
+/// A choice among alternatives by measured cost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// What was chosen: `run mode`, `occlusion test`, `recording`.
+    pub subject: &'static str,
+    /// The view or pass that it was chosen for; none for the whole frame.
+    pub labels: Arc<Labels>,
+    /// The alternatives.
+    pub alternatives: Vec<Alternative>,
+    /// The index of the one that the frame has.
+    pub chosen: usize,
+    /// Whether the frame has it only to measure it.
+    pub is_trial: bool,
+    /// What its cost is for: `run`, `object`, `batch`.
+    pub unit: &'static str,
+}
+
+/// One alternative of a [`Choice`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alternative {
+    /// Its name: `serial`, `cached bundles`.
+    pub name: &'static str,
+    /// Its estimated cost in nanoseconds per [unit](Choice::unit), before the frame; `None` if it was not measured yet, or not
+    /// since the work has changed.
+    pub nanoseconds: Option<f32>,
+}
+
+/// The job size of one node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobSize {
+    /// The stage, and the view and process that it is for.
+    pub labels: Arc<Labels>,
+    /// The number of items of the node.
+    pub items: usize,
+    /// How many of them make a job.
+    pub items_per_job: usize,
+    /// The estimated thread time of an item in nanoseconds, after the frame; `None` if it was not measured yet.
+    pub nanoseconds_per_item: Option<f32>,
+}
+
+impl JobSize {
+    /// The number of jobs.
+    pub fn jobs(&self) -> usize {
+        self.items.div_ceil(self.items_per_job.max(1))
+    }
+
+    /// The estimated thread time of all items in nanoseconds; 0 if it was not measured yet.
+    pub fn work(&self) -> f32 {
+        self.nanoseconds_per_item.unwrap_or(0.0) * self.items as f32
+    }
+}
+
+/// One line: what was chosen and why. Alternatives that were not measured are left out.
+///
+/// ```text
+/// recording of geometry buffer in main: cached bundles for 21.0 ns a batch; direct 95.2 ns, bundles 101 ns
+/// ```
+impl Display for Choice {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.subject)?;
+        write_labels(formatter, &self.labels)?;
+        let Some(chosen) = self.alternatives.get(self.chosen) else { return Ok(()) };
+        write!(formatter, ": {}", chosen.name)?;
+        if let Some(nanoseconds) = chosen.nanoseconds {
+            let article = if self.unit.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+            write!(formatter, " for {} {article} {}", Nanoseconds(nanoseconds), self.unit)?;
+        }
+        if self.is_trial {
+            write!(formatter, ", as a trial")?;
+        }
+        let others = self.alternatives.iter().enumerate().filter(|&(index, _)| index != self.chosen);
+        let measured = others.filter_map(|(_, other)| Some((other.name, other.nanoseconds?)));
+        for (position, (name, nanoseconds)) in measured.enumerate() {
+            write!(formatter, "{} {name} {}", if position == 0 { ";" } else { "," }, Nanoseconds(nanoseconds))?;
+        }
+        Ok(())
+    }
+}
+
+/// One line: the job size and the reason for it.
+///
+/// ```text
+/// fill of geometry buffer in main: 10000 items of 6.1 ns in 4 jobs of 2560
+/// ```
+impl Display for JobSize {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.labels.stage.as_deref().unwrap_or("node"))?;
+        write_labels(formatter, &self.labels)?;
+        write!(formatter, ": {} {}", self.items, if self.items == 1 { "item" } else { "items" })?;
+        if let Some(nanoseconds) = self.nanoseconds_per_item {
+            write!(formatter, " of {}", Nanoseconds(nanoseconds))?;
+        }
+        match self.jobs() {
+            1 => write!(formatter, " in one job"),
+            jobs => write!(formatter, " in {jobs} jobs of {}", self.items_per_job),
+        }
+    }
+}
+
+fn write_labels(formatter: &mut Formatter<'_>, labels: &Labels) -> fmt::Result {
+    if let Some(process) = &labels.process {
+        write!(formatter, " of {process}")?;
+    }
+    match &labels.view {
+        Some(view) => write!(formatter, " in {view}"),
+        None => Ok(()),
+    }
+}
+
+/// A time with three significant digits, in the unit that suits it.
+struct Nanoseconds(f32);
+
+impl Display for Nanoseconds {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        let (value, unit) = match self.0 {
+            nanoseconds if nanoseconds < 1e3 => (nanoseconds, "ns"),
+            nanoseconds if nanoseconds < 1e6 => (nanoseconds / 1e3, "µs"),
+            nanoseconds => (nanoseconds / 1e6, "ms"),
+        };
+        let decimals = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
+        write!(formatter, "{value:.decimals$} {unit}")
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    fn labels() -> Arc<Labels> {
+        let [process, view, stage] = ["geometry buffer", "main", "fill"].map(|label| Some(label.to_owned()));
+        Arc::new(Labels { process, stage, view })
+    }
+
+    #[test]
+    fn a_choice_is_a_line() {
+        let alternative = |name, nanoseconds| Alternative { name, nanoseconds };
+        let choice = Choice {
+            subject: "recording",
+            labels: labels(),
+            alternatives: vec![
+                alternative("direct", Some(95.2)),
+                alternative("bundles", Some(1500.0)),
+                alternative("split", None),
+            ],
+            chosen: 1,
+            is_trial: true,
+            unit: "batch",
+        };
+        let text = "recording of geometry buffer in main: bundles for 1.50 µs a batch, as a trial; direct 95.2 ns";
+        assert_eq!(choice.to_string(), text);
+    }
+
+    #[test]
+    fn a_job_size_is_a_line() {
+        let size = |items, items_per_job| {
+            JobSize { labels: labels(), items, items_per_job, nanoseconds_per_item: Some(6.13) }.to_string()
+        };
+        assert_eq!(size(10_000, 2560), "fill of geometry buffer in main: 10000 items of 6.13 ns in 4 jobs of 2560");
+        assert_eq!(size(1, 1), "fill of geometry buffer in main: 1 item of 6.13 ns in one job");
+    }
+}

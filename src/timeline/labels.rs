@@ -1,0 +1,12 @@
+//! What a node belongs to.
+
+/// What a node belongs to, so that nodes can be grouped by render process, stage and view.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Labels {
+    /// The render process: `geometry buffer`.
+    pub process: Option<String>,
+    /// The stage of the frame: `visibility`, `record`.
+    pub stage: Option<String>,
+    /// The view that it is for.
+    pub view: Option<String>,
+}

@@ -1,0 +1,126 @@
+//! What was chosen by measurement is in the statistics, the log and the frame report.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::process::Deferred;
+use drawloom::quality::Quality;
+use drawloom::report::{FrameReport, SchedulerCosts};
+use drawloom::task::Scheduler;
+use drawloom::timeline::{Choice, FrameTuning};
+use drawloom::{Granularity, Renderer};
+use drawloom_testing::scenes::field;
+
+/// The tuning of some frames, and the renderer's scheduler, whose timeline recorded them.
+fn record(frames: usize, workers: usize, granularity: Granularity) -> (Vec<FrameTuning>, Arc<Scheduler>) {
+    let scheduler = Arc::new(Scheduler::new(workers).unwrap());
+    let quality = Quality { occlusion: Some(8), ..Quality::balanced() };
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let (mut renderer, _submitter) = builder.granularity(granularity).build(Arc::clone(&scheduler)).unwrap();
+    let scene = field(3000);
+    scheduler.timeline().start();
+    let tuning = (0..frames).map(|_| {
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let statistics = recorded.statistics();
+        let is_hidden = statistics.views.iter().any(|view| view.occluded > 0);
+        let test = choices_of(&statistics.tuning, "occlusion test");
+        assert!(!is_hidden || test.iter().any(|choice| choice.alternatives[choice.chosen].name == "on"));
+        statistics.tuning.clone()
+    });
+    (tuning.collect(), scheduler)
+}
+
+fn choices_of<'a>(tuning: &'a FrameTuning, subject: &str) -> Vec<&'a Choice> {
+    tuning.choices.iter().filter(|choice| choice.subject == subject).collect()
+}
+
+#[test]
+fn choices_come_with_the_costs_that_they_were_made_by() {
+    let (tuning, _) = record(40, 2, Granularity::Adaptive);
+    let view_count = choices_of(&tuning[0], "occlusion test").len();
+    assert!(view_count > 0);
+    for (frame, tuning) in tuning.iter().enumerate() {
+        let tests = choices_of(tuning, "occlusion test");
+        assert_eq!((tests.len(), choices_of(tuning, "run mode").len()), (view_count, 1));
+        assert!(tests.iter().all(|choice| choice.labels.view.is_some()));
+        for Choice { alternatives, .. } in tests {
+            // The first frame fills caches, the next three measure the first alternative; from the ninth on both are known.
+            let known: Vec<_> = alternatives.iter().map(|alternative| alternative.nanoseconds.is_some()).collect();
+            assert!(known[0] == (frame >= 2) && (frame < 9 || known[1]), "frame {frame}: {alternatives:?}");
+        }
+    }
+}
+
+#[test]
+fn job_sizes_come_with_the_cost_of_an_item() {
+    let (tuning, _) = record(20, 2, Granularity::Adaptive);
+    let sizes = &tuning.last().unwrap().job_sizes;
+    let objects: Vec<_> = sizes.iter().filter(|size| size.labels.stage.as_deref() == Some("objects")).collect();
+    assert_eq!(objects.len(), 1);
+    assert!(objects[0].items > 0 && objects[0].nanoseconds_per_item.unwrap() > 0.0);
+    for size in sizes {
+        assert!((1..=size.items).contains(&size.items_per_job), "{size:?}");
+        assert_eq!(size.jobs() == 1, size.items_per_job == size.items);
+    }
+    let fill = sizes.iter().find(|size| size.labels.stage.as_deref() == Some("fill")).unwrap();
+    assert!(fill.labels.process.is_some() && fill.labels.view.is_some());
+}
+
+#[test]
+fn a_fixed_granularity_has_no_job_sizes_and_one_worker_has_no_run_mode() {
+    let (tuning, _) = record(3, 1, Granularity::PerDraw);
+    for tuning in tuning {
+        assert!(tuning.job_sizes.is_empty() && choices_of(&tuning, "run mode").is_empty());
+    }
+}
+
+#[test]
+fn the_log_and_the_frame_report_have_the_choices_of_each_frame() {
+    let (tuning, scheduler) = record(5, 2, Granularity::Adaptive);
+    let log = scheduler.timeline().take();
+    assert_eq!(log.tuning.iter().map(|(_, tuning)| tuning).collect::<Vec<_>>(), tuning.iter().collect::<Vec<_>>());
+    let costs = SchedulerCosts::measure().unwrap();
+    for (frame, tuning) in log.tuning.iter().zip(&tuning).map(|((frame, _), tuning)| (*frame, tuning)) {
+        let report = FrameReport::new(&log, frame, &costs).unwrap();
+        assert_eq!(report.tuning.as_ref(), Some(tuning));
+        let text = report.to_string();
+        assert!(text.contains(&tuning.choices[0].to_string()), "{text}");
+    }
+}
+
+#[cfg(feature = "wgpu")]
+#[test]
+fn each_pass_of_commands_has_a_choice_of_recording() {
+    use drawloom::backend::{RecordingStrategy, WgpuBackend};
+    use drawloom_testing::adapter;
+
+    let frames = |backend: fn(WgpuBackend) -> WgpuBackend| {
+        let (device, queue) = adapter::noop_device().unwrap();
+        let scheduler = Arc::new(Scheduler::new(1).unwrap());
+        let builder = Renderer::builder(backend(WgpuBackend::new(device, queue).unwrap()));
+        let (mut renderer, submitter) = builder.deferred(Deferred::to_picture()).build(scheduler).unwrap();
+        let scene = field(600);
+        let draw = |_| submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap().statistics.tuning;
+        let tuning: Vec<_> = (0..60).map(draw).collect();
+        (tuning, renderer.backend().pass_statistics())
+    };
+    let (tuning, passes) = frames(|backend| backend);
+    let choices = choices_of(tuning.last().unwrap(), "recording");
+    assert_eq!(choices.len(), passes.len());
+    for (choice, pass) in choices.iter().zip(&passes) {
+        assert_eq!(choice.labels.process.as_deref(), Some(pass.process.as_str()));
+        let name = match pass.recording {
+            RecordingStrategy::Direct => "direct",
+            RecordingStrategy::Bundles => "bundles",
+            RecordingStrategy::CachedBundles => "cached bundles",
+            RecordingStrategy::Indirect => "indirect",
+        };
+        assert!(choice.alternatives[choice.chosen].name.contains(name), "{choice} {pass:?}");
+        let has_batches = pass.batches > 0;
+        assert_eq!(choice.alternatives[choice.chosen].nanoseconds.is_some(), has_batches, "{choice} {pass:?}");
+    }
+    let trials = tuning.iter().flat_map(|tuning| choices_of(tuning, "recording")).filter(|choice| choice.is_trial);
+    assert!(trials.count() > passes.len());
+    let (fixed, _) = frames(|backend| backend.recording_strategy(RecordingStrategy::Direct).unwrap());
+    assert!(choices_of(&fixed[0], "recording").iter().all(|choice| choice.alternatives.len() == 2));
+}
