@@ -7,7 +7,7 @@ use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::task::Worker;
-use crate::timeline::{Choice, Labels};
+use crate::timeline::{Labels, TuningChoice};
 use crate::view::ObjectTable;
 
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
@@ -103,7 +103,7 @@ pub trait Backend: Send + Sync + 'static {
 
     /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or made none by
     /// measured cost. `labels` are those of the pass.
-    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<Choice> {
+    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let _ = (frame, pass, labels);
         None
     }

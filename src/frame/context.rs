@@ -65,4 +65,11 @@ impl<B: Backend> FrameContext<'_, B> {
         let by_cost = || self.costs.items_per_job(node, width, self.workers);
         self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
     }
+
+    /// Reports the job size that a node uses, if it is another one than it was given.
+    pub(super) fn report_job_size(&self, node: usize, width: usize, items_per_job: usize) {
+        if self.granularity == Granularity::Adaptive {
+            self.costs.report_size(node, width, items_per_job);
+        }
+    }
 }

@@ -1,8 +1,10 @@
 //! The cost model: what the items of each stage cost, measured every frame, and the job size that follows.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use crate::timeline::{JobSize, Labels};
 use crate::tuning::{Estimate, Filter, Hysteresis};
 use crate::view::ObjectTable;
 
@@ -10,6 +12,8 @@ use crate::view::ObjectTable;
 /// size of its own. Nodes are counted in the order of the stage graph.
 #[derive(Debug, Default)]
 pub(super) struct CostModel {
+    /// By node, the index of its cost kind. Apart from `sizes`, which jobs write to.
+    kinds: Vec<usize>,
     /// By cost kind.
     costs: Vec<ItemCost>,
     /// By node.
@@ -29,24 +33,14 @@ struct ItemCost {
 /// The job size of a node.
 #[derive(Debug, Default)]
 struct NodeSize {
-    /// The index of its cost kind.
-    kind: usize,
-    /// The number of its items in the current frame; 0 if it was not asked for.
-    width: AtomicUsize,
-    /// The job size in items that was chosen last; 0 before the first choice.
+    /// The job size in items that was chosen last by an estimate; 0 before the first choice.
     chosen: AtomicUsize,
+    /// The number of the node's items in the current frame, 0 if it did not ask for a job size, and the size that it uses.
+    width: AtomicUsize,
+    used: AtomicUsize,
 }
 
-/// A node's job size in one frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ChosenSize {
-    pub(super) node: usize,
-    pub(super) items: usize,
-    pub(super) items_per_job: usize,
-    pub(super) nanoseconds_per_item: Option<f32>,
-}
-
-const FILTER: Filter = Filter::frequent(6.0);
+const FILTER: Filter = Filter::limiting_outliers(6.0);
 
 /// Work that is worth a second job: more than it costs another worker to take the job and to fetch what the job reads into its
 /// caches.
@@ -64,17 +58,18 @@ const HYSTERESIS: Hysteresis = Hysteresis::new(1.6);
 
 impl CostModel {
     /// An empty model. For each node the index of its cost kind.
-    pub(super) fn new(kind_of_node: &[usize]) -> Self {
-        let kinds = kind_of_node.iter().max().map_or(0, |last| last + 1);
+    pub(super) fn new(kinds: Vec<usize>) -> Self {
+        let costs = kinds.iter().max().map_or(0, |last| last + 1);
         Self {
-            costs: (0..kinds).map(|_| ItemCost::default()).collect(),
-            sizes: kind_of_node.iter().map(|&kind| NodeSize { kind, ..NodeSize::default() }).collect(),
+            costs: (0..costs).map(|_| ItemCost::default()).collect(),
+            sizes: kinds.iter().map(|_| NodeSize::default()).collect(),
+            kinds,
         }
     }
 
     /// Adds a sample: the time of a job over `items` items of a node.
     pub(super) fn add_sample(&self, node: usize, items: usize, took: Duration) {
-        let cost = &self.costs[self.sizes[node].kind];
+        let cost = &self.costs[self.kinds[node]];
         // Relaxed, here and below: sums, read after the run.
         cost.time.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
         cost.items.fetch_add(items as u64, Ordering::Relaxed);
@@ -90,12 +85,13 @@ impl CostModel {
         }
     }
 
-    /// Discards the samples of a frame that failed.
+    /// Discards the samples and sizes of a frame that failed.
     pub(super) fn discard_frame(&mut self) {
         for cost in &mut self.costs {
             *cost.time.get_mut() = 0;
             *cost.items.get_mut() = 0;
         }
+        self.sizes.iter_mut().for_each(|size| *size.width.get_mut() = 0);
     }
 
     /// The number of a node's `width` items that make a job on this number of workers.
@@ -104,24 +100,41 @@ impl CostModel {
     /// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping.
     pub(super) fn items_per_job(&self, node: usize, width: usize, workers: usize) -> usize {
         let size = &self.sizes[node];
-        let previous = Some(size.chosen.load(Ordering::Relaxed)).filter(|&items| items != 0 && items != usize::MAX);
-        let best = match self.costs[size.kind].estimate.get() {
+        let used = match self.costs[self.kinds[node]].estimate.get() {
             _ if workers == 1 => usize::MAX,
-            None => return FIRST_JOB_ITEMS,
-            Some(per_item) => best_size(per_item, width, workers, previous),
+            None => FIRST_JOB_ITEMS,
+            Some(per_item) => {
+                let before = size.chosen.load(Ordering::Relaxed);
+                let previous = Some(before).filter(|&items| items != 0 && items != usize::MAX);
+                let best = best_size(per_item, width, workers, previous);
+                if best != before {
+                    size.chosen.store(best, Ordering::Relaxed);
+                }
+                best
+            }
         };
-        size.width.store(width, Ordering::Relaxed);
-        size.chosen.store(best, Ordering::Relaxed);
-        best
+        self.report_size(node, width, used);
+        used
     }
 
-    /// Takes out the job sizes of the latest frame. Nodes that did not ask for one are left out.
-    pub(super) fn take_sizes(&mut self) -> impl Iterator<Item = ChosenSize> {
-        self.sizes.iter_mut().enumerate().filter_map(|(node, size)| {
+    /// Reports the job size that a node uses in this frame.
+    pub(super) fn report_size(&self, node: usize, width: usize, items_per_job: usize) {
+        self.sizes[node].width.store(width, Ordering::Relaxed);
+        self.sizes[node].used.store(items_per_job, Ordering::Relaxed);
+    }
+
+    /// Takes out the job sizes of the latest frame, with the estimates before its [`update`](Self::update). Nodes that did not ask
+    /// for one are left out. `labels` are those of the nodes.
+    pub(super) fn take_sizes(&mut self, labels: &[Arc<Labels>]) -> impl Iterator<Item = JobSize> {
+        let nodes = self.sizes.iter_mut().zip(&self.kinds).zip(labels);
+        nodes.filter_map(|((size, &kind), labels)| {
             let items = std::mem::take(size.width.get_mut());
-            let items_per_job = (*size.chosen.get_mut()).min(items);
-            let nanoseconds_per_item = self.costs[size.kind].estimate.get();
-            (items > 0).then_some(ChosenSize { node, items, items_per_job, nanoseconds_per_item })
+            (items > 0).then(|| JobSize {
+                labels: Arc::clone(labels),
+                items,
+                items_per_job: (*size.used.get_mut()).min(items),
+                nanoseconds_per_item: self.costs[kind].estimate.get(),
+            })
         })
     }
 }
@@ -177,7 +190,7 @@ mod tests {
     #[test]
     fn a_job_size_settles_within_thirty_frames_and_stays() {
         for (width, per_item) in [(10, 3), (1_000, 5), (40_000, 3), (1_000_000, 20), (64, 2_000), (7, 300_000)] {
-            let mut model = CostModel::new(&[0]);
+            let mut model = CostModel::new(vec![0]);
             // The first frame runs with cold caches.
             frame(&mut model, width, per_item * 20);
             frames(29, &mut model, width, per_item);
@@ -202,11 +215,11 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: 60, max_wrong: 0, max_changes: 2 };
+        let requirements = Requirements { settles_within: [30; 3], max_wrong: 0, max_changes: 2 };
         let nanoseconds = |is_after| if is_after { 400.0 } else { 20.0 };
         check_controller(
             &requirements,
-            || CostModel::new(&[0]),
+            || CostModel::new(vec![0]),
             |model, is_after, signal| frame(model, 10_000, signal.sample(nanoseconds(is_after)) as u64),
             |&items, is_after| {
                 let job = nanoseconds(is_after) * items as f32;
@@ -217,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_job_size_follows_a_change_of_scene() {
-        let mut model = CostModel::new(&[0]);
+        let mut model = CostModel::new(vec![0]);
         frames(30, &mut model, 10_000, 4);
         let before = frame(&mut model, 10_000, 4);
         frames(30, &mut model, 10_000, 400);
@@ -231,7 +244,7 @@ mod tests {
 
     #[test]
     fn work_near_the_parallel_threshold_does_not_flap() {
-        let mut model = CostModel::new(&[0]);
+        let mut model = CostModel::new(vec![0]);
         let width_of = |nanoseconds: u128| (nanoseconds / 10) as usize;
         let threshold = PARALLEL_THRESHOLD.as_nanos();
         let chosen: Vec<_> =
@@ -240,8 +253,28 @@ mod tests {
     }
 
     #[test]
+    fn a_node_that_did_not_ask_has_no_size() {
+        let (mut model, labels) = (CostModel::new(vec![0, 0]), [Arc::default(), Arc::default()]);
+        let sizes = |model: &mut CostModel| {
+            let sizes =
+                model.take_sizes(&labels).map(|size| (size.items, size.items_per_job, size.nanoseconds_per_item));
+            sizes.collect::<Vec<_>>()
+        };
+        model.items_per_job(NODE, 1000, 2);
+        model.add_sample(NODE, 1000, Duration::from_micros(3));
+        assert_eq!(sizes(&mut model), [(1000, FIRST_JOB_ITEMS, None)]);
+        model.update();
+        assert_eq!(sizes(&mut model), []);
+        model.items_per_job(NODE, 700, 2);
+        assert_eq!(sizes(&mut model), [(700, 700, Some(3.0))]);
+        model.items_per_job(NODE, 500, 2);
+        model.discard_frame();
+        assert_eq!(sizes(&mut model), []);
+    }
+
+    #[test]
     fn one_worker_has_one_job() {
-        let model = CostModel::new(&[0]);
+        let model = CostModel::new(vec![0]);
         model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
         assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
     }

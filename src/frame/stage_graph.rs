@@ -116,7 +116,7 @@ impl<B: Backend> StageGraph<B> {
         let labels = TuningLabels::new(labels, plan, &passes, views);
         Ok(Self {
             schedule: graph.compile().map_err(|error| FrameError::Jobs(error.problem))?,
-            tuning: StageTuning::new(&kind_of_node, occlusion, labels),
+            tuning: StageTuning::new(kind_of_node, occlusion, labels),
             passes,
             plan: Arc::clone(plan),
             key,
@@ -211,9 +211,11 @@ impl<B: Backend> GraphBuilder<B> {
                 self.cost_kinds.len() - 1
             });
             let node = self.kind_of_node.len();
-            let labels = Labels { stage: Some(info.name.to_owned()), ..scope.labels.clone() };
+            let labels_of = |stage: &str| Labels { stage: Some(stage.to_owned()), ..scope.labels.clone() };
             self.kind_of_node.push(kind);
-            self.labels.push(Arc::new(labels.clone()));
+            // The stage whose jobs a node sizes is the one that it shares its cost kind with.
+            self.labels.push(Arc::new(labels_of(info.cost_kind)));
+            let labels = labels_of(info.name);
             let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
             let id = self.graph.add(scope.name_of(info.name), StageNode { stage, node, tuned_view });
             self.graph.label(id, labels);

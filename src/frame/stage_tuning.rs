@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::cost_model::{ChosenSize, CostModel};
+use super::cost_model::CostModel;
 use super::occlusion_control::{OcclusionControl, occlusion_choices, update_occlusion};
 use super::tables::FrameTables;
 use crate::backend::Backend;
 use crate::graph::ModeChoice;
 use crate::process::{FramePlan, Pass};
-use crate::timeline::{Alternative, Choice, FrameTuning, JobSize, Labels};
+use crate::timeline::{FrameTuning, Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::view::RenderView;
 
 /// What is tuned by measurement in the frames of one stage graph, beside the run mode, which its schedule tunes.
@@ -45,7 +45,7 @@ impl TuningLabels {
 
 impl StageTuning {
     /// The tuning of nodes whose cost kinds have these indices, and of views with these controls.
-    pub(super) fn new(kind_of_node: &[usize], occlusion: Vec<OcclusionControl>, labels: TuningLabels) -> Self {
+    pub(super) fn new(kind_of_node: Vec<usize>, occlusion: Vec<OcclusionControl>, labels: TuningLabels) -> Self {
         Self { costs: CostModel::new(kind_of_node), occlusion, labels }
     }
 
@@ -57,28 +57,23 @@ impl StageTuning {
         backend: &B,
         frame: &B::Frame,
     ) -> FrameTuning {
-        let occlusion = occlusion_choices(&self.occlusion, &self.labels.views);
+        let occlusion = occlusion_choices(&self.occlusion, tables, &self.labels.views);
         let recording = |(pass, labels)| backend.recording_choice(frame, pass, labels);
         let recording = self.labels.passes.iter().enumerate().filter_map(recording);
         let choices = run_mode.map(run_mode_choice).into_iter().chain(occlusion).chain(recording).collect();
+        let job_sizes = self.costs.take_sizes(&self.labels.nodes).collect();
         update_occlusion(&mut self.occlusion, tables);
         self.costs.update();
-        let job_size = |size: ChosenSize| JobSize {
-            labels: Arc::clone(&self.labels.nodes[size.node]),
-            items: size.items,
-            items_per_job: size.items_per_job,
-            nanoseconds_per_item: size.nanoseconds_per_item,
-        };
-        FrameTuning { choices, job_sizes: self.costs.take_sizes().map(job_size).collect() }
+        FrameTuning { choices, job_sizes }
     }
 }
 
-fn run_mode_choice(choice: ModeChoice) -> Choice {
+fn run_mode_choice(choice: ModeChoice) -> TuningChoice {
     let ModeChoice { parallel, is_trial, serial_nanoseconds, parallel_nanoseconds } = choice;
     let alternatives = vec![
-        Alternative { name: "serial", nanoseconds: serial_nanoseconds },
-        Alternative { name: "parallel", nanoseconds: parallel_nanoseconds },
+        TuningAlternative { name: "serial", nanoseconds: serial_nanoseconds },
+        TuningAlternative { name: "parallel", nanoseconds: Some(parallel_nanoseconds) },
     ];
-    let chosen = usize::from(parallel);
-    Choice { subject: "run mode", labels: Arc::default(), alternatives, chosen, is_trial, unit: "run" }
+    let (subject, chosen) = (TuningSubject::RunMode, usize::from(parallel));
+    TuningChoice { subject, labels: Arc::default(), alternatives, chosen, is_trial }
 }

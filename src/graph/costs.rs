@@ -16,7 +16,7 @@ pub(super) struct NodeCosts {
     work: AtomicUsize,
 }
 
-const MEASURED_RUNS: Filter = Filter::rare(4.0);
+const MEASURED_RUNS: Filter = Filter::unlimited(4.0);
 
 impl NodeCosts {
     pub(super) fn new(nodes: usize) -> Self {
@@ -106,8 +106,8 @@ mod tests {
     use crate::tuning::signal::{Requirements, check_controller};
 
     #[test]
-    fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: 40, max_wrong: 150, max_changes: 120 };
+    fn it_settles_and_recovers_and_an_outlier_changes_the_order_briefly() {
+        let requirements = Requirements { settles_within: [40; 3], max_wrong: 150, max_changes: 60 };
         check_controller(
             &requirements,
             || NodeCosts::new(2),

@@ -43,8 +43,9 @@ pub struct ModeChoice {
     pub is_trial: bool,
     /// The estimated time of a serial run in nanoseconds, before the run; `None` if it was not measured yet.
     pub serial_nanoseconds: Option<f32>,
-    /// The estimated time of a parallel run in nanoseconds, before the run; `None` if it was not measured yet.
-    pub parallel_nanoseconds: Option<f32>,
+    /// What it is compared with: the estimated time of a parallel run in nanoseconds, before the run, or that of a wake-up if that
+    /// is longer or no parallel run was measured yet.
+    pub parallel_nanoseconds: f32,
 }
 
 /// This many of the first parallel runs are measured, except for the very first, which warms the caches; and then one run in
@@ -60,17 +61,20 @@ const PARALLEL_EVERY: u32 = 128;
 /// sign that the frame's work has changed.
 const EXCEEDED_RUNS: u32 = 8;
 
-const SERIAL_RUNS: Filter = Filter::frequent(8.0);
+const SERIAL_RUNS: Filter = Filter::limiting_outliers(8.0);
 
 /// The latest run counts most but not alone, because alternate frames may do different things.
-const MEASURED_RUNS: Filter = Filter::rare(4.0 / 3.0);
+const MEASURED_RUNS: Filter = Filter::unlimited(4.0 / 3.0);
 
 const HYSTERESIS: Hysteresis = Hysteresis::new(1.25);
 
 impl ExecutionPolicy {
     /// Chooses the mode of the next run.
     pub(crate) fn choose(&mut self, wake_up_cost: Duration) -> RunMode {
-        let (serial, parallel) = (self.serial.get(), self.parallel.get());
+        let wake_up_cost = wake_up_cost.as_nanos() as f32;
+        let serial = self.serial.get();
+        // A run that takes less than a wake-up is worth no wake-up.
+        let parallel = self.parallel.get().unwrap_or(0.0).max(wake_up_cost);
         let (mode, is_trial) = self.choose_by(serial, parallel, wake_up_cost);
         self.latest = Some(ModeChoice {
             parallel: matches!(mode, RunMode::Parallel { .. }),
@@ -81,23 +85,21 @@ impl ExecutionPolicy {
         mode
     }
 
-    /// Chooses by these estimates. Returns the mode, and whether it is a trial.
-    fn choose_by(&mut self, serial: Option<f32>, parallel: Option<f32>, wake_up_cost: Duration) -> (RunMode, bool) {
+    /// Chooses by these times in nanoseconds. Returns the mode, and whether it is a trial.
+    fn choose_by(&mut self, serial: Option<f32>, parallel: f32, wake_up_cost: f32) -> (RunMode, bool) {
         let is_unknown = serial.is_none() && self.parallel_runs == 0 && self.exceeded == 0;
         if is_unknown {
-            // A run that takes less than a wake-up is worth no wake-up. Any other run loses no more time than one wake-up takes.
-            return (RunMode::Serial { limit: Some(wake_up_cost) }, true);
+            // A run loses no more time than one wake-up takes.
+            return (RunMode::Serial { limit: Some(Duration::from_nanos(wake_up_cost as u64)) }, true);
         }
-        let wake_up_cost = wake_up_cost.as_nanos() as f32;
-        let limit = parallel.unwrap_or(0.0).max(wake_up_cost);
         self.is_serial = match serial {
             None => false,
-            Some(serial) if self.is_serial => !HYSTERESIS.replaces(limit, serial),
-            Some(serial) => HYSTERESIS.replaces(serial, limit),
+            Some(serial) if self.is_serial => !HYSTERESIS.replaces(parallel, serial),
+            Some(serial) => HYSTERESIS.replaces(serial, parallel),
         };
         let is_due = serial.is_some_and(|serial| serial > wake_up_cost) && self.since_measured >= PARALLEL_EVERY;
         if self.is_serial && !is_due {
-            let limit = limit * 2.0 * HYSTERESIS.factor();
+            let limit = parallel * 2.0 * HYSTERESIS.factor();
             return (RunMode::Serial { limit: Some(Duration::from_nanos(limit as u64)) }, false);
         }
         (self.parallel(), self.is_serial)
@@ -179,14 +181,13 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: 200, max_wrong: 100, max_changes: 60 };
+        let requirements = Requirements { settles_within: [100, 100, 200], max_wrong: 100, max_changes: 60 };
         check_controller(
             &requirements,
             ExecutionPolicy::default,
             |policy, is_after, signal| {
                 let [serial, parallel] = if is_after { [2000.0, 1100.0] } else { [30.0, 60.0] };
-                let factor = signal.sample(1.0);
-                run_once(policy, (serial * factor) as u64, (parallel * factor) as u64)
+                run_once(policy, signal.sample(serial) as u64, signal.sample(parallel) as u64)
             },
             |&is_serial, is_after| is_serial != is_after,
         );

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::chunks::Chunks;
 use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
-use crate::tuning::{Estimate, Filter};
 
 /// Hands out the chunks of a loop or a node to the workers that have joined it. A ticket is a claim on some chunks.
 ///
@@ -125,8 +124,6 @@ impl Tickets {
 /// How many chunks a worker claims at once: one at first, more if the chunks before were quick.
 #[derive(Debug)]
 pub(crate) struct TicketSize {
-    /// Nanoseconds per chunk.
-    cost: Estimate,
     /// At least one.
     max: usize,
     /// The last reading of the clock, and how many chunks have been claimed since.
@@ -138,18 +135,16 @@ pub(crate) struct TicketSize {
 impl TicketSize {
     /// How many nanoseconds the chunks of one ticket may take: long enough that the ticket itself costs nothing beside them, and
     /// short enough that it does not matter who runs them.
-    const TARGET_NANOSECONDS: f32 = 8_000.0;
+    const TARGET_NANOSECONDS: usize = 8_000;
     /// The smallest ticket is this fraction of the largest, even if less is left for each worker.
     const MIN_FRACTION: usize = 16;
-    /// The latest chunks count alone, as the costs of chunks may differ much within a loop. But one cheap chunk says little about
-    /// the rest, so a ticket is at most four times as large as the last one.
-    const FILTER: Filter = Filter::rare(1.0).with_max_fall(4.0);
+    /// The factor by which a ticket may exceed the last one: one cheap chunk says little about the rest.
+    const GROWTH: usize = 4;
     /// How many chunks pass between two readings of the clock, once their cost is known.
     const STEADY: usize = 8;
 
     fn new(max: usize) -> Self {
-        let cost = Estimate::settled_at(Self::TARGET_NANOSECONDS / max as f32);
-        Self { cost, max, since: None, measure_after: 1 }
+        Self { max, since: None, measure_after: 1 }
     }
 
     /// How many of the remaining chunks to claim: two thirds of this worker's share, within bounds.
@@ -175,10 +170,9 @@ impl TicketSize {
         }
         let now = now();
         if let Some((since, chunks)) = self.since {
-            let nanoseconds = (now.duration_since(since).as_nanos() as f32).max(1.0);
-            self.cost.add(nanoseconds / chunks as f32, Self::FILTER);
-            let fitting = Self::TARGET_NANOSECONDS / self.cost.get().unwrap_or(Self::TARGET_NANOSECONDS);
-            self.max = (fitting as usize).max(1);
+            let nanoseconds = (now.duration_since(since).as_nanos() as usize).max(1);
+            let fitting = chunks.saturating_mul(Self::TARGET_NANOSECONDS) / nanoseconds;
+            self.max = fitting.clamp(1, self.max.max(chunks.saturating_mul(Self::GROWTH)));
             self.measure_after = Self::STEADY;
         }
         self.since = Some((now, claimed));
@@ -190,42 +184,66 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::tuning::signal::{Requirements, check_controller};
+    use crate::tuning::signal::{Requirements, Signal, check_controller};
 
-    /// The cost of a chunk in nanoseconds.
-    fn cost(is_after: bool) -> f32 {
+    /// A worker that takes tickets of an endless loop.
+    struct Simulation {
+        size: TicketSize,
+        now: Instant,
+    }
+
+    impl Simulation {
+        fn new() -> Self {
+            Self { size: TicketSize::new(1), now: Instant::now() }
+        }
+
+        /// Takes a ticket of chunks that take these nanoseconds each, and returns their number.
+        fn take(&mut self, nanoseconds: f32) -> usize {
+            let claimed = self.size.of(1_000_000, 2);
+            self.size.adapt(claimed, || self.now);
+            self.now += Duration::from_nanos((nanoseconds * claimed as f32) as u64);
+            claimed
+        }
+    }
+
+    fn nanoseconds(is_after: bool) -> f32 {
         if is_after { 1000.0 } else { 50.0 }
     }
 
     #[test]
-    fn it_settles_follows_outliers_briefly_and_recovers() {
-        let requirements = Requirements { settles_within: 20, max_wrong: 250, max_changes: 1000 };
+    fn it_settles_and_recovers_and_an_outlier_counts_briefly() {
+        let requirements = Requirements { settles_within: [20; 3], max_wrong: 250, max_changes: 60 };
         check_controller(
             &requirements,
-            || (TicketSize::new(1), Instant::now()),
-            |(size, now), is_after, signal| {
-                let claimed = size.of(1_000_000, 2);
-                size.adapt(claimed, || *now);
-                *now += Duration::from_nanos((signal.sample(cost(is_after)) * claimed as f32) as u64);
-                claimed
+            Simulation::new,
+            |simulation, is_after, signal| {
+                let ticket = simulation.take(signal.sample(nanoseconds(is_after))) as f32 * nanoseconds(is_after);
+                let target = TicketSize::TARGET_NANOSECONDS as f32;
+                (target / 4.0..=target).contains(&ticket)
             },
-            |&claimed, is_after| {
-                let ticket = cost(is_after) * claimed as f32;
-                (TicketSize::TARGET_NANOSECONDS / 4.0..=TicketSize::TARGET_NANOSECONDS).contains(&ticket)
-            },
+            |&is_right, _| is_right,
         );
     }
 
     #[test]
-    fn a_ticket_grows_fourfold_at_most() {
-        let (mut size, now) = (TicketSize::new(1), Instant::now());
-        let mut largest = 1;
-        for step in 0..10 {
-            let claimed = size.of(1_000_000, 2);
-            assert!(claimed <= 4 * largest, "{claimed} after {largest}");
-            largest = largest.max(claimed);
-            size.adapt(claimed, || now + Duration::from_nanos(10 * step));
+    fn a_ticket_is_at_most_four_times_as_large_as_all_before_it() {
+        let mut simulation = Simulation::new();
+        let (mut largest, mut total) = (1, 1);
+        for _ in 0..30 {
+            let claimed = simulation.take(1.0);
+            assert!(claimed <= 4 * total, "{claimed} after {total}");
+            (largest, total) = (largest.max(claimed), total + claimed);
         }
-        assert!(largest > 1000, "{largest}");
+        assert!(largest > 4000, "{largest}");
+    }
+
+    #[test]
+    fn tickets_are_large_again_soon_after_a_costly_chunk() {
+        let mut simulation = Simulation::new();
+        simulation.take(1_000_000.0);
+        let chunks: usize = (0..).map(|_| simulation.take(50.0)).take_while(|&claimed| claimed < 100).sum();
+        assert!(chunks < 100, "{chunks}");
+        let mut signal = Signal::new(1);
+        assert!((0..20).all(|_| simulation.take(signal.sample(50.0)) >= 100));
     }
 }

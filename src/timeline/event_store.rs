@@ -8,8 +8,11 @@ use std::{mem, thread};
 use super::frame_tuning::FrameTuning;
 use super::log::{Counter, Frame, Log, Run, Span};
 
-/// The capacity for frames, runs, spans, counter readings and frames' tuning, each, between two logs.
+/// The capacity for frames, runs, spans and counter readings, each, between two logs.
 const MAX_EVENTS: usize = 1 << 16;
+
+/// The capacity for frames' tuning between two logs: each is some kilobytes.
+const MAX_TUNED_FRAMES: usize = 1 << 10;
 
 /// The frames, runs, spans, counters and tuning since the last log.
 #[derive(Default)]
@@ -115,6 +118,15 @@ impl EventStore {
         let list = list(&mut self.events);
         if list.len() < MAX_EVENTS {
             list.push(event);
+        } else {
+            self.events.dropped += 1;
+        }
+    }
+
+    /// Adds a frame's tuning, or counts it as dropped if there is no room.
+    pub(super) fn add_tuning(&mut self, frame: u64, tuning: FrameTuning) {
+        if self.events.tuning.len() < MAX_TUNED_FRAMES {
+            self.events.tuning.push((frame, tuning));
         } else {
             self.events.dropped += 1;
         }

@@ -8,51 +8,82 @@ use super::labels::Labels;
 /// What was chosen by measurement in a frame, and the costs by which it was chosen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTuning {
-    /// The choices among alternatives: the run mode of the frame's job graph, the occlusion test of each view that can test, and
-    /// how each pass is recorded. A choice that nothing can be measured for, or that the engine has made, is not among them.
-    pub choices: Vec<Choice>,
-    /// The sizes of jobs, for each node of the frame's job graph whose items are divided by cost. Empty unless the
+    /// The choices among alternatives. Choices that the engine fixed are left out, and so are those of which nothing can be
+    /// measured.
+    pub choices: Vec<TuningChoice>,
+    /// The job sizes of the nodes of the frame's job graph whose items are divided by cost. Empty unless the
     /// [granularity](crate::Granularity) is adaptive.
     pub job_sizes: Vec<JobSize>,
 }
 
 /// A choice among alternatives by measured cost.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// What was chosen: `run mode`, `occlusion test`, `recording`.
-    pub subject: &'static str,
+pub struct TuningChoice {
+    /// What was chosen.
+    pub subject: TuningSubject,
     /// The view or pass that it was chosen for; none for the whole frame.
     pub labels: Arc<Labels>,
     /// The alternatives.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<TuningAlternative>,
     /// The index of the one that the frame has.
     pub chosen: usize,
     /// Whether the frame has it only to measure it.
     pub is_trial: bool,
-    /// What its cost is for: `run`, `object`, `batch`.
-    pub unit: &'static str,
 }
 
-/// One alternative of a [`Choice`].
+/// What is chosen among alternatives by measured cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum TuningSubject {
+    /// Whether the frame's job graph runs on the calling thread alone or on all workers: see
+    /// [`Schedule::run_mode`](crate::graph::Schedule::run_mode).
+    RunMode,
+    /// Whether a view tests for occlusion: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
+    OcclusionTest,
+    /// How a pass is recorded and encoded.
+    Recording,
+}
+
+impl TuningSubject {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RunMode => "run mode",
+            Self::OcclusionTest => "occlusion test",
+            Self::Recording => "recording",
+        }
+    }
+
+    /// What the cost of an alternative is for.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::RunMode => "run",
+            Self::OcclusionTest => "object",
+            Self::Recording => "batch",
+        }
+    }
+}
+
+/// One alternative of a [`TuningChoice`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alternative {
+pub struct TuningAlternative {
     /// Its name: `serial`, `cached bundles`.
     pub name: &'static str,
-    /// Its estimated cost in nanoseconds per [unit](Choice::unit), before the frame; `None` if it was not measured yet, or not
-    /// since the work has changed.
+    /// Its estimated cost in nanoseconds per [unit](TuningSubject::unit) when the frame was recorded. `None` if it was not
+    /// measured yet, or not since the work has changed; a trial begins without an estimate too.
     pub nanoseconds: Option<f32>,
 }
 
 /// The job size of one node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobSize {
-    /// The stage, and the view and process that it is for.
+    /// The stage whose jobs these are, and its view and process.
     pub labels: Arc<Labels>,
     /// The number of items of the node.
     pub items: usize,
     /// How many of them make a job.
     pub items_per_job: usize,
-    /// The estimated thread time of an item in nanoseconds, after the frame; `None` if it was not measured yet.
+    /// The estimated thread time of an item in nanoseconds, before the frame; `None` if it was not measured yet.
     pub nanoseconds_per_item: Option<f32>,
 }
 
@@ -73,15 +104,16 @@ impl JobSize {
 /// ```text
 /// recording of geometry buffer in main: cached bundles for 21.0 ns a batch; direct 95.2 ns, bundles 101 ns
 /// ```
-impl Display for Choice {
+impl Display for TuningChoice {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}", self.subject)?;
+        write!(formatter, "{}", self.subject.name())?;
         write_labels(formatter, &self.labels)?;
         let Some(chosen) = self.alternatives.get(self.chosen) else { return Ok(()) };
         write!(formatter, ": {}", chosen.name)?;
         if let Some(nanoseconds) = chosen.nanoseconds {
-            let article = if self.unit.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-            write!(formatter, " for {} {article} {}", Nanoseconds(nanoseconds), self.unit)?;
+            let unit = self.subject.unit();
+            let article = if unit.starts_with('o') { "an" } else { "a" };
+            write!(formatter, " for {} {article} {unit}", Nanoseconds(nanoseconds))?;
         }
         if self.is_trial {
             write!(formatter, ", as a trial")?;
@@ -98,7 +130,7 @@ impl Display for Choice {
 /// One line: the job size and the reason for it.
 ///
 /// ```text
-/// fill of geometry buffer in main: 10000 items of 6.1 ns in 4 jobs of 2560
+/// fill of geometry buffer in main: 10000 items of 6.10 ns in 4 jobs of 2560
 /// ```
 impl Display for JobSize {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
@@ -130,12 +162,18 @@ struct Nanoseconds(f32);
 
 impl Display for Nanoseconds {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        let (value, unit) = match self.0 {
-            nanoseconds if nanoseconds < 1e3 => (nanoseconds, "ns"),
-            nanoseconds if nanoseconds < 1e6 => (nanoseconds / 1e3, "µs"),
-            nanoseconds => (nanoseconds / 1e6, "ms"),
+        let (mut value, mut unit) = (self.0, "ns");
+        for larger in ["µs", "ms", "s"] {
+            // What would be rounded to 1000 is 1 of the next unit.
+            if value >= 999.5 {
+                (value, unit) = (value / 1e3, larger);
+            }
+        }
+        let decimals = match value {
+            value if value < 9.995 => 2,
+            value if value < 99.95 => 1,
+            _ => 0,
         };
-        let decimals = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
         write!(formatter, "{value:.decimals$} {unit}")
     }
 }
@@ -151,9 +189,9 @@ mod tests {
 
     #[test]
     fn a_choice_is_a_line() {
-        let alternative = |name, nanoseconds| Alternative { name, nanoseconds };
-        let choice = Choice {
-            subject: "recording",
+        let alternative = |name, nanoseconds| TuningAlternative { name, nanoseconds };
+        let choice = TuningChoice {
+            subject: TuningSubject::Recording,
             labels: labels(),
             alternatives: vec![
                 alternative("direct", Some(95.2)),
@@ -162,7 +200,6 @@ mod tests {
             ],
             chosen: 1,
             is_trial: true,
-            unit: "batch",
         };
         let text = "recording of geometry buffer in main: bundles for 1.50 µs a batch, as a trial; direct 95.2 ns";
         assert_eq!(choice.to_string(), text);
@@ -175,5 +212,14 @@ mod tests {
         };
         assert_eq!(size(10_000, 2560), "fill of geometry buffer in main: 10000 items of 6.13 ns in 4 jobs of 2560");
         assert_eq!(size(1, 1), "fill of geometry buffer in main: 1 item of 6.13 ns in one job");
+    }
+
+    #[test]
+    fn times_have_three_digits() {
+        let texts = [0.0, 5.0, 9.994, 9.996, 99.96, 999.4, 999.7, 12_345.0, 1.5e6, 2e9]
+            .map(|time| Nanoseconds(time).to_string());
+        let expected =
+            ["0.00 ns", "5.00 ns", "9.99 ns", "10.0 ns", "100 ns", "999 ns", "1.00 µs", "12.3 µs", "1.50 ms", "2.00 s"];
+        assert_eq!(texts, expected);
     }
 }

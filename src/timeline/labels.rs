@@ -1,4 +1,4 @@
-//! What a node belongs to.
+//! What a node, a view or a pass is called.
 
 /// What a node belongs to, so that nodes can be grouped by render process, stage and view.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -2,7 +2,8 @@
 //!
 //! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and can be switched on and off while the
 //! scheduler runs. Each worker writes to its own ring buffer, so no worker waits for another. [`Timeline::take`] takes
-//! out what was recorded, as a [`Log`]: plain data: frames, runs of schedules, and every chunk of each run.
+//! out what was recorded, as a [`Log`]: plain data: frames, runs of schedules, every chunk of each run, and what was chosen
+//! by measurement.
 //!
 //! ```
 //! use drawloom::graph::{Closure, FrameGraph};
@@ -29,7 +30,8 @@
 //! While the timeline is off: one read of a flag for each run, and for each worker that falls asleep. While it is on:
 //! one reading of the clock for each chunk and one for each node (on x86-64, of the processor's counter), and 48 bytes
 //! per chunk in a ring buffer of [fixed size](crate::task::SchedulerBuilder::timeline_capacity). Events that do not fit
-//! are dropped and counted.
+//! are dropped and counted. A [`Renderer`](crate::Renderer) adds what it chose by measurement: some kilobytes a frame, for 1,024
+//! frames at most between two logs.
 
 mod chunk_timer;
 mod clock;
@@ -45,7 +47,7 @@ mod track;
 pub(crate) use chunk_timer::ChunkTimer;
 pub(crate) use recorder::{OpenRun, RunEnd, TimelineSettings};
 
-pub use frame_tuning::{Alternative, Choice, FrameTuning, JobSize};
+pub use frame_tuning::{FrameTuning, JobSize, TuningAlternative, TuningChoice, TuningSubject};
 pub use labels::Labels;
 pub use log::{
     Chunk, Counter, DeviceLog, DevicePass, Frame, Graph, Idle, IdleKind, Log, NodeInfo, Run, Span, WorkerLog,

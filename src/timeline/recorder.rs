@@ -152,7 +152,8 @@ impl Timeline {
     /// Records what was chosen by measurement in a frame: none if the timeline was off when the frame began.
     pub(crate) fn add_tuning(&self, frame: Option<u64>, tuning: &FrameTuning) {
         if let Some(frame) = frame.filter(|_| self.is_on()) {
-            self.store.lock().push(|events| &mut events.tuning, (frame, tuning.clone()));
+            let tuning = tuning.clone();
+            self.store.lock().add_tuning(frame, tuning);
         }
     }
 

@@ -4,8 +4,9 @@
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Estimate {
     average: f32,
-    /// The larger of the first two samples, until the third decides between them.
-    larger: f32,
+    /// The larger of the first two samples, until the third decides between them. Later, while there are outliers: the average
+    /// before the first of them.
+    reference: f32,
     samples: u32,
     /// How many of the latest samples in a row were outliers.
     outliers: u32,
@@ -16,26 +17,18 @@ pub(crate) struct Estimate {
 pub(crate) struct Filter {
     /// The time constant of the average in samples: the latest sample has one part in this many.
     time_constant: f32,
-    /// A sample counts as at most this multiple of the average,
-    max_rise: f32,
-    /// and as at least the average divided by this.
-    max_fall: f32,
+    limits_outliers: bool,
 }
 
 impl Filter {
-    /// A filter for samples of which there is one each frame or run.
-    pub(crate) const fn frequent(time_constant: f32) -> Self {
-        Self { time_constant, max_rise: Estimate::OUTLIER_LIMIT, max_fall: f32::INFINITY }
+    /// A filter for samples of which there is one each frame or run. It limits outliers.
+    pub(crate) const fn limiting_outliers(time_constant: f32) -> Self {
+        Self { time_constant, limits_outliers: true }
     }
 
-    /// A filter for samples between which there are many frames or runs: none is taken for an outlier.
-    pub(crate) const fn rare(time_constant: f32) -> Self {
-        Self { time_constant, max_rise: f32::INFINITY, max_fall: f32::INFINITY }
-    }
-
-    /// As this one, but a sample counts as at least the average divided by `max_fall`.
-    pub(crate) const fn with_max_fall(self, max_fall: f32) -> Self {
-        Self { max_fall, ..self }
+    /// A filter for samples between which there are many runs, so that no sample is taken for an outlier, nor is the first one.
+    pub(crate) const fn unlimited(time_constant: f32) -> Self {
+        Self { time_constant, limits_outliers: false }
     }
 }
 
@@ -51,11 +44,6 @@ impl Estimate {
     /// The samples of which the average begins as the median: enough to tolerate one outlier.
     pub(crate) const FIRST_SAMPLES: u32 = 3;
 
-    /// An estimate that begins as if it had this average for some time.
-    pub(crate) const fn settled_at(average: f32) -> Self {
-        Self { average, larger: average, samples: Self::FIRST_SAMPLES, outliers: 0 }
-    }
-
     /// The estimated cost; `None` before the first sample.
     pub(crate) fn get(self) -> Option<f32> {
         (self.samples > 0).then_some(self.average)
@@ -68,22 +56,42 @@ impl Estimate {
 
     /// Adds a sample. Returns true if it shows a step: the cost has risen for good, and the estimate starts over.
     pub(crate) fn add(&mut self, sample: f32, filter: Filter) -> bool {
-        match self.samples {
-            0 => (self.average, self.larger) = (sample, sample),
-            1 => (self.average, self.larger) = (self.average.min(sample), self.average.max(sample)),
-            2 => self.average = sample.clamp(self.average, self.larger),
-            _ => {
-                let limit = self.average * filter.max_rise;
-                self.outliers = if sample > limit { self.outliers + 1 } else { 0 };
-                if self.outliers >= Self::STEP_SAMPLES {
-                    *self = Self { average: sample, larger: sample, samples: 1, outliers: 0 };
-                    return true;
-                }
-                let counted = sample.min(limit).max(self.average / filter.max_fall);
-                self.average += (counted - self.average) / filter.time_constant;
+        let is_step = match self.samples {
+            0 => {
+                (self.average, self.reference) = (sample, sample);
+                false
             }
-        }
+            _ if !filter.limits_outliers => {
+                self.average += (sample - self.average) / filter.time_constant;
+                false
+            }
+            1 => {
+                (self.average, self.reference) = (self.average.min(sample), self.average.max(sample));
+                false
+            }
+            2 => {
+                // The median of three: the third sample, or that of the first two which is closer to it.
+                self.average = sample.max(self.average).min(self.reference.max(self.average));
+                false
+            }
+            _ => self.add_limited(sample, filter),
+        };
         self.samples = self.samples.saturating_add(1);
+        is_step
+    }
+
+    fn add_limited(&mut self, sample: f32, filter: Filter) -> bool {
+        if self.outliers == 0 {
+            // Outliers raise the average, but not what later ones are compared with.
+            self.reference = self.average;
+        }
+        self.outliers = if sample > self.reference * Self::OUTLIER_LIMIT { self.outliers + 1 } else { 0 };
+        if self.outliers >= Self::STEP_SAMPLES {
+            *self = Self { average: sample, reference: sample, samples: 0, outliers: 0 };
+            return true;
+        }
+        let counted = sample.min(self.average * Self::OUTLIER_LIMIT);
+        self.average += (counted - self.average) / filter.time_constant;
         false
     }
 }
@@ -93,7 +101,7 @@ mod tests {
     use super::*;
     use crate::tuning::signal::Signal;
 
-    const FILTER: Filter = Filter::frequent(8.0);
+    const FILTER: Filter = Filter::limiting_outliers(8.0);
 
     /// The estimate after each sample.
     fn estimates(samples: impl IntoIterator<Item = f32>) -> Vec<f32> {
@@ -123,25 +131,47 @@ mod tests {
 
     #[test]
     fn a_step_up_is_followed_within_ten_samples_and_a_step_down_within_thirty() {
-        let up = estimates((0..100).map(|index| if index < 50 { 10.0 } else { 1000.0 }));
-        assert!(up[49] == 10.0 && up[54] < 60.0 && up[58] == 1000.0, "{up:?}");
-        let down = estimates((0..100).map(|index| if index < 50 { 1000.0 } else { 10.0 }));
-        assert!(down[80] < 30.0, "{down:?}");
+        for factor in [1.7, 2.0, 3.0, 20.0] {
+            let up = estimates((0..100).map(|index| if index < 50 { 10.0 } else { 10.0 * factor }));
+            assert!(up[49] == 10.0 && up[54] < 60.0 && up[58] == 10.0 * factor, "{up:?}");
+            let down = estimates((0..100).map(|index| if index < 50 { 10.0 * factor } else { 10.0 }));
+            assert!(down[80] < 14.0, "{down:?}");
+        }
     }
 
     #[test]
-    fn a_step_is_reported_once() {
+    fn a_step_is_reported_once_and_less_than_a_step_is_not() {
+        for (factor, expected) in [(1.5, vec![]), (1.7, vec![57]), (100.0, vec![57])] {
+            let mut estimate = Estimate::default();
+            let steps = (0..200).filter(|&index| estimate.add(if index < 50 { 10.0 } else { 10.0 * factor }, FILTER));
+            assert_eq!(steps.collect::<Vec<_>>(), expected, "{factor}");
+        }
+    }
+
+    #[test]
+    fn a_cost_of_zero_is_followed_like_any_other() {
         let mut estimate = Estimate::default();
-        let steps = (0..100).filter(|&index| estimate.add(if index < 50 { 10.0 } else { 1000.0 }, FILTER));
-        assert_eq!(steps.collect::<Vec<_>>(), [57]);
+        let costs: Vec<_> = (0..40)
+            .map(|index| {
+                estimate.add(if index < 20 { 0.0 } else { 5.0 }, FILTER);
+                estimate.get().unwrap()
+            })
+            .collect();
+        assert_eq!((costs[19], costs[39]), (0.0, 5.0));
+        let mut estimate = Estimate::default();
+        for sample in [0.0, 0.0, 0.0, 0.0, 8.0] {
+            estimate.add(sample, Filter::unlimited(2.0));
+        }
+        assert_eq!(estimate.get(), Some(4.0));
     }
 
     #[test]
-    fn a_rare_sample_counts_in_full_and_a_fall_can_be_limited() {
-        let mut estimate = Estimate::settled_at(100.0);
-        assert!(!estimate.add(900.0, Filter::rare(2.0)));
-        assert_eq!(estimate.get(), Some(500.0));
-        estimate.add(5.0, Filter::rare(1.0).with_max_fall(4.0));
-        assert_eq!(estimate.get(), Some(125.0));
+    fn a_sample_counts_as_it_is_if_outliers_are_not_limited() {
+        let mut estimate = Estimate::default();
+        let averages = [100.0, 900.0, 100.0].map(|sample| {
+            assert!(!estimate.add(sample, Filter::unlimited(2.0)));
+            estimate.get().unwrap()
+        });
+        assert_eq!(averages, [100.0, 500.0, 300.0]);
     }
 }

@@ -13,9 +13,9 @@ impl Hysteresis {
         self.0
     }
 
-    /// Whether an alternative that costs `other` replaces the current choice, which costs `current`.
+    /// Whether an alternative that costs `other` replaces the current choice, which costs `current`. One of equal cost never does.
     pub(crate) fn replaces(self, other: f32, current: f32) -> bool {
-        current >= other * self.0
+        other < current && current >= other * self.0
     }
 
     /// Whether a size is kept, if another one would be best now.
@@ -39,6 +39,7 @@ mod tests {
     #[test]
     fn the_current_choice_stays_until_it_is_wrong_by_the_factor() {
         assert!(!HYSTERESIS.replaces(100.0, 149.0) && HYSTERESIS.replaces(100.0, 151.0));
+        assert!(!HYSTERESIS.replaces(0.0, 0.0) && HYSTERESIS.replaces(0.0, 1.0));
         assert!(HYSTERESIS.keeps(100.0, 149.0) && HYSTERESIS.keeps(149.0, 100.0));
         assert!(!HYSTERESIS.keeps(100.0, 151.0) && !HYSTERESIS.keeps(151.0, 100.0));
     }

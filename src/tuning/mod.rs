@@ -5,12 +5,12 @@
 //!
 //! | controller | chooses | sample | time constant | changes its choice if |
 //! | --- | --- | --- | --- | --- |
-//! | `CostModel` (`frame/cost_model.rs`) | the items of a stage's jobs | each frame: ns an item | 6 frames | the size is wrong by 1.6 |
-//! | `TicketSize` (`task/tickets.rs`) | the chunks that a worker claims at once | every 8 chunks: ns a chunk | 1 sample | always: a size needs no hysteresis where a change costs nothing |
-//! | `NodeCosts` (`graph/costs.rs`) | which ready node runs first | each measured run: ns a node | 4 runs | always: an order costs nothing to change |
-//! | `ExecutionPolicy` (`graph/execution_policy.rs`) | a serial or a parallel run | each run: ns a run | 8 serial runs, or 4/3 measured parallel ones | the other mode is faster by 1.25 |
-//! | [`Tuner`] of recording strategies (`backend/wgpu/strategy`) | how a pass is recorded and encoded | each frame: ns a batch | 8 frames | another strategy is cheaper by 1.15 |
-//! | [`Tuner`] of occlusion tests (`frame/occlusion_control.rs`) | whether a view tests for occlusion | each frame: ns an object | 8 frames | the other way is cheaper by 1.15 |
+//! | `CostModel` (`frame/cost_model.rs`) | the items of a stage's jobs | each frame: thread time an item | 6 frames | the size is wrong by 1.6; from one job to several above 19 µs of work, and back below 12 |
+//! | `TicketSize` (`task/tickets.rs`) | the chunks that a worker claims at once | every 8 chunks, at most once a ticket: time of a chunk | none: the latest sample | it is wrong at all |
+//! | `NodeCosts` (`graph/costs.rs`) | which ready node runs first | each measured run: time from a node's start to its end | 4 measured runs | the order of the costs changes |
+//! | `ExecutionPolicy` (`graph/execution_policy.rs`) | a serial or a parallel run | each serial run and each measured parallel one: its time | 8 serial or 4/3 measured parallel runs | the other mode is faster by 1.25, where a parallel run takes a wake-up at least |
+//! | [`Tuner`] of recording (`backend/wgpu/strategy`) | how a pass is recorded and encoded | each frame: thread time a batch, and the time that other workers wait for it | 8 frames | another way is cheaper by 1.11 |
+//! | [`Tuner`] of occlusion tests (`frame/occlusion_control.rs`) | whether a view tests for occlusion | each frame: thread time an object | 8 frames | the other way is cheaper by 1.11 |
 //!
 //! Three of them divide work, each at another scale, and none can replace another. `CostModel` decides how many items one
 //! call of a stage gets: items of a chunk share what the call sets up. `TicketSize` decides how many such calls a worker
@@ -19,20 +19,30 @@
 //!
 //! # Rules
 //!
-//! 1. **A cost is measured where it arises, and divided by what was done**: time of workers an item, not time of frames.
-//! 2. **The first samples are not trusted.** They fill caches and make buffers. An estimate is the smaller of its first two
-//!    samples, then the median of its first three, and only from then on an average.
+//! 1. **A cost is divided by the work that it was for**, so that it stays when only the amount of work changes. Only the costs of
+//!    whole nodes and runs are not.
+//! 2. **The first samples are trusted least**, because they fill caches and make buffers. An estimate is the smaller of its first
+//!    two samples, then the median of its first three, and only from then on an average. Until a controller has an estimate, it
+//!    makes a choice that is wrong by little: jobs of 512 items, a serial run with a limit.
 //! 3. **Outliers count as [`Estimate::OUTLIER_LIMIT`] times the average.** The operating system preempts workers, which makes a
 //!    sample long and never short, so only long samples are limited.
 //! 4. **[`Estimate::STEP_SAMPLES`] outliers in a row are a step**: the work has changed. The estimate starts over.
-//! 5. **A sample that is rare counts in full** ([`Filter::rare`]): the next one is too far off to wait for it.
-//! 6. **Hysteresis is a factor, in one place for each controller** ([`Hysteresis`]): larger where a change costs more than a
-//!    wrong choice.
+//! 5. **Where samples are rare, rules 2 to 4 do not hold** ([`Filter::unlimited`]): one run in 31 is measured in parallel, and the
+//!    next sample is too far off to wait for it.
+//! 6. **Hysteresis is a factor, one for each controller** ([`Hysteresis`]). It is large where a wrong choice costs little, as that
+//!    of a job size, and small where it costs in proportion.
 //! 7. **An alternative that loses a trial is tried again later each time**, up to a longest pause, so that trials cost next to
-//!    nothing and alternatives of equal cost stop replacing each other. A step in the cost or a change in the amount of work
-//!    tries all of them again.
+//!    nothing and alternatives of equal cost stop replacing each other. A step in the cost, or twice or half the work for
+//!    [`Estimate::STEP_SAMPLES`] frames, makes the tuner try all of them again, but not before 256 frames have passed since it last
+//!    did so, and twice as many each time, up to 8192. The longest pause follows from what a trial costs: see
+//!    [`Tuner::new`].
 //!
-//! `Renderer::record` puts what was chosen, and by which costs, into [`FrameTuning`](crate::timeline::FrameTuning).
+//! `TicketSize` follows none of the rules 2 to 4: it works within one loop, whose chunks may differ much, and a ticket that is too
+//! large holds up all workers, so the latest chunks count alone. The mode of a run has no pauses either: a serial schedule runs in
+//! parallel once in 128 runs.
+//!
+//! What was chosen, and by which costs, is in [`FrameTuning`](crate::timeline::FrameTuning), and of any schedule in
+//! [`Schedule::run_mode`](crate::graph::Schedule::run_mode).
 
 mod estimate;
 mod hysteresis;

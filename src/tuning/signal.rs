@@ -38,8 +38,8 @@ impl Signal {
 
 /// How good the choices of a controller must be under any signal.
 pub(crate) struct Requirements {
-    /// Within how many frames its choice is right, at first and after each step.
-    pub(crate) settles_within: usize,
+    /// Within how many frames its choice is right: at first, after a step, and after the step back.
+    pub(crate) settles_within: [usize; 3],
     /// How many of the thousand frames after that may be wrong: trials, and what outliers cause.
     pub(crate) max_wrong: usize,
     /// How often the choice may change in these frames.
@@ -65,8 +65,9 @@ pub(crate) fn check_controller<C, T: PartialEq + Debug>(
     ];
     for (name, mut signal) in signals {
         let mut controller = controller();
-        for (phase, is_after) in [("at first", false), ("after the step", true), ("after the step back", false)] {
-            (0..requirements.settles_within).for_each(|_| drop(frame(&mut controller, is_after, &mut signal)));
+        let phases = [("at first", false), ("after the step", true), ("after the step back", false)];
+        for ((phase, is_after), settles_within) in phases.into_iter().zip(requirements.settles_within) {
+            (0..settles_within).for_each(|_| drop(frame(&mut controller, is_after, &mut signal)));
             let chosen: Vec<_> = (0..1000).map(|_| frame(&mut controller, is_after, &mut signal)).collect();
             let wrong: Vec<_> = chosen.iter().filter(|choice| !is_right(choice, is_after)).collect();
             let first = wrong.first();

@@ -4,9 +4,10 @@ use super::{Estimate, Filter, Hysteresis};
 
 /// Chooses one of several alternatives from frame to frame.
 ///
-/// Every frame measures the alternative in use. At first, and when the cost or the amount of work changes much, the tuner
-/// tries each other alternative for a few frames. Later it tries one of them for a single frame now and then, less often the
-/// more often it lost. It switches only to an alternative that is cheaper by a margin in several frames.
+/// Every frame measures the alternative in use. At first, and when the cost or the amount of work changes much, the tuner learns:
+/// it tries each other alternative for a few frames, and takes the cheapest. Later it tries one of them for a single frame now and
+/// then; the pause before its next trial doubles each time it loses. The tuner switches only to an alternative that is cheaper by a
+/// margin in several frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Tuner {
     candidates: Vec<Candidate>,
@@ -17,6 +18,10 @@ pub(crate) struct Tuner {
     /// The number of units in the latest frame, and in the frame in which learning started.
     units: usize,
     learned_units: usize,
+    /// For how many frames in a row the number of units has been far from that of learning.
+    changed_frames: u32,
+    /// Whether the current alternative's cost has shown a step since learning started.
+    has_stepped: bool,
     /// Learning does not restart before this frame, so that a scene that oscillates does not restart it all the time.
     next_learning: u64,
     learning_pause: u64,
@@ -51,10 +56,10 @@ struct Trial {
 }
 
 /// Trials are short, and the average that they are compared with is longer.
-const FILTER: Filter = Filter::frequent(8.0);
+const FILTER: Filter = Filter::limiting_outliers(8.0);
 
-/// A candidate replaces the current alternative if it is cheaper by this factor.
-const HYSTERESIS: Hysteresis = Hysteresis::new(1.15);
+/// Outside of learning, a candidate replaces the current alternative if it is cheaper by this factor.
+const HYSTERESIS: Hysteresis = Hysteresis::new(1.11);
 
 /// In frames.
 const MIN_PAUSE: u64 = 64;
@@ -64,7 +69,8 @@ const MAX_LEARNING_PAUSE: u64 = 8192;
 /// A trial ends without a result after this many frames, because its frames are not submitted.
 const MAX_TRIAL_FRAMES: u64 = 16;
 
-/// Learning restarts if the number of units has more than doubled or halved since, by more than this many.
+/// Learning restarts if the number of units has more than doubled or halved since, by more than this many, for
+/// [`Estimate::STEP_SAMPLES`] frames: a few units more change no cost.
 const UNITS_THRESHOLD: usize = 64;
 
 impl Tuner {
@@ -79,14 +85,16 @@ impl Tuner {
             is_learning: true,
             units: 0,
             learned_units: 0,
+            changed_frames: 0,
+            has_stepped: false,
             next_learning: 0,
             learning_pause: MIN_LEARNING_PAUSE,
         }
     }
 
-    /// Chooses a frame's alternative: its index, and whether this is a trial. Of all tuners of a frame at most one begins a trial
-    /// outside of learning: the one that takes `may_try`. `is_useful` says whether an alternative makes any difference for so many
-    /// units.
+    /// Chooses a frame's alternative: its index, and whether this is a trial. Of the tuners of a frame that share `may_try`, at most
+    /// one begins a trial outside of learning: the one that takes it. `is_useful` says whether an alternative, by index, differs
+    /// from the others at this number of units.
     pub(crate) fn choose(
         &mut self,
         frame: u64,
@@ -98,6 +106,9 @@ impl Tuner {
                 return (candidate, true);
             }
             self.end_trial(candidate, frame);
+        }
+        if self.has_stepped && frame >= self.next_learning {
+            self.start_learning(frame);
         }
         if !self.candidates[self.current].cost.is_settled() {
             return (self.current, false);
@@ -124,18 +135,25 @@ impl Tuner {
         }
         self.units = sample.units;
         let (fewer, more) = (self.learned_units.min(self.units), self.learned_units.max(self.units));
-        if more > 2 * fewer + UNITS_THRESHOLD && frame >= self.next_learning {
-            self.start_learning(frame);
+        if self.learned_units == 0 {
+            self.learned_units = self.units;
+        } else if more <= 2 * fewer + UNITS_THRESHOLD {
+            self.changed_frames = 0;
+        } else {
+            self.changed_frames = self.changed_frames.saturating_add(1);
+            if self.changed_frames >= Estimate::STEP_SAMPLES && frame >= self.next_learning {
+                self.start_learning(frame);
+            }
         }
         if !sample.is_warm {
             return;
         }
         let cost = (sample.nanoseconds / sample.units as f64) as f32;
         let is_step = self.candidates[alternative].cost.add(cost, FILTER);
-        match self.trial {
-            Some(Trial { candidate, .. }) if candidate == alternative => self.decide_trial(alternative, frame),
-            _ if alternative == self.current && is_step && frame >= self.next_learning => self.start_learning(frame),
-            _ => {}
+        if self.trial.as_ref().is_some_and(|trial| trial.candidate == alternative) {
+            self.decide_trial(alternative, frame);
+        } else if alternative == self.current {
+            self.has_stepped |= is_step;
         }
     }
 
@@ -148,10 +166,12 @@ impl Tuner {
     fn decide_trial(&mut self, candidate: usize, frame: u64) {
         let cost = self.candidates[candidate].cost;
         let [tried, current] = [cost, self.candidates[self.current].cost].map(|cost| cost.get().unwrap_or(f32::MAX));
-        match (cost.is_settled(), HYSTERESIS.replaces(tried, current)) {
+        let is_cheaper = if self.is_learning { tried < current } else { HYSTERESIS.replaces(tried, current) };
+        match (cost.is_settled(), is_cheaper) {
             (true, true) => {
                 // Each loser is paused for longer, so two alternatives of equal cost stop replacing each other.
                 let loser = std::mem::replace(&mut self.current, candidate);
+                self.has_stepped = false;
                 self.end_trial(loser, frame);
             }
             (true, false) => self.end_trial(candidate, frame),
@@ -161,12 +181,14 @@ impl Tuner {
         }
     }
 
-    /// Ends the trial, if there is one, and pauses an alternative.
+    /// Ends the trial, if there is one, and pauses an alternative. It has not lost if it was not measured.
     fn end_trial(&mut self, loser: usize, frame: u64) {
         self.trial = None;
         let loser = &mut self.candidates[loser];
         loser.due = frame + loser.pause;
-        loser.pause = (loser.pause * 2).min(loser.max_pause);
+        if loser.cost.get().is_some() {
+            loser.pause = (loser.pause * 2).min(loser.max_pause);
+        }
     }
 
     /// Starts to try all alternatives.
@@ -176,11 +198,9 @@ impl Tuner {
         }
         self.is_learning = true;
         self.trial = None;
+        (self.has_stepped, self.changed_frames) = (false, 0);
         self.next_learning = frame + self.learning_pause;
-        // The first frame with units always starts learning, so it does not lengthen the pause.
-        if self.learned_units > 0 {
-            self.learning_pause = (self.learning_pause * 2).min(MAX_LEARNING_PAUSE);
-        }
+        self.learning_pause = (self.learning_pause * 2).min(MAX_LEARNING_PAUSE);
         self.learned_units = self.units;
     }
 }
@@ -243,7 +263,7 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: 700, max_wrong: 60, max_changes: 80 };
+        let requirements = Requirements { settles_within: [30, 60, 2200], max_wrong: 60, max_changes: 80 };
         let controller = || (Tuner::new([MAX_PAUSE; ALTERNATIVES]), 0);
         let cost = |alternative, is_after| match (alternative, is_after) {
             (0, false) => 10.0,
@@ -273,6 +293,13 @@ mod tests {
     }
 
     #[test]
+    fn learning_takes_the_cheapest_alternative_however_little_it_saves() {
+        let mut simulation = Simulation::new();
+        simulation.run(30, |alternative| if alternative == 2 { 19.0 } else { 20.0 });
+        assert_eq!(simulation.tuner.current, 2);
+    }
+
+    #[test]
     fn trials_of_a_steady_cost_are_rare() {
         let mut simulation = Simulation::new();
         simulation.run(30, cheapest(0));
@@ -296,6 +323,7 @@ mod tests {
     #[test]
     fn a_slightly_cheaper_alternative_does_not_replace_the_current_one() {
         let mut simulation = Simulation::new();
+        simulation.run(100, |_| 20.0);
         simulation.run(5_000, |alternative| if alternative == 0 { 20.0 } else { 19.0 });
         assert_eq!(simulation.tuner.current, 0);
         simulation.run(5_000, |alternative| if alternative == 0 { 20.0 } else { 17.0 });
@@ -322,6 +350,33 @@ mod tests {
         simulation.units = 5000;
         simulation.run(30, |alternative| if alternative == 4 { 5.0 } else { cheapest(1)(alternative) });
         assert_eq!(simulation.tuner.current, 4);
+    }
+
+    #[test]
+    fn a_step_during_the_pause_of_learning_is_not_lost() {
+        for factor in [1.8, 6.0] {
+            let mut simulation = Simulation::new();
+            simulation.run(1500, cheapest(0));
+            // Each step makes the tuner learn. The second one falls into the pause after the first.
+            simulation.run(60, |alternative| if alternative == 0 { 10.0 * factor } else { 30.0 * factor });
+            let mut frames = 0;
+            while simulation.tuner.current == 0 && frames < 400 {
+                simulation.run(1, |alternative| if alternative == 0 { 10.0 * factor * factor } else { 11.0 * factor });
+                frames += 1;
+            }
+            assert!(frames < MIN_LEARNING_PAUSE, "{factor}: {frames}");
+        }
+    }
+
+    #[test]
+    fn a_frame_with_more_units_does_not_restart_learning() {
+        let mut simulation = Simulation::with_noise(0.1);
+        simulation.run(600, cheapest(1));
+        simulation.units = 10_000;
+        simulation.run(Estimate::STEP_SAMPLES as usize - 1, cheapest(1));
+        simulation.units = 2000;
+        simulation.run(1, cheapest(1));
+        assert!(!simulation.tuner.is_learning);
     }
 
     #[test]

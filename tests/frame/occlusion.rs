@@ -15,7 +15,7 @@ use drawloom_testing::scenes::{cube, field, sized};
 
 /// A wall in front of the first camera, and small cubes behind and beside it, one in four of them glass. The second camera views the
 /// scene from behind, so that its cubes are in front of the wall.
-fn wall_and_cubes() -> Scene {
+pub fn wall_and_cubes() -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add(cube()).unwrap();
     let stone = scene.add(Material::default()).unwrap();

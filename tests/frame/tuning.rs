@@ -1,5 +1,6 @@
 //! What was chosen by measurement is in the statistics, the log and the frame report.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
@@ -7,9 +8,11 @@ use drawloom::process::Deferred;
 use drawloom::quality::Quality;
 use drawloom::report::{FrameReport, SchedulerCosts};
 use drawloom::task::Scheduler;
-use drawloom::timeline::{Choice, FrameTuning};
+use drawloom::timeline::{FrameTuning, TuningChoice, TuningSubject};
 use drawloom::{Granularity, Renderer};
 use drawloom_testing::scenes::field;
+
+use crate::occlusion::wall_and_cubes;
 
 /// The tuning of some frames, and the renderer's scheduler, whose timeline recorded them.
 fn record(frames: usize, workers: usize, granularity: Granularity) -> (Vec<FrameTuning>, Arc<Scheduler>) {
@@ -19,34 +22,27 @@ fn record(frames: usize, workers: usize, granularity: Granularity) -> (Vec<Frame
     let (mut renderer, _submitter) = builder.granularity(granularity).build(Arc::clone(&scheduler)).unwrap();
     let scene = field(3000);
     scheduler.timeline().start();
-    let tuning = (0..frames).map(|_| {
-        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
-        let statistics = recorded.statistics();
-        let is_hidden = statistics.views.iter().any(|view| view.occluded > 0);
-        let test = choices_of(&statistics.tuning, "occlusion test");
-        assert!(!is_hidden || test.iter().any(|choice| choice.alternatives[choice.chosen].name == "on"));
-        statistics.tuning.clone()
-    });
-    (tuning.collect(), scheduler)
+    let record = |_| renderer.record(scene.as_scene_ref()).unwrap().statistics().tuning.clone();
+    ((0..frames).map(record).collect(), scheduler)
 }
 
-fn choices_of<'a>(tuning: &'a FrameTuning, subject: &str) -> Vec<&'a Choice> {
+fn choices_of(tuning: &FrameTuning, subject: TuningSubject) -> Vec<&TuningChoice> {
     tuning.choices.iter().filter(|choice| choice.subject == subject).collect()
 }
 
 #[test]
 fn choices_come_with_the_costs_that_they_were_made_by() {
     let (tuning, _) = record(40, 2, Granularity::Adaptive);
-    let view_count = choices_of(&tuning[0], "occlusion test").len();
+    let view_count = choices_of(&tuning[0], TuningSubject::OcclusionTest).len();
     assert!(view_count > 0);
     for (frame, tuning) in tuning.iter().enumerate() {
-        let tests = choices_of(tuning, "occlusion test");
-        assert_eq!((tests.len(), choices_of(tuning, "run mode").len()), (view_count, 1));
+        let tests = choices_of(tuning, TuningSubject::OcclusionTest);
+        assert_eq!((tests.len(), choices_of(tuning, TuningSubject::RunMode).len()), (view_count, 1));
         assert!(tests.iter().all(|choice| choice.labels.view.is_some()));
-        for Choice { alternatives, .. } in tests {
-            // The first frame fills caches, the next three measure the first alternative; from the ninth on both are known.
+        for TuningChoice { alternatives, .. } in tests {
+            // The first frame fills caches, the next three measure the first alternative, and one more is in the state of the other.
             let known: Vec<_> = alternatives.iter().map(|alternative| alternative.nanoseconds.is_some()).collect();
-            assert!(known[0] == (frame >= 2) && (frame < 9 || known[1]), "frame {frame}: {alternatives:?}");
+            assert!(known[0] == (frame >= 2) && known[1] == (frame >= 6), "frame {frame}: {alternatives:?}");
         }
     }
 }
@@ -67,10 +63,36 @@ fn job_sizes_come_with_the_cost_of_an_item() {
 }
 
 #[test]
-fn a_fixed_granularity_has_no_job_sizes_and_one_worker_has_no_run_mode() {
-    let (tuning, _) = record(3, 1, Granularity::PerDraw);
-    for tuning in tuning {
-        assert!(tuning.job_sizes.is_empty() && choices_of(&tuning, "run mode").is_empty());
+fn a_frame_that_tests_for_occlusion_says_so() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let quality = Quality { occlusion: Some(8), ..Quality::balanced() };
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let (mut renderer, _submitter) = builder.build(scheduler).unwrap();
+    let scene = wall_and_cubes();
+    let mut chosen = BTreeSet::new();
+    for _ in 0..20 {
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let statistics = recorded.statistics();
+        let view = &statistics.views[0];
+        let choices = choices_of(&statistics.tuning, TuningSubject::OcclusionTest);
+        let choice = choices.iter().find(|choice| choice.labels.view.as_ref() == Some(&view.name)).unwrap();
+        assert_eq!(choice.alternatives[choice.chosen].name == "on", view.occluded > 0);
+        chosen.insert((choice.chosen, choice.is_trial));
+    }
+    assert!(chosen.contains(&(0, false)) && chosen.contains(&(1, true)), "{chosen:?}");
+}
+
+#[test]
+fn a_fixed_granularity_has_no_job_sizes() {
+    let (tuning, _) = record(3, 2, Granularity::PerDraw);
+    assert!(tuning.iter().all(|tuning| tuning.job_sizes.is_empty()));
+}
+
+#[test]
+fn one_worker_has_one_job_a_stage_and_no_run_mode() {
+    for tuning in record(3, 1, Granularity::Adaptive).0 {
+        assert!(choices_of(&tuning, TuningSubject::RunMode).is_empty());
+        assert!(!tuning.job_sizes.is_empty() && tuning.job_sizes.iter().all(|size| size.jobs() == 1), "{tuning:?}");
     }
 }
 
@@ -82,7 +104,7 @@ fn the_log_and_the_frame_report_have_the_choices_of_each_frame() {
     let costs = SchedulerCosts::measure().unwrap();
     for (frame, tuning) in log.tuning.iter().zip(&tuning).map(|((frame, _), tuning)| (*frame, tuning)) {
         let report = FrameReport::new(&log, frame, &costs).unwrap();
-        assert_eq!(report.tuning.as_ref(), Some(tuning));
+        assert_eq!(&report.tuning, std::slice::from_ref(tuning));
         let text = report.to_string();
         assert!(text.contains(&tuning.choices[0].to_string()), "{text}");
     }
@@ -105,7 +127,7 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
         (tuning, renderer.backend().pass_statistics())
     };
     let (tuning, passes) = frames(|backend| backend);
-    let choices = choices_of(tuning.last().unwrap(), "recording");
+    let choices = choices_of(tuning.last().unwrap(), TuningSubject::Recording);
     assert_eq!(choices.len(), passes.len());
     for (choice, pass) in choices.iter().zip(&passes) {
         assert_eq!(choice.labels.process.as_deref(), Some(pass.process.as_str()));
@@ -115,12 +137,13 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
             RecordingStrategy::CachedBundles => "cached bundles",
             RecordingStrategy::Indirect => "indirect",
         };
-        assert!(choice.alternatives[choice.chosen].name.contains(name), "{choice} {pass:?}");
+        assert_eq!(choice.alternatives[choice.chosen].name.trim_start_matches("split "), name, "{choice} {pass:?}");
         let has_batches = pass.batches > 0;
         assert_eq!(choice.alternatives[choice.chosen].nanoseconds.is_some(), has_batches, "{choice} {pass:?}");
     }
-    let trials = tuning.iter().flat_map(|tuning| choices_of(tuning, "recording")).filter(|choice| choice.is_trial);
+    let trials =
+        tuning.iter().flat_map(|tuning| choices_of(tuning, TuningSubject::Recording)).filter(|choice| choice.is_trial);
     assert!(trials.count() > passes.len());
     let (fixed, _) = frames(|backend| backend.recording_strategy(RecordingStrategy::Direct).unwrap());
-    assert!(choices_of(&fixed[0], "recording").iter().all(|choice| choice.alternatives.len() == 2));
+    assert!(choices_of(&fixed[0], TuningSubject::Recording).iter().all(|choice| choice.alternatives.len() == 2));
 }

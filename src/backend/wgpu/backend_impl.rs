@@ -12,7 +12,7 @@ use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::Worker;
-use crate::timeline::{Alternative, Choice, Labels};
+use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::view::ObjectTable;
 
 impl Backend for WgpuBackend {
@@ -140,23 +140,23 @@ impl Backend for WgpuBackend {
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
     }
 
-    fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<Choice> {
+    fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let strategies = self.strategies.strategies();
         let state = frame.pass(pass);
         if strategies.len() == 1 || state.command_pass_index.is_none() {
             return None;
         }
         let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
-        let named = |(strategy, nanoseconds): (&PassStrategy, _)| Alternative { name: strategy.name(), nanoseconds };
+        let named =
+            |(strategy, nanoseconds): (&PassStrategy, _)| TuningAlternative { name: strategy.name(), nanoseconds };
         let alternatives = pipelines
             .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
-        Some(Choice {
-            subject: "recording",
+        Some(TuningChoice {
+            subject: TuningSubject::Recording,
             labels: Arc::clone(labels),
             alternatives,
             chosen: state.strategy_index,
             is_trial: state.is_trial,
-            unit: "batch",
         })
     }
 

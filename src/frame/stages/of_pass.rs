@@ -68,7 +68,9 @@ impl<B: Backend> Stage<B> for Split {
         let count = frame.visible_count(self.pass);
         // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
         let buckets = count.div_ceil(frame.items_per_job(job.node, count, 1)).min(frame.workers);
-        table.splitters.write().choose(&table.commands, count, buckets);
+        let mut splitters = table.splitters.write();
+        splitters.choose(&table.commands, count, buckets);
+        frame.report_job_size(job.node, count, count.div_ceil(splitters.bucket_count().max(1)));
         Ok(())
     }
 }

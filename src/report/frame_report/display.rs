@@ -10,7 +10,7 @@ use super::slack::Slack;
 use super::step::{HeldBy, Step};
 use super::what_if::WhatIf;
 use super::worker_report::WorkerReport;
-use crate::timeline::{Choice, FrameTuning, JobSize};
+use crate::timeline::{JobSize, TuningChoice};
 
 /// How many lines a list has, for a person to read it.
 const MAX_LINES: usize = 10;
@@ -204,14 +204,14 @@ impl FrameReport {
     }
 
     fn write_tuning(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        let Some(FrameTuning { choices, job_sizes }) = &self.tuning else { return Ok(()) };
-        if choices.is_empty() && job_sizes.is_empty() {
+        let choices: Vec<_> =
+            self.tuning.iter().flat_map(|tuning| &tuning.choices).map(TuningChoice::to_string).collect();
+        let mut sizes: Vec<_> = self.tuning.iter().flat_map(|tuning| &tuning.job_sizes).collect();
+        if choices.is_empty() && sizes.is_empty() {
             return Ok(());
         }
         writeln!(formatter, "\nchosen by measured cost")?;
-        let mut sizes: Vec<_> = job_sizes.iter().collect();
         sizes.sort_by(|one, other| other.work().total_cmp(&one.work()));
-        let choices: Vec<_> = choices.iter().map(Choice::to_string).collect();
         let sizes: Vec<_> = sizes.into_iter().map(JobSize::to_string).collect();
         for (lines, kind) in
             [(choices, ["choice", "choices"]), (sizes, ["node with less work", "nodes with less work"])]

@@ -46,8 +46,8 @@ pub struct FrameReport {
     pub what_if: Vec<WhatIf>,
     /// How long a replay takes on other numbers of workers: 1, 2, 4, 8, 16.
     pub on_workers: Vec<(usize, Duration)>,
-    /// What was chosen by measurement, if a [`Renderer`](crate::Renderer) recorded the frame.
-    pub tuning: Option<FrameTuning>,
+    /// What was chosen by measurement, for each [`Renderer::record`](crate::Renderer::record) of the frame.
+    pub tuning: Vec<FrameTuning>,
 }
 
 /// The numbers of workers that each frame is replayed on.
@@ -96,7 +96,12 @@ impl FrameReport {
             queue_waits: queue_waits(&runs),
             replayed,
             what_if: what_if(&runs, &replay, workers, replayed),
-            tuning: log.tuning.iter().find(|(number, _)| *number == frame).map(|(_, tuning)| tuning.clone()),
+            tuning: log
+                .tuning
+                .iter()
+                .filter(|(number, _)| *number == frame)
+                .map(|(_, tuning)| tuning.clone())
+                .collect(),
             on_workers: WORKER_COUNTS.map(|workers| (workers, replay.frame_time(workers))).to_vec(),
         })
     }

@@ -1,4 +1,4 @@
-//! How a pass is recorded and encoded, and what chooses that by measurement.
+//! How a pass is recorded and encoded.
 
 mod pass_segment;
 mod pass_strategy;
