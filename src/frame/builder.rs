@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::plan_cache::PlanCache;
+use super::plan_cache::{PlanCache, with_quality};
 use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
 use crate::backend::Backend;
@@ -101,7 +101,7 @@ impl<B: Backend> RendererBuilder<B> {
         }
         self.quality.unwrap_or_default().check()?;
         let deferred = match (self.deferred, &self.quality) {
-            (Some(deferred), Some(quality)) => Some(deferred.quality(quality)),
+            (Some(deferred), Some(quality)) => Some(with_quality(deferred, quality)?),
             (deferred, _) => deferred,
         };
         let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
+use crate::quality::Quality;
 use crate::scene::{Assets, Light, ViewKind};
+use crate::task::{JobPanic, catch};
 use crate::view::ShadowMaps;
 
 /// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
@@ -33,7 +35,7 @@ impl PlanCache {
         }
         let all = Requirements::all();
         if let Some(deferred) = &deferred {
-            deferred.check()?;
+            plan(|| deferred.check())?;
             compile(Some(deferred), &processes, &outputs, &all)?;
         }
         let nothing = Requirements::default();
@@ -105,8 +107,23 @@ fn compile(
     outputs: &[String],
     requirements: &Requirements,
 ) -> Result<FramePlan, PlanError> {
-    let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
-    let own = deferred.map(|deferred| deferred.output().to_owned());
-    let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
-    FramePlan::new(chain, processes.to_vec(), &outputs)
+    plan(|| {
+        let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
+        let own = deferred.map(|deferred| deferred.output().to_owned());
+        let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
+        FramePlan::new(chain, processes.to_vec(), &outputs)
+    })
+}
+
+/// A pipeline with this quality, which its steps of post-processing are asked about.
+///
+/// # Errors
+/// If a step panics.
+pub(super) fn with_quality(deferred: Deferred, quality: &Quality) -> Result<Deferred, PlanError> {
+    plan(|| Ok(deferred.quality(quality)))
+}
+
+/// Calls code that asks processes and steps of the engine, and turns their panic into an error.
+fn plan<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
+    catch(call).unwrap_or_else(|JobPanic { message }| Err(PlanError::Panicked { message }))
 }

@@ -6,7 +6,7 @@ use parking_lot::RwLockReadGuard;
 
 use super::context::FrameContext;
 use super::pass_recording::PassRecording;
-use super::plan_cache::PlanCache;
+use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::Recorded;
 use super::scene_check::check_scene;
 use super::shadow_cache::ShadowCache;
@@ -195,14 +195,14 @@ impl<B: Backend> Renderer<B> {
     /// Sets the quality from the next frame on, of the deferred pipeline too.
     ///
     /// # Errors
-    /// If the quality is invalid; then nothing changes.
+    /// If the quality is invalid, or a step of post-processing panics; then nothing changes.
     pub fn set_quality(&mut self, quality: Quality) -> Result<(), BuildError> {
         quality.check()?;
         if quality == self.quality && self.pipeline_has_quality {
             return Ok(());
         }
         if let Some(deferred) = self.plans.deferred() {
-            self.plans = self.plans.with_deferred(deferred.clone().quality(&quality))?;
+            self.plans = self.plans.with_deferred(with_quality(deferred.clone(), &quality)?)?;
         }
         (self.quality, self.pipeline_has_quality) = (quality, true);
         self.shadow_cache.invalidate();
@@ -218,7 +218,7 @@ impl<B: Backend> Renderer<B> {
     /// process draws no commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
-        let name = |pass: &Pass| graph.plan.processes()[pass.process_index].process.name();
+        let name = |pass: &Pass| graph.plan.processes()[pass.process_index].name.as_str();
         let is_wanted = |pass: &Pass| pass.view_index == view && name(pass) == process;
         let table = self.tables.passes.get(graph.passes.iter().position(is_wanted)?)?;
         table.selection.map(|_| table.list.read())

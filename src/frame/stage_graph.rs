@@ -90,7 +90,7 @@ impl<B: Backend> StageGraph<B> {
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
-            let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].process.name());
+            let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].name.as_str());
             let needs = StageNeeds {
                 draws_commands: draws[pass.process_index].selection().is_some(),
                 tests_occlusion: occlusion[pass.view_index].is_possible(),

@@ -34,7 +34,7 @@ impl TuningLabels {
             let (process, view) = (process.map(str::to_owned), Some(view.name().to_owned()));
             Arc::new(Labels { process, stage: None, view })
         };
-        let name = |pass: &Pass| plan.processes()[pass.process_index].process.name();
+        let name = |pass: &Pass| plan.processes()[pass.process_index].name.as_str();
         Self {
             nodes,
             passes: passes.iter().map(|pass| labels(Some(name(pass)), &views[pass.view_index])).collect(),

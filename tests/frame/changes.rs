@@ -42,7 +42,7 @@ fn dark_field() -> Scene {
 }
 
 fn processes(renderer: &Renderer<NullBackend>) -> Vec<&str> {
-    renderer.plan().processes().iter().map(|planned| planned.process.name()).collect()
+    renderer.plan().processes().iter().map(|planned| planned.name.as_str()).collect()
 }
 
 #[test]

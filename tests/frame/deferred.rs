@@ -56,7 +56,7 @@ fn build_error(builder: RendererBuilder<NullBackend>) -> PlanError {
 /// The names of the processes that draw a scene, in order.
 fn processes(renderer: &mut Renderer<NullBackend>, scene: &Scene) -> Vec<String> {
     drop(renderer.record(scene.as_scene_ref()).unwrap());
-    renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned()).collect()
+    renderer.plan().processes().iter().map(|planned| planned.name.clone()).collect()
 }
 
 fn empty() -> Scene {
@@ -107,7 +107,7 @@ fn an_empty_scene_uses_only_the_required_processes() {
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let expected = ["geometry buffer", "tone mapping"];
     // Also before the first frame.
-    let planned: Vec<_> = renderer.plan().processes().iter().map(|planned| planned.process.name()).collect();
+    let planned: Vec<_> = renderer.plan().processes().iter().map(|planned| planned.name.as_str()).collect();
     assert_eq!(planned, expected);
     assert_eq!(processes(&mut renderer, &empty()), expected);
     assert_eq!(renderer.plan_count(), 1);

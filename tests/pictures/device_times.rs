@@ -55,8 +55,7 @@ fn names_of(fixture: &Fixture, recorded: &Recorded<WgpuBackend>) -> Vec<(String,
         .iter()
         .flat_map(|group| recorded.queues().iter().filter(|queue| group.kinds.contains(&views[queue.view].kind)));
     let processes = fixture.renderer.plan().processes();
-    let names =
-        |(process, view): (usize, usize)| (processes[process].process.name().to_owned(), views[view].name.clone());
+    let names = |(process, view): (usize, usize)| (processes[process].name.clone(), views[view].name.clone());
     let passes = queues.flat_map(|queue| &queue.passes);
     passes.map(|(pass, _)| names((pass.process_index, pass.view_index))).collect()
 }

@@ -265,7 +265,7 @@ fn hundred() -> Result<(), Failed> {
 
     let recorded = fixture.record(&panel_scene.scene(&[view])?)?;
     let processes = fixture.renderer.plan().processes().iter();
-    let names: Vec<_> = processes.map(|planned| planned.process.name().to_owned()).collect();
+    let names: Vec<_> = processes.map(|planned| planned.name.clone()).collect();
     if names != ["geometry buffer", "point lights", "tone mapping"] || recorded.statistics().views[0].lights != 100 {
         return Err(format!("{names:?} draw {} lights", recorded.statistics().views[0].lights).into());
     }

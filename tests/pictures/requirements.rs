@@ -257,7 +257,7 @@ fn every_process_is_needed() -> Result<(), Failed> {
     let all = || deferred().depth_pre_pass(true).post(Fxaa::default());
     let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
     let picture = fixture.draw(&everything())?;
-    let names = fixture.renderer.plan().processes().iter().map(|planned| planned.process.name().to_owned());
+    let names = fixture.renderer.plan().processes().iter().map(|planned| planned.name.clone());
     let mut needed_by_others = Vec::new();
     let (mut count, mut changed) = (0, 0);
     for name in names {

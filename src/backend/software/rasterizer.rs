@@ -87,7 +87,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
 /// If a process has none, or panics when its `cpu_shader` is called.
 pub(super) fn cpu_shaders_of(request: &FrameRequest<'_>) -> Result<Vec<CpuShader>, BackendError> {
     let shader_of = |planned: &PlannedProcess| {
-        let process = || planned.process.name().to_owned();
+        let process = || planned.name.clone();
         let shader = catch(|| planned.process.cpu_shader())
             .map_err(|panic| BackendError::CpuShaderPanicked { process: process(), message: panic.message })?;
         shader.ok_or_else(|| BackendError::NoCpuShader { process: process() })
@@ -122,7 +122,7 @@ fn software_pass<R: Precision>(
     targets: &SoftwareTargets<R>,
 ) -> Result<SoftwarePass<R>, BackendError> {
     let planned = &request.plan.processes()[pass.process_index];
-    let process = planned.process.name().to_owned();
+    let process = planned.name.clone();
     let draws = match (&request.draws[pass.process_index], R::shader(shader)) {
         (Draws::Commands(draws), TypedCpuShader::Objects(shader)) => {
             SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth }

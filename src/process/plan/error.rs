@@ -71,6 +71,12 @@ pub enum PlanError {
     /// A process could not say what it reads and writes.
     #[error(transparent)]
     Process(#[from] ProcessError),
+    /// A process or step of the engine panicked when it was asked for its name, or a step when it was asked for its process.
+    #[error("a process or a step of post-processing panicked while the frame was planned: {message}")]
+    Panicked {
+        /// The message of the panic.
+        message: String,
+    },
     /// No process is left, because none leads to an output.
     #[error("no process leads to an output")]
     Empty,

@@ -51,9 +51,10 @@ impl FramePlan {
         planned.sort_by_key(|(_, planned)| planned.declaration.views);
         let mut graph = FrameGraph::new();
         let mut added: Vec<AddedProcess> = Vec::new();
-        for (chain_slot, PlannedProcess { process, declaration }) in planned {
-            let name = process.name().to_owned();
-            let id = graph.add(name.clone(), PlannedProcess { process, declaration: declaration.clone() });
+        for (chain_slot, planned) in planned {
+            let PlannedProcess { name, declaration, .. } = &planned;
+            let (name, declaration) = (name.clone(), declaration.clone());
+            let id = graph.add(name.clone(), planned);
             for (target, access) in &declaration.accesses {
                 let resource = graph.resource(resource_name(access.views(declaration.views), target));
                 if access.reads() {
@@ -252,7 +253,7 @@ mod tests {
     #[test]
     fn reads_and_writes_determine_the_order() {
         let plan = plan(shipped()).unwrap();
-        let names: Vec<_> = plan.processes().iter().map(|planned| planned.process.name()).collect();
+        let names: Vec<_> = plan.processes().iter().map(|planned| planned.name.as_str()).collect();
         assert_eq!(names, ["geometry buffer", "point lights", "tone mapping"]);
         let targets: Vec<_> = plan.targets().iter().map(|target| (target.name.as_str(), target.format)).collect();
         assert_eq!(
@@ -377,7 +378,7 @@ mod tests {
         let names: Vec<_> = plan
             .passes(&views)
             .iter()
-            .map(|pass| (plan.processes()[pass.process_index].process.name(), pass.view_index))
+            .map(|pass| (plan.processes()[pass.process_index].name.as_str(), pass.view_index))
             .collect();
         assert_eq!(names, [("first", 0), ("first", 1), ("mirror", 2), ("second", 0), ("second", 1)]);
 

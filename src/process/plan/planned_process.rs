@@ -10,24 +10,28 @@ use crate::task::{JobPanic, catch};
 pub struct PlannedProcess {
     /// The process.
     pub process: Arc<dyn RenderProcess>,
+    /// Its name, which it was asked for once.
+    pub name: String,
     /// What it declared.
     pub declaration: Declaration,
 }
 
 impl PlannedProcess {
-    /// Calls a process's `declare`, once.
+    /// Calls a process's `name` and `declare`, once.
     ///
     /// # Errors
-    /// If `declare` panics, or declares more than one depth target.
+    /// If one of them panics, or `declare` declares more than one depth target.
     pub(super) fn new(process: Arc<dyn RenderProcess>) -> Result<Self, PlanError> {
+        let name =
+            catch(|| process.name().to_owned()).map_err(|JobPanic { message }| PlanError::Panicked { message })?;
         let mut declare = Declare::default();
         catch(|| process.declare(&mut declare))
-            .map_err(|panic| ProcessError::Panicked { process: process.name().to_owned(), message: panic.message })?;
+            .map_err(|panic| ProcessError::Panicked { process: name.clone(), message: panic.message })?;
         let declaration = declare.finish();
         if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
-            return Err(PlanError::MultipleDepthTargets { process: process.name().to_owned() });
+            return Err(PlanError::MultipleDepthTargets { process: name });
         }
-        Ok(Self { process, declaration })
+        Ok(Self { process, name, declaration })
     }
 
     /// What the process draws in this frame.
@@ -36,7 +40,7 @@ impl PlannedProcess {
     /// If the process panics, or its draws do not fit its declaration: only raw passes use targets by their own
     /// commands.
     pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
-        let process = || self.process.name().to_owned();
+        let process = || self.name.clone();
         let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
         let draws = catch(|| self.process.draws()).map_err(panicked)?;
         let is_raw = match draws {

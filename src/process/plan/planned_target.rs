@@ -38,10 +38,7 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
                 });
             }
             Some(known) if known.layered != layered => {
-                return Err(PlanError::LayeringMismatch {
-                    process: planned.process.name().to_owned(),
-                    target: name.clone(),
-                });
+                return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
             }
             Some(_) => {}
             None => targets.push(PlannedTarget { name: name.clone(), views, format, stored: false, layered }),
@@ -52,7 +49,7 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
         let Some(known) = targets.iter_mut().find(|known| known.name == *name && known.views == views) else {
             continue;
         };
-        let process = || planned.process.name().to_owned();
+        let process = || planned.name.clone();
         known.stored |= matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored();
         let draws_color = matches!(access, Access::ClearColor(..) | Access::DrawOver);
         if (access.is_depth() && !known.format.is_depth()) || (draws_color && known.format.is_depth()) {

@@ -151,7 +151,7 @@ impl FrameBuffers {
         }
         let names =
             passes.iter().filter(|pass| pass.timed_pass_index.is_some()).map(|WgpuPassState { pass, .. }| {
-                (request.plan.processes()[pass.process_index].process.name(), request.views[pass.view_index].name())
+                (request.plan.processes()[pass.process_index].name.as_str(), request.views[pass.view_index].name())
             });
         timestamps.get_or_insert_default().begin_frame(device, names)
     }
@@ -267,7 +267,7 @@ impl Buffers {
             let draws = &request.draws[pass.process_index];
             state.pass = pass;
             state.set_label(
-                request.plan.processes()[pass.process_index].process.name(),
+                request.plan.processes()[pass.process_index].name.as_str(),
                 request.views[pass.view_index].name(),
             );
             state.command_pass_index =

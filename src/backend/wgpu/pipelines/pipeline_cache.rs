@@ -51,7 +51,7 @@ impl PipelineCache {
             let pipelines = match fitting {
                 Some(fitting) => fitting,
                 None => {
-                    let label = format!("the shader of {:?}", planned.process.name());
+                    let label = format!("the shader of {:?}", planned.name.as_str());
                     let create = || ProcessPipelines::new(device, layouts, plan, planned, draws, quality);
                     Arc::new(with_error_scope(device, &label, create)?)
                 }

@@ -82,7 +82,7 @@ impl ProcessPipelines {
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> Self {
-        let name = planned.process.name();
+        let name = planned.name.as_str();
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
         let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
@@ -116,7 +116,7 @@ impl ProcessPipelines {
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> bool {
-        self.name == planned.process.name()
+        self.name == planned.name.as_str()
             && self.fits_draws(draws, quality)
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
     }
