@@ -57,7 +57,7 @@
 //! | --- | --- | --- | --- |
 //! | `drawloom` | span `record`, as long as [`Renderer::record`] takes | debug | `objects` |
 //! | `drawloom` | span `submit`, as long as [`Submitter::submit`] takes | debug | |
-//! | `drawloom` | an event for each reason why something is not drawn as asked | warn | `count`, `first`, `message` |
+//! | `drawloom` | an event for each reason why something is not drawn as requested | warn | `count`, `first`, `message` |
 //! | `drawloom::graph` | span `node`: one node of a [schedule](graph::Schedule) in one run | debug | `name`; if the node has [labels](timeline::Labels), `process`, `stage`, `view` |
 //! | `drawloom::graph` | span `chunk`, inside its node's span: a range of the node's items, run by one worker | trace | `start`, `end` |
 //! | `drawloom::graph` | event `taken`: a worker starts a ready node, in a parallel run | trace | `ready`: how many other nodes are ready; `queued`: the jobs in that worker's queues |

@@ -43,7 +43,7 @@ impl JobPanic {
 /// ```
 ///
 /// # Errors
-/// Returns a [`JobPanic`] with the message of the panic. With `panic = "abort"` the process ends instead.
+/// Returns a [`JobPanic`] with the message of the panic. With `panic = "abort"` the program ends instead.
 #[inline]
 pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
     catch_unwind(AssertUnwindSafe(call)).map_err(JobPanic::new)

@@ -11,11 +11,16 @@ use crate::timeline::{Labels, TuningChoice};
 use crate::view::ObjectTable;
 
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
-/// most of them by several workers at once. Those take the worker as proof that they run in a job (M 10.3 asserts it).
+/// most of them by several workers at once. Those that record take the worker as proof that they run in a job (M 10.3
+/// asserts it).
 ///
-/// The order within a frame: `begin`; then, at the same time as what follows, `upload_objects` for every block of
-/// objects; for every pass of commands `prepare` and `record` for each range of its parts; for every pass `finish`;
-/// later, on the device thread, `submit`.
+/// The order within a frame:
+///
+/// 1. `begin`.
+/// 2. In any order and at the same time: `upload_objects` for every block of objects, and the passes. Of each pass of
+///    commands `prepare`, then `record` for each range of its parts; of every pass `finish`.
+/// 3. `recording_choice` for every pass.
+/// 4. Later, on the device thread, `submit`.
 ///
 /// What a backend must honour:
 ///

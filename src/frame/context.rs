@@ -24,7 +24,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) costs: &'a CostModel,
     /// One for each view.
     pub(super) occlusion: &'a [OcclusionControl],
-    /// Whether the triangles of meshes that ask for it are culled.
+    /// Whether the triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
     pub(super) workers: usize,
 }
@@ -50,7 +50,7 @@ impl<B: Backend> FrameContext<'_, B> {
         self.backend.part_count(self.backend_frame, &self.pass_request(pass, &self.tables.passes[pass].list.read()))
     }
 
-    /// Whether a pass culls triangles of meshes that ask for it.
+    /// Whether a pass culls triangles of meshes with triangle culling.
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
         self.culls_triangles && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
@@ -66,7 +66,7 @@ impl<B: Backend> FrameContext<'_, B> {
         self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
     }
 
-    /// Reports the job size that a node uses, if it is another one than it was given.
+    /// Overrides the job size that is reported for a node.
     pub(super) fn report_job_size(&self, node: usize, width: usize, items_per_job: usize) {
         if self.granularity == Granularity::Adaptive {
             self.costs.report_size(node, width, items_per_job);

@@ -12,7 +12,7 @@ use crate::view::ObjectTable;
 /// size of its own. Nodes are counted in the order of the stage graph.
 #[derive(Debug, Default)]
 pub(super) struct CostModel {
-    /// By node, the index of its cost kind. Apart from `sizes`, which jobs write to.
+    /// By node, the index of its cost kind. Not in `sizes`, because jobs read this one while others write there.
     kinds: Vec<usize>,
     /// By cost kind.
     costs: Vec<ItemCost>,
@@ -35,8 +35,9 @@ struct ItemCost {
 struct NodeSize {
     /// The job size in items that was chosen last by an estimate; 0 before the first choice.
     chosen: AtomicUsize,
-    /// The number of the node's items in the current frame, 0 if it did not ask for a job size, and the size that it uses.
+    /// The number of the node's items in the current frame; 0 if it did not ask for a job size.
     width: AtomicUsize,
+    /// The job size of the current frame.
     used: AtomicUsize,
 }
 
@@ -165,7 +166,7 @@ fn whole_blocks(items: usize) -> usize {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::tuning::signal::{Requirements, check_controller};
+    use crate::tuning::signal::{ControllerBounds, check_controller};
 
     const NODE: usize = 0;
 
@@ -215,10 +216,10 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: [30; 3], max_wrong: 0, max_changes: 2 };
+        let bounds = ControllerBounds { settles_within: [30; 3], max_wrong: 0, max_changes: 2 };
         let nanoseconds = |is_after| if is_after { 400.0 } else { 20.0 };
         check_controller(
-            &requirements,
+            &bounds,
             || CostModel::new(vec![0]),
             |model, is_after, signal| frame(model, 10_000, signal.sample(nanoseconds(is_after)) as u64),
             |&items, is_after| {

@@ -79,7 +79,7 @@ pub enum FrameError {
         source: NodeError,
     },
     /// A stage panicked, in the code of a process or in Drawloom's own. Where the program is built with `panic =
-    /// "abort"` the process ends instead, as no panic can be caught.
+    /// "abort"` the program ends instead, as no panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
         /// The process, the view and the stage.
@@ -92,10 +92,10 @@ pub enum FrameError {
     Process(#[from] ProcessError),
     /// A callback of the scheduler panicked.
     #[error(transparent)]
-    Job(#[from] JobPanic),
-    /// The job graph has no order: a bug in Drawloom.
-    #[error("the stages of the frame make no graph: {0}")]
-    Jobs(GraphProblem),
+    Scheduler(#[from] JobPanic),
+    /// The frame's stage graph does not compile: a bug in Drawloom.
+    #[error("the frame's stage graph does not compile: {0}")]
+    StageGraph(GraphProblem),
 }
 
 impl From<RunError> for FrameError {
@@ -103,7 +103,7 @@ impl From<RunError> for FrameError {
         match error {
             RunError::Failed { node, source } => Self::Failed { stage: node, source },
             RunError::Panicked { node, message } => Self::Panicked { stage: node, message },
-            RunError::Scheduler(panic) => Self::Job(panic),
+            RunError::Scheduler(panic) => Self::Scheduler(panic),
         }
     }
 }

@@ -112,7 +112,7 @@ pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &Frame
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::tuning::signal::{Requirements, Signal, check_controller};
+    use crate::tuning::signal::{ControllerBounds, Signal, check_controller};
 
     fn control() -> OcclusionControl {
         OcclusionControl {
@@ -140,9 +140,9 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: [20, 70, 80], max_wrong: 60, max_changes: 60 };
+        let bounds = ControllerBounds { settles_within: [20, 70, 80], max_wrong: 60, max_changes: 60 };
         check_controller(
-            &requirements,
+            &bounds,
             control,
             |control, is_after, signal| frame(control, if is_after { [300.0, 100.0] } else { [100.0, 300.0] }, signal),
             |&is_on, is_after| is_on != is_after,

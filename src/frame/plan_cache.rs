@@ -35,7 +35,7 @@ impl PlanCache {
         }
         let all = Requirements::all();
         if let Some(deferred) = &deferred {
-            plan(|| deferred.check())?;
+            catch_panics(|| deferred.check())?;
             compile(Some(deferred), &processes, &outputs, &all)?;
         }
         let nothing = Requirements::default();
@@ -107,7 +107,7 @@ fn compile(
     outputs: &[String],
     requirements: &Requirements,
 ) -> Result<FramePlan, PlanError> {
-    plan(|| {
+    catch_panics(|| {
         let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
         let own = deferred.map(|deferred| deferred.output().to_owned());
         let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
@@ -115,15 +115,15 @@ fn compile(
     })
 }
 
-/// A pipeline with this quality, which its steps of post-processing are asked about.
+/// Applies a quality to a pipeline and its steps of post-processing.
 ///
 /// # Errors
 /// If a step panics.
 pub(super) fn with_quality(deferred: Deferred, quality: &Quality) -> Result<Deferred, PlanError> {
-    plan(|| Ok(deferred.quality(quality)))
+    catch_panics(|| Ok(deferred.quality(quality)))
 }
 
-/// Calls code that asks processes and steps of the engine, and turns their panic into an error.
-fn plan<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
+/// Calls code of processes and steps of the engine, and turns its panic into an error.
+fn catch_panics<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
     catch(call).unwrap_or_else(|JobPanic { message }| Err(PlanError::Panicked { message }))
 }

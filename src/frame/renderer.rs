@@ -184,7 +184,7 @@ impl<B: Backend> Renderer<B> {
     /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.
     ///
     /// # Errors
-    /// If the processes make no frame; then nothing changes.
+    /// If the processes make no frame, or one of them panics; then nothing changes.
     pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
         self.plans = self.plans.with_deferred(deferred)?;
         self.pipeline_has_quality = false;
@@ -214,7 +214,7 @@ impl<B: Backend> Renderer<B> {
         &self.quality
     }
 
-    /// What one process drew in one view, by index, in the latest frame; empty if that frame failed. `None` where the
+    /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed. `None` where the
     /// process draws no commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
@@ -234,8 +234,8 @@ impl<B: Backend> Renderer<B> {
         self.plans.count()
     }
 
-    /// The job graph of the latest frame in the DOT language; `None` before the first frame.
-    pub fn jobs_to_dot(&self) -> Option<String> {
+    /// The stage graph of the latest frame in the DOT language; `None` before the first frame.
+    pub fn stage_graph_to_dot(&self) -> Option<String> {
         self.graphs.latest().map(|graph| graph.schedule.to_dot())
     }
 

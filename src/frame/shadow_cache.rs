@@ -41,9 +41,9 @@ pub(super) struct InFlight {
 }
 
 impl ShadowCache {
-    /// Decides whether a frame draws its shadow maps or reads cached ones. The views that are returned are the requested ones; where
-    /// maps are cached, their views and lights are those that the maps were drawn for, because a map is valid only with the light that it was drawn for.
-    /// The brightness of a light is always the requested one.
+    /// Decides whether a frame draws its shadow maps or reads cached ones. Returns the requested views; a cached map replaces its
+    /// view and light by those that it was drawn for, because it is valid only with that light. The brightness of a light is always
+    /// the requested one.
     ///
     /// Maps are cached for less than `interval` frames, and only while the same lights request maps in the same layers. Lights and
     /// objects that move do not cause a redraw, so maps are up to `interval` − 1 frames old.

@@ -1,4 +1,4 @@
-//! What a stage is: one step of the frame's pipeline, and a node of the frame's job graph.
+//! What a stage is: one step of the frame's pipeline, and a node of the frame's stage graph.
 
 use std::ops::Range;
 
@@ -25,8 +25,8 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
         1
     }
 
-    /// The divisor for the cost estimate: the time of a job over `items`, divided by this, is the cost of an item. `None` where the
-    /// cost model does not estimate the stage.
+    /// The number of items that a job over `items` counts as in the cost model. `None` where the cost model does not estimate the
+    /// stage.
     fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
         let _ = frame;
         matches!(self.info().chunking, Chunking::ByCost { .. }).then(|| items.len())
@@ -91,7 +91,7 @@ pub(super) struct StageJob<'a> {
     pub(super) node: usize,
 }
 
-/// A stage as a node of the frame's job graph.
+/// A stage as a node of the frame's stage graph.
 pub(super) struct StageNode<B> {
     pub(super) stage: Box<dyn Stage<B>>,
     /// Its index in the cost model.

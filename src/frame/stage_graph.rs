@@ -1,4 +1,4 @@
-//! The frame's job graph: which stages a frame has, and which waits for which.
+//! The frame's stage graph: which stages a frame has, and which waits for which.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ struct GraphKey {
 pub(super) struct StageOptions {
     /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
     pub(super) occlusion_tile: Option<u32>,
-    /// Whether triangles of meshes that ask for it are culled.
+    /// Whether triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
 }
 
@@ -108,14 +108,15 @@ impl<B: Backend> StageGraph<B> {
                 });
                 view_scope.of_process(pass.process_index, process)
             } else {
-                frame.of_view(pass.view_index, view, needs.tests_occlusion).of_process(pass.process_index, process)
+                // What such a pass costs has nothing to do with occlusion.
+                frame.of_view(pass.view_index, view, false).of_process(pass.process_index, process)
             };
             builder.add(pass_scope, stages_of_pass(index), needs);
         }
         let GraphBuilder { graph, kind_of_node, labels, .. } = builder;
         let labels = TuningLabels::new(labels, plan, &passes, views);
         Ok(Self {
-            schedule: graph.compile().map_err(|error| FrameError::Jobs(error.problem))?,
+            schedule: graph.compile().map_err(|error| FrameError::StageGraph(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
             passes,
             plan: Arc::clone(plan),

@@ -22,7 +22,7 @@ pub struct FrameStatistics {
     pub uploaded: u64,
     /// The thread time of each group of stages.
     pub stages: StageTimes,
-    /// What was left out or cannot be drawn as asked, and why.
+    /// What was left out or cannot be drawn as requested, and why.
     pub rejections: Vec<Rejection>,
     /// What was chosen by measurement, and by which costs.
     pub tuning: FrameTuning,

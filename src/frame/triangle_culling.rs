@@ -1,4 +1,4 @@
-//! Triangle culling on the CPU, for meshes that ask for it (S 9.6).
+//! Triangle culling on the CPU, for meshes with triangle culling enabled (S 9.6).
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Warnings about what a frame leaves out or cannot draw as asked.
+//! Warnings about what a frame leaves out or cannot draw as requested.
 
 use crate::view::{Rejection, RejectionReason};
 
@@ -18,7 +18,7 @@ impl Warnings {
                 continue;
             }
             let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-            tracing::warn!(target: "drawloom", count, first, "not drawn as asked: {reason}");
+            tracing::warn!(target: "drawloom", count, first, "not drawn as requested: {reason}");
         }
         let is_unknown = |rejection: &Rejection| has_cached_maps && rejection.reason == RejectionReason::CoarseEdges;
         self.reported.retain(is_unknown);

@@ -107,7 +107,7 @@ impl RankedAdjacency {
     }
 
     /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end.
-    /// `costs` has the nanoseconds of each node.
+    /// `cost_of` returns the nanoseconds of a node.
     pub(crate) fn rank(&mut self, cost_of: impl Fn(usize) -> u64) {
         self.cost_from_start.fill(0);
         for node in 0..self.len() {

@@ -103,13 +103,13 @@ fn nanoseconds(since: Instant) -> u32 {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::tuning::signal::{Requirements, check_controller};
+    use crate::tuning::signal::{ControllerBounds, check_controller};
 
     #[test]
     fn it_settles_and_recovers_and_an_outlier_changes_the_order_briefly() {
-        let requirements = Requirements { settles_within: [40; 3], max_wrong: 150, max_changes: 60 };
+        let bounds = ControllerBounds { settles_within: [40; 3], max_wrong: 150, max_changes: 60 };
         check_controller(
-            &requirements,
+            &bounds,
             || NodeCosts::new(2),
             |costs, is_after, signal| {
                 for (took, cost) in costs.took.iter().zip([2000.0, if is_after { 9000.0 } else { 500.0 }]) {

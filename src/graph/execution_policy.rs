@@ -43,8 +43,8 @@ pub struct ModeChoice {
     pub is_trial: bool,
     /// The estimated time of a serial run in nanoseconds, before the run; `None` if it was not measured yet.
     pub serial_nanoseconds: Option<f32>,
-    /// What it is compared with: the estimated time of a parallel run in nanoseconds, before the run, or that of a wake-up if that
-    /// is longer or no parallel run was measured yet.
+    /// What the serial time is compared with, in nanoseconds: the estimated time of a parallel run, before the run, but at least
+    /// the wake-up cost; the wake-up cost alone if no parallel run was measured yet.
     pub parallel_nanoseconds: f32,
 }
 
@@ -54,7 +54,7 @@ const FIRST_MEASURED: u32 = 4;
 const MEASURED_EVERY: u32 = 31;
 
 /// A serial schedule with more work than a wake-up runs in parallel once in this many runs, to check that serial execution is
-/// still faster. Each such run costs what the others save.
+/// still faster. A trial that takes twice as long as a serial run costs less than a percent of the time.
 const PARALLEL_EVERY: u32 = 128;
 
 /// How many serial runs within their limit cancel one that exceeded it. Two that exceed it with fewer runs between them are a
@@ -156,7 +156,7 @@ mod tests {
     use std::time::Duration;
 
     use super::{ExecutionPolicy, RunMode};
-    use crate::tuning::signal::{Requirements, check_controller};
+    use crate::tuning::signal::{ControllerBounds, check_controller};
 
     const WAKE_UP_COST: Duration = Duration::from_micros(40);
 
@@ -181,9 +181,9 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: [100, 100, 200], max_wrong: 100, max_changes: 60 };
+        let bounds = ControllerBounds { settles_within: [100, 100, 200], max_wrong: 100, max_changes: 60 };
         check_controller(
-            &requirements,
+            &bounds,
             ExecutionPolicy::default,
             |policy, is_after, signal| {
                 let [serial, parallel] = if is_after { [2000.0, 1100.0] } else { [30.0, 60.0] };

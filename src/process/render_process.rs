@@ -44,7 +44,8 @@ pub trait RenderProcess: Send + Sync {
     fn name(&self) -> &str;
 
     /// Declares the views that it draws in, and what it reads and writes. Called once for every plan that it is part
-    /// of: when the renderer is built, and when a scene requires other processes beside it.
+    /// of: when the renderer is built or gets another pipeline or quality, and when a scene requires other processes
+    /// beside it.
     fn declare(&self, declare: &mut Declare);
 
     /// What it draws. Called once per frame, and the result may change: new parameters cost nothing, another shader or

@@ -114,7 +114,7 @@
 //! # Panics
 //!
 //! The panic of a job, of a loop's body or of a scope's body is caught. All workers go on, and the call returns the panic as a
-//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the process ends at
+//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the program ends at
 //! once, without an error.
 //!
 //! Other code of the engine may panic too. The hooks that name, place or start threads fail the

@@ -73,7 +73,7 @@ impl Tickets {
         let mut claimed = self.claimed.load(Ordering::Relaxed);
         while claimed < chunks.count() {
             let remaining = chunks.count() - claimed;
-            let end = claimed + size.of(remaining, workers);
+            let end = claimed + size.chunks_to_claim(remaining, workers);
             match self.claimed.compare_exchange_weak(claimed, end, Ordering::Relaxed, Ordering::Relaxed) {
                 Ok(_) => {
                     if end - claimed > 1 || remaining > 2 * workers {
@@ -136,12 +136,12 @@ impl TicketSize {
     /// How many nanoseconds the chunks of one ticket may take: long enough that the ticket itself costs nothing beside them, and
     /// short enough that it does not matter who runs them.
     const TARGET_NANOSECONDS: usize = 8_000;
-    /// The smallest ticket is this fraction of the largest, even if less is left for each worker.
-    const MIN_FRACTION: usize = 16;
+    /// The smallest ticket is the largest divided by this, even if less is left for each worker.
+    const MIN_SIZE_DIVISOR: usize = 16;
     /// The factor by which a ticket may exceed the last one: one cheap chunk says little about the rest.
     const GROWTH: usize = 4;
     /// How many chunks pass between two readings of the clock, once their cost is known.
-    const STEADY: usize = 8;
+    const CHUNKS_PER_MEASUREMENT: usize = 8;
 
     fn new(max: usize) -> Self {
         Self { max, since: None, measure_after: 1 }
@@ -149,9 +149,9 @@ impl TicketSize {
 
     /// How many of the remaining chunks to claim: two thirds of this worker's share, within bounds.
     #[inline]
-    fn of(&self, remaining: usize, workers: usize) -> usize {
+    fn chunks_to_claim(&self, remaining: usize, workers: usize) -> usize {
         let share = 2 * (remaining / (3 * workers));
-        share.clamp((self.max / Self::MIN_FRACTION).max(1), self.max).min(remaining)
+        share.clamp((self.max / Self::MIN_SIZE_DIVISOR).max(1), self.max).min(remaining)
     }
 
     /// The chunks of the last ticket are done, and `claimed` more begin.
@@ -173,7 +173,7 @@ impl TicketSize {
             let nanoseconds = (now.duration_since(since).as_nanos() as usize).max(1);
             let fitting = chunks.saturating_mul(Self::TARGET_NANOSECONDS) / nanoseconds;
             self.max = fitting.clamp(1, self.max.max(chunks.saturating_mul(Self::GROWTH)));
-            self.measure_after = Self::STEADY;
+            self.measure_after = Self::CHUNKS_PER_MEASUREMENT;
         }
         self.since = Some((now, claimed));
     }
@@ -184,7 +184,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::tuning::signal::{Requirements, Signal, check_controller};
+    use crate::tuning::signal::{ControllerBounds, Signal, check_controller};
 
     /// A worker that takes tickets of an endless loop.
     struct Simulation {
@@ -199,7 +199,7 @@ mod tests {
 
         /// Takes a ticket of chunks that take these nanoseconds each, and returns their number.
         fn take(&mut self, nanoseconds: f32) -> usize {
-            let claimed = self.size.of(1_000_000, 2);
+            let claimed = self.size.chunks_to_claim(1_000_000, 2);
             self.size.adapt(claimed, || self.now);
             self.now += Duration::from_nanos((nanoseconds * claimed as f32) as u64);
             claimed
@@ -212,9 +212,9 @@ mod tests {
 
     #[test]
     fn it_settles_and_recovers_and_an_outlier_counts_briefly() {
-        let requirements = Requirements { settles_within: [20; 3], max_wrong: 250, max_changes: 60 };
+        let bounds = ControllerBounds { settles_within: [20; 3], max_wrong: 250, max_changes: 60 };
         check_controller(
-            &requirements,
+            &bounds,
             Simulation::new,
             |simulation, is_after, signal| {
                 let ticket = simulation.take(signal.sample(nanoseconds(is_after))) as f32 * nanoseconds(is_after);

@@ -8,10 +8,9 @@ use super::labels::Labels;
 /// What was chosen by measurement in a frame, and the costs by which it was chosen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTuning {
-    /// The choices among alternatives. Choices that the engine fixed are left out, and so are those of which nothing can be
-    /// measured.
+    /// The choices among alternatives. Choices that the engine fixed are left out, and so are views and passes without a choice.
     pub choices: Vec<TuningChoice>,
-    /// The job sizes of the nodes of the frame's job graph whose items are divided by cost. Empty unless the
+    /// The job sizes of the nodes of the frame's stage graph whose items are divided by cost. Empty unless the
     /// [granularity](crate::Granularity) is adaptive.
     pub job_sizes: Vec<JobSize>,
 }
@@ -35,7 +34,7 @@ pub struct TuningChoice {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum TuningSubject {
-    /// Whether the frame's job graph runs on the calling thread alone or on all workers: see
+    /// Whether the frame's stage graph runs on the calling thread alone or on all workers: see
     /// [`Schedule::run_mode`](crate::graph::Schedule::run_mode).
     RunMode,
     /// Whether a view tests for occlusion: see [`Quality::occlusion`](crate::quality::Quality::occlusion).

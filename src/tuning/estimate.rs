@@ -4,8 +4,7 @@
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Estimate {
     average: f32,
-    /// The larger of the first two samples, until the third decides between them. Later, while there are outliers: the average
-    /// before the first of them.
+    /// The average before the current run of outliers. During the first three samples, the larger of the first two.
     reference: f32,
     samples: u32,
     /// How many of the latest samples in a row were outliers.
@@ -26,7 +25,7 @@ impl Filter {
         Self { time_constant, limits_outliers: true }
     }
 
-    /// A filter for samples between which there are many runs, so that no sample is taken for an outlier, nor is the first one.
+    /// A filter for samples that are too rare to tell an outlier from a change.
     pub(crate) const fn unlimited(time_constant: f32) -> Self {
         Self { time_constant, limits_outliers: false }
     }
@@ -63,6 +62,8 @@ impl Estimate {
             }
             _ if !filter.limits_outliers => {
                 self.average += (sample - self.average) / filter.time_constant;
+                // Samples of another filter that follow are no first samples.
+                (self.samples, self.outliers) = (self.samples.max(Self::FIRST_SAMPLES), 0);
                 false
             }
             1 => {
@@ -163,6 +164,15 @@ mod tests {
             estimate.add(sample, Filter::unlimited(2.0));
         }
         assert_eq!(estimate.get(), Some(4.0));
+    }
+
+    #[test]
+    fn samples_of_two_filters_are_averaged() {
+        let mut estimate = Estimate::default();
+        estimate.add(100.0, Filter::unlimited(2.0));
+        estimate.add(200.0, Filter::unlimited(2.0));
+        estimate.add(70.0, FILTER);
+        assert_eq!(estimate.get(), Some(140.0));
     }
 
     #[test]

@@ -23,8 +23,8 @@ impl Hysteresis {
         !self.replaces(best, size) && !self.replaces(size, best)
     }
 
-    /// Whether a value counts as above a threshold. It must exceed the threshold by the factor, but does not fall below it before
-    /// it is less than the threshold.
+    /// Whether a value counts as above a threshold: it rises above at the threshold times the factor, and falls below at the
+    /// threshold.
     pub(crate) fn is_above(self, value: f32, threshold: f32, was_above: bool) -> bool {
         value >= if was_above { threshold } else { threshold * self.0 }
     }

@@ -1,4 +1,4 @@
-//! Costs as a machine would measure them, for tests of controllers.
+//! Drives controllers in tests, with costs as a machine would measure them.
 
 use std::fmt::Debug;
 
@@ -37,7 +37,7 @@ impl Signal {
 }
 
 /// How good the choices of a controller must be under any signal.
-pub(crate) struct Requirements {
+pub(crate) struct ControllerBounds {
     /// Within how many frames its choice is right: at first, after a step, and after the step back.
     pub(crate) settles_within: [usize; 3],
     /// How many of the thousand frames after that may be wrong: trials, and what outliers cause.
@@ -51,7 +51,7 @@ pub(crate) struct Requirements {
 /// `frame` runs one frame, in which costs are those after the step if the flag is set, measured by the signal, and returns the
 /// choice that the frame was run with. `is_right` says whether a choice is right before or after the step.
 pub(crate) fn check_controller<C, T: PartialEq + Debug>(
-    requirements: &Requirements,
+    bounds: &ControllerBounds,
     controller: impl Fn() -> C,
     mut frame: impl FnMut(&mut C, bool, &mut Signal) -> T,
     is_right: impl Fn(&T, bool) -> bool,
@@ -66,14 +66,14 @@ pub(crate) fn check_controller<C, T: PartialEq + Debug>(
     for (name, mut signal) in signals {
         let mut controller = controller();
         let phases = [("at first", false), ("after the step", true), ("after the step back", false)];
-        for ((phase, is_after), settles_within) in phases.into_iter().zip(requirements.settles_within) {
+        for ((phase, is_after), settles_within) in phases.into_iter().zip(bounds.settles_within) {
             (0..settles_within).for_each(|_| drop(frame(&mut controller, is_after, &mut signal)));
             let chosen: Vec<_> = (0..1000).map(|_| frame(&mut controller, is_after, &mut signal)).collect();
             let wrong: Vec<_> = chosen.iter().filter(|choice| !is_right(choice, is_after)).collect();
             let first = wrong.first();
-            assert!(wrong.len() <= requirements.max_wrong, "{name}, {phase}: {} wrong choices: {first:?}", wrong.len());
+            assert!(wrong.len() <= bounds.max_wrong, "{name}, {phase}: {} wrong choices: {first:?}", wrong.len());
             let changes = chosen.windows(2).filter(|pair| pair[0] != pair[1]).count();
-            assert!(changes <= requirements.max_changes, "{name}, {phase}: {changes} changes");
+            assert!(changes <= bounds.max_changes, "{name}, {phase}: {changes} changes");
         }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct CostSample {
     pub(crate) nanoseconds: f64,
     /// What the cost is divided by: batches, objects.
     pub(crate) units: usize,
-    /// Whether caches are in the state that the alternative leaves behind. The cost does not count otherwise.
+    /// Whether caches are as this alternative leaves them. The sample of a frame with cold caches does not count.
     pub(crate) is_warm: bool,
 }
 
@@ -55,7 +55,7 @@ struct Trial {
     begun: u64,
 }
 
-/// Trials are short, and the average that they are compared with is longer.
+/// The average over 8 frames is steadier than the three frames of a trial, which are compared with it.
 const FILTER: Filter = Filter::limiting_outliers(8.0);
 
 /// Outside of learning, a candidate replaces the current alternative if it is cheaper by this factor.
@@ -74,8 +74,8 @@ const MAX_TRIAL_FRAMES: u64 = 16;
 const UNITS_THRESHOLD: usize = 64;
 
 impl Tuner {
-    /// A tuner that begins with the first alternative. For each, the longest pause between two trials in frames: the longer, the
-    /// more a trial of it can cost.
+    /// A tuner that begins with the first alternative. `max_pauses` has, for each, the longest pause between two trials in frames:
+    /// longer where its trials are expensive.
     pub(crate) fn new(max_pauses: impl IntoIterator<Item = u64>) -> Self {
         let candidate = |max_pause| Candidate { cost: Estimate::default(), due: 0, pause: MIN_PAUSE, max_pause };
         Self {
@@ -92,14 +92,14 @@ impl Tuner {
         }
     }
 
-    /// Chooses a frame's alternative: its index, and whether this is a trial. Of the tuners of a frame that share `may_try`, at most
-    /// one begins a trial outside of learning: the one that takes it. `is_useful` says whether an alternative, by index, differs
-    /// from the others at this number of units.
+    /// Chooses a frame's alternative: its index, and whether this is a trial. The tuners of a frame share `may_try`: the first that
+    /// begins a trial outside of learning clears it. `is_distinct` says whether an alternative, by index, differs from the others
+    /// at this number of units.
     pub(crate) fn choose(
         &mut self,
         frame: u64,
         may_try: &mut bool,
-        is_useful: impl Fn(usize, usize) -> bool,
+        is_distinct: impl Fn(usize, usize) -> bool,
     ) -> (usize, bool) {
         if let Some(Trial { candidate, begun }) = self.trial {
             if frame < begun + MAX_TRIAL_FRAMES {
@@ -114,7 +114,7 @@ impl Tuner {
             return (self.current, false);
         }
         let due = (0..self.candidates.len()).filter(|&candidate| {
-            candidate != self.current && self.candidates[candidate].due <= frame && is_useful(candidate, self.units)
+            candidate != self.current && self.candidates[candidate].due <= frame && is_distinct(candidate, self.units)
         });
         let Some(candidate) = due.min_by_key(|&candidate| self.candidates[candidate].due) else {
             self.is_learning = false;
@@ -208,7 +208,7 @@ impl Tuner {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-    use crate::tuning::signal::{Requirements, Signal, check_controller};
+    use crate::tuning::signal::{ControllerBounds, Signal, check_controller};
 
     const ALTERNATIVES: usize = 6;
     const MAX_PAUSE: u64 = 2048;
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn it_settles_does_not_flap_and_recovers() {
-        let requirements = Requirements { settles_within: [30, 60, 2200], max_wrong: 60, max_changes: 80 };
+        let bounds = ControllerBounds { settles_within: [30, 60, 2200], max_wrong: 60, max_changes: 80 };
         let controller = || (Tuner::new([MAX_PAUSE; ALTERNATIVES]), 0);
         let cost = |alternative, is_after| match (alternative, is_after) {
             (0, false) => 10.0,
@@ -272,7 +272,7 @@ mod tests {
             _ => 30.0,
         };
         check_controller(
-            &requirements,
+            &bounds,
             controller,
             |(tuner, number), is_after, signal| {
                 *number += 1;

@@ -212,7 +212,7 @@ impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
         let recorded = match self.renderer.record(*scene) {
             Ok(recorded) => recorded,
             Err(FrameError::Panicked { stage, message }) => return Err(format!("{stage} panicked: {message}").into()),
-            Err(FrameError::Job(panic)) => return Err(format!("a job panicked: {panic}").into()),
+            Err(FrameError::Scheduler(panic)) => return Err(format!("a job panicked: {panic}").into()),
             Err(error) => return Ok(Outcome::Refused(error)),
         };
         let submitted = match self.submitter.submit(recorded) {

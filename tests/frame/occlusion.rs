@@ -210,5 +210,5 @@ fn objects_that_are_not_drawn_occlude_nothing() {
     let builder = Renderer::builder(NullBackend).process(Glass).output("picture").quality(quality);
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     assert_eq!(renderer.record(wall_and_cubes().as_scene_ref()).unwrap().statistics().views[0].occluded, 0);
-    assert!(!renderer.jobs_to_dot().unwrap().contains("coarse depth"), "no coarse depth buffer is drawn");
+    assert!(!renderer.stage_graph_to_dot().unwrap().contains("coarse depth"), "no coarse depth buffer is drawn");
 }

@@ -91,7 +91,7 @@ fn a_cached_map_costs_no_culling_and_no_commands() {
     }
     assert!(recorded.queues()[2..].iter().all(|queue| queue.passes.is_empty()));
     assert!(fixture.renderer.draw_list("shadow casters", 2).is_none());
-    assert!(!fixture.renderer.jobs_to_dot().unwrap().contains("shadow casters"));
+    assert!(!fixture.renderer.stage_graph_to_dot().unwrap().contains("shadow casters"));
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn remaining_triangles_match_the_views_culling_of_each_object() {
 fn meshes_that_do_not_request_it_are_not_culled() {
     let (statistics, renderer) = frame(&field(400), 2, Granularity::Adaptive);
     assert!(statistics.views.iter().all(|view| view.culled_triangles == CulledTriangles::default()));
-    assert!(!renderer.jobs_to_dot().unwrap().contains("triangles"));
+    assert!(!renderer.stage_graph_to_dot().unwrap().contains("triangles"));
 
     let some = with_meshes(field(400), |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
     let (statistics, renderer) = frame(&some, 2, Granularity::Adaptive);

@@ -40,7 +40,7 @@ fn choices_come_with_the_costs_that_they_were_made_by() {
         assert_eq!((tests.len(), choices_of(tuning, TuningSubject::RunMode).len()), (view_count, 1));
         assert!(tests.iter().all(|choice| choice.labels.view.is_some()));
         for TuningChoice { alternatives, .. } in tests {
-            // The first frame fills caches, the next three measure the first alternative, and one more is in the state of the other.
+            // Frame 0 is cold, 1 to 3 measure the test; 4 is cold again, 5 to 7 measure frames without it.
             let known: Vec<_> = alternatives.iter().map(|alternative| alternative.nanoseconds.is_some()).collect();
             assert!(known[0] == (frame >= 2) && known[1] == (frame >= 6), "frame {frame}: {alternatives:?}");
         }

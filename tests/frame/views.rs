@@ -75,9 +75,9 @@ fn views_are_submitted_whole_shadows_first_each_with_the_processes_of_its_kind()
 #[test]
 fn graphs_can_be_exported_to_dot() {
     let (mut renderer, _) = renderer(1, Granularity::default());
-    assert!(renderer.jobs_to_dot().is_none());
+    assert!(renderer.stage_graph_to_dot().is_none());
     drop(renderer.record(field(3).as_scene_ref()).unwrap());
-    let jobs = renderer.jobs_to_dot().unwrap();
+    let jobs = renderer.stage_graph_to_dot().unwrap();
     assert!(renderer.plan().to_dot().contains("geometry buffer") && jobs.contains("fill"));
 }
 

@@ -54,7 +54,7 @@ impl Contender {
             ("drawloom", None),
             ("drawloom-direct", Some(RecordingStrategy::Direct)),
             ("drawloom-bundles", Some(RecordingStrategy::Bundles)),
-            ("drawloom-kept", Some(RecordingStrategy::CachedBundles)),
+            ("drawloom-cached", Some(RecordingStrategy::CachedBundles)),
             ("drawloom-indirect", Some(RecordingStrategy::Indirect)),
         ];
         for workers in [1, 2] {

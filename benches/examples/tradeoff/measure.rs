@@ -75,8 +75,9 @@ impl FrameContents {
     }
 }
 
-/// Warm-up frames: pipelines are created, memory is allocated, and views decide whether occlusion culling is worth it.
-const WARM_UP: usize = 6;
+/// Warm-up frames: pipelines are created, memory is allocated, and views decide whether occlusion culling is worth it, in four frames
+/// with it and four without.
+const WARM_UP: usize = 8;
 
 impl Measurements {
     /// # Errors

@@ -40,7 +40,7 @@ pub struct WgpuBackend {
     pub(super) strategies: StrategySet,
     /// The number of frames begun.
     pub(super) frames: AtomicU64,
-    /// The number of workers that have recorded so far.
+    /// The highest index of a worker that has recorded so far, plus one.
     pub(super) workers: AtomicUsize,
     /// How each pass with commands was recorded in the frame that was submitted last.
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,

@@ -83,9 +83,9 @@ impl WgpuBackend {
 
             let (mut index, mut is_trial) = (0, false);
             if strategies.len() > 1 && pass.command_pass_index.is_some() {
-                let is_useful = |index: usize, batches| strategies[index].is_useful(batches);
+                let is_distinct = |index: usize, batches| strategies[index].is_distinct(batches);
                 (index, is_trial) = pipelines
-                    .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_useful));
+                    .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
             }
             pass.set_strategy(strategies[index], index, is_trial);
             let caches_bundles =

@@ -175,7 +175,7 @@ impl<B: Backend> Stage<B> for Join {
     }
 }
 
-/// Culls the triangles of meshes that ask for it (S 9.6).
+/// Culls the triangles of meshes with triangle culling (S 9.6).
 pub(super) struct Triangles {
     pub(super) pass: usize,
 }

@@ -71,7 +71,7 @@ pub enum PlanError {
     /// A process could not say what it reads and writes.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// A process or step of the engine panicked when it was asked for its name, or a step when it was asked for its process.
+    /// `RenderProcess::name`, `PostStep::process` or `PostStep::with_quality` panicked.
     #[error("a process or a step of post-processing panicked while the frame was planned: {message}")]
     Panicked {
         /// The message of the panic.
@@ -86,8 +86,8 @@ pub enum PlanError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProcessError {
-    /// It panicked when it was asked.
-    #[error("process {process:?} panicked when it was asked what it does: {message}")]
+    /// It panicked in `declare` or `draws`.
+    #[error("process {process:?} panicked in `declare` or `draws`: {message}")]
     Panicked {
         /// The process.
         process: String,

@@ -1,6 +1,6 @@
 //! One process in one view.
 
-/// One process in one view: recorded as a unit, and finished on one worker.
+/// One process in one view: recorded as a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pass {
     /// The process's index in [`FramePlan::processes`](super::FramePlan::processes).

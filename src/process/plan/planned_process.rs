@@ -10,7 +10,7 @@ use crate::task::{JobPanic, catch};
 pub struct PlannedProcess {
     /// The process.
     pub process: Arc<dyn RenderProcess>,
-    /// Its name, which it was asked for once.
+    /// Its name, read once.
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,

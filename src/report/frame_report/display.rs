@@ -28,7 +28,7 @@ const MAX_WORKER_NAME_LENGTH: usize = 40;
 const MAX_SHORT_NAME_LENGTH: usize = 17;
 
 /// Savings and slack shorter than the frame divided by this number are left out.
-const MIN_SAVED_PART: u32 = 200;
+const MIN_SAVING_DIVISOR: u32 = 200;
 
 /// What is to blame first, then each list, cut to a length that a person reads.
 impl Display for FrameReport {
@@ -58,7 +58,7 @@ impl FrameReport {
             let most = most.map(|share| format!("{}% {}", percent(share.ran, *duration), group(&share.group)));
             let waited = percent(self.critical_path.iter().map(Step::waited).sum(), *duration);
             let most = most.collect::<Vec<_>>().join(", ");
-            writeln!(formatter, "its critical path: {most}; {waited}% waited for workers to come")?;
+            writeln!(formatter, "its critical path: {most}; {waited}% waiting for a worker")?;
         }
         if let Some(WhatIf { group, saved, .. }) = self.worth_saving().first() {
             writeln!(formatter, "most could be saved in {}: {} ms", sanitized(group), Milliseconds(*saved))?;
@@ -139,7 +139,7 @@ impl FrameReport {
     /// Those that save enough to be listed, what saves the most first.
     fn worth_saving(&self) -> &[WhatIf] {
         let is_worth_it =
-            |what_if: &WhatIf| what_if.saved >= self.replayed / MIN_SAVED_PART && !what_if.saved.is_zero();
+            |what_if: &WhatIf| what_if.saved >= self.replayed / MIN_SAVING_DIVISOR && !what_if.saved.is_zero();
         &self.what_if[..self.what_if.partition_point(is_worth_it)]
     }
 
@@ -153,7 +153,7 @@ impl FrameReport {
     }
 
     fn write_slack(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        let is_loose = |slack: &&Slack| slack.time > self.duration / MIN_SAVED_PART;
+        let is_loose = |slack: &&Slack| slack.time > self.duration / MIN_SAVING_DIVISOR;
         let mut loose: Vec<&Slack> = self.slack.iter().filter(is_loose).collect();
         if loose.is_empty() {
             return Ok(());
@@ -180,7 +180,7 @@ impl FrameReport {
         if self.queue_waits.is_empty() {
             return Ok(());
         }
-        writeln!(formatter, "\nlongest waits for a worker, and how many workers were at what meanwhile")?;
+        writeln!(formatter, "\nlongest waits for a worker; how many workers ran what meanwhile")?;
         for wait @ QueueWait { name, meanwhile, .. } in self.queue_waits.iter().take(MAX_QUEUE_WAITS) {
             let workers = |time: Duration| time.as_secs_f64() / wait.waited().as_secs_f64().max(f64::MIN_POSITIVE);
             let at_once = meanwhile.iter().map(|(group, time)| (group, workers(*time)));

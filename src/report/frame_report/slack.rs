@@ -11,9 +11,9 @@ pub struct Slack {
     pub node: (usize, usize),
     /// The name of the node.
     pub name: String,
-    /// How much later all worker spans of the node could have ended without the run's last one ending later, if every span
-    /// that waited for them, directly or not, took as long from ready to end as it did: the spans of its dependents, and
-    /// later spans of the same workers. Zero on the critical path. It is the total float of the critical path method
+    /// How much later all worker spans of the node could have ended without delaying the run's last span. Every span that
+    /// waited for them, directly or not, keeps its time from ready to end: the spans of its dependents, and later spans of
+    /// the same workers. Zero on the critical path. It is the total float of the critical path method
     /// (Kelley and Walker, "Critical-Path Planning and Scheduling", 1959), on a graph of [worker spans](super::Step).
     pub time: Duration,
 }

@@ -66,8 +66,8 @@ impl PassStrategy {
         }
     }
 
-    /// Whether the strategy differs from one encoder per pass, for a pass of `batches` batches.
-    pub(crate) fn is_useful(self, batches: usize) -> bool {
+    /// Whether the strategy differs from all others for a pass of `batches` batches: a small pass is never split.
+    pub(crate) fn is_distinct(self, batches: usize) -> bool {
         self.encoding != EncodingStrategy::Split
             || self.encoder_count(batches.div_ceil(DrawList::BATCHES_PER_BUNDLE)) > 1
     }
