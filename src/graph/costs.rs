@@ -106,6 +106,7 @@ mod tests {
     use crate::tuning::signal::{ControllerBounds, check_controller};
 
     #[test]
+    #[cfg_attr(miri, ignore = "long, and calls no unsafe code")]
     fn it_settles_and_recovers_and_an_outlier_changes_the_order_briefly() {
         let bounds = ControllerBounds { settles_within: [40; 3], max_wrong: 150, max_changes: 60 };
         check_controller(

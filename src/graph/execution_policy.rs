@@ -180,6 +180,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "long, and calls no unsafe code")]
     fn it_settles_does_not_flap_and_recovers() {
         let bounds = ControllerBounds { settles_within: [100, 100, 200], max_wrong: 100, max_changes: 60 };
         check_controller(
