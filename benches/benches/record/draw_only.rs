@@ -1,5 +1,7 @@
 //! Shared by the techniques that set no state between draws: all meshes in one buffer, all objects in another.
 
+use std::ops::Range;
+
 use drawloom::glam::Mat4;
 use drawloom::scene::{Mesh, SceneRef};
 use drawloom::wgpu;
@@ -18,13 +20,20 @@ pub struct DrawOnly {
     /// By slot.
     meshes: Vec<MeshRange>,
     objects: wgpu::Buffer,
-    cameras: Vec<(wgpu::Buffer, wgpu::BindGroup)>,
+    cameras: Vec<CameraBuffers>,
     pub gpu_objects: Vec<GpuObject>,
     pub spheres: Vec<Sphere>,
 }
 
 /// Fewer are not worth another thread.
 const MIN_OBJECTS_PER_JOB: usize = 512;
+
+struct CameraBuffers {
+    clip_from_world: wgpu::Buffer,
+    /// The objects to draw, if the shader reads a list of them.
+    instances: Option<wgpu::Buffer>,
+    group: wgpu::BindGroup,
+}
 
 struct MeshRange {
     first_index: u32,
@@ -33,7 +42,17 @@ struct MeshRange {
 }
 
 impl DrawOnly {
+    /// An instance is an object.
     pub fn new(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
+        Self::with_shader(fixture, scene, include_str!("draw_only.wgsl"), false)
+    }
+
+    /// Each camera has a list of instances, which are objects.
+    pub fn with_instances(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
+        Self::with_shader(fixture, scene, include_str!("by_mesh.wgsl"), true)
+    }
+
+    fn with_shader(fixture: Fixture, scene: &SceneRef<'_>, shader: &str, has_instances: bool) -> Self {
         let device = &fixture.device;
         let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for (_, mesh) in scene.assets.iter::<Mesh>() {
@@ -53,19 +72,21 @@ impl DrawOnly {
         );
         let objects = buffer(wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(&gpu_objects));
         let colors = buffer(wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(&colors(scene)));
-        let layout = layout(device);
+        let layout = layout(device, has_instances);
         let camera = |_| {
-            let camera = buffer(wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&Mat4::ZERO));
+            let clip_from_world = buffer(wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&Mat4::ZERO));
+            let none = || vec![0_u32; scene.object_count()];
+            let instances = has_instances.then(|| buffer(wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(&none())));
             let mut entries = Vec::new();
-            for (binding, buffer) in (0..).zip([&camera, &objects, &colors]) {
+            for (binding, buffer) in (0..).zip([&clip_from_world, &objects, &colors].into_iter().chain(&instances)) {
                 entries.push(wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
             }
             let descriptor = wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries };
             let group = device.create_bind_group(&descriptor);
-            (camera, group)
+            CameraBuffers { clip_from_world, instances, group }
         };
         let cameras = scene.cameras.iter().map(camera).collect();
-        let pipeline = fixture.pipeline(&[&layout], include_str!("draw_only.wgsl"));
+        let pipeline = fixture.pipeline(&[&layout], shader);
         let spheres = vec![Sphere::default(); scene.object_count()];
         Self { pipeline, vertices, indices, meshes, objects, cameras, gpu_objects, spheres, fixture }
     }
@@ -80,9 +101,33 @@ impl DrawOnly {
         self.write_objects();
     }
 
+    /// As [`prepare`](Self::prepare), on the calling thread.
+    pub fn prepare_serially(&mut self, scene: &SceneRef<'_>) {
+        let objects = self.gpu_objects.iter_mut().zip(&mut self.spheres).enumerate();
+        objects.for_each(|(object, (gpu_object, sphere))| {
+            (*gpu_object, *sphere) = (GpuObject::new(scene, object), Sphere::new(scene, object));
+        });
+        self.write_objects();
+    }
+
+    pub fn camera_count(&self) -> usize {
+        self.cameras.len()
+    }
+
+    pub fn mesh_count(&self) -> usize {
+        self.meshes.len()
+    }
+
     /// Uploads a camera.
     pub fn write_camera(&self, camera: usize, clip_from_world: &Mat4) {
-        self.fixture.queue.write_buffer(&self.cameras[camera].0, 0, bytemuck::bytes_of(clip_from_world));
+        self.fixture.queue.write_buffer(&self.cameras[camera].clip_from_world, 0, bytemuck::bytes_of(clip_from_world));
+    }
+
+    /// Uploads a camera's list of instances.
+    pub fn write_instances(&self, camera: usize, instances: &[u32]) {
+        if let Some(buffer) = &self.cameras[camera].instances {
+            self.fixture.queue.write_buffer(buffer, 0, bytemuck::cast_slice(instances));
+        }
     }
 
     /// Uploads all objects.
@@ -93,19 +138,24 @@ impl DrawOnly {
     /// Sets the state that all draws share.
     pub fn set<'a>(&'a self, encoder: &mut impl RenderEncoder<'a>, camera: usize) {
         encoder.set_pipeline(&self.pipeline);
-        encoder.set_bind_group(0, Some(&self.cameras[camera].1), &[]);
+        encoder.set_bind_group(0, Some(&self.cameras[camera].group), &[]);
         encoder.set_vertex_buffer(0, Some(self.vertices.slice(..)));
         encoder.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 
     pub fn draw<'a>(&self, encoder: &mut impl RenderEncoder<'a>, scene: &SceneRef<'_>, object: usize) {
-        let MeshRange { first_index, index_count, base_vertex } = self.meshes[scene.meshes[object].index() as usize];
         let instance = object as u32;
-        encoder.draw_indexed(first_index..first_index + index_count, base_vertex, instance..instance + 1);
+        self.draw_mesh(encoder, scene.meshes[object].index() as usize, instance..instance + 1);
+    }
+
+    /// Draws some instances of the mesh in a slot.
+    pub fn draw_mesh<'a>(&self, encoder: &mut impl RenderEncoder<'a>, mesh: usize, instances: Range<u32>) {
+        let MeshRange { first_index, index_count, base_vertex } = self.meshes[mesh];
+        encoder.draw_indexed(first_index..first_index + index_count, base_vertex, instances);
     }
 }
 
-fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+fn layout(device: &wgpu::Device, has_instances: bool) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
@@ -113,6 +163,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         count: None,
     };
     let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    let entries = [entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage), entry(2, storage)];
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+    let entries = [entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage), entry(2, storage), entry(3, storage)];
+    let entries = if has_instances { &entries[..] } else { &entries[..3] };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries })
 }

@@ -9,6 +9,8 @@
 //! - *rayon* splits the objects of each camera into chunks, culls them and records a bundle of each in parallel; all meshes are in
 //!   one buffer and all objects in another, so no state is set between draws.
 //! - *encoder-per-thread* has a thread per camera, which culls and records directly into an encoder of its own, in the same form.
+//! - *by-mesh* instances by hand: a thread culls a camera, counts and scatters its objects by mesh, and records one draw a mesh. It
+//!   is the best plain code there is here, and the peer to compare with; the others issue single draws.
 //! - *drawloom* is this crate by default, and *drawloom-…* are its recording strategies, each alone.
 //!
 //! All draw the same picture, which is checked first, upload the moving objects in every frame, and use wgpu alike. They are
@@ -19,6 +21,7 @@
 //! `target/drawloom/record.json` and `.svg` have the same.
 
 mod allocations;
+mod by_mesh;
 mod draw_only;
 mod encoders;
 mod fixture;

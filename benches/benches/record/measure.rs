@@ -29,6 +29,8 @@ pub struct Measured {
     pub independent: f64,
     /// The speed-up of two workers over one, and of two independent threads over one worker.
     pub speed_ups: [f64; 2],
+    /// The speed-up of one worker over by-mesh on one thread, and of two workers over two threads.
+    pub speed_ups_over_by_mesh: [f64; 2],
 }
 
 /// # Errors
@@ -63,6 +65,8 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         median(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
     };
     let speed_ups = [speed_up(one, two.map_or(&[][..], |two| &times[two])), speed_up(one, &independent_times)];
+    let by_mesh = [(1, one), (2, two)]
+        .map(|(threads, drawloom)| speed_up(find("by-mesh", threads), drawloom.map_or(&[][..], |index| &times[index])));
     for (contender, times) in contenders.iter_mut().zip(&times) {
         let own = contender.is_drawloom().then(|| own_requests(contender.workers, rounds.warm_up, &mut world));
         rows.push(Row {
@@ -80,7 +84,13 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             })?,
         });
     }
-    Ok(Measured { backend, rows, independent: nanoseconds(median(independent_times)), speed_ups })
+    Ok(Measured {
+        backend,
+        rows,
+        independent: nanoseconds(median(independent_times)),
+        speed_ups,
+        speed_ups_over_by_mesh: by_mesh,
+    })
 }
 
 /// Draws one frame, and more until they have taken `at_least`; returns seconds per frame.

@@ -82,10 +82,12 @@ impl Report {
         let mut table = Table::new(&["figure", "target", "reached"]);
         for (figure, target, reached) in [
             ("naive, of drawloom with 2 workers", 20.0, of_naive),
+            ("by-mesh on 1 thread, of drawloom with 1 worker", 1.67, noop.speed_ups_over_by_mesh[0]),
+            ("by-mesh on 2 threads, of drawloom with 2 workers", 1.67, noop.speed_ups_over_by_mesh[1]),
             ("drawloom with 1 worker, of 2", 1.8, noop.speed_ups[0]),
         ] {
             let note = if reached >= target { "" } else { ", short" };
-            table.row([figure.to_owned(), format!("{target:.1}"), format!("{reached:.2}{note}")]);
+            table.row([figure.to_owned(), format!("{target:.2}"), format!("{reached:.2}{note}")]);
         }
         table.print();
     }

@@ -7,6 +7,7 @@ use drawloom::scene::SceneRef;
 use drawloom_benches::backends::BackendName;
 
 use crate::CAMERAS;
+use crate::by_mesh::ByMesh;
 use crate::draw_only::DrawOnly;
 use crate::encoders::EncoderPerThread;
 use crate::fixture::Fixture;
@@ -49,6 +50,8 @@ impl Contender {
             of("rayon", 1, Box::new(Parallel::new(draw_only()?, 1)?)),
             of("rayon", 2, Box::new(Parallel::new(draw_only()?, 2)?)),
             of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?)),
+            of("by-mesh", 1, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 1)?)),
+            of("by-mesh", 2, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 2)?)),
         ];
         let strategies = [
             ("drawloom", None),
