@@ -45,6 +45,10 @@ impl OcclusionControl {
         view: (usize, &RenderView),
     ) -> Self {
         let occluders = is_enabled.then(|| occluders(plan, draws, passes, view)).flatten();
+        Self::with_occluders(occluders)
+    }
+
+    fn with_occluders(occluders: Option<Vec<Selection>>) -> Self {
         Self { occluders, tuner: Tuner::new(MAX_PAUSES), frames: 0, chosen: WITH_TEST, is_trial: false, previous: None }
     }
 
@@ -115,14 +119,7 @@ mod tests {
     use crate::tuning::signal::{ControllerBounds, Signal, check_controller};
 
     fn control() -> OcclusionControl {
-        OcclusionControl {
-            occluders: Some(Vec::new()),
-            tuner: Tuner::new(MAX_PAUSES),
-            frames: 0,
-            chosen: WITH_TEST,
-            is_trial: false,
-            previous: None,
-        }
+        OcclusionControl::with_occluders(Some(Vec::new()))
     }
 
     /// Runs a frame that takes these times an object with and without the test, and returns whether it was with.

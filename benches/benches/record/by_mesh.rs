@@ -86,7 +86,7 @@ fn encode(
     let mut pass = shared.fixture.pass(&mut encoder, index);
     shared.set(&mut pass, index);
     let mut first = 0;
-    for (mesh, &end) in visible.ends.iter().enumerate().filter(|&(_, &end)| end > 0) {
+    for (mesh, &end) in visible.ends.iter().enumerate() {
         if end > first {
             shared.draw_mesh(&mut pass, mesh, first..end);
             first = end;

@@ -44,15 +44,17 @@ struct MeshRange {
 impl DrawOnly {
     /// An instance is an object.
     pub fn new(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
-        Self::with_shader(fixture, scene, include_str!("draw_only.wgsl"), false)
+        let object_index = "fn object_index(instance: u32) -> u32 { return instance; }";
+        Self::with_object_index(fixture, scene, object_index, false)
     }
 
     /// Each camera has a list of instances, which are objects.
     pub fn with_instances(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
-        Self::with_shader(fixture, scene, include_str!("by_mesh.wgsl"), true)
+        Self::with_object_index(fixture, scene, include_str!("by_mesh.wgsl"), true)
     }
 
-    fn with_shader(fixture: Fixture, scene: &SceneRef<'_>, shader: &str, has_instances: bool) -> Self {
+    /// `object_index` is the shader's function of that name.
+    fn with_object_index(fixture: Fixture, scene: &SceneRef<'_>, object_index: &str, has_instances: bool) -> Self {
         let device = &fixture.device;
         let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for (_, mesh) in scene.assets.iter::<Mesh>() {
@@ -86,7 +88,7 @@ impl DrawOnly {
             CameraBuffers { clip_from_world, instances, group }
         };
         let cameras = scene.cameras.iter().map(camera).collect();
-        let pipeline = fixture.pipeline(&[&layout], shader);
+        let pipeline = fixture.pipeline(&[&layout], &(include_str!("draw_only.wgsl").to_owned() + object_index));
         let spheres = vec![Sphere::default(); scene.object_count()];
         Self { pipeline, vertices, indices, meshes, objects, cameras, gpu_objects, spheres, fixture }
     }
@@ -96,7 +98,7 @@ impl DrawOnly {
         let objects =
             self.gpu_objects.par_iter_mut().zip(&mut self.spheres).enumerate().with_min_len(MIN_OBJECTS_PER_JOB);
         objects.for_each(|(object, (gpu_object, sphere))| {
-            (*gpu_object, *sphere) = (GpuObject::new(scene, object), Sphere::new(scene, object));
+            (*gpu_object, *sphere) = describe(scene, object);
         });
         self.write_objects();
     }
@@ -105,7 +107,7 @@ impl DrawOnly {
     pub fn prepare_serially(&mut self, scene: &SceneRef<'_>) {
         let objects = self.gpu_objects.iter_mut().zip(&mut self.spheres).enumerate();
         objects.for_each(|(object, (gpu_object, sphere))| {
-            (*gpu_object, *sphere) = (GpuObject::new(scene, object), Sphere::new(scene, object));
+            (*gpu_object, *sphere) = describe(scene, object);
         });
         self.write_objects();
     }
@@ -153,6 +155,11 @@ impl DrawOnly {
         let MeshRange { first_index, index_count, base_vertex } = self.meshes[mesh];
         encoder.draw_indexed(first_index..first_index + index_count, base_vertex, instances);
     }
+}
+
+/// What is computed for each object in each frame.
+fn describe(scene: &SceneRef<'_>, object: usize) -> (GpuObject, Sphere) {
+    (GpuObject::new(scene, object), Sphere::new(scene, object))
 }
 
 fn layout(device: &wgpu::Device, has_instances: bool) -> wgpu::BindGroupLayout {

@@ -19,7 +19,7 @@ fn vertex(
     @location(1) normal: vec3<f32>,
     @builtin(instance_index) instance: u32,
 ) -> Surface {
-    let object = objects[instance];
+    let object = objects[object_index(instance)];
     let world_position = object.world_from_object * vec4<f32>(position, 1.0);
     return Surface(clip_from_world * world_position, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz, object.material);
 }
