@@ -18,7 +18,9 @@ use drawloom::handle::Handle;
 use drawloom::process::{
     CommandDraws, Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess, ToneMapping,
 };
-use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
+use drawloom::scene::{
+    Assets, Blend, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
+};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
 use parking_lot::Mutex;
@@ -133,6 +135,8 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            // Every cube moves in every frame.
+            changes: Changes::Unknown,
             assets: &self.assets,
             lights: &self.lights,
             cameras: std::slice::from_ref(&self.camera),

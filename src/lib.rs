@@ -8,13 +8,15 @@
 //!  scene (read-only while a frame is recorded)                                        scene
 //!    │  views        one per camera: "everything is a camera"                         view
 //!    ▼
-//!  objects           checked, described and uploaded once     parallel over objects   view
+//!  objects           those that changed: checked, described,  parallel over objects   view
+//!    │               and uploaded
 //!    ▼
 //!  visibility        per view: which objects it sees          parallel over objects   view
 //!    ▼
-//!  fill              per pass: a command for each of them     parallel over objects   view
-//!    ▼
-//!  sort → instance   by key; equal commands become one draw   parallel over buckets   command
+//!  bin               per pass: opaque objects by state and    parallel over objects   command
+//!    │               mesh; each bin is one draw
+//!  fill → sort →     or, where depth orders them, a command   parallel over objects   view
+//!  instance          for each; equal ones become one draw     and buckets             command
 //!    ▼
 //!  record            batches into passes, or bundles first    parallel over parts     backend
 //!    ▼

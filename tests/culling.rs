@@ -106,8 +106,7 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
     ] {
         let mut table = ObjectTable::default();
         table.configure(volume);
-        table.reset(3);
-        table.fill(&scene_ref, 0..3);
+        table.update(&scene_ref);
         assert_eq!(table.block(0).visible(&frustum, volume, 0..3), visible, "{volume:?}");
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }

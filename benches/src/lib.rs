@@ -1,7 +1,9 @@
 //! Code that Drawloom's benchmarks share.
 //!
-//!     cargo bench -p drawloom-benches --bench record
-//!     cargo bench -p drawloom-benches --bench record -- --quick
+//! ```sh
+//! cargo bench -p drawloom-benches --bench record
+//! cargo bench -p drawloom-benches --bench record -- --quick
+//! ```
 
 pub mod arguments;
 #[cfg(feature = "wgpu")]

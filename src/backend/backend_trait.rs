@@ -17,7 +17,8 @@ use crate::view::ObjectTable;
 /// The order within a frame:
 ///
 /// 1. `begin`.
-/// 2. In any order and at the same time: `upload_objects` for every block of objects, and the passes. Of each pass of
+/// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and the
+///    passes. Of each pass of
 ///    commands `prepare`, then `record` for each range of its parts; of every pass `finish`.
 /// 3. `recording_choice` for every pass.
 /// 4. Later, on the device thread, `submit`.
@@ -58,7 +59,14 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device lacks room for the frame's resources, or refuses them.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
-    /// Uploads blocks of the object table.
+    /// The [epoch](ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none. If it is the
+    /// current one, nothing is uploaded.
+    fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
+        let _ = frame;
+        0
+    }
+
+    /// Uploads blocks of the object table: at least what changed since [`Backend::objects_epoch`].
     ///
     /// # Errors
     /// If the device refuses.

@@ -139,7 +139,8 @@ impl Backend for NullBackend {
         ensure(frame.passes.contains(&pass), || format!("prepared passes belong to the frame, but {pass:?} does not"))?;
         let before = frame.prepared.lock().insert(pass, list.objects.len());
         ensure(before.is_none(), || format!("each pass is prepared once, but {pass:?} is prepared again"))?;
-        ensure(list.objects.len() == list.commands().count(), || "a list has one object per command".to_owned())?;
+        let commands = list.commands().count();
+        ensure(commands == 0 || commands == list.objects.len(), || "a list has one object per command".to_owned())?;
         let ordered = list.commands().is_sorted_by_key(|command| (command.key, command.object));
         ensure(ordered, || "commands are sorted by key and object".to_owned())?;
         let out_of_range = list.objects.iter().find(|&&object| object as usize >= frame.object_count);

@@ -23,6 +23,8 @@ pub struct FrameRequest<'a> {
     pub passes: &'a [Pass],
     /// The scene.
     pub scene: &'a SceneRef<'a>,
+    /// The epoch of the object table.
+    pub objects_epoch: u64,
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.

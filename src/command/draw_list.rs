@@ -1,13 +1,13 @@
 //! What one pass draws.
 
-use std::ops::Range;
+use std::ops::{DerefMut, Range};
 
-use super::{Batch, Bucket, RenderCommand};
+use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
 #[derive(Clone, Debug, Default)]
 pub struct DrawList {
-    /// The commands in draw order, bucket by bucket. Only the first `bucket_count` vectors are part of the list; the others
+    /// The commands in draw order, bucket by bucket, of a pass that sorts them. Only the first `bucket_count` vectors are part of the list; the others
     /// keep their memory for later frames.
     commands: Vec<Vec<RenderCommand>>,
     bucket_count: usize,
@@ -19,6 +19,8 @@ pub struct DrawList {
     remaining_indices: Vec<u32>,
     /// The indices of partial batches, ascending, each with its range of `remaining_indices`.
     partial_batches: Vec<(u32, Range<u32>)>,
+    /// The version of batches and objects.
+    version: Version,
 }
 
 impl DrawList {
@@ -26,8 +28,20 @@ impl DrawList {
     /// much per draw, and bundle boundaries that moved with the granularity could change the picture.
     pub const BATCHES_PER_BUNDLE: usize = 256;
 
+    /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
+    /// it. Lists of [`Version::default`] may differ.
+    pub fn version(&self) -> Version {
+        self.version
+    }
+
+    /// Gives the list a version, which no other list has.
+    pub fn set_version(&mut self, version: Version) {
+        self.version = version;
+    }
+
     /// Removes everything and keeps the memory.
     pub fn clear(&mut self) {
+        self.version = Version::default();
         self.bucket_count = 0;
         self.batches.clear();
         self.objects.clear();
@@ -59,6 +73,53 @@ impl DrawList {
         }
         self.batches.extend(batches);
         self.objects.extend_from_slice(&bucket.objects);
+    }
+
+    /// Joins the segments of a pass that orders its objects by bin. Each bin becomes one batch. If `can_merge` is false for its mesh's
+    /// slot, each object becomes a batch. The list may take the vectors of the segments and leave its own in exchange.
+    ///
+    /// The list has no commands. It does not depend on where the segments begin.
+    pub fn join_bins<S: DerefMut<Target = BinnedSegment>>(
+        &mut self,
+        segments: &mut [S],
+        bins: &Bins,
+        can_merge: impl Fn(u32) -> bool,
+    ) {
+        if let [segment] = segments {
+            let mut index = 0;
+            while let Some((bin, objects)) = segment.run(index) {
+                self.push_batches(bins, bin, objects, &can_merge);
+                index += 1;
+            }
+            std::mem::swap(&mut self.objects, segment.by_bin_mut());
+            return;
+        }
+        debug_assert!(segments.len() <= Self::MAX_SEGMENTS);
+        let mut positions = [0; Self::MAX_SEGMENTS];
+        let next_bin = |positions: &[usize], segments: &[S]| {
+            let runs = segments.iter().zip(positions).filter_map(|(segment, &index)| segment.run(index));
+            runs.map(|(bin, _)| bin).min_by_key(|&bin| bins.rank(bin))
+        };
+        while let Some(bin) = next_bin(&positions, segments) {
+            let start = self.objects.len();
+            for (segment, index) in segments.iter().zip(&mut positions) {
+                if let Some((_, objects)) = segment.run(*index).filter(|(other, _)| *other == bin) {
+                    self.objects.extend_from_slice(segment.objects(objects));
+                    *index += 1;
+                }
+            }
+            self.push_batches(bins, bin, start..self.objects.len(), &can_merge);
+        }
+    }
+
+    /// The most segments that can be joined.
+    pub const MAX_SEGMENTS: usize = 32;
+
+    fn push_batches(&mut self, bins: &Bins, bin: u32, objects: Range<usize>, can_merge: impl Fn(u32) -> bool) {
+        let Bin { mesh, state } = bins.get(bin);
+        let step = if can_merge(mesh) { objects.len() } else { 1 };
+        let batches = objects.step_by(step).map(|first| Batch { mesh, state, first: first as u32, count: step as u32 });
+        self.batches.extend(batches);
     }
 
     /// Makes a batch of one object partial: it draws only the triangles whose corners `append_indices` appends, three per
@@ -93,7 +154,7 @@ impl DrawList {
         self.partial_batches.get(next_partial).is_none_or(|(batch, _)| *batch >= end)
     }
 
-    /// The sorted commands.
+    /// The sorted commands; none if the pass orders its objects by bin.
     pub fn commands(&self) -> impl DoubleEndedIterator<Item = &RenderCommand> + Clone {
         self.commands[..self.bucket_count].iter().flatten()
     }

@@ -27,6 +27,11 @@ impl DrawState {
         Self(topology as u8 | (cull as u8) << 1 | (blend as u8) << 3)
     }
 
+    /// The same state with another topology.
+    pub(crate) fn with_topology(self, topology: Topology) -> Self {
+        Self(self.0 & !1 | topology as u8)
+    }
+
     /// The same state with another subdivision level, at most [`DrawState::MAX_SUBDIVISION_LEVEL`].
     pub fn with_subdivision_level(self, level: u32) -> Self {
         Self(self.0 & 0b1_1111 | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u8) << 5)

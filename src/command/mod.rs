@@ -1,6 +1,8 @@
 //! Commands, each of which draws one object, independent of any device and small enough to sort by the million (M 10.3). They
 //! are sorted in buckets, merged into batches (instanced draws), and joined to one draw list per pass (M 10.5).
 
+mod binned_segment;
+mod bins;
 mod bucket;
 mod delta;
 mod draw_list;
@@ -13,7 +15,10 @@ mod selection;
 mod sort;
 mod sort_key;
 mod splitters;
+mod version;
 
+pub use binned_segment::BinnedSegment;
+pub use bins::{Bin, Bins};
 pub use bucket::{Batch, Bucket};
 pub use delta::{DeltaCommands, DeltaError};
 pub use draw_list::DrawList;
@@ -24,3 +29,4 @@ pub use selection::{Blending, MaterialShare, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
 pub use splitters::Splitters;
+pub use version::Version;

@@ -70,13 +70,13 @@ mod tests {
     use crate::quality::Quality;
     use crate::scene::{Blend, Topology};
 
-    /// As [`Quality::balanced`] has them, in a view from 5 cm to infinity.
+    /// As [`Quality::exact`] has them, in a view from 5 cm to infinity.
     fn opaque_code(depth: f32) -> u32 {
-        Quality::balanced().opaque_order.quantize(depth, 0.05, f32::INFINITY)
+        Quality::exact().opaque_order.quantize(depth, 0.05, f32::INFINITY)
     }
 
     fn blended_code(depth: f32) -> u32 {
-        Quality::balanced().blended_order.quantize(depth, 0.05, f32::INFINITY)
+        Quality::exact().blended_order.quantize(depth, 0.05, f32::INFINITY)
     }
 
     proptest! {

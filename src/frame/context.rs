@@ -2,12 +2,17 @@
 
 use super::cost_model::CostModel;
 use super::granularity::Granularity;
+use super::list_inputs::{ListInputs, OrderInputs};
 use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
 use super::stage_clock::StageClock;
 use super::tables::FrameTables;
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
+use crate::scene::Projection;
+
+/// Fewer visible objects than this cost less than a job and the copy that joins its segment.
+const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
 
 /// What the jobs of a frame share.
 pub(super) struct FrameContext<'a, B: Backend> {
@@ -37,7 +42,48 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// The number of objects that a pass's view sees.
     pub(super) fn visible_count(&self, pass: usize) -> usize {
-        self.tables.visible[self.view_index_of(pass)].count()
+        self.tables.visibility[self.view_index_of(pass)].set.count()
+    }
+
+    /// Whether a pass orders its objects by bin, and not by depth.
+    pub(super) fn orders_by_bin(&self, pass: usize) -> bool {
+        self.tables.passes[pass].orders_by_bin
+    }
+
+    /// What the draw list of a pass is made from, once its view's visible set is complete.
+    pub(super) fn list_inputs(&self, pass: usize) -> ListInputs {
+        let view_index = self.view_index_of(pass);
+        let objects = &self.tables.objects;
+        ListInputs {
+            visible: self.tables.visibility[view_index].set.version(),
+            selection: self.tables.passes[pass].selection.unwrap_or_default(),
+            instancing: self.instancing,
+            order: if self.orders_by_bin(pass) {
+                OrderInputs::Bins { draws_changed_in: objects.draws_changed_in() }
+            } else {
+                OrderInputs::of_depth(objects.epoch(), &self.request.views[view_index].camera)
+            },
+        }
+    }
+
+    /// Whether the draw list of a pass holds for this frame as it is.
+    pub(super) fn keeps_list(&self, pass: usize) -> bool {
+        self.can_keep_list(pass) && *self.tables.passes[pass].list_inputs.read() == Some(self.list_inputs(pass))
+    }
+
+    /// Whether later frames may keep the draw list of a pass. Those of paraboloids are made anew, because a frame counts the objects
+    /// whose edges are too coarse while it makes them; so are those whose triangles are culled.
+    pub(super) fn can_keep_list(&self, pass: usize) -> bool {
+        let view = &self.request.views[self.view_index_of(pass)];
+        view.camera.projection != Projection::Paraboloid && !self.pass_culls_triangles(pass)
+    }
+
+    /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share the workers.
+    pub(super) fn segment_count(&self, pass: usize) -> usize {
+        let by_size = self.visible_count(pass) / MIN_OBJECTS_PER_SEGMENT;
+        let binning = self.tables.passes.iter().filter(|table| table.orders_by_bin).count();
+        let by_workers = self.workers.div_ceil(binning.max(1));
+        by_size.min(by_workers).clamp(1, DrawList::MAX_SEGMENTS)
     }
 
     /// What the backend records of a pass.

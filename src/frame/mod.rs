@@ -7,6 +7,7 @@ mod context;
 mod cost_model;
 mod error;
 mod granularity;
+mod list_inputs;
 mod occluders;
 mod occlusion_control;
 mod pass_recording;
@@ -25,6 +26,7 @@ mod tables;
 mod triangle_culling;
 mod valid_lights;
 mod view_occlusion;
+mod view_visibility;
 mod views;
 mod warnings;
 

@@ -21,7 +21,7 @@ use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
 use crate::command::DrawList;
 use crate::process::{Deferred, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
-use crate::scene::SceneRef;
+use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
@@ -97,6 +97,9 @@ impl<B: Backend> Renderer<B> {
 
     /// Records a frame: everything up to submission. The calling thread works too.
     ///
+    /// What is derived from an object is kept for the next frame. [`SceneRef::changes`] says which objects changed since the last
+    /// call.
+    ///
     /// Objects, lights and textures that cannot be drawn are left out, counted in the statistics, and warned of through
     /// `tracing` when their number changes.
     ///
@@ -105,18 +108,27 @@ impl<B: Backend> Renderer<B> {
     /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
+        let recorded = self.record_frame(&scene);
+        match recorded {
+            Ok(_) => self.tables.end_frame(),
+            Err(_) => self.tables.abandon_frame(),
+        }
+        recorded
+    }
+
+    fn record_frame(&mut self, scene: &SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
         let _entered = span.enter();
-        check_scene(&scene)?;
+        check_scene(scene)?;
 
         // Scene → views: one for each camera, and one for each shadow map.
         self.tables.objects.configure(self.quality.culling);
-        self.tables.objects.reset(scene.object_count());
-        let valid_lights = ValidLights::new(&scene, self.tables.objects.rejections(), self.quality.light_cut_off);
+        self.tables.objects.begin_frame(scene);
+        let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let plan = self.plans.select(&valid_lights.lights, scene.assets)?;
-        let requested = FrameViews::new(&scene, valid_lights, self.plans.shadow_maps(), &plan)?;
+        let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), &plan)?;
         let (frame_views, shadow_maps) = self.shadow_cache.resolve(self.quality.shadows.interval, &plan, requested);
         let FrameViews { views, lights } = frame_views;
 
@@ -126,9 +138,13 @@ impl<B: Backend> Renderer<B> {
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =
             !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;
-        let options = StageOptions { occlusion_tile: self.quality.occlusion, culls_triangles };
+        let options = StageOptions {
+            occlusion_tile: self.quality.occlusion,
+            culls_triangles,
+            opaque_order: self.quality.opaque_order,
+        };
         let graph = self.graphs.get(&plan, &draws, &views, options)?;
-        graph.reset_tables(&mut self.tables, &scene, &views, self.scheduler.workers());
+        graph.begin_frame(&mut self.tables, scene, &views, self.quality.culling, self.scheduler.workers());
         let clock = StageClock::default();
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, separate_shadowed_lights));
@@ -139,7 +155,8 @@ impl<B: Backend> Renderer<B> {
             lights: &lights,
             light_tables: &self.tables.lights,
             passes: &graph.passes,
-            scene: &scene,
+            scene,
+            objects_epoch: self.tables.objects.epoch(),
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
@@ -165,6 +182,12 @@ impl<B: Backend> Renderer<B> {
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
             graph.tuning.costs.discard_frame();
             return Err(error.into());
+        }
+        if cfg!(debug_assertions)
+            && let Some(object) = self.tables.objects.unreported_change(scene)
+        {
+            graph.tuning.costs.discard_frame();
+            return Err(SceneError::UnreportedChange { object }.into());
         }
         let tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
         self.scheduler.timeline().add_tuning(frame_number, &tuning);
@@ -205,6 +228,7 @@ impl<B: Backend> Renderer<B> {
             self.plans = self.plans.with_deferred(with_quality(deferred.clone(), &quality)?)?;
         }
         (self.quality, self.pipeline_has_quality) = (quality, true);
+        self.tables.invalidate();
         self.shadow_cache.invalidate();
         Ok(())
     }

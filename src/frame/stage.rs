@@ -74,10 +74,19 @@ pub(super) enum Chunking {
 pub(super) struct StageNeeds {
     /// Whether the pass draws commands, or any pass of the view.
     pub(super) draws_commands: bool,
+    /// Whether the pass orders its objects by bin, and so sorts no commands.
+    pub(super) orders_by_bin: bool,
     /// Whether the view may test for occlusion.
     pub(super) tests_occlusion: bool,
     /// Whether the scene has meshes whose triangles are culled.
     pub(super) culls_triangles: bool,
+}
+
+impl StageNeeds {
+    /// Whether the pass makes commands of its objects, and sorts them.
+    pub(super) fn sorts_commands(&self) -> bool {
+        self.draws_commands && !self.orders_by_bin
+    }
 }
 
 /// A job of a stage.

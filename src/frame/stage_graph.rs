@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::FrameError;
+use super::list_inputs::orders_by_bin;
 use super::occlusion_control::OcclusionControl;
 use super::stage::{Stage, StageNeeds, StageNode};
 use super::stage_tuning::{StageTuning, TuningLabels};
@@ -12,7 +13,8 @@ use crate::backend::Backend;
 use crate::command::Selection;
 use crate::graph::{FrameGraph, NodeId, Schedule};
 use crate::process::{Draws, FramePlan, Pass};
-use crate::scene::{SceneRef, ViewKind};
+use crate::quality::{CullingVolume, DepthKey};
+use crate::scene::{Projection, SceneRef, ViewKind};
 use crate::timeline::Labels;
 use crate::view::RenderView;
 
@@ -30,26 +32,36 @@ pub(super) struct StageGraph<B: Backend> {
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
 #[derive(Debug)]
 struct GraphKey {
-    /// The name and kind of each view, and whether its picture is cached.
-    views: Vec<(String, ViewKind, bool)>,
+    /// Of each view the name, the kind, whether its picture is cached, and whether it is a paraboloid.
+    views: Vec<(String, ViewKind, bool, bool)>,
     /// For each process, the objects that it draws, and whether these hide what is behind them.
     draws: Vec<(Option<Selection>, bool)>,
     options: StageOptions,
 }
 
 /// The optional parts of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StageOptions {
     /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
     pub(super) occlusion_tile: Option<u32>,
     /// Whether triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
+    /// The order of opaque objects.
+    pub(super) opaque_order: DepthKey,
+}
+
+fn of_view(view: &RenderView) -> (&str, ViewKind, bool, bool) {
+    (view.name(), view.kind(), view.is_cached, view.camera.projection == Projection::Paraboloid)
 }
 
 impl GraphKey {
     fn new(draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> Self {
         Self {
-            views: views.iter().map(|view| (view.name().to_owned(), view.kind(), view.is_cached)).collect(),
+            views: views
+                .iter()
+                .map(of_view)
+                .map(|(name, kind, is_cached, is_paraboloid)| (name.to_owned(), kind, is_cached, is_paraboloid))
+                .collect(),
             draws: draws.iter().map(|draws| (draws.selection(), draws.hides())).collect(),
             options,
         }
@@ -57,9 +69,12 @@ impl GraphKey {
 
     /// Whether the key matches the inputs of a frame. Allocates nothing.
     fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> bool {
-        let views_of_key = self.views.iter().map(|(name, kind, is_cached)| (name.as_str(), *kind, *is_cached));
+        let views_of_key = self
+            .views
+            .iter()
+            .map(|(name, kind, is_cached, is_paraboloid)| (name.as_str(), *kind, *is_cached, *is_paraboloid));
         self.options == options
-            && views_of_key.eq(views.iter().map(|view| (view.name(), view.kind(), view.is_cached)))
+            && views_of_key.eq(views.iter().map(of_view))
             && self.draws.iter().copied().eq(draws.iter().map(|draws| (draws.selection(), draws.hides())))
     }
 }
@@ -86,13 +101,17 @@ impl<B: Backend> StageGraph<B> {
         let control_of = |view| OcclusionControl::new(tests_occlusion, plan, draws, &passes, view);
         let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();
         let mut builder = GraphBuilder::default();
-        let every_frame = StageNeeds { draws_commands: true, tests_occlusion: false, culls_triangles: false };
+        let every_frame =
+            StageNeeds { draws_commands: true, orders_by_bin: false, tests_occlusion: false, culls_triangles: false };
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
             let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].name.as_str());
+            let selection = draws[pass.process_index].selection();
             let needs = StageNeeds {
-                draws_commands: draws[pass.process_index].selection().is_some(),
+                draws_commands: selection.is_some(),
+                orders_by_bin: selection
+                    .is_some_and(|selection| orders_by_bin(selection, view, key.options.opaque_order)),
                 tests_occlusion: occlusion[pass.view_index].is_possible(),
                 culls_triangles: key.options.culls_triangles,
             };
@@ -124,26 +143,37 @@ impl<B: Backend> StageGraph<B> {
         })
     }
 
-    /// Empties the tables for a frame of these views.
-    pub(super) fn reset_tables(
+    /// Begins a frame of these views in the tables. The object table has begun it already.
+    pub(super) fn begin_frame(
         &self,
         tables: &mut FrameTables,
         scene: &SceneRef<'_>,
         views: &[RenderView],
+        culling: CullingVolume,
         workers: usize,
     ) {
+        let StageOptions { occlusion_tile: tile, culls_triangles, opaque_order } = self.key.options;
+        tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
             let (selection, _) = self.key.draws[pass.process_index];
-            table.reset(selection, scene.object_count(), self.key.options.culls_triangles);
+            let orders_by_bin =
+                selection.is_some_and(|selection| orders_by_bin(selection, &views[pass.view_index], opaque_order));
+            table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
         }
-        tables.reset(views.len(), workers);
-        let tile = self.key.options.occlusion_tile;
         if tile.is_some() {
             tables.occluder_meshes.sync(scene.assets);
         }
         for (index, view) in views.iter().enumerate() {
             tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
+            let draws_commands =
+                |pass: &Pass| pass.view_index == index && self.key.draws[pass.process_index].0.is_some();
+            if self.passes.iter().any(draws_commands) {
+                let tests_occlusion = tables.occlusion[index].is_on();
+                tables.visibility[index].begin_frame(view, &tables.objects, culling, tests_occlusion);
+            } else {
+                tables.visibility[index].clear();
+            }
         }
     }
 }

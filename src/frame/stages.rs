@@ -7,8 +7,8 @@ mod of_frame;
 mod of_pass;
 mod of_view;
 
-use of_frame::{Objects, Upload};
-use of_pass::{Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
+use of_frame::{Bins, Objects, Upload};
+use of_pass::{Bin, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
 use of_view::{CoarseDepth, Compact, Occluders, Occlusion, Visibility};
 
 use super::stage::Stage;
@@ -16,7 +16,7 @@ use crate::backend::Backend;
 
 /// The stages that a frame has once.
 pub(super) fn stages_of_frame<B: Backend>() -> Vec<Box<dyn Stage<B>>> {
-    vec![Box::new(Objects), Box::new(Upload)]
+    vec![Box::new(Objects), Box::new(Bins), Box::new(Upload)]
 }
 
 /// The stages of one view, by index.
@@ -37,6 +37,7 @@ pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> 
         Box::new(Split { pass }),
         Box::new(Sort { pass }),
         Box::new(Instance { pass }),
+        Box::new(Bin { pass }),
         Box::new(Join { pass }),
         Box::new(Triangles { pass }),
         Box::new(Prepare { pass }),

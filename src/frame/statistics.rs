@@ -59,7 +59,7 @@ pub struct StageTimes {
     pub visibility: Duration,
     /// Filling commands.
     pub fill: Duration,
-    /// Sorting commands.
+    /// Sorting commands, and ordering objects by bin.
     pub sort: Duration,
     /// Merging commands into batches, joining these to draw lists, and culling triangles.
     pub instance: Duration,
@@ -97,7 +97,7 @@ impl ViewStatistics {
         let mut statistics = Self {
             name: view.name().to_owned(),
             kind: view.kind(),
-            visible: tables.visible[index].count(),
+            visible: tables.visibility[index].set.count(),
             occluded: tables.occlusion[index].hidden(),
             lights: tables.lights[index].gpu_lights().len(),
             commands: 0,

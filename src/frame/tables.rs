@@ -2,19 +2,21 @@
 
 use parking_lot::{Mutex, RwLock};
 
+use super::list_inputs::ListInputs;
 use super::triangle_culling::{CullableMeshes, PassTriangles};
 use super::view_occlusion::ViewOcclusion;
+use super::view_visibility::ViewVisibility;
 use crate::chunked_array::ChunkedArray;
-use crate::command::{Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters};
+use crate::command::{BinnedSegment, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version};
 use crate::scene::Light;
-use crate::view::{LightTable, ObjectTable, OccluderMeshes, RenderView, VisibleSet};
+use crate::view::{LightTable, ObjectTable, OccluderMeshes, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
     /// One for each view.
-    pub(super) visible: Vec<VisibleSet>,
+    pub(super) visibility: Vec<ViewVisibility>,
     /// One for each view.
     pub(super) occlusion: Vec<ViewOcclusion>,
     /// The convex parts of meshes, for views that test for occlusion.
@@ -27,19 +29,46 @@ pub(super) struct FrameTables {
     pub(super) passes: Vec<PassTable>,
     /// One for each worker.
     pub(super) sort_scratch: Vec<Mutex<SortScratch>>,
+    /// The number of frames that began.
+    frames: u64,
+    is_in_frame: bool,
 }
 
 impl FrameTables {
-    /// Empties the tables for a frame of `views` views on `workers` workers. The object table has its size already.
-    pub(super) fn reset(&mut self, views: usize, workers: usize) {
-        let objects = self.objects.len();
-        self.visible.resize_with(views, VisibleSet::default);
+    /// Begins a frame of `views` views on `workers` workers. The object table has begun it already.
+    pub(super) fn begin_frame(&mut self, views: usize, workers: usize) {
+        self.frames += 1;
+        self.is_in_frame = true;
+        self.visibility.resize_with(views, ViewVisibility::default);
         self.occlusion.resize_with(views, ViewOcclusion::default);
         self.lights.resize_with(views, LightTable::default);
         self.sort_scratch.resize_with(workers, Mutex::default);
-        for visible in &mut self.visible {
-            visible.reset(objects);
+    }
+
+    /// Ends a frame that succeeded: what it derived holds for the next one.
+    pub(super) fn end_frame(&mut self) {
+        self.objects.end_frame();
+        self.is_in_frame = false;
+    }
+
+    /// Ends a frame that failed: the next one derives everything anew. The draw lists are empty if the frame had begun.
+    pub(super) fn abandon_frame(&mut self) {
+        if std::mem::take(&mut self.is_in_frame) {
+            self.passes.iter_mut().for_each(PassTable::clear_list);
         }
+        self.invalidate();
+    }
+
+    /// Makes the next frame derive everything anew.
+    pub(super) fn invalidate(&mut self) {
+        self.objects.invalidate();
+        self.visibility.iter_mut().for_each(ViewVisibility::invalidate);
+        self.passes.iter_mut().for_each(PassTable::invalidate);
+    }
+
+    /// The version of what the frame makes for a view or pass, by index.
+    pub(super) fn version(&self, index: usize) -> Version {
+        Version { frame: self.frames, index }
     }
 
     /// Finds the lights that reach each view: see [`LightTable::fill`].
@@ -55,29 +84,56 @@ impl FrameTables {
 pub(super) struct PassTable {
     /// The objects that it draws; `None` for a pass without commands.
     pub(super) selection: Option<Selection>,
+    /// Whether it orders them by bin, and not by depth.
+    pub(super) orders_by_bin: bool,
     /// One command for each visible object, by rank.
     pub(super) commands: ChunkedArray<RenderCommand>,
     pub(super) splitters: RwLock<Splitters>,
     /// [`Splitters::MAX_BUCKETS`] of them, in a pass with commands.
     pub(super) buckets: Vec<RwLock<Bucket>>,
+    /// [`DrawList::MAX_SEGMENTS`] of them, in a pass that orders objects by bin.
+    pub(super) segments: Vec<RwLock<BinnedSegment>>,
     pub(super) list: RwLock<DrawList>,
+    /// What the list was made from; `None` if the next frame has to make it anew.
+    pub(super) list_inputs: RwLock<Option<ListInputs>>,
     pub(super) triangles: RwLock<PassTriangles>,
 }
 
 impl PassTable {
-    /// Empties the table for a frame of `objects` objects.
-    pub(super) fn reset(&mut self, selection: Option<Selection>, objects: usize, culls_triangles: bool) {
+    /// Begins a frame of `objects` objects. The list is kept as that of a frame with the same inputs.
+    pub(super) fn begin_frame(
+        &mut self,
+        selection: Option<Selection>,
+        objects: usize,
+        culls_triangles: bool,
+        orders_by_bin: bool,
+    ) {
         self.selection = selection;
-        // The list may be that of another pass of the previous frame, and this frame may fail before it is joined.
-        self.list.get_mut().clear();
+        self.orders_by_bin = orders_by_bin;
+        if selection.is_none() || culls_triangles {
+            self.clear_list();
+        }
         if culls_triangles {
             self.triangles.get_mut().clear();
         } else {
             *self.triangles.get_mut() = PassTriangles::default();
         }
-        if selection.is_some() {
+        if orders_by_bin {
+            self.segments.resize_with(DrawList::MAX_SEGMENTS, RwLock::default);
+        } else if selection.is_some() {
             self.commands.grow(objects, RenderCommand::EMPTY);
             self.buckets.resize_with(Splitters::MAX_BUCKETS, RwLock::default);
         }
+    }
+
+    /// Makes the next frame make the list anew.
+    fn invalidate(&mut self) {
+        *self.list_inputs.get_mut() = None;
+    }
+
+    /// Empties the list.
+    fn clear_list(&mut self) {
+        self.list.get_mut().clear();
+        self.invalidate();
     }
 }

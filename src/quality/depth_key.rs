@@ -1,11 +1,13 @@
 //! Quantizes distances to the depth bits of sort keys.
 
+use std::ops::RangeInclusive;
+
 use super::QualityError;
 
 /// How a sort key quantizes a command's distance along the view's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthKey {
-    /// The number of bits, at least 1.
+    /// The number of bits. With 0 bits, commands are not ordered by distance.
     pub bits: u32,
     /// The mapping from distances to codes.
     pub curve: DepthCurve,
@@ -35,6 +37,9 @@ impl DepthKey {
     /// The whole f32: distances that differ in f32 are never in the wrong order.
     pub const EXACT: Self = Self { bits: Self::MAX_BLENDED_BITS, curve: DepthCurve::Logarithmic };
 
+    /// No order by distance.
+    pub const UNORDERED: Self = Self { bits: 0, curve: DepthCurve::Logarithmic };
+
     /// Quantizes a distance along the view's axis, in metres, for a view from `near` to `far`. Codes grow with the
     /// distance. A code is in the upper [`DepthKey::bits`] of the 32 bits; the others are 0, so shorter keys leave
     /// fewer bits to sort by.
@@ -62,11 +67,14 @@ impl DepthKey {
     /// as one at 2¹²⁸ m. If S is at most 2ᵇ, every float has its own code, and the step is 0. Rounding S adds less than
     /// 2⁻³⁰.
     ///
-    /// With 32 bits the step is 0, whatever the curve.
+    /// With 32 bits the step is 0, whatever the curve; with 0 bits it is infinite.
     pub fn step(self, distance: f32, near: f32, far: f32) -> f64 {
-        let bits = self.bits.clamp(1, Self::MAX_BLENDED_BITS);
+        let bits = self.bits.min(Self::MAX_BLENDED_BITS);
         if bits == Self::MAX_BLENDED_BITS {
             return 0.0;
+        }
+        if bits == 0 {
+            return f64::INFINITY;
         }
         let codes = 2_f64.powi(bits as i32);
         match self.curve {
@@ -84,10 +92,11 @@ impl DepthKey {
 
     /// The quantizer for a view from `near` to `far`.
     pub(crate) fn quantizer(self, near: f32, far: f32) -> DepthQuantizer {
-        let bits = self.bits.clamp(1, Self::MAX_BLENDED_BITS);
+        let bits = self.bits.min(Self::MAX_BLENDED_BITS);
         let unused = Self::MAX_BLENDED_BITS - bits;
         let curve = match self.curve {
             _ if unused == 0 => QuantizedCurve::Exact,
+            _ if bits == 0 => QuantizedCurve::Unordered,
             DepthCurve::Linear { far } => {
                 let codes = 2_f64.powi(bits as i32);
                 QuantizedCurve::Linear { per_metre: codes / f64::from(far), last: (codes - 1.0) as u32 }
@@ -104,9 +113,9 @@ impl DepthKey {
     ///
     /// # Errors
     /// Returns [`QualityError::OutOfRange`] if one of them is out of range.
-    pub(super) fn check(&self, setting: &'static str, max_bits: u32) -> Result<(), QualityError> {
-        if !(1..=max_bits).contains(&self.bits) {
-            let range = if max_bits == Self::MAX_OPAQUE_BITS { "1 to 20 bits" } else { "1 to 32 bits" };
+    pub(super) fn check(&self, setting: &'static str, bits: RangeInclusive<u32>) -> Result<(), QualityError> {
+        if !bits.contains(&self.bits) {
+            let range = if *bits.start() == 0 { "0 to 20 bits" } else { "1 to 32 bits" };
             return Err(QualityError::OutOfRange { setting, value: format!("{} bits", self.bits), range });
         }
         match self.curve {
@@ -130,6 +139,7 @@ pub(crate) struct DepthQuantizer {
 #[derive(Clone, Copy, Debug)]
 enum QuantizedCurve {
     Exact,
+    Unordered,
     Linear {
         per_metre: f64,
         last: u32,
@@ -149,6 +159,7 @@ impl DepthQuantizer {
     pub(crate) fn quantize(&self, depth: f32) -> u32 {
         match self.curve {
             QuantizedCurve::Exact => ordered_bits(depth),
+            QuantizedCurve::Unordered => 0,
             // The cast converts NaN to 0, and saturates.
             QuantizedCurve::Linear { per_metre, last } => {
                 ((f64::from(depth) * per_metre) as u32).min(last) << self.unused
@@ -193,7 +204,7 @@ mod tests {
             Just(DepthCurve::Logarithmic),
             (-6.0..9.0_f32).prop_map(|exponent| DepthCurve::Linear { far: 10_f32.powf(exponent) }),
         ];
-        (1_u32..=32, curve).prop_map(|(bits, curve)| DepthKey { bits, curve })
+        (0_u32..=32, curve).prop_map(|(bits, curve)| DepthKey { bits, curve })
     }
 
     fn any_planes() -> impl Strategy<Value = (f32, f32)> {

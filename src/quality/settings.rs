@@ -25,11 +25,13 @@ use super::{
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// The depth precision of the front-to-back order of opaque objects of one mesh: 1 to [`DepthKey::MAX_OPAQUE_BITS`]
-    /// bits.
+    /// The depth precision of the front-to-back order of opaque objects of one mesh: 0 to [`DepthKey::MAX_OPAQUE_BITS`]
+    /// bits. With 0 bits they are not ordered by depth.
     ///
-    /// Error: pairs drawn back to front, which cause overdraw but do not change the picture. Cost: only the additional
-    /// bits to sort by.
+    /// Error: pairs drawn back to front, which cause overdraw but do not change the picture, except that of coinciding
+    /// surfaces the first drawn wins. Cost: with 0 bits, objects are counted by state and mesh, and a draw list is kept while
+    /// the same objects are seen. From 1 bit on, every visible object becomes a command, and commands are sorted anew in every
+    /// frame in which an object or the camera moves.
     pub opaque_order: DepthKey,
     /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
     ///
@@ -97,7 +99,7 @@ impl Quality {
     /// The fastest preset: errors are visible on inspection.
     pub fn fast() -> Self {
         Self {
-            opaque_order: DepthKey { bits: 8, curve: DepthCurve::Logarithmic },
+            opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey { bits: 18, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::Sphere,
             occlusion: Some(16),
@@ -115,7 +117,7 @@ impl Quality {
     /// The default preset: errors are below what is visible.
     pub fn balanced() -> Self {
         Self {
-            opaque_order: DepthKey { bits: 20, curve: DepthCurve::Logarithmic },
+            opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey::EXACT,
             culling: CullingVolume::Sphere,
             occlusion: None,
@@ -133,6 +135,7 @@ impl Quality {
     /// The reference preset: errors are below a step of the picture's 8-bit channels.
     pub fn exact() -> Self {
         Self {
+            opaque_order: DepthKey { bits: 20, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::OrientedBox,
             normals: NormalFormat::Octahedral16,
             diffuse: DiffuseFormat::HalfFloat,
@@ -146,8 +149,8 @@ impl Quality {
     /// # Errors
     /// Returns a [`QualityError`] if a setting is out of range, or if two settings are incompatible.
     pub fn check(&self) -> Result<(), QualityError> {
-        self.opaque_order.check("opaque_order", DepthKey::MAX_OPAQUE_BITS)?;
-        self.blended_order.check("blended_order", DepthKey::MAX_BLENDED_BITS)?;
+        self.opaque_order.check("opaque_order", 0..=DepthKey::MAX_OPAQUE_BITS)?;
+        self.blended_order.check("blended_order", 1..=DepthKey::MAX_BLENDED_BITS)?;
         if let Some(tile_size) = self.occlusion {
             if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
                 return Err(QualityError::OutOfRange {
@@ -200,7 +203,7 @@ mod tests {
             (Quality { light_cut_off: f32::NAN, ..valid }, "light_cut_off"),
             (Quality { light_cut_off: f32::INFINITY, ..valid }, "light_cut_off"),
             (Quality { opaque_order: order(21, DepthCurve::Logarithmic), ..valid }, "opaque_order"),
-            (Quality { opaque_order: order(0, DepthCurve::Logarithmic), ..valid }, "opaque_order"),
+            (Quality { blended_order: order(0, DepthCurve::Logarithmic), ..valid }, "blended_order"),
             (Quality { blended_order: order(33, DepthCurve::Logarithmic), ..valid }, "blended_order"),
             (Quality { blended_order: order(9, DepthCurve::Linear { far: 0.0 }), ..valid }, "blended_order"),
             (Quality { blended_order: order(9, DepthCurve::Linear { far: f32::INFINITY }), ..valid }, "blended_order"),

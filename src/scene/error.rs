@@ -30,6 +30,13 @@ pub enum SceneError {
         /// The number of vertices.
         vertices: usize,
     },
+    /// An object that changed since the last frame, although [`SceneRef::changes`](super::SceneRef::changes) does not report it. It is
+    /// found with debug assertions only.
+    #[error("object {object} changed since the last frame, but the scene's changes do not report it")]
+    UnreportedChange {
+        /// The index of the first such object.
+        object: usize,
+    },
     /// A NaN or an infinity in a vertex.
     #[error("mesh `{mesh}`: vertex {vertex} is not finite")]
     NonFiniteVertex {

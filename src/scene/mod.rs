@@ -5,6 +5,7 @@
 
 mod assets;
 mod camera;
+mod changes;
 mod error;
 mod light;
 mod material;
@@ -19,6 +20,7 @@ mod transform;
 
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
+pub use changes::Changes;
 pub use error::SceneError;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Asset, Assets, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
+use super::{Asset, Assets, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
@@ -85,6 +85,7 @@ impl Scene {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            changes: Changes::Unknown,
             assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Assets, Bounds, Camera, Light, Material, Mesh, SceneError};
+use super::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, SceneError};
 use crate::handle::Handle;
 
 /// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
@@ -27,6 +27,8 @@ pub struct SceneRef<'a> {
     pub meshes: &'a [Handle<Mesh>],
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
+    /// Which objects changed since the last frame.
+    pub changes: Changes<'a>,
     /// The assets that the handles refer to.
     pub assets: &'a Assets,
     /// The lights.

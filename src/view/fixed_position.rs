@@ -18,16 +18,16 @@ impl FixedPosition {
     /// The world's origin.
     pub const ORIGIN: Self = Self([0; 3]);
 
-    const STEPS_PER_METRE: f64 = 1_073_741_824.0;
-
     /// The nearest fixed-point position; `None` if a coordinate is not finite or beyond
     /// [`FixedPosition::MAX_COORDINATE`].
     pub fn new(position: DVec3) -> Option<Self> {
-        // The comparison is false for NaN.
-        let within = position.abs().cmplt(DVec3::splat(Self::MAX_COORDINATE)).all();
-        within.then(|| {
-            Self((position * Self::STEPS_PER_METRE).to_array().map(|steps| (steps + 0.5_f64.copysign(steps)) as i64))
-        })
+        let coordinates = position.to_array();
+        coordinates.iter().all(|&coordinate| is_within_reach(coordinate)).then(|| Self(coordinates.map(nearest_step)))
+    }
+
+    /// The position at these numbers of steps.
+    pub(super) fn from_steps(steps: [i64; 3]) -> Self {
+        Self(steps)
     }
 
     /// Joins the halves that [`FixedPosition::halves`] returns.
@@ -50,6 +50,32 @@ impl FixedPosition {
         (self.0.map(|steps| steps as u32), self.0.map(|steps| (steps >> 32) as i32))
     }
 }
+
+/// Whether a coordinate is finite and within [`FixedPosition::MAX_COORDINATE`].
+#[inline(always)]
+pub(super) fn is_within_reach(coordinate: f64) -> bool {
+    // The comparison is false for NaN.
+    coordinate.abs() < FixedPosition::MAX_COORDINATE
+}
+
+/// The step that is nearest to a coordinate within reach; of two, the even one.
+///
+/// It takes a few operations that exist as vector instructions; the conversion from f64 to i64 does not. Adding [`INTEGERS`] to a
+/// number below 2⁵¹ rounds it to an integer, and the sum's bits minus those of [`INTEGERS`] are that integer. The coordinate is split
+/// into a multiple of 4 m, which are 2³² steps, and a rest of at most 2 m. The subtraction is exact: the rest is a multiple of the
+/// coordinate's last place, and no larger than the coordinate.
+#[inline(always)]
+pub(super) fn nearest_step(coordinate: f64) -> i64 {
+    const STEPS_PER_METRE: f64 = 1_073_741_824.0;
+    let integer = |sum: f64| (sum.to_bits() as i64).wrapping_sub(INTEGERS.to_bits() as i64);
+    let whole = coordinate * 0.25 + INTEGERS;
+    let rest = coordinate - (whole - INTEGERS) * 4.0;
+    // Beyond reach the result means nothing.
+    (integer(whole) << 32).wrapping_add(integer(rest * STEPS_PER_METRE + INTEGERS))
+}
+
+/// In the middle of the f64s that are all integers, and no others.
+const INTEGERS: f64 = 1.5 * (1_u64 << 52) as f64;
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
@@ -89,6 +115,34 @@ mod tests {
             let exact = other - coordinate;
             let bound = 2_f64.powi(-30) + exact.abs() * 2_f64.powi(-22);
             prop_assert!((f64::from(found[0]) - exact).abs() <= bound, "{} for {exact}", found[0]);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn positions_are_rounded_to_the_nearest_step(coordinate in prop_oneof![
+            -4.294_967_29e9..4.294_967_29e9_f64, -10.0..10.0_f64, -1e-8..1e-8_f64,
+            // Ties, and their neighbours.
+            (-1_i64 << 40..1 << 40, -1_i32..=1).prop_map(|(halves, ulps)| {
+                let tie = (halves as f64 + 0.5) / 1_073_741_824.0;
+                if ulps > 0 { tie.next_up() } else if ulps < 0 { tie.next_down() } else { tie }
+            }),
+        ]) {
+            // Exact: the product by a power of two is, and so is the difference of an integer and a near number.
+            let steps = coordinate * 1_073_741_824.0;
+            let nearest = steps.round_ties_even();
+            prop_assert_eq!(nearest_step(coordinate), nearest as i64);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn positions_beyond_reach_are_rejected_without_a_panic(coordinate in prop_oneof![
+            any::<f64>(), (1_i64 << 31..1 << 40, -3_i32..3).prop_map(|(fours, rest)| fours as f64 * 4.0 + f64::from(rest)),
+        ]) {
+            nearest_step(coordinate);
+            let is_within = coordinate.abs() < FixedPosition::MAX_COORDINATE;
+            prop_assert_eq!(FixedPosition::new(DVec3::new(0.0, coordinate, 0.0)).is_some(), is_within);
         }
     }
 

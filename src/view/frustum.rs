@@ -3,6 +3,7 @@
 use std::array::from_fn;
 
 use glam::{DVec3, Vec3};
+use multiversion::multiversion;
 
 use super::BoundingSpheres;
 use crate::scene::{Camera, Projection, ViewKind};
@@ -15,7 +16,7 @@ use crate::scene::{Camera, Projection, ViewKind};
 /// across·c, and the two differ only in its sign. That takes 28 operations for six planes instead of 42.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frustum {
-    origin: DVec3,
+    pub(super) origin: DVec3,
     /// The view direction, of unit length.
     forward: Vec3,
     /// The left and right planes, and the bottom and top planes.
@@ -26,6 +27,8 @@ pub struct Frustum {
     pub(super) far: f32,
     /// `forward`, and the normals of the two pairs of side planes: inward, of unit length.
     pub(super) normals: [Vec3; 5],
+    /// All planes as the tests of spheres compute them, in f64: inward normals, and offsets with tolerance.
+    pub(super) planes: [([f64; 3], f64); 6],
 }
 
 /// Two opposite side planes, relative to the camera. A point c with `slope · (forward · c) + offset ≥ |across · c|`
@@ -89,12 +92,14 @@ impl Frustum {
             let [sine, cosine] = sines_and_cosines[pair];
             (forward * sine + axes[pair] * (cosine * sign)).as_vec3()
         };
+        let (near, far) = (moved_outwards(near), moved_outwards(camera.far));
         Self {
             origin: camera.position,
             forward: forward.as_vec3(),
             sides,
-            near: moved_outwards(near),
-            far: moved_outwards(camera.far),
+            near,
+            far,
+            planes: planes(forward.as_vec3(), near, far, &sides),
             normals: [forward.as_vec3(), normal(0, 1.0), normal(0, -1.0), normal(1, 1.0), normal(1, -1.0)],
         }
     }
@@ -123,7 +128,7 @@ impl Frustum {
     /// # Panics
     /// If there are fewer than [`Frustum::WORD`] spheres from `first` on.
     pub fn intersects_spheres(&self, spheres: &BoundingSpheres, first: usize) -> u64 {
-        self.classify_spheres(spheres, first).intersecting
+        intersecting_spheres(self, spheres, first)
     }
 
     /// The number of spheres that [`Frustum::intersects_spheres`] tests: one for each bit of its mask.
@@ -197,6 +202,30 @@ impl SidePlanes {
     }
 }
 
+/// See [`Frustum::planes`].
+fn planes(forward: Vec3, near: f32, far: f32, sides: &[SidePlanes; 2]) -> [([f64; 3], f64); 6] {
+    let forward = forward.as_dvec3();
+    let side = |pair: usize, sign: f64| {
+        let SidePlanes { across, slope, offset } = sides[pair];
+        let normal = forward * f64::from(slope) + across.as_dvec3() * sign;
+        (normal.to_array(), f64::from(offset))
+    };
+    [
+        (forward.to_array(), f64::from(near)),
+        ((-forward).to_array(), f64::from(far)),
+        side(0, 1.0),
+        side(0, -1.0),
+        side(1, 1.0),
+        side(1, -1.0),
+    ]
+}
+
+/// [`Frustum::intersects_spheres`].
+#[multiversion(targets("x86_64+avx2"))]
+fn intersecting_spheres(frustum: &Frustum, spheres: &BoundingSpheres, first: usize) -> u64 {
+    frustum.classify_spheres(spheres, first).intersecting
+}
+
 /// A sphere's radius with the tolerance for rounding.
 #[inline(always)]
 fn tolerant_radius(radius: f32, point: CameraPoint) -> f32 {
@@ -239,7 +268,7 @@ const PARABOLOID_MARGIN: f32 = 0.05;
 pub(super) const ROUNDING_TOLERANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
 
 #[cfg(all(test, not(drawloom_loom)))]
-mod tests {
+pub(super) mod tests {
     use glam::Quat;
     use proptest::prelude::*;
 
@@ -271,7 +300,7 @@ mod tests {
     }
 
     prop_compose! {
-        fn any_camera()(
+        pub(in crate::view) fn any_camera()(
             position in prop::array::uniform3(-1.0..1.0_f64),
             exponent in 0.0..9.0_f64,
             axis in prop::array::uniform3(-1.0..1.0_f32),

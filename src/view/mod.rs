@@ -2,15 +2,21 @@
 //!
 //! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts.
 
+mod bin;
 mod bounding_boxes;
 mod bounding_spheres;
+mod changed_objects;
+mod draw_states;
 mod fill;
 mod fixed_position;
 mod frustum;
 mod gpu_light;
 mod gpu_object;
 mod gpu_view;
+mod group_bounds;
 mod light_table;
+mod object_block;
+mod object_description;
 mod object_table;
 mod occlusion;
 mod rejection;
@@ -20,6 +26,7 @@ mod subdivision_level;
 mod triangle_culling;
 mod visible_set;
 
+pub(crate) use bin::bin_visible;
 #[doc(hidden)]
 pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;
@@ -30,8 +37,11 @@ pub use frustum::Frustum;
 pub use gpu_light::GpuLight;
 pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
+pub(crate) use group_bounds::{GroupBounds, Overlap};
 pub use light_table::{LightClass, LightTable};
-pub use object_table::{ObjectBlock, ObjectDraw, ObjectTable};
+pub use object_block::ObjectBlock;
+pub use object_description::ObjectDraw;
+pub use object_table::ObjectTable;
 #[doc(hidden)] // For this repository's tests and benchmarks.
 pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub use rejection::{Rejection, RejectionReason, Rejections};

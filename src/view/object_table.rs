@@ -1,159 +1,202 @@
-//! The table of a frame's objects, which all views share.
+//! The table of a scene's objects, which all views share.
 
 use std::ops::Range;
 
-use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+use multiversion::multiversion;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::frustum::Classified;
-use super::{
-    BoundingBoxes, BoundingSphere, BoundingSpheres, FixedPosition, Frustum, GpuObject, OrientedBox, RejectionReason,
-    Rejections,
-};
+use super::changed_objects::{ChangedObjects, ChangedWord};
+use super::draw_states::DrawStates;
+use super::group_bounds::GroupBounds;
+use super::object_block::ObjectBlock;
+use super::object_description::{LANES, ObjectDraw, bounding_box, describe_objects};
+use super::{BoundingBoxes, Frustum, GpuObject, Rejections, set_bits};
 use crate::chunked_array::block_ranges;
-use crate::command::{Cull, DrawState};
+use crate::command::{Bin, Bins};
 use crate::quality::CullingVolume;
-use crate::scene::{Material, Mesh, SceneRef, is_unit};
+use crate::scene::{Changes, SceneRef};
 
-/// The frame's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are
-/// rejected.
+/// A scene's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are rejected.
+///
+/// The table is kept from frame to frame, and a frame describes the objects that changed. [`ObjectTable::epoch`] counts the
+/// frames with changes; what else is kept from frame to frame compares epochs.
 ///
 /// Objects are in blocks, each with its own lock: jobs that fill different blocks never wait for each other, and one
 /// uncontended lock per block costs a fraction of a nanosecond per object.
 #[derive(Debug, Default)]
 pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
+    /// The bounds of the blocks, in groups.
+    block_bounds: RwLock<Vec<GroupBounds>>,
+    bins: RwLock<Bins>,
     rejections: Rejections,
     length: usize,
-    /// The culling volume from the next [`ObjectTable::reset`] on.
+    /// The culling volume from the next [`ObjectTable::begin_frame`] on.
     culling: CullingVolume,
     /// The culling volume that the blocks' boxes are for.
     boxes_volume: CullingVolume,
+    changed: ChangedObjects,
+    draw_states: DrawStates,
+    /// Whether the table is that of the last frame; if not, the next frame describes all objects.
+    is_current: bool,
+    epoch: u64,
+    summary: RwLock<Summary>,
 }
 
-/// [`ObjectTable::BLOCK_SIZE`] objects of the table; object `index` is at `index % BLOCK_SIZE`.
-#[derive(Clone, Debug)]
-pub struct ObjectBlock {
-    /// The GPU layouts to upload.
-    pub gpu_objects: [GpuObject; ObjectTable::BLOCK_SIZE],
-    /// The bounding spheres.
-    pub spheres: BoundingSpheres,
-    /// The bounding boxes, if the culling volume is a box.
-    pub boxes: Option<BoundingBoxes>,
-    /// The meshes, materials and states.
-    pub draws: [ObjectDraw; ObjectTable::BLOCK_SIZE],
-}
-
-impl ObjectBlock {
-    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
-    /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no rejected
-    /// one; it may contain a few invisible ones.
-    ///
-    /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only
-    /// the others' boxes are tested.
-    ///
-    /// # Panics
-    /// If `entries` is empty or not within the block.
-    pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
-        let offset = entries.start % Frustum::WORD;
-        let first = entries.start - offset;
-        if volume == CullingVolume::None {
-            let is_valid = |mask, (bit, &radius): (usize, &f32)| mask | u64::from(radius >= 0.0) << bit;
-            return self.spheres.radii()[entries].iter().enumerate().fold(0, is_valid);
-        }
-        if entries.len() < WORD_TEST_THRESHOLD {
-            let intersects = |entry: usize| {
-                let BoundingSphere { center, radius } = self.spheres.get(entry);
-                frustum.intersects_sphere(center, radius)
-            };
-            let test = |mask, entry: usize| mask | u64::from(intersects(entry)) << (entry - entries.start);
-            return self.test_boxes(frustum, first, entries.clone().fold(0, test) << offset) >> offset;
-        }
-        match &self.boxes {
-            None => frustum.intersects_spheres(&self.spheres, first) >> offset,
-            Some(_) => {
-                let Classified { intersecting, inside } = frustum.classify_spheres(&self.spheres, first);
-                let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
-                (intersecting & inside | self.test_boxes(frustum, first, intersecting & !inside & tested)) >> offset
-            }
-        }
-    }
-
-    /// The `candidates`, in the word from `first` on, whose boxes intersect the frustum; all of them if there are no
-    /// boxes.
-    fn test_boxes(&self, frustum: &Frustum, first: usize, candidates: u64) -> u64 {
-        self.boxes
-            .as_ref()
-            .map_or(candidates, |boxes| frustum.intersects_boxes(&self.spheres, boxes, first, candidates))
-    }
-}
-
-/// Fewer objects than this are tested one by one, which takes less time than testing a whole word.
-const WORD_TEST_THRESHOLD: usize = 12;
-
-impl Default for ObjectBlock {
-    fn default() -> Self {
-        Self {
-            gpu_objects: [bytemuck::Zeroable::zeroed(); ObjectTable::BLOCK_SIZE],
-            spheres: BoundingSpheres::default(),
-            boxes: None,
-            draws: [ObjectDraw::default(); ObjectTable::BLOCK_SIZE],
-        }
-    }
+/// What jobs find out about the objects that they describe.
+#[derive(Clone, Copy, Debug, Default)]
+struct Summary {
+    /// The epoch in which an object was last drawn in another way than before.
+    draws_changed_in: u64,
+    /// Whether an object may be rejected.
+    has_rejected: bool,
 }
 
 impl ObjectTable {
     /// Objects in a block.
-    pub const BLOCK_SIZE: usize = BoundingSpheres::COUNT;
+    pub const BLOCK_SIZE: usize = ObjectBlock::SIZE;
 
-    /// Sets the bounding volume that culling tests, from the next [`ObjectTable::reset`] on. The default is spheres.
+    /// Sets the bounding volume that culling tests, from the next [`ObjectTable::begin_frame`] on. The default is spheres.
     pub fn configure(&mut self, volume: CullingVolume) {
         self.culling = volume;
     }
 
-    /// Resizes the table for `objects` objects, and clears its rejections.
-    pub fn reset(&mut self, objects: usize) {
-        self.length = objects;
+    /// Makes room for a scene's objects, and finds out which of them have to be described: those that changed, or all.
+    pub fn begin_frame(&mut self, scene: &SceneRef<'_>) {
+        let objects = scene.object_count();
+        let assets_changed = self.draw_states.update(scene.assets);
+        if assets_changed && self.bins.get_mut().len() > MIN_UNUSED_BINS + 2 * objects {
+            // Most of them belong to meshes that are gone.
+            self.bins.get_mut().clear();
+            self.blocks.iter_mut().for_each(|block| block.get_mut().forget_bins());
+        }
+        let length_before = std::mem::replace(&mut self.length, objects);
+        self.rejections = Rejections::default();
+        if self.is_current && !assets_changed && self.boxes_volume == self.culling {
+            self.changed.set(scene.changes, length_before, objects);
+        } else {
+            self.changed.set_all(objects);
+        }
+        self.is_current = false;
+        if self.changed.word_count() > 0 || objects != length_before {
+            self.epoch += 1;
+        }
+        self.resize_blocks(length_before);
+    }
+
+    fn resize_blocks(&mut self, length_before: usize) {
         let old_count = self.blocks.len();
         let blocks = self.block_count().max(old_count);
         self.blocks.resize_with(blocks, RwLock::default);
+        self.block_bounds.get_mut().resize_with(blocks.div_ceil(GroupBounds::GROUPS), GroupBounds::default);
         // Blocks whose boxes are already right stay untouched.
         let up_to_date = if self.boxes_volume == self.culling { old_count } else { 0 };
         for block in &mut self.blocks[up_to_date..] {
             block.get_mut().boxes = BoundingBoxes::new(self.culling);
         }
         self.boxes_volume = self.culling;
-        // Entries after the last object are tested with it, and must not be visible.
-        if let Some(last) = self.blocks.get_mut(objects / Self::BLOCK_SIZE) {
-            let spheres = &mut last.get_mut().spheres;
-            (objects % Self::BLOCK_SIZE..Self::BLOCK_SIZE).for_each(|entry| spheres.set(entry, BoundingSphere::EMPTY));
+        // Removed objects are neither seen nor counted as rejected, also when others are added after them.
+        for object in self.length..length_before {
+            self.blocks[object / Self::BLOCK_SIZE].get_mut().remove(object % Self::BLOCK_SIZE);
         }
-        self.rejections = Rejections::default();
     }
 
-    /// Fills in the objects in `range`.
-    pub fn fill(&self, scene: &SceneRef<'_>, range: Range<usize>) {
-        for (index, part) in block_ranges(range, Self::BLOCK_SIZE) {
-            let mut block = self.blocks[index].write();
-            let ObjectBlock { gpu_objects, spheres, boxes, draws } = &mut **block;
-            for object in part {
-                let entry = object % Self::BLOCK_SIZE;
-                match entry_of(scene, object) {
-                    Ok((gpu_object, bounds, draw)) => {
-                        gpu_objects[entry] = gpu_object;
-                        spheres.set(entry, bounds);
-                        if let Some(boxes) = boxes {
-                            boxes.set(entry, &bounding_box(scene, object, bounds));
-                        }
-                        draws[entry] = draw;
-                    }
-                    Err(reason) => {
-                        spheres.set(entry, BoundingSphere::EMPTY);
-                        self.rejections.count(reason, object);
-                    }
-                }
+    /// Ends a frame that succeeded: the next one describes the objects that change until then. Without this call it describes all.
+    pub fn end_frame(&mut self) {
+        self.is_current = true;
+    }
+
+    /// Makes the next frame describe all objects.
+    pub fn invalidate(&mut self) {
+        self.is_current = false;
+    }
+
+    /// The number of words of [`Frustum::WORD`] objects in which an object has to be described.
+    pub fn changed_word_count(&self) -> usize {
+        self.changed.word_count()
+    }
+
+    /// One of the words in which an object has to be described, by its index among them. They ascend.
+    ///
+    /// # Panics
+    /// If `index` is not below [`ObjectTable::changed_word_count`].
+    pub(crate) fn changed_word(&self, index: usize) -> usize {
+        self.changed.word(index).word
+    }
+
+    /// Whether all objects have to be described.
+    pub(crate) fn all_changed(&self) -> bool {
+        self.changed.are_all()
+    }
+
+    /// Describes the objects that changed in a range of words, which are counted as [`ObjectTable::changed_word_count`] counts
+    /// them.
+    pub fn describe(&self, scene: &SceneRef<'_>, words: Range<usize>) {
+        let (mut draws_changed, mut rejects) = (false, false);
+        for ChangedWord { word, mask } in words.map(|index| self.changed.word(index)) {
+            let found = describe_word(self, scene, word, mask);
+            draws_changed |= found.draws_changed;
+            rejects |= found.rejects;
+        }
+        if draws_changed || rejects {
+            let mut summary = self.summary.write();
+            if draws_changed {
+                summary.draws_changed_in = self.epoch;
+            }
+            summary.has_rejected |= rejects;
+        }
+    }
+
+    fn bin_of(&self, draw: ObjectDraw) -> u32 {
+        let bin = Bin { state: draw.state, mesh: draw.mesh };
+        let known = self.bins.read().find(bin);
+        known.unwrap_or_else(|| self.bins.write().insert(bin))
+    }
+
+    /// Completes the table when all changed objects are described: orders new bins, updates the bounds of blocks, and counts the
+    /// objects that are rejected.
+    pub fn finish(&self) {
+        self.bins.write().sort();
+        let mut bounds = self.block_bounds.write();
+        let mut latest = None;
+        for index in 0..self.changed.word_count() {
+            let block = self.changed.word(index).word * Frustum::WORD / Self::BLOCK_SIZE;
+            if latest.replace(block) != Some(block) {
+                let parts = &self.blocks[block].read().word_bounds;
+                bounds[block / GroupBounds::GROUPS].set_union(block % GroupBounds::GROUPS, parts);
             }
         }
+        drop(bounds);
+        if self.summary.read().has_rejected {
+            let mut has_rejected = false;
+            for (index, block) in self.blocks[..self.block_count()].iter().enumerate() {
+                for (entry, reason) in block.read().rejected() {
+                    has_rejected = true;
+                    self.rejections.count(reason, index * Self::BLOCK_SIZE + entry);
+                }
+            }
+            self.summary.write().has_rejected = has_rejected;
+        }
+    }
+
+    /// An object that changed although it was not reported; `None` if there is none. Call it when the table is complete.
+    pub(crate) fn unreported_change(&self, scene: &SceneRef<'_>) -> Option<usize> {
+        let is_as_before = |&object: &usize| {
+            let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
+            let mut is_same = false;
+            describe_objects(scene, &self.draw_states, object, 1, |_, now| is_same = now == before);
+            is_same
+        };
+        let unreported = |object: &usize| !self.changed.contains(*object);
+        (0..self.length).filter(unreported).find(|object| !is_as_before(object))
+    }
+
+    /// Begins a frame, and describes all its objects.
+    pub fn update(&mut self, scene: &SceneRef<'_>) {
+        self.begin_frame(&SceneRef { changes: Changes::Unknown, ..*scene });
+        self.describe(scene, 0..self.changed_word_count());
+        self.finish();
+        self.end_frame();
     }
 
     /// The number of objects.
@@ -166,9 +209,49 @@ impl ObjectTable {
         self.length == 0
     }
 
+    /// A number that grows with each frame in which an object changed.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// The epoch in which the latest object was drawn in another way than before: with another mesh, material or state.
+    pub(crate) fn draws_changed_in(&self) -> u64 {
+        self.summary.read().draws_changed_in
+    }
+
     /// The number of blocks that the objects fill.
     pub fn block_count(&self) -> usize {
         self.length.div_ceil(Self::BLOCK_SIZE)
+    }
+
+    /// Cuts a range of objects at the borders of blocks: the index of each block, and the objects of the range in it.
+    pub fn block_ranges(objects: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+        block_ranges(objects, Self::BLOCK_SIZE)
+    }
+
+    /// Calls `visit` with ranges of objects that contain all objects of some blocks that changed after an epoch. The ranges ascend;
+    /// between two of them are at least `gap` objects.
+    pub fn for_each_change(&self, blocks: Range<usize>, epoch: u64, gap: usize, mut visit: impl FnMut(Range<usize>)) {
+        let mut run = 0..0;
+        for index in blocks {
+            let changed_in = self.block(index).changed_in;
+            for (group, _) in changed_in.iter().enumerate().filter(|(_, changed_in)| **changed_in > epoch) {
+                let first = index * Self::BLOCK_SIZE + group * ObjectBlock::GROUP;
+                if first >= self.length {
+                    break;
+                }
+                if run.is_empty() || first >= run.end + gap {
+                    let before = std::mem::replace(&mut run, first..first);
+                    if !before.is_empty() {
+                        visit(before);
+                    }
+                }
+                run.end = (first + ObjectBlock::GROUP).min(self.length);
+            }
+        }
+        if !run.is_empty() {
+            visit(run);
+        }
     }
 
     /// The first object of a block, and the GPU layouts of all its objects, 64 bytes each.
@@ -189,123 +272,78 @@ impl ObjectTable {
         self.blocks[index].read()
     }
 
-    /// The objects that were rejected.
+    /// The bounds of the blocks, in groups of [`GroupBounds::GROUPS`].
+    pub(crate) fn block_bounds(&self) -> RwLockReadGuard<'_, Vec<GroupBounds>> {
+        self.block_bounds.read()
+    }
+
+    /// The bins of the objects.
+    pub fn bins(&self) -> RwLockReadGuard<'_, Bins> {
+        self.bins.read()
+    }
+
+    /// What the frame rejects. Objects are among it after [`ObjectTable::finish`].
     pub fn rejections(&self) -> &Rejections {
         &self.rejections
     }
 }
 
-/// How an object is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectDraw {
-    /// The mesh's slot.
-    pub mesh: u32,
-    /// The material's slot.
-    pub material: u32,
-    /// The fixed-function state.
-    pub state: DrawState,
+/// What is found out about the objects of a word.
+#[derive(Clone, Copy, Debug, Default)]
+struct WordSummary {
+    /// Whether one is drawn in another way than before.
+    draws_changed: bool,
+    /// Whether one is rejected.
+    rejects: bool,
 }
 
-impl Default for ObjectDraw {
-    fn default() -> Self {
-        Self { mesh: 0, material: 0, state: DrawState::PLAIN }
+/// Unused bins that are not worth removing.
+const MIN_UNUSED_BINS: usize = 64;
+
+/// If fewer objects of a word change, its bounds are extended. Otherwise they are computed anew.
+const EXTENSION_LIMIT: u32 = 16;
+
+/// After this many frames with changes, the bounds of a word are computed anew in any case: objects that travel would leave them large.
+const EXTENDED_FRAMES: u64 = 32;
+
+/// Describes the objects of a word that are in the mask.
+#[multiversion(targets("x86_64+avx2"))]
+fn describe_word(table: &ObjectTable, scene: &SceneRef, word: usize, mask: u64) -> WordSummary {
+    let mut found = WordSummary::default();
+    let first = word * Frustum::WORD;
+    let mut block = table.blocks[first / ObjectTable::BLOCK_SIZE].write();
+    for group in (0..Frustum::WORD).step_by(LANES) {
+        let changed = (mask >> group) as u8;
+        if changed == 0 {
+            continue;
+        }
+        block.changed_in[(first + group) % ObjectTable::BLOCK_SIZE / ObjectBlock::GROUP] = table.epoch;
+        describe_objects(scene, &table.draw_states, first + group, changed, |object, description| {
+            let entry = object % ObjectTable::BLOCK_SIZE;
+            match description {
+                Ok(description) => {
+                    if block.set(entry, &description) {
+                        block.bins[entry] = table.bin_of(description.draw);
+                        found.draws_changed = true;
+                    }
+                    block.set_box(entry, |sphere| bounding_box(scene, object, sphere));
+                }
+                Err(reason) => {
+                    block.reject(entry, reason);
+                    found.rejects = true;
+                }
+            }
+        });
     }
-}
-
-fn entry_of(scene: &SceneRef<'_>, object: usize) -> Result<(GpuObject, BoundingSphere, ObjectDraw), RejectionReason> {
-    let (position, scale, orientation) = (scene.positions[object], scene.scales[object], scene.orientations[object]);
-    let Some(fixed) = FixedPosition::new(position) else {
-        let is_valid = scene.transform_is_valid(object);
-        return Err(if is_valid { RejectionReason::OutOfReach } else { RejectionReason::InvalidTransform });
-    };
-    if !(scale.is_finite() && is_unit(orientation.length_squared())) {
-        return Err(RejectionReason::InvalidTransform);
+    let word = first % ObjectTable::BLOCK_SIZE / Frustum::WORD;
+    let ObjectBlock { spheres, word_bounds, .. } = &mut **block;
+    // Words take turns.
+    let is_due = (table.epoch + first as u64 / Frustum::WORD as u64).is_multiple_of(EXTENDED_FRAMES);
+    if mask.count_ones() < EXTENSION_LIMIT && !is_due {
+        let entries = set_bits(mask).map(|bit| word * Frustum::WORD + bit);
+        entries.for_each(|entry| word_bounds.extend_word(word, spheres.get(entry)));
+    } else {
+        word_bounds.set_word(word, spheres);
     }
-    let orientation = normalized(orientation);
-    let mesh = scene.assets.get(scene.meshes[object]).map_err(|_| RejectionReason::StaleMesh)?;
-    let material = scene.assets.get(scene.materials[object]).map_err(|_| RejectionReason::StaleMaterial)?;
-
-    let bounds = scene.bounds[object];
-    let offset = orientation * (scale * bounds.center);
-    let center = position + offset.as_dvec3();
-    let radius = bounds.radius * scale.abs().max_element() * 1.000_001 + position_error(center, offset) as f32;
-    // An offset that is not finite makes the radius NaN or infinite.
-    if !(bounds.radius >= 0.0 && radius <= MAX_RADIUS) {
-        return Err(RejectionReason::InvalidBounds);
-    }
-
-    let (mesh_slot, material_slot) = (scene.meshes[object].index(), scene.materials[object].index());
-    let (position_low, position_high) = fixed.halves();
-    let gpu_object = GpuObject {
-        position_low,
-        material: material_slot,
-        position_high,
-        padding: 0,
-        orientation: orientation.to_array(),
-        scale: scale.to_array(),
-        object: object as u32,
-    };
-    let draw = ObjectDraw { mesh: mesh_slot, material: material_slot, state: draw_state(mesh, material, scale) };
-    Ok((gpu_object, BoundingSphere { center, radius }, draw))
-}
-
-/// An upper bound of the distance in metres between an object's computed centre and where devices draw it.
-///
-/// The offset is rotated in f32: at most some 40 roundings of 2⁻²⁴ (thirteen of the orientation's length and direction
-/// and of the scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length;
-/// 2⁻¹⁸ is 64 of them. The error of each coordinate of the centre, in f64, is half a step, 2⁻⁵³ of it. The error of the
-/// drawn position relative to a camera is half a fixed-point step for each of the two, 2⁻³⁰ m per coordinate. √3 times
-/// as much in space is less than twice.
-#[inline]
-fn position_error(center: DVec3, offset: Vec3) -> f64 {
-    let turned = f64::from(offset.abs().element_sum()) * 2_f64.powi(-18);
-    turned + center.abs().max_element() * 2_f64.powi(-52) + 2_f64.powi(-29)
-}
-
-/// The box around an object's mesh, or around its bounding sphere if the engine's bounds differ from the mesh's.
-///
-/// Rounding in f64 is far below the tolerances of [`position_error`] and [`Frustum::intersects_boxes`].
-fn bounding_box(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> OrientedBox {
-    let bounds = scene.bounds[object];
-    let mesh = scene.assets.get(scene.meshes[object]).ok().filter(|mesh| mesh.bounds() == bounds);
-    let Some(mesh) = mesh else {
-        let radius = f64::from(sphere.radius);
-        return OrientedBox { half_axes: [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius), margin: 0.0 };
-    };
-    let [low, high] = mesh.corners().map(Vec3::as_dvec3);
-    let center = bounds.center.as_dvec3();
-    let scale = scene.scales[object];
-    let half = (high - center).max(center - low) * scale.abs().as_dvec3();
-    let rotation = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
-    let offset = scale * bounds.center;
-    OrientedBox {
-        half_axes: [rotation.x_axis * half.x, rotation.y_axis * half.y, rotation.z_axis * half.z],
-        // A rotation changes no coordinate by more than the vector's length.
-        margin: position_error(sphere.center, offset),
-    }
-}
-
-/// The largest radius in metres of an object in the world. Larger ones exceed the range of f32 on the way to clip
-/// space: the narrowest field of view multiplies positions by some 1e6, and a tall picture by a hundred more.
-const MAX_RADIUS: f32 = 1e30;
-
-/// Normalizes a quaternion whose length differs from 1 by no more than [`is_unit`] allows.
-///
-/// Two steps of Newton's method for 1/√x, starting at 1, reduce an error e of the squared length to less than e⁴, which
-/// is below f32's precision, and take a fraction of the time of a square root and a division. They run in f64, because
-/// an error of one rounding in the length moves rotated vectors by four.
-#[inline]
-fn normalized(orientation: Quat) -> Quat {
-    let newton_step = |q: DQuat| q * (1.5 - 0.5 * q.length_squared());
-    newton_step(newton_step(orientation.as_dquat())).as_quat()
-}
-
-fn draw_state(mesh: &Mesh, material: &Material, scale: Vec3) -> DrawState {
-    let mirrored = scale.is_negative_bitmask().count_ones() % 2 == 1;
-    let cull = match (material.double_sided, mirrored) {
-        (true, _) => Cull::Nothing,
-        (false, false) => Cull::Back,
-        (false, true) => Cull::Front,
-    };
-    DrawState::new(mesh.topology(), cull, material.blend)
+    found
 }

@@ -6,24 +6,38 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use parking_lot::RwLock;
 
 use crate::chunked_array::block_ranges;
+use crate::command::Version;
 
 /// The objects that a view sees: a bit for each object, and a prefix sum over words of 64.
 ///
 /// Frustum culling sets bits and occlusion culling clears them. Any worker may do either for any object; the result does
 /// not depend on which. So the compacted order is always that of the objects.
+///
+/// A set may be kept for the next frame, which tests only the objects that changed.
 #[derive(Debug, Default)]
 pub struct VisibleSet {
     words: Vec<AtomicU64>,
+    compacted: RwLock<Compacted>,
+}
+
+#[derive(Debug, Default)]
+struct Compacted {
     /// For each word, the number of bits set in the words before it; the last entry is the total.
-    offsets: RwLock<Vec<u32>>,
+    offsets: Vec<u32>,
+    /// The words that `version` is of.
+    words: Vec<u64>,
+    version: Version,
 }
 
 impl VisibleSet {
-    /// Resizes the set for `objects` objects, and clears it.
+    /// Resizes the set for `objects` objects, all of which have to be tested.
     pub fn reset(&mut self, objects: usize) {
-        self.words.clear();
-        self.words.resize_with(objects.div_ceil(64), AtomicU64::default);
-        self.offsets.get_mut().clear();
+        self.words.resize_with(objects.div_ceil(Self::OBJECTS_PER_WORD), AtomicU64::default);
+        // No object is tested for the bits after the last one.
+        if let Some(last) = self.words.last_mut() {
+            *last.get_mut() = 0;
+        }
+        self.compacted.get_mut().offsets.clear();
     }
 
     /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::OBJECTS_PER_WORD`]
@@ -31,10 +45,16 @@ impl VisibleSet {
     /// at the same time must not share objects, but may share words.
     pub fn test(&self, objects: Range<usize>, is_visible: impl Fn(Range<usize>) -> u64) {
         for (word, part) in block_ranges(objects, Self::OBJECTS_PER_WORD) {
-            let mask = u64::MAX >> (Self::OBJECTS_PER_WORD - part.len());
-            let bits = (is_visible(part.clone()) & mask) << (part.start % Self::OBJECTS_PER_WORD);
+            let shift = part.start % Self::OBJECTS_PER_WORD;
+            let mask = (u64::MAX >> (Self::OBJECTS_PER_WORD - part.len())) << shift;
+            let bits = (is_visible(part) << shift) & mask;
             // Relaxed: jobs that read the bits depend on this job.
-            self.words[word].fetch_or(bits, Ordering::Relaxed);
+            if mask == u64::MAX {
+                self.words[word].store(bits, Ordering::Relaxed);
+            } else {
+                self.words[word].fetch_and(!mask, Ordering::Relaxed);
+                self.words[word].fetch_or(bits, Ordering::Relaxed);
+            }
         }
     }
 
@@ -64,29 +84,47 @@ impl VisibleSet {
     /// The number of objects in a word.
     pub const OBJECTS_PER_WORD: usize = u64::BITS as usize;
 
-    /// Computes the prefix sum over words. Call it once, after all objects have been tested and hidden
-    /// ones removed.
-    pub fn compact(&self) {
-        let mut offsets = self.offsets.write();
+    /// Computes the prefix sum over words. Call it once, after all objects have been tested and hidden ones removed. If the set
+    /// differs from the one that was compacted before, it gets `version`, which no other set has.
+    pub fn compact(&self, version: Version) {
+        let Compacted { offsets, words, version: current } = &mut *self.compacted.write();
         offsets.clear();
         let mut total = 0;
-        for word in &self.words {
+        let mut differs = words.len() != self.words.len();
+        words.resize(self.words.len(), 0);
+        for (word, before) in self.words.iter().zip(words) {
             offsets.push(total);
-            total += word.load(Ordering::Relaxed).count_ones();
+            let bits = word.load(Ordering::Relaxed);
+            total += bits.count_ones();
+            differs |= *before != bits;
+            *before = bits;
         }
         offsets.push(total);
+        if differs {
+            *current = version;
+        }
+    }
+
+    /// The version that the latest set with these objects got.
+    pub fn version(&self) -> Version {
+        self.compacted.read().version
+    }
+
+    /// The number of words.
+    pub fn word_count(&self) -> usize {
+        self.words.len()
     }
 
     /// The number of visible objects; 0 before [`VisibleSet::compact`].
     pub fn count(&self) -> usize {
-        self.offsets.read().last().map_or(0, |&total| total as usize)
+        self.compacted.read().offsets.last().map_or(0, |&total| total as usize)
     }
 
     /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the
     /// visible objects) is in `ranks`. Bit `b` is object `word × OBJECTS_PER_WORD + b`; the lowest set bit has the rank `rank`.
     /// Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
-        let offsets = self.offsets.read();
+        let offsets = &self.compacted.read().offsets;
         let end = ranks.end.min(offsets.last().map_or(0, |&total| total as usize));
         let mut rank = ranks.start;
         // The last word whose first rank is not beyond `rank`: empty words before it have the same first rank.
@@ -143,7 +181,7 @@ mod tests {
             for start in starts {
                 set.test(start..(start + chunk).min(visible.len()), |part| mask_of(part, |object| visible[object]));
             }
-            set.compact();
+            set.compact(Version::default());
             prop_assert_eq!(set.count(), expected.len());
             let mut found = Vec::new();
             for start in (0..visible.len() + 1).step_by(ranks) {
@@ -162,11 +200,11 @@ mod tests {
         let mut set = VisibleSet::default();
         set.reset(3);
         set.test(0..3, |_| u64::MAX);
-        set.compact();
+        set.compact(Version::default());
         set.reset(130);
         assert_eq!(set.count(), 0);
         set.test(0..130, |part| mask_of(part, |object| object == 129));
-        set.compact();
+        set.compact(Version::default());
         assert_eq!(set.count(), 1);
     }
 }

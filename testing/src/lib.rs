@@ -3,6 +3,7 @@
 #[cfg(feature = "wgpu")]
 pub mod adapter;
 pub mod adversarial_names;
+pub mod changing_world;
 pub mod culling;
 pub mod draw_lists;
 pub mod precision;

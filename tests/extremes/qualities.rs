@@ -79,6 +79,7 @@ fn limits(harness: &mut Harness) -> Result<(), Failed> {
     let key = |bits, curve| DepthKey { bits, curve };
     let linear = |far| DepthCurve::Linear { far };
     for quality in [
+        Quality { opaque_order: DepthKey::UNORDERED, ..usual },
         Quality { opaque_order: key(1, DepthCurve::Logarithmic), ..usual },
         Quality { opaque_order: key(DepthKey::MAX_OPAQUE_BITS, linear(f32::MAX)), ..usual },
         Quality { opaque_order: key(1, linear(f32::MIN_POSITIVE)), ..usual },
@@ -122,7 +123,7 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
         (Quality { occlusion: Some(32), ..usual }, "occlusion"),
         (Quality { light_cut_off: f32::NAN, ..usual }, "light_cut_off"),
         (Quality { light_cut_off: -f32::from_bits(1), ..usual }, "light_cut_off"),
-        (Quality { opaque_order: key(0, DepthCurve::Logarithmic), ..usual }, "opaque_order"),
+        (Quality { blended_order: key(0, DepthCurve::Logarithmic), ..usual }, "blended_order"),
         (Quality { opaque_order: key(u32::MAX, DepthCurve::Logarithmic), ..usual }, "opaque_order"),
         (Quality { blended_order: key(32, DepthCurve::Linear { far: f32::NAN }), ..usual }, "blended_order"),
         (Quality { blended_order: key(32, DepthCurve::Linear { far: -1.0 }), ..usual }, "blended_order"),

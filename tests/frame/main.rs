@@ -8,6 +8,7 @@ mod failing_process;
 mod null_backend;
 mod occlusion;
 mod quality;
+mod retained;
 mod shadow_interval;
 mod timeline;
 mod triangles;

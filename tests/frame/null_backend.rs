@@ -24,6 +24,8 @@ fn broken_rule(
 ) -> String {
     let scene = one_view();
     let (mut renderer, _) = renderer(1, Granularity::default());
+    // A list that is ordered by depth has commands.
+    renderer.set_quality(Quality::exact()).unwrap();
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     let list = renderer.draw_list("geometry buffer", 0).unwrap().clone();
 
@@ -38,6 +40,7 @@ fn broken_rule(
         light_tables: &[LightTable::default()],
         passes: &[PASS],
         scene: &scene.as_scene_ref(),
+        objects_epoch: 1,
         quality: &Quality::balanced(),
         rejections: &Rejections::default(),
     };
@@ -140,8 +143,7 @@ fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
     assert!(twice.contains("finished once"), "{twice}");
     let uploaded = broken_rule(|worker, frame, _, request| {
         let mut table = ObjectTable::default();
-        table.reset(request.scene.object_count());
-        table.fill(request.scene, 0..table.len());
+        table.update(request.scene);
         NullBackend.upload_objects(worker, frame, &table, 0..table.block_count())?;
         NullBackend.upload_objects(worker, frame, &table, 0..1)
     });

@@ -45,11 +45,11 @@ fn a_log_accounts_for_whole_frames() {
             assert!(frame.began <= spans[0].began && spans[0].began < run.began && run.ended < spans[0].ended);
             assert!(spans[0].ended <= spans[1].began && spans[1].ended == frame.ended);
 
-            // The visibility stage counts each object once, with jobs of any size.
+            // The visibility stage counts each word of objects once, with jobs of any size.
             let nodes = run.graph.nodes.iter().enumerate();
             let visibility = nodes.filter(|(_, node)| node.labels.stage.as_deref() == Some("visibility"));
             let widths: Vec<_> = visibility.map(|(index, _)| run.width(index)).collect();
-            assert_eq!(widths, vec![2_000; scene.cameras.len()]);
+            assert_eq!(widths, vec![2_000_usize.div_ceil(64); scene.cameras.len()]);
 
             let replay = Replay::of_frame(&log, frame.number, SchedulerCosts::ZERO).unwrap();
             let serial = (spans[0].ended - spans[0].began) - run.duration() + (spans[1].ended - spans[1].began);
@@ -73,7 +73,10 @@ fn every_node_is_labelled_with_its_process_stage_and_view() {
     let views: BTreeSet<_> = labels().filter_map(|labels| labels.view.as_deref()).collect();
     assert!(scene.cameras.iter().all(|camera| views.contains(camera.name.as_str())), "{views:?}");
     let stages: BTreeSet<_> = labels().map(|labels| labels.stage.as_deref().unwrap()).collect();
+    // Opaque objects are binned, and blended ones sorted.
     let expected = [
+        "bin",
+        "bins",
         "compact",
         "fill",
         "finish",

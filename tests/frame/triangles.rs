@@ -25,7 +25,9 @@ fn frame(scene: &Scene, workers: usize, granularity: Granularity) -> (FrameStati
     for pass in &submitted.submission.passes {
         drawn += pass.triangles;
         let list = renderer.draw_list(&pass.process, pass.view);
-        all += list.map_or(0, |list| list.commands().map(|command| triangles_of(scene, command.mesh)).sum());
+        all += list.map_or(0, |list| {
+            list.batches.iter().map(|batch| batch.count as usize * triangles_of(scene, batch.mesh)).sum()
+        });
     }
     assert_eq!(drawn, all - culled, "all other triangles are drawn");
     (submitted.statistics, renderer)

@@ -14,8 +14,7 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     let view = RenderView::new(&scene.cameras[0]);
     assert_ne!(view.kind(), ViewKind::Shadow);
     let mut table = ObjectTable::default();
-    table.reset(count);
-    table.fill(scene, 0..count);
+    table.update(scene);
     let mut visible = VisibleSet::default();
     visible.reset(count);
     visible.test(0..count, |objects| {

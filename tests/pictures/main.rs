@@ -23,6 +23,7 @@ mod processes;
 mod rays;
 mod references;
 mod requirements;
+mod retained;
 mod shadow_bias;
 mod shadow_casters;
 mod shadow_interval;
@@ -59,6 +60,7 @@ fn main() {
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (requirements::CASES, Needs::Adapter),
+        (retained::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (strategies::CASES, Needs::Adapter),

@@ -57,8 +57,7 @@ pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<
         let tables = [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox].map(|volume| {
             let mut table = ObjectTable::default();
             table.configure(volume);
-            table.reset(objects);
-            table.fill(&scene.as_scene_ref(), 0..objects);
+            table.update(&scene.as_scene_ref());
             table
         });
         let camera = Camera { far: 900.0, ..Camera::looking_at("main", DVec3::new(3.0, 2.0, 1.0), DVec3::NEG_Z) };

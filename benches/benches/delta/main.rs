@@ -76,7 +76,7 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
 /// Objects of 64 meshes and 16 materials at random depths, one in ten blended.
 fn scattered(objects: u32) -> Vec<RenderCommand> {
     let mut random = Random::new();
-    let Quality { opaque_order, blended_order, .. } = Quality::balanced();
+    let Quality { opaque_order, blended_order, .. } = Quality::exact();
     let command = |object: u32| {
         let (mesh, material) = (random.below(64) as u32, random.below(16) as u32);
         let (depth, state) = (random.between(100.0, 200.0) as f32, DrawState::PLAIN);

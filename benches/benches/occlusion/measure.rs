@@ -80,8 +80,7 @@ impl<'a> CameraCase<'a> {
     pub fn new(scene: &'a SceneRef<'a>, camera: &Camera) -> Self {
         let count = scene.object_count();
         let mut table = ObjectTable::default();
-        table.reset(count);
-        table.fill(scene, 0..count);
+        table.update(scene);
         let mut meshes = OccluderMeshes::default();
         meshes.sync(scene.assets);
         let view = RenderView::new(camera);

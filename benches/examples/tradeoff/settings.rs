@@ -118,6 +118,7 @@ pub fn all() -> Vec<Setting> {
 
     let far = 1000.0;
     let key = |bits, curve| DepthKey { bits, curve };
+    add(Knob::OpaqueOrder, "unordered", Quality { opaque_order: DepthKey::UNORDERED, ..exact });
     for bits in [1, 8, 16] {
         let name = format!("{bits} {}, logarithmic", if bits == 1 { "bit" } else { "bits" });
         add(Knob::OpaqueOrder, &name, Quality { opaque_order: key(bits, DepthCurve::Logarithmic), ..exact });

@@ -34,6 +34,10 @@ impl Backend for WgpuBackend {
         self.begin_frame(request).inspect_err(|_| self.clear())
     }
 
+    fn objects_epoch(&self, frame: &WgpuFrame) -> u64 {
+        frame.buffers.held_epoch()
+    }
+
     fn upload_objects(
         &self,
         _worker: &Worker,
@@ -54,7 +58,7 @@ impl Backend for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.batches.len(), list.bundle_count(), pass.strategy.part_count(list));
         let created = with_error_scope(&self.device, &pass.label, || {
-            frame.buffers.write_object_indices(&self.uploads, index, &list.objects);
+            frame.buffers.write_object_indices(&self.uploads, index, list);
             pass.upload_partial_indices(&self.device, &self.uploads, list.remaining_indices())?;
             self.subdivide(frame, request, list)?;
             match pass.strategy.recording {
@@ -160,12 +164,18 @@ impl Backend for WgpuBackend {
         })
     }
 
-    fn submit(&self, frame: WgpuFrame, queues: Vec<ViewQueue<WgpuCommands>>) -> Result<WgpuSubmission, BackendError> {
-        self.submit_frame(&frame, queues).inspect_err(|_| {
+    fn submit(
+        &self,
+        mut frame: WgpuFrame,
+        queues: Vec<ViewQueue<WgpuCommands>>,
+    ) -> Result<WgpuSubmission, BackendError> {
+        let submission = self.submit_frame(&frame, queues).inspect_err(|_| {
             self.buffers.clear();
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();
             }
-        })
+        })?;
+        frame.buffers.keep_objects();
+        Ok(submission)
     }
 }

@@ -4,9 +4,9 @@ use super::super::context::FrameContext;
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
-use crate::view::ObjectTable;
+use crate::view::{Frustum, ObjectTable};
 
-/// Checks every object, and computes what all views need to know about it.
+/// Checks the objects that changed, and computes what all views need to know about them. An item is a word of objects.
 pub(super) struct Objects;
 
 impl<B: Backend> Stage<B> for Objects {
@@ -15,23 +15,44 @@ impl<B: Backend> Stage<B> for Objects {
             name: "objects",
             after: &[],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
             cost_kind: "objects",
             depends_on_occlusion: false,
         }
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.objects.len()
+        frame.tables.objects.changed_word_count()
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        frame.tables.objects.fill(frame.request.scene, job.items);
+        frame.tables.objects.describe(frame.request.scene, job.items);
         Ok(())
     }
 }
 
-/// Uploads the object table. An item is a block of objects.
+/// Orders the bins of objects, if there are new ones.
+pub(super) struct Bins;
+
+impl<B: Backend> Stage<B> for Bins {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "bins",
+            after: &["objects"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::PerItem,
+            cost_kind: "bins",
+            depends_on_occlusion: false,
+        }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        frame.tables.objects.finish();
+        Ok(())
+    }
+}
+
+/// Uploads what changed of the object table since the backend's buffers were written. An item is a block of objects.
 pub(super) struct Upload;
 
 impl<B: Backend> Stage<B> for Upload {
@@ -47,7 +68,8 @@ impl<B: Backend> Stage<B> for Upload {
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.objects.block_count()
+        let objects = &frame.tables.objects;
+        if frame.backend.objects_epoch(frame.backend_frame) == objects.epoch() { 0 } else { objects.block_count() }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {

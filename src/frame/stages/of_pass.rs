@@ -1,5 +1,6 @@
 //! The stages of a pass: from visible objects to finished commands.
 
+use std::array;
 use std::ops::Range;
 
 use super::super::context::FrameContext;
@@ -26,8 +27,12 @@ impl<B: Backend> Stage<B> for Fill {
         }
     }
 
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.sorts_commands()
+    }
+
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.visible_count(self.pass)
+        if frame.keeps_list(self.pass) { 0 } else { frame.visible_count(self.pass) }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
@@ -35,7 +40,7 @@ impl<B: Backend> Stage<B> for Fill {
         let fill = view::Fill {
             table: &frame.tables.objects,
             view: &frame.request.views[view_index],
-            visible: &frame.tables.visible[view_index],
+            visible: &frame.tables.visibility[view_index].set,
             selection: table.selection.unwrap_or_default(),
             scene: frame.request.scene,
             quality: frame.request.quality,
@@ -61,6 +66,14 @@ impl<B: Backend> Stage<B> for Split {
             cost_kind: "sort",
             depends_on_occlusion: true,
         }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.sorts_commands()
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        usize::from(!frame.keeps_list(self.pass))
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
@@ -92,8 +105,12 @@ impl<B: Backend> Stage<B> for Sort {
         }
     }
 
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.sorts_commands()
+    }
+
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.passes[self.pass].splitters.read().bucket_count()
+        if frame.keeps_list(self.pass) { 0 } else { frame.tables.passes[self.pass].splitters.read().bucket_count() }
     }
 
     /// The bucket's share of the visible objects, drawn or not: the split knows only their number.
@@ -131,8 +148,12 @@ impl<B: Backend> Stage<B> for Instance {
         }
     }
 
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.sorts_commands()
+    }
+
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.passes[self.pass].splitters.read().bucket_count()
+        if frame.keeps_list(self.pass) { 0 } else { frame.tables.passes[self.pass].splitters.read().bucket_count() }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
@@ -144,7 +165,48 @@ impl<B: Backend> Stage<B> for Instance {
     }
 }
 
-/// Joins the buckets to the pass's draw list.
+/// Orders the pass's objects by bin, where their depth does not matter. An item is a segment of the visible objects.
+pub(super) struct Bin {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for Bin {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "bin",
+            after: &["compact"],
+            group: StageGroup::Sort,
+            chunking: Chunking::PerItem,
+            cost_kind: "bin",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.orders_by_bin
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        if frame.keeps_list(self.pass) { 0 } else { frame.segment_count(self.pass) }
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
+        let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
+        let selection = table.selection.unwrap_or_default();
+        let (words, segments) = (visible.word_count(), frame.segment_count(self.pass));
+        for segment in job.items {
+            let words = segment * words / segments..(segment + 1) * words / segments;
+            let mut segment = table.segments[segment].write();
+            segment.clear();
+            view::bin_visible(objects, visible, selection, words, &mut segment);
+            segment.order(&objects.bins());
+        }
+        Ok(())
+    }
+}
+
+/// Joins the buckets, or segments, to the pass's draw list.
 pub(super) struct Join {
     pub(super) pass: usize,
 }
@@ -153,7 +215,7 @@ impl<B: Backend> Stage<B> for Join {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "join",
-            after: &["instance"],
+            after: &["instance", "bin"],
             group: StageGroup::Instance,
             chunking: Chunking::PerItem,
             cost_kind: "join",
@@ -161,15 +223,31 @@ impl<B: Backend> Stage<B> for Join {
         }
     }
 
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        usize::from(!frame.keeps_list(self.pass))
+    }
+
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
         let table = &frame.tables.passes[self.pass];
+        let can_merge = |mesh| frame.can_merge(self.pass, mesh);
         let mut list = table.list.write();
         list.clear();
-        for bucket in &table.buckets[..table.splitters.read().bucket_count()] {
-            list.append(&mut bucket.write(), |mesh| frame.can_merge(self.pass, mesh));
+        *table.list_inputs.write() = None;
+        if frame.orders_by_bin(self.pass) {
+            let mut segments =
+                array::from_fn::<_, { DrawList::MAX_SEGMENTS }, _>(|index| table.segments[index].write());
+            list.join_bins(&mut segments[..frame.segment_count(self.pass)], &frame.tables.objects.bins(), can_merge);
+        } else {
+            for bucket in &table.buckets[..table.splitters.read().bucket_count()] {
+                list.append(&mut bucket.write(), can_merge);
+            }
         }
         if frame.pass_culls_triangles(self.pass) {
             table.triangles.write().find(&list, &frame.tables.cullable_meshes, frame.request.scene.assets);
+        }
+        if frame.can_keep_list(self.pass) {
+            list.set_version(frame.tables.version(self.pass));
+            *table.list_inputs.write() = Some(frame.list_inputs(self.pass));
         }
         Ok(())
     }

@@ -5,9 +5,9 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::scene::Blend;
-use crate::view::ObjectTable;
+use crate::view::Frustum;
 
-/// Tests the objects against the view's frustum.
+/// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
 pub(super) struct Visibility {
     pub(super) view: usize,
 }
@@ -16,25 +16,22 @@ impl<B: Backend> Stage<B> for Visibility {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "visibility",
-            after: &["objects"],
+            after: &["bins"],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
             cost_kind: "visibility",
             depends_on_occlusion: false,
         }
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.objects.len()
+        frame.tables.visibility[self.view].word_count(&frame.tables.objects)
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let frustum = &frame.request.views[self.view].frustum;
-        frame.tables.visible[self.view].test(job.items, |objects| {
-            let block = frame.tables.objects.block(objects.start / ObjectTable::BLOCK_SIZE);
-            let first = objects.start % ObjectTable::BLOCK_SIZE;
-            block.visible(frustum, frame.request.quality.culling, first..first + objects.len())
-        });
+        let (visibility, objects) = (&frame.tables.visibility[self.view], &frame.tables.objects);
+        let (frustum, volume) = (&frame.request.views[self.view].frustum, frame.request.quality.culling);
+        visibility.test_words(job.items, objects, frustum, volume);
         Ok(())
     }
 }
@@ -71,7 +68,7 @@ impl<B: Backend> Stage<B> for Occluders {
         occlusion.select_occluders(
             scene,
             &tables.objects,
-            &tables.visible[self.view],
+            &tables.visibility[self.view].set,
             &tables.occluder_meshes,
             |draw| {
                 let blend = draw.state.blend();
@@ -143,7 +140,7 @@ impl<B: Backend> Stage<B> for Occlusion {
         let occlusion = &frame.tables.occlusion[self.view];
         let hidden_of =
             |first, visible| occlusion.occlusion.hidden(frame.request.scene, &frame.tables.objects, first, visible);
-        occlusion.add_hidden(frame.tables.visible[self.view].remove_hidden(job.items, hidden_of));
+        occlusion.add_hidden(frame.tables.visibility[self.view].set.remove_hidden(job.items, hidden_of));
         Ok(())
     }
 }
@@ -166,7 +163,7 @@ impl<B: Backend> Stage<B> for Compact {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        frame.tables.visible[self.view].compact();
+        frame.tables.visibility[self.view].compact(frame.tables.version(self.view));
         Ok(())
     }
 }

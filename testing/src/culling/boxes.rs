@@ -125,8 +125,7 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
             .map(|entry| objects.add(shapes, &oracle, entry % 4 != 0, &mut random))
             .collect();
         for (volume, table) in tables.iter_mut().enumerate() {
-            table.reset(ObjectTable::BLOCK_SIZE);
-            table.fill(&objects.as_scene_ref(shapes), 0..ObjectTable::BLOCK_SIZE);
+            table.update(&objects.as_scene_ref(shapes));
             tallies.rejected += table.rejections().list().iter().map(|rejection| rejection.count as u64).sum::<u64>();
             let block = table.block(0);
             for first in (0..ObjectTable::BLOCK_SIZE).step_by(Frustum::WORD) {

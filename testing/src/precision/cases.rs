@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DQuat, DVec3, Quat, Vec3};
-use drawloom::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Topology, Vertex};
+use drawloom::scene::{
+    Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, SceneRef, Topology, Vertex,
+};
 use drawloom::view::{GpuObject, ObjectTable, ShadowMaps};
 
 use super::vertex::Case;
@@ -150,9 +152,18 @@ impl GpuObjects {
                 None => drop(self.scene.add_object(object)?),
             }
         }
-        self.table.reset(cases.len());
         let scene = self.scene.as_scene_ref();
-        self.table.fill(&scene, 0..cases.len());
+        let count = cases.len();
+        // Objects of earlier, longer cases stay in the scene.
+        self.table.update(&SceneRef {
+            positions: &scene.positions[..count],
+            orientations: &scene.orientations[..count],
+            scales: &scene.scales[..count],
+            bounds: &scene.bounds[..count],
+            meshes: &scene.meshes[..count],
+            materials: &scene.materials[..count],
+            ..scene
+        });
         assert!(self.table.rejections().list().is_empty(), "an object was left out");
         for block in 0..self.table.block_count() {
             let (first, gpu_objects) = self.table.gpu_objects(block);

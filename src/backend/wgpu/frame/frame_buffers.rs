@@ -15,6 +15,7 @@ use crate::backend::wgpu::resources::{
 };
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
+use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass};
 use crate::view::{GpuObject, GpuView, ObjectTable};
 
@@ -64,7 +65,7 @@ impl BufferPool {
                 idle.passes.iter_mut().for_each(WgpuPassState::clear_caches);
             }
         }
-        FrameBuffers { buffers, pool: Arc::clone(self), generation: free.generation }
+        FrameBuffers { buffers, pool: Arc::clone(self), generation: free.generation, held_epoch: 0, objects_epoch: 0 }
     }
 }
 
@@ -73,6 +74,10 @@ pub(crate) struct FrameBuffers {
     buffers: Buffers,
     pool: Arc<BufferPool>,
     generation: u64,
+    /// The epoch of the object table that the buffers held when the frame began; 0 for none.
+    held_epoch: u64,
+    /// The epoch of the frame's object table.
+    objects_epoch: u64,
 }
 
 impl Drop for FrameBuffers {
@@ -99,6 +104,9 @@ impl FrameBuffers {
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
         let buffers = &mut self.buffers;
+        // A frame that fails may have written some of its objects. Only its submission confirms that it wrote all.
+        self.held_epoch = mem::take(&mut buffers.objects_epoch);
+        self.objects_epoch = request.objects_epoch;
         buffers.set_passes(request);
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
@@ -118,6 +126,9 @@ impl FrameBuffers {
         buffers.next_key.object_indices_stride = stride;
 
         let mut reallocated = buffers.objects.reserve(device, object_bytes)?;
+        if reallocated {
+            self.held_epoch = 0;
+        }
         reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
             reallocated |= mirrored.upload(device, uploads)?;
@@ -126,8 +137,10 @@ impl FrameBuffers {
             mem::swap(&mut buffers.key, &mut buffers.next_key);
             let objects_bound = buffers.objects.size().min(limits.max_storage_buffer_binding_size & !3) as usize;
             for index in 0..buffers.passes.len() {
-                buffers.passes[index].frame_bind_group =
-                    Some(buffers.new_frame_bind_group(device, layouts, index, objects_bound));
+                let bind_group = buffers.new_frame_bind_group(device, layouts, index, objects_bound);
+                let pass = &mut buffers.passes[index];
+                pass.frame_bind_group = Some(bind_group);
+                *pass.uploaded_list.get_mut() = Version::default();
             }
         }
         Ok(())
@@ -161,6 +174,16 @@ impl FrameBuffers {
         self.buffers.timestamps.as_ref()
     }
 
+    /// The epoch of the object table that the buffers held when the frame began; 0 for none.
+    pub(crate) fn held_epoch(&self) -> u64 {
+        self.held_epoch
+    }
+
+    /// The frame was submitted, so the buffers hold its objects for the next frame.
+    pub(crate) fn keep_objects(&mut self) {
+        self.buffers.objects_epoch = self.objects_epoch;
+    }
+
     /// The passes in submission order.
     pub(crate) fn passes(&self) -> &[WgpuPassState] {
         &self.buffers.passes
@@ -176,32 +199,40 @@ impl FrameBuffers {
         &self.buffers.subdivided
     }
 
-    /// Uploads blocks of objects in one write, because each write has a fixed cost.
+    /// Uploads what changed in blocks of objects since [`FrameBuffers::held_epoch`]: one write for each run of objects, because each
+    /// write has a fixed cost.
     pub(crate) fn write_objects(&self, uploads: &UploadQueue, objects: &ObjectTable, blocks: Range<usize>) {
-        let first = blocks.start * ObjectTable::BLOCK_SIZE;
-        let end = objects.len().min(blocks.end * ObjectTable::BLOCK_SIZE);
+        objects.for_each_change(blocks, self.held_epoch, MIN_UNCHANGED, |run| self.write_run(uploads, objects, run));
+    }
+
+    fn write_run(&self, uploads: &UploadQueue, objects: &ObjectTable, run: Range<usize>) {
         let bytes = |objects: usize| objects * size_of::<GpuObject>();
-        let size = NonZeroU64::new(bytes(end - first) as u64);
+        let size = NonZeroU64::new(bytes(run.len()) as u64);
         let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
-        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(first) as u64, size) else { return };
-        for block in blocks {
-            let (start, records) = objects.gpu_objects(block);
-            let range = bytes(start - first)..bytes(start - first + records.len());
-            staged.slice(range).copy_from_slice(bytemuck::cast_slice(&records));
+        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(run.start) as u64, size) else { return };
+        for (block, part) in ObjectTable::block_ranges(run.clone()) {
+            let gpu_objects = &objects.block(block).gpu_objects[part.start % ObjectTable::BLOCK_SIZE..][..part.len()];
+            let range = bytes(part.start - run.start)..bytes(part.end - run.start);
+            staged.slice(range).copy_from_slice(bytemuck::cast_slice(gpu_objects));
         }
     }
 
-    /// Uploads the objects that a pass draws, in the order of instances.
-    pub(crate) fn write_object_indices(&self, uploads: &UploadQueue, pass: usize, objects: &[u32]) {
-        if let Some(index) = self.buffers.passes[pass].command_pass_index {
-            self.buffers.object_indices.write(
-                uploads,
-                index * self.buffers.key.object_indices_stride,
-                bytemuck::cast_slice(objects),
-            );
+    /// Uploads the objects that a pass draws, in the order of instances, unless the buffer holds them already.
+    pub(crate) fn write_object_indices(&self, uploads: &UploadQueue, pass: usize, list: &DrawList) {
+        let state = &self.buffers.passes[pass];
+        let Some(index) = state.command_pass_index else { return };
+        let mut uploaded = state.uploaded_list.write();
+        if list.version() != Version::default() && *uploaded == list.version() {
+            return;
         }
+        *uploaded = list.version();
+        let offset = index * self.buffers.key.object_indices_stride;
+        self.buffers.object_indices.write(uploads, offset, bytemuck::cast_slice(&list.objects));
     }
 }
+
+/// Fewer unchanged objects between two runs are uploaded with them: that takes less time than another write.
+const MIN_UNCHANGED: usize = 64;
 
 struct Buffers {
     objects: GrowingBuffer,
@@ -221,6 +252,8 @@ struct Buffers {
     timestamps: Option<Timestamps>,
     /// For how many frames no frame has taken them.
     unused: u32,
+    /// The epoch of the object table that `objects` holds; 0 for none.
+    objects_epoch: u64,
 }
 
 /// The key of bind groups, beside the buffers themselves.
@@ -248,6 +281,7 @@ impl Default for Buffers {
             subdivided: RwLock::default(),
             timestamps: None,
             unused: 0,
+            objects_epoch: 0,
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::backend::wgpu::pipelines::ProcessBindGroup;
 use crate::backend::wgpu::resources::{GrowingBuffer, UploadQueue};
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
+use crate::command::Version;
 use crate::process::Pass;
 use crate::tuning::CostSample;
 
@@ -30,6 +31,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) frame_bind_group: Option<wgpu::BindGroup>,
     /// `@group(2)`.
     pub(crate) process_bind_group: Option<ProcessBindGroup>,
+    /// The version of the draw list whose objects the buffers hold.
+    pub(crate) uploaded_list: RwLock<Version>,
     pub(crate) strategy: PassStrategy,
     /// The strategy's index in the backend's set, and whether the frame only tries it.
     pub(crate) strategy_index: usize,
@@ -53,6 +56,7 @@ impl Default for WgpuPassState {
             parameters: None,
             frame_bind_group: None,
             process_bind_group: None,
+            uploaded_list: RwLock::default(),
             strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
             strategy_index: 0,
             is_trial: false,

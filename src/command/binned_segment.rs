@@ -1,0 +1,165 @@
+//! A segment of a view's visible objects, ordered by bin.
+
+use std::ops::Range;
+
+use super::Bins;
+
+/// The objects of one pass among a segment of a view's visible objects, ordered by bin: by draw state, by mesh, and by object.
+///
+/// They are counted and scattered (counting sort; Knuth, *The Art of Computer Programming* 3, 5.2), in time proportional to the
+/// numbers of objects and bins. Where there are many more bins than objects, they are sorted.
+#[derive(Clone, Debug, Default)]
+pub struct BinnedSegment {
+    /// The objects in their own order, and the number of the bin of each.
+    objects: Vec<u32>,
+    bins: Vec<u32>,
+    /// The objects by bin.
+    by_bin: Vec<u32>,
+    /// The bins that have objects, in draw order, each with the end of its objects in `by_bin`.
+    ends: Vec<(u32, u32)>,
+    /// Scratch memory: a counter for each bin.
+    counts: Vec<u32>,
+    /// Scratch memory: keys to sort by.
+    keys: Vec<u64>,
+}
+
+impl BinnedSegment {
+    /// Empties the segment.
+    pub fn clear(&mut self) {
+        self.objects.clear();
+        self.bins.clear();
+    }
+
+    /// Appends an object, after all objects of lower indices.
+    #[inline]
+    pub fn push(&mut self, object: u32, bin: u32) {
+        self.objects.push(object);
+        self.bins.push(bin);
+    }
+
+    /// Orders the objects by bin.
+    pub fn order(&mut self, bins: &Bins) {
+        self.ends.clear();
+        if bins.len() > self.objects.len() * BINS_PER_OBJECT {
+            self.sort(bins);
+        } else {
+            self.count_and_scatter(bins);
+        }
+    }
+
+    fn count_and_scatter(&mut self, bins: &Bins) {
+        let Self { objects, bins: bin_of, by_bin, ends, counts, .. } = self;
+        counts.clear();
+        counts.resize(bins.len(), 0);
+        for &bin in &*bin_of {
+            counts[bin as usize] += 1;
+        }
+        let mut next = 0;
+        for &bin in bins.in_order() {
+            // From here on, where the bin's next object goes.
+            let count = std::mem::replace(&mut counts[bin as usize], next);
+            next += count;
+            if count > 0 {
+                ends.push((bin, next));
+            }
+        }
+        by_bin.resize(objects.len(), 0);
+        for (&object, &bin) in objects.iter().zip(&*bin_of) {
+            let position = &mut counts[bin as usize];
+            by_bin[*position as usize] = object;
+            *position += 1;
+        }
+    }
+
+    fn sort(&mut self, bins: &Bins) {
+        let Self { objects, bins: bin_of, by_bin, ends, keys, .. } = self;
+        keys.clear();
+        keys.extend(
+            objects.iter().zip(&*bin_of).map(|(&object, &bin)| u64::from(bins.rank(bin)) << 32 | u64::from(object)),
+        );
+        keys.sort_unstable();
+        by_bin.clear();
+        for same_bin in keys.chunk_by(|one, next| one >> 32 == next >> 32) {
+            by_bin.extend(same_bin.iter().map(|key| *key as u32));
+            ends.push((bins.in_order()[(same_bin[0] >> 32) as usize], by_bin.len() as u32));
+        }
+    }
+
+    /// The ordered objects, for the list that takes them.
+    pub(super) fn by_bin_mut(&mut self) -> &mut Vec<u32> {
+        &mut self.by_bin
+    }
+
+    /// One of the bins that have objects, by index in draw order, with the range of its objects.
+    pub(super) fn run(&self, index: usize) -> Option<(u32, Range<usize>)> {
+        let &(bin, end) = self.ends.get(index)?;
+        let start = index.checked_sub(1).map_or(0, |before| self.ends[before].1);
+        Some((bin, start as usize..end as usize))
+    }
+
+    /// The objects in a range of a run.
+    pub(super) fn objects(&self, range: Range<usize>) -> &[u32] {
+        &self.by_bin[range]
+    }
+}
+
+/// With more bins than this per object, sorting the objects takes less time than going through the bins.
+const BINS_PER_OBJECT: usize = 8;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::command::bins::Bin;
+    use crate::command::{Batch, Cull, DrawList, DrawState};
+    use crate::scene::{Blend, Topology};
+
+    fn bin_of(kind: u32) -> Bin {
+        let culls = [Cull::Back, Cull::Front, Cull::Nothing];
+        let state = DrawState::new(Topology::TriangleList, culls[kind as usize % 3], Blend::None);
+        Bin { state, mesh: kind / 3 % 40 }
+    }
+
+    proptest! {
+        #[test]
+        fn joined_segments_are_the_objects_in_the_order_of_state_mesh_and_index(
+            kinds in prop::collection::vec((0_u32..120, prop::bool::weighted(0.7)), 0..300),
+            unused in prop::collection::vec(0_u32..120, 0..120),
+            cuts in prop::collection::vec(0_usize..300, 0..5),
+            unmergeable in 0_u32..60,
+        ) {
+            let mut bins = Bins::default();
+            // Numbers in an order of their own, some of bins without objects.
+            let numbers: Vec<_> = unused.iter().map(|&kind| bins.insert(bin_of(kind))).collect();
+            bins.sort();
+            prop_assert!(numbers.iter().zip(&unused).all(|(&number, &kind)| bins.get(number) == bin_of(kind)));
+            let drawn: Vec<_> = (0_u32..).zip(&kinds).filter(|(_, (_, is_drawn))| *is_drawn).map(|(object, (kind, _))| (object, bin_of(*kind))).collect();
+            let of_objects: Vec<_> = drawn.iter().map(|&(object, bin)| (object, bins.insert(bin))).collect();
+            bins.sort();
+
+            let mut edges: Vec<_> = cuts.iter().map(|cut| cut % (drawn.len() + 1)).chain([0, drawn.len()]).collect();
+            edges.sort_unstable();
+            let mut segments: Vec<_> = edges.windows(2).map(|edge| {
+                let mut segment = BinnedSegment::default();
+                of_objects[edge[0]..edge[1]].iter().for_each(|&(object, bin)| segment.push(object, bin));
+                segment.order(&bins);
+                Box::new(segment)
+            }).collect();
+            let mut list = DrawList::default();
+            list.join_bins(&mut segments, &bins, |mesh| mesh != unmergeable);
+
+            let mut expected = drawn;
+            expected.sort_by_key(|&(object, bin)| (bin.state, bin.mesh, object));
+            prop_assert_eq!(&list.objects, &expected.iter().map(|(object, _)| *object).collect::<Vec<_>>());
+            let mut batches: Vec<Batch> = Vec::new();
+            for (index, &(_, Bin { state, mesh })) in (0..).zip(&expected) {
+                match batches.last_mut() {
+                    Some(last) if (last.state, last.mesh) == (state, mesh) && mesh != unmergeable => last.count += 1,
+                    _ => batches.push(Batch { mesh, state, first: index, count: 1 }),
+                }
+            }
+            prop_assert_eq!(&list.batches, &batches);
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! What a draw list is made from.
+
+use glam::{DVec3, Quat};
+
+use crate::command::{Blending, Selection, Version};
+use crate::quality::DepthKey;
+use crate::scene::{Camera, Projection};
+use crate::view::RenderView;
+
+/// What a draw list is made from: equal inputs make equal lists.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ListInputs {
+    /// The version of the view's visible set.
+    pub(super) visible: Version,
+    pub(super) selection: Selection,
+    pub(super) instancing: bool,
+    pub(super) order: OrderInputs,
+}
+
+/// What the order of a list depends on, beside the visible set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum OrderInputs {
+    /// By bin: the epoch in which an object was last drawn in another way.
+    Bins { draws_changed_in: u64 },
+    /// By depth: the epoch of the object table, and the camera.
+    Depth { epoch: u64, position: DVec3, orientation: Quat, near: f32, far: f32 },
+}
+
+impl OrderInputs {
+    pub(super) fn of_depth(epoch: u64, camera: &Camera) -> Self {
+        let &Camera { position, orientation, near, far, .. } = camera;
+        Self::Depth { epoch, position, orientation, near, far }
+    }
+}
+
+/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, the quality asks for no order, and the view
+/// is not a paraboloid, where the subdivision level gives an object another state.
+pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthKey) -> bool {
+    selection.blending == Blending::Opaque && opaque_order.bits == 0 && view.camera.projection != Projection::Paraboloid
+}

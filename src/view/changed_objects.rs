@@ -1,0 +1,148 @@
+//! The objects that a frame describes anew, as words of 64.
+
+use crate::scene::Changes;
+
+/// The objects that a frame describes anew: all of them, or those that changed.
+#[derive(Debug, Default)]
+pub(super) struct ChangedObjects {
+    /// The number of objects if all of them are described.
+    all: Option<usize>,
+    /// Otherwise each word with changed objects, ascending.
+    words: Vec<ChangedWord>,
+    /// While changes are collected, a mask for each word; zeros otherwise.
+    masks: Vec<u64>,
+}
+
+/// Changed objects among 64: bit `b` of the mask is object `word × 64 + b`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ChangedWord {
+    pub(super) word: usize,
+    pub(super) mask: u64,
+}
+
+impl ChangedObjects {
+    /// All objects of a scene.
+    pub(super) fn set_all(&mut self, objects: usize) {
+        self.all = Some(objects);
+        self.words.clear();
+    }
+
+    /// The reported objects, and those at indices that the last frame did not have. Indices beyond `objects` are ignored.
+    pub(super) fn set(&mut self, changes: Changes<'_>, objects_before: usize, objects: usize) {
+        self.all = None;
+        self.words.clear();
+        self.masks.resize(objects.div_ceil(WORD), 0);
+        match changes {
+            Changes::Unknown => return self.set_all(objects),
+            Changes::Objects(indices) => {
+                indices.iter().map(|&index| index as usize).filter(|&index| index < objects).for_each(|index| {
+                    self.mark(index / WORD, 1 << (index % WORD));
+                });
+            }
+            Changes::Ranges(ranges) => {
+                ranges.iter().for_each(|range| self.mark_range(range.start as usize, (range.end as usize).min(objects)))
+            }
+        }
+        self.mark_range(objects_before, objects);
+        self.words.sort_unstable_by_key(|changed| changed.word);
+        for changed in &mut self.words {
+            changed.mask = std::mem::take(&mut self.masks[changed.word]);
+        }
+    }
+
+    fn mark_range(&mut self, start: usize, end: usize) {
+        if start < end {
+            for word in start / WORD..end.div_ceil(WORD) {
+                let first = start.saturating_sub(word * WORD);
+                let excess = ((word + 1) * WORD).saturating_sub(end);
+                self.mark(word, (u64::MAX << first) & (u64::MAX >> excess));
+            }
+        }
+    }
+
+    fn mark(&mut self, word: usize, mask: u64) {
+        if self.masks[word] == 0 {
+            // The mask follows when all are marked.
+            self.words.push(ChangedWord { word, mask: 0 });
+        }
+        self.masks[word] |= mask;
+    }
+
+    /// The number of words with changed objects.
+    pub(super) fn word_count(&self) -> usize {
+        self.all.map_or(self.words.len(), |objects| objects.div_ceil(WORD))
+    }
+
+    /// Whether all objects are described, reported or not.
+    pub(super) fn are_all(&self) -> bool {
+        self.all.is_some()
+    }
+
+    /// A word with changed objects, by index.
+    ///
+    /// # Panics
+    /// If `index` is not below [`ChangedObjects::word_count`].
+    pub(super) fn word(&self, index: usize) -> ChangedWord {
+        match self.all {
+            Some(objects) => {
+                let excess = ((index + 1) * WORD).saturating_sub(objects);
+                ChangedWord { word: index, mask: u64::MAX >> excess }
+            }
+            None => self.words[index],
+        }
+    }
+
+    /// Whether an object is described.
+    pub(super) fn contains(&self, object: usize) -> bool {
+        let is_marked = |index: usize| self.words[index].mask >> (object % WORD) & 1 == 1;
+        self.are_all() || self.words.binary_search_by_key(&(object / WORD), |changed| changed.word).is_ok_and(is_marked)
+    }
+}
+
+const WORD: usize = u64::BITS as usize;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::ops::Range;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn objects_of(changed: &ChangedObjects) -> Vec<usize> {
+        let words = (0..changed.word_count()).map(|index| changed.word(index));
+        words
+            .flat_map(|ChangedWord { word, mask }| {
+                (0..64).filter(move |bit| mask >> bit & 1 == 1).map(move |bit| word * 64 + bit)
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn reported_and_new_objects_are_found_once_each(
+            indices in prop::collection::vec(0_u32..700, 0..40),
+            ranges in prop::collection::vec((0_u32..700, 0_u32..200), 0..5),
+            before in 0_usize..600,
+            objects in 0_usize..600,
+        ) {
+            // A range that ends before it starts is empty.
+            let ranges: Vec<Range<u32>> = ranges.iter().map(|&(start, length)| start..start + length.saturating_sub(5)).collect();
+            let mut changed = ChangedObjects::default();
+            let new: BTreeSet<_> = (before..objects).collect();
+            for (changes, reported) in [
+                (Changes::Objects(&indices), indices.clone()),
+                (Changes::Ranges(&ranges), ranges.iter().cloned().flatten().collect()),
+            ] {
+                changed.set(changes, before, objects);
+                let reported = reported.into_iter().map(|index| index as usize).filter(|&index| index < objects);
+                let expected: BTreeSet<_> = reported.chain(new.iter().copied()).collect();
+                prop_assert_eq!(objects_of(&changed), expected.iter().copied().collect::<Vec<_>>());
+                prop_assert!((0..objects).all(|object| changed.contains(object) == expected.contains(&object)));
+            }
+            changed.set(Changes::Unknown, before, objects);
+            prop_assert_eq!(objects_of(&changed), (0..objects).collect::<Vec<_>>());
+        }
+    }
+}

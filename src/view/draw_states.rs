@@ -1,0 +1,75 @@
+//! The draw states of meshes and materials, in small tables.
+
+use glam::Vec3;
+
+use crate::command::{Cull, DrawState};
+use crate::handle::Handle;
+use crate::scene::{Assets, Material, Mesh, Topology};
+
+/// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache lines; the assets
+/// themselves are much larger.
+#[derive(Debug, Default)]
+pub(super) struct DrawStates {
+    /// The meshes and materials that the tables are of; `None` before the first update.
+    version: Option<AssetVersion>,
+    meshes: Vec<Option<MeshEntry>>,
+    /// With the states of objects with triangle lists, as they are and mirrored.
+    materials: Vec<Option<(Handle<Material>, [DrawState; 2])>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct MeshEntry {
+    mesh: Handle<Mesh>,
+    topology: Topology,
+    revision: u64,
+}
+
+/// The meshes and materials of a scene at one time: of each the identity of the collection, and its revision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct AssetVersion {
+    meshes: (u64, u64),
+    materials: (u64, u64),
+}
+
+impl DrawStates {
+    /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there before: no
+    /// object can have been described with one that is new.
+    pub(super) fn update(&mut self, assets: &Assets) -> bool {
+        let Assets { meshes, materials, .. } = assets;
+        let version = AssetVersion {
+            meshes: (meshes.identity(), meshes.revision()),
+            materials: (materials.identity(), materials.revision()),
+        };
+        if self.version == Some(version) {
+            return false;
+        }
+        self.version = Some(version);
+        let mut new_meshes = vec![None; meshes.slot_count()];
+        for (mesh, revision, content) in meshes.iter_with_revision() {
+            new_meshes[mesh.index() as usize] = Some(MeshEntry { mesh, topology: content.topology(), revision });
+        }
+        let mut new_materials = vec![None; materials.slot_count()];
+        for (handle, &Material { double_sided, blend, .. }) in materials.iter() {
+            let culls = if double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
+            let states = culls.map(|cull| DrawState::new(Topology::TriangleList, cull, blend));
+            new_materials[handle.index() as usize] = Some((handle, states));
+        }
+        let changed = has_changed(&self.meshes, &new_meshes) || has_changed(&self.materials, &new_materials);
+        (self.meshes, self.materials) = (new_meshes, new_materials);
+        changed
+    }
+
+    /// The state of an object; `None` if a handle is stale.
+    #[inline]
+    pub(super) fn get(&self, mesh: Handle<Mesh>, material: Handle<Material>, scale: Vec3) -> Option<DrawState> {
+        let MeshEntry { mesh: known_mesh, topology, .. } = (*self.meshes.get(mesh.index() as usize)?)?;
+        let (known_material, states) = (*self.materials.get(material.index() as usize)?)?;
+        let is_mirrored = scale.is_negative_bitmask().count_ones() as usize % 2;
+        (known_mesh == mesh && known_material == material).then(|| states[is_mirrored].with_topology(topology))
+    }
+}
+
+/// Whether an entry of `before` is not the same in `now`.
+fn has_changed<T: PartialEq>(before: &[Option<T>], now: &[Option<T>]) -> bool {
+    before.iter().enumerate().any(|(slot, entry)| entry.is_some() && now.get(slot) != Some(entry))
+}

@@ -1,0 +1,207 @@
+//! A block of the object table.
+
+use std::ops::Range;
+
+use super::bounding_spheres::{BoundingSphere, BoundingSpheres};
+use super::frustum::Classified;
+use super::group_bounds::{GroupBounds, Overlap};
+use super::object_description::{LANES, ObjectDescription, ObjectDraw};
+use super::{BoundingBoxes, Frustum, GpuObject, OrientedBox, RejectionReason};
+use crate::quality::CullingVolume;
+use crate::scene::Blend;
+
+/// [`ObjectBlock::SIZE`] objects of the object table; object `index` is at `index % SIZE`.
+#[derive(Clone, Debug)]
+pub struct ObjectBlock {
+    /// The GPU layouts to upload.
+    pub gpu_objects: [GpuObject; Self::SIZE],
+    /// The bounding spheres.
+    pub spheres: BoundingSpheres,
+    /// The bounding boxes, if the culling volume is a box.
+    pub boxes: Option<BoundingBoxes>,
+    /// The meshes, materials and states.
+    pub draws: [ObjectDraw; Self::SIZE],
+    /// The number of each object's [bin](crate::command::Bins).
+    pub bins: [u32; Self::SIZE],
+    /// The objects without blending: a mask for each word.
+    pub(crate) opaque: [u64; Self::WORDS],
+    /// The bounds of each word.
+    pub(super) word_bounds: GroupBounds,
+    /// The table's epoch when an object of a group of [`ObjectBlock::GROUP`] last changed.
+    pub(super) changed_in: [u64; Self::SIZE / Self::GROUP],
+    /// The number of objects that are rejected, and why they are.
+    rejected_count: usize,
+    rejected: [Option<RejectionReason>; Self::SIZE],
+}
+
+impl ObjectBlock {
+    /// The number of objects in a block.
+    pub const SIZE: usize = BoundingSpheres::COUNT;
+
+    /// The number of objects in a group, which are described and uploaded together.
+    pub(super) const GROUP: usize = LANES;
+
+    /// The number of words in a block.
+    pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
+
+    /// Replaces an object. Returns whether its mesh, material or state changed, and with them perhaps its bin.
+    #[inline(always)]
+    pub(super) fn set(&mut self, entry: usize, description: &ObjectDescription) -> bool {
+        let ObjectDescription { gpu_object, bounds, draw } = description;
+        self.gpu_objects[entry] = *gpu_object;
+        self.spheres.set(entry, *bounds);
+        self.set_rejected(entry, None);
+        let is_new = self.bins[entry] == NO_BIN;
+        let draw_changed = is_new || self.draws[entry] != *draw;
+        if draw_changed {
+            self.draws[entry] = *draw;
+            let (word, bit) = (entry / Frustum::WORD, entry % Frustum::WORD);
+            self.opaque[word] = self.opaque[word] & !(1 << bit) | u64::from(draw.state.blend() == Blend::None) << bit;
+        }
+        draw_changed
+    }
+
+    /// Replaces an object's box, if the culling volume is a box.
+    pub(super) fn set_box(&mut self, entry: usize, make: impl FnOnce(BoundingSphere) -> OrientedBox) {
+        if let Some(boxes) = &mut self.boxes {
+            boxes.set(entry, &make(self.spheres.get(entry)));
+        }
+    }
+
+    /// The description of an object, or why it is rejected.
+    pub(super) fn description(&self, entry: usize) -> Result<ObjectDescription, RejectionReason> {
+        match self.rejected[entry] {
+            Some(reason) => Err(reason),
+            None => Ok(ObjectDescription {
+                gpu_object: self.gpu_objects[entry],
+                bounds: self.spheres.get(entry),
+                draw: self.draws[entry],
+            }),
+        }
+    }
+
+    /// The rejected objects.
+    pub(super) fn rejected(&self) -> impl Iterator<Item = (usize, RejectionReason)> {
+        let searched = if self.rejected_count > 0 { &self.rejected[..] } else { &[] };
+        searched.iter().enumerate().filter_map(|(entry, reason)| reason.map(|reason| (entry, reason)))
+    }
+
+    /// Removes an object: no view sees it.
+    pub(super) fn remove(&mut self, entry: usize) {
+        self.spheres.set(entry, BoundingSphere::EMPTY);
+        self.set_rejected(entry, None);
+    }
+
+    /// Rejects an object: no view sees it.
+    pub(super) fn reject(&mut self, entry: usize, reason: RejectionReason) {
+        self.spheres.set(entry, BoundingSphere::EMPTY);
+        self.set_rejected(entry, Some(reason));
+    }
+
+    #[inline(always)]
+    fn set_rejected(&mut self, entry: usize, reason: Option<RejectionReason>) {
+        if self.rejected[entry] != reason {
+            let before = std::mem::replace(&mut self.rejected[entry], reason);
+            self.rejected_count = self.rejected_count - usize::from(before.is_some()) + usize::from(reason.is_some());
+        }
+    }
+
+    /// Removes the objects from their bins, whose numbers are about to be given anew.
+    pub(super) fn forget_bins(&mut self) {
+        self.bins = [NO_BIN; Self::SIZE];
+    }
+
+    /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see [`ObjectBlock::visible`]. Calls
+    /// `put` with each and a mask of the objects that a view may see. Words that lie outside or inside as a whole have the same masks
+    /// as if their objects were tested.
+    ///
+    /// # Panics
+    /// If `words` are not within the block.
+    pub fn visible_words(
+        &self,
+        frustum: &Frustum,
+        volume: CullingVolume,
+        words: Range<usize>,
+        mut put: impl FnMut(usize, u64),
+    ) {
+        let overlaps = frustum.overlaps(&self.word_bounds);
+        for word in words {
+            let entries = word * Frustum::WORD..(word + 1) * Frustum::WORD;
+            let all = || self.visible(frustum, CullingVolume::None, entries.clone());
+            put(
+                word,
+                match overlaps[word] {
+                    _ if volume == CullingVolume::None => all(),
+                    Overlap::Outside => 0,
+                    Overlap::Inside => all(),
+                    Overlap::Partial => self.visible(frustum, volume, entries),
+                },
+            );
+        }
+    }
+
+    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
+    /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no rejected
+    /// one; it may contain a few invisible ones.
+    ///
+    /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only
+    /// the others' boxes are tested.
+    ///
+    /// # Panics
+    /// If `entries` is empty or not within the block.
+    pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
+        let offset = entries.start % Frustum::WORD;
+        let first = entries.start - offset;
+        if volume == CullingVolume::None {
+            let is_valid = |mask, (bit, &radius): (usize, &f32)| mask | u64::from(radius >= 0.0) << bit;
+            return self.spheres.radii()[entries].iter().enumerate().fold(0, is_valid);
+        }
+        if entries.len() < WORD_TEST_THRESHOLD {
+            let intersects = |entry: usize| {
+                let BoundingSphere { center, radius } = self.spheres.get(entry);
+                frustum.intersects_sphere(center, radius)
+            };
+            let test = |mask, entry: usize| mask | u64::from(intersects(entry)) << (entry - entries.start);
+            return self.test_boxes(frustum, first, entries.clone().fold(0, test) << offset) >> offset;
+        }
+        match &self.boxes {
+            None => frustum.intersects_spheres(&self.spheres, first) >> offset,
+            Some(_) => {
+                let Classified { intersecting, inside } = frustum.classify_spheres(&self.spheres, first);
+                let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
+                (intersecting & inside | self.test_boxes(frustum, first, intersecting & !inside & tested)) >> offset
+            }
+        }
+    }
+
+    /// The `candidates`, in the word from `first` on, whose boxes intersect the frustum; all of them if there are no
+    /// boxes.
+    fn test_boxes(&self, frustum: &Frustum, first: usize, candidates: u64) -> u64 {
+        self.boxes
+            .as_ref()
+            .map_or(candidates, |boxes| frustum.intersects_boxes(&self.spheres, boxes, first, candidates))
+    }
+}
+
+/// The number of an entry's bin before it has one.
+const NO_BIN: u32 = u32::MAX;
+
+/// Fewer objects than this are tested one by one, which takes less time than testing a whole word.
+const WORD_TEST_THRESHOLD: usize = 12;
+
+impl Default for ObjectBlock {
+    fn default() -> Self {
+        Self {
+            gpu_objects: [bytemuck::Zeroable::zeroed(); Self::SIZE],
+            spheres: BoundingSpheres::default(),
+            boxes: None,
+            draws: [ObjectDraw::default(); Self::SIZE],
+            bins: [NO_BIN; Self::SIZE],
+            opaque: [0; Self::WORDS],
+            word_bounds: GroupBounds::default(),
+            changed_in: [0; Self::SIZE / Self::GROUP],
+            rejected_count: 0,
+            rejected: [None; Self::SIZE],
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What is kept from frame to frame, against renderers that keep nothing.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::command::Batch;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::quality::{CullingVolume, DepthCurve, DepthKey, Quality};
+use drawloom::scene::{Camera, Changes, Light, SceneError, SceneRef};
+use drawloom::task::Scheduler;
+use drawloom::view::Rejection;
+use drawloom::{FrameError, FrameStatistics, Renderer, Submitter, ViewStatistics};
+use drawloom_testing::changing_world::ChangingWorld;
+use drawloom_testing::scenes::field;
+use proptest::prelude::*;
+
+/// What a frame is made of: its statistics, and the objects and batches of each process in each view.
+type Contents = (Vec<ViewStatistics>, Vec<Rejection>, Vec<(String, usize, Vec<Batch>, Vec<u32>)>);
+
+fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
+}
+
+fn contents(renderer: &Renderer<NullBackend>, statistics: &FrameStatistics) -> Contents {
+    let mut lists = Vec::new();
+    for process in renderer.plan().processes() {
+        for view in 0..statistics.views.len() {
+            if let Some(list) = renderer.draw_list(&process.name, view) {
+                lists.push((process.name.clone(), view, list.batches.clone(), list.objects.clone()));
+            }
+        }
+    }
+    (statistics.views.clone(), statistics.rejections.clone(), lists)
+}
+
+/// The contents of a frame of a new renderer, which is told nothing.
+fn of_a_new_renderer(quality: Quality, scene: SceneRef<'_>) -> Contents {
+    let (mut renderer, _) = renderer(quality, 1);
+    let recorded = renderer.record(SceneRef { changes: Changes::Unknown, ..scene }).unwrap();
+    contents(&renderer, recorded.statistics())
+}
+
+/// What differs first between two frames, in a line.
+fn difference(found: &Contents, expected: &Contents) -> Option<String> {
+    if (&found.0, &found.1) != (&expected.0, &expected.1) {
+        return Some(format!("{:?}, {:?} instead of {:?}, {:?}", found.0, found.1, expected.0, expected.1));
+    }
+    let differing = found.2.iter().zip(&expected.2).find(|(one, other)| one != other);
+    differing
+        .map(|((process, view, batches, objects), other)| {
+            let objects = objects.iter().zip(&other.3).position(|(one, other)| one != other);
+            let batches = batches.iter().zip(&other.2).position(|(one, other)| one != other);
+            format!("{process} in view {view}: object {objects:?}, batch {batches:?}")
+        })
+        .or_else(|| (found.2.len() != expected.2.len()).then(|| "the number of lists".to_owned()))
+}
+
+fn any_quality() -> impl Strategy<Value = Quality> {
+    let order = prop_oneof![
+        3 => Just(DepthKey::UNORDERED),
+        1 => Just(DepthKey { bits: 8, curve: DepthCurve::Logarithmic }),
+    ];
+    let culling = prop_oneof![2 => Just(CullingVolume::Sphere), 1 => Just(CullingVolume::OrientedBox)];
+    (order, culling).prop_map(|(opaque_order, culling)| Quality { opaque_order, culling, ..Quality::balanced() })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn reported_changes_make_the_frames_of_a_renderer_that_is_told_nothing(
+        seed in any::<u64>(), count in 0_usize..700, quality in any_quality(), workers in 1_usize..3, steps in 5_usize..25,
+    ) {
+        let mut world = ChangingWorld::new(seed, count);
+        let (mut kept, submitter) = renderer(quality, workers);
+        let mut log = Vec::new();
+        for step in 0..steps {
+            if step % 7 == 6 {
+                // A frame that fails sees the reported changes, and the next one is not told of them again.
+                let mut scene = world.as_scene_ref();
+                let far_away = [Camera::looking_at("far away", DVec3::splat(1e12), DVec3::ZERO)];
+                scene.cameras = if step % 2 == 0 { &[] } else { &far_away };
+                prop_assert!(kept.record(scene).is_err());
+                log.push("a failed frame".to_owned());
+            } else {
+                let recorded = kept.record(world.as_scene_ref());
+                prop_assert!(recorded.is_ok(), "{:?} after {log:#?}", recorded.err());
+                let recorded = recorded.unwrap();
+                let found = contents(&kept, recorded.statistics());
+                let difference = difference(&found, &of_a_new_renderer(quality, world.as_scene_ref()));
+                prop_assert!(difference.is_none(), "{difference:?} after {log:#?}");
+                // Some frames are dropped.
+                if step % 3 > 0 {
+                    submitter.submit(recorded).unwrap();
+                }
+            }
+            log.push(world.step().unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_frame_in_which_nothing_changed_tests_describes_and_orders_no_object() {
+    let scene = field(5_000);
+    let (mut renderer, submitter) = renderer(Quality::balanced(), 1);
+    submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    renderer.scheduler().timeline().start();
+    let still = SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() };
+    submitter.submit(renderer.record(still).unwrap()).unwrap();
+    let log = renderer.scheduler().timeline().take();
+    for (index, node) in log.runs[0].graph.nodes.iter().enumerate() {
+        let stage = node.labels.stage.as_deref().unwrap();
+        let works = ["bins", "compact", "prepare", "record", "finish", "upload"].contains(&stage);
+        assert!(works || log.runs[0].width(index) == 0, "{stage} has {} items", log.runs[0].width(index));
+    }
+}
+
+#[test]
+fn a_camera_that_sees_the_same_objects_keeps_the_order_of_opaque_ones() {
+    let mut scene = field(500);
+    // It sees all, wherever it is.
+    scene.cameras.truncate(1);
+    scene.cameras[0].position.z = 2_000.0;
+    let (mut renderer, submitter) = renderer(Quality::balanced(), 1);
+    submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    renderer.scheduler().timeline().start();
+    scene.cameras[0].position.x += 1.0;
+    submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let log = renderer.scheduler().timeline().take();
+    let width = |name: &str| {
+        let nodes = log.runs[0].graph.nodes.iter().enumerate();
+        let of_stage = nodes.filter(|(_, node)| node.labels.stage.as_deref() == Some(name));
+        of_stage.map(|(index, _)| log.runs[0].width(index)).sum::<usize>()
+    };
+    assert_eq!([width("visibility"), width("bin")], [500_usize.div_ceil(64), 0]);
+    assert!(width("sort") > 0, "blended objects have another order");
+}
+
+#[cfg(debug_assertions)]
+#[test]
+fn a_change_that_is_not_reported_is_named_and_the_next_frame_is_right() {
+    let scene = field(300);
+    let (mut renderer, _) = renderer(Quality::balanced(), 2);
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
+    let mut positions = scene.as_scene_ref().positions.to_vec();
+    positions[211].x += 1.0;
+    let moved = SceneRef { positions: &positions, changes: Changes::Objects(&[1, 212]), ..scene.as_scene_ref() };
+    let error = renderer.record(moved).map(drop).unwrap_err();
+    assert!(matches!(error, FrameError::Scene(SceneError::UnreportedChange { object: 211 })), "{error}");
+    let told_nothing_more = SceneRef { changes: Changes::NONE, ..moved };
+    let recorded = renderer.record(told_nothing_more).unwrap();
+    assert_eq!(contents(&renderer, recorded.statistics()), of_a_new_renderer(Quality::balanced(), moved));
+}
+
+#[test]
+fn a_shadow_map_of_another_projection_keeps_no_list() {
+    let mut scene = field(200);
+    let [cone, hemisphere] = [
+        Light::Spot {
+            position: DVec3::Y * 60.0,
+            intensity: Vec3::splat(900.0),
+            range: 500.0,
+            direction: Vec3::NEG_Y,
+            inner_angle: 0.6,
+            outer_angle: 0.8,
+            casts_shadow: true,
+        },
+        Light::Hemispherical {
+            position: DVec3::Y * 60.0,
+            intensity: Vec3::splat(900.0),
+            range: 500.0,
+            direction: Vec3::NEG_Y,
+            casts_shadow: true,
+        },
+    ];
+    for quality in [Quality::balanced(), Quality::exact()] {
+        let (mut renderer, _) = renderer(quality, 1);
+        for light in [cone, hemisphere, cone, hemisphere] {
+            scene.lights = vec![light];
+            let still = SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() };
+            let recorded = renderer.record(still).unwrap();
+            let found = contents(&renderer, recorded.statistics());
+            let difference = difference(&found, &of_a_new_renderer(quality, still));
+            assert!(difference.is_none(), "{difference:?} with {light:?}");
+        }
+    }
+}
