@@ -42,6 +42,19 @@ pub fn back_to_back(objects: [usize; 4]) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
+/// A row of clouds far from each other, `objects` boxes in each, one after the other in the scene. Each of the cameras sees one of the
+/// first clouds.
+///
+/// # Errors
+/// Returns an error if the scene rejects a mesh, a material or an object.
+pub fn row(clouds: usize, objects: usize, cameras: usize) -> Result<Scene, SceneError> {
+    let center = |cloud: usize| DVec3::X * (cloud as f64 * 50.0 * DISTANCE);
+    let mut scene = scene_of_clouds((0..clouds).map(|cloud| (center(cloud), objects)))?;
+    let before = |cloud| camera(cloud, center(cloud) + DVec3::Z * DISTANCE, center(cloud));
+    scene.cameras = (0..cameras).map(before).collect();
+    Ok(scene)
+}
+
 fn directions(count: usize) -> impl Iterator<Item = DVec3> {
     (0..count).map(move |index| {
         let (sine, cosine) = (TAU * index as f64 / count as f64).sin_cos();

@@ -1,36 +1,84 @@
-//! A scene in which all objects move.
+//! A scene in which objects or cameras move.
 
 use drawloom::glam::DVec3;
-use drawloom::scene::{Scene, SceneRef};
+use drawloom::scene::{Camera, Changes, Scene, SceneRef};
+use drawloom_testing::random::Random;
 
 /// An engine's world: its positions are an array of its own, which it lends to the renderer.
 pub struct Moving {
     scene: Scene,
+    motion: Motion,
     positions: Vec<DVec3>,
+    cameras: Vec<Camera>,
+    /// Which objects moved in the latest step, if the world says so.
+    moved: Vec<u32>,
     frame: u32,
+    random: Random,
+}
+
+/// What moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// All objects. The engine says nothing about it.
+    Everything,
+    /// One object in a hundred, another one in each frame. The engine says which.
+    OnePercent,
+    /// Nothing, and the engine says so.
+    Nothing,
+    /// The cameras alone, and the engine says that no object does.
+    Cameras,
 }
 
 /// The distance that an object moves per frame, in metres, and the number of frames after which it turns around.
 const STEP: f64 = 1e-3;
 const FRAMES: u32 = 64;
 
+impl Motion {
+    pub const ALL: [Self; 4] = [Self::Everything, Self::OnePercent, Self::Nothing, Self::Cameras];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Everything => "moving",
+            Self::OnePercent => "one percent moving",
+            Self::Nothing => "still",
+            Self::Cameras => "still, cameras moving",
+        }
+    }
+}
+
 impl Moving {
-    pub fn new(scene: Scene) -> Self {
+    pub fn new(scene: Scene, motion: Motion) -> Self {
         let positions = scene.as_scene_ref().positions.to_vec();
-        Self { scene, positions, frame: 0 }
+        let cameras = scene.cameras.clone();
+        Self { scene, motion, positions, cameras, moved: Vec::new(), frame: 0, random: Random::new() }
     }
 
-    /// Moves every object a little, back and forth, so that it stays near its original position.
+    /// Moves what moves a little, back and forth, so that it stays near its original position.
     pub fn step(&mut self) {
         let forward = (self.frame / FRAMES).is_multiple_of(2);
         let step = DVec3::new(STEP, STEP / 2.0, 0.0) * if forward { 1.0 } else { -1.0 };
-        for position in &mut self.positions {
-            *position += step;
+        self.moved.clear();
+        match self.motion {
+            Motion::Everything => self.positions.iter_mut().for_each(|position| *position += step),
+            Motion::OnePercent => {
+                for _ in 0..self.positions.len().div_ceil(100) {
+                    let object = self.random.below(self.positions.len());
+                    self.positions[object] += step;
+                    self.moved.push(object as u32);
+                }
+            }
+            Motion::Nothing => {}
+            Motion::Cameras => self.cameras.iter_mut().for_each(|camera| camera.position += step),
         }
         self.frame += 1;
     }
 
+    /// The scene. Only one renderer may draw it, because it tells what changed since the step before.
     pub fn as_scene_ref(&self) -> SceneRef<'_> {
-        SceneRef { positions: &self.positions, ..self.scene.as_scene_ref() }
+        let changes = match self.motion {
+            Motion::Everything => Changes::Unknown,
+            Motion::OnePercent | Motion::Nothing | Motion::Cameras => Changes::Objects(&self.moved),
+        };
+        SceneRef { positions: &self.positions, cameras: &self.cameras, changes, ..self.scene.as_scene_ref() }
     }
 }

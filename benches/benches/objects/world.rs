@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
 use drawloom_benches::boxes::new_box;
-use drawloom_benches::moving::Moving;
+use drawloom_benches::moving::{Motion, Moving};
 use drawloom_testing::random::Random;
 
 /// The main camera's view, and the light's.
@@ -45,5 +45,5 @@ pub fn new(objects: usize) -> Result<Moving, SceneError> {
         range: 40.0,
         casts_shadow: true,
     });
-    Ok(Moving::new(scene))
+    Ok(Moving::new(scene, Motion::Everything))
 }

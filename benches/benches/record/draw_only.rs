@@ -26,7 +26,7 @@ pub struct DrawOnly {
 }
 
 /// Fewer are not worth another thread.
-const MIN_OBJECTS_PER_JOB: usize = 512;
+pub const MIN_OBJECTS_PER_JOB: usize = 512;
 
 struct CameraBuffers {
     clip_from_world: wgpu::Buffer,
@@ -97,15 +97,6 @@ impl DrawOnly {
     pub fn prepare(&mut self, scene: &SceneRef<'_>) {
         let objects =
             self.gpu_objects.par_iter_mut().zip(&mut self.spheres).enumerate().with_min_len(MIN_OBJECTS_PER_JOB);
-        objects.for_each(|(object, (gpu_object, sphere))| {
-            (*gpu_object, *sphere) = describe(scene, object);
-        });
-        self.write_objects();
-    }
-
-    /// As [`prepare`](Self::prepare), on the calling thread.
-    pub fn prepare_serially(&mut self, scene: &SceneRef<'_>) {
-        let objects = self.gpu_objects.iter_mut().zip(&mut self.spheres).enumerate();
         objects.for_each(|(object, (gpu_object, sphere))| {
             (*gpu_object, *sphere) = describe(scene, object);
         });

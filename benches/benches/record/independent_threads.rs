@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::clouds::around_one;
-use drawloom_benches::moving::Moving;
+use drawloom_benches::moving::{Motion, Moving};
 
 use crate::CAMERAS;
 use crate::renderer::Drawloom;
@@ -66,7 +66,10 @@ impl Runner {
 fn draw(backend: BackendName, objects: usize, state: &mut Option<(Moving, Drawloom)>) -> Result<f64, Failure> {
     let (world, drawloom) = match state {
         Some(state) => state,
-        None => state.insert((Moving::new(around_one(CAMERAS, objects)?), Drawloom::new(backend.open()?, 1)?)),
+        None => state.insert((
+            Moving::new(around_one(CAMERAS, objects)?, Motion::Everything),
+            Drawloom::new(backend.open()?, 1, true)?,
+        )),
     };
     let mut elapsed = 0.0;
     for _ in 0..FRAMES {

@@ -1,29 +1,40 @@
-//! The cost of recording by technique: 4 cameras × 10,000 moving objects of 64 meshes and 16 materials, from visibility to submit.
+//! The cost of recording by technique: 4 cameras × 10,000 objects of 64 meshes and 16 materials, from visibility to submit.
 //!
 //!     cargo bench -p drawloom-benches --bench record
 //!     cargo bench -p drawloom-benches --bench record -- --quick
 //!     cargo bench -p drawloom-benches --bench record -- --backend noop
+//!
+//! In the scene *moving*, every object moves, and the engine says nothing about it. In *one percent moving*, *still* and *still, cameras
+//! moving* it says what moved. Techniques that issue 64 instanced draws a camera have a table of their own:
+//!
+//! - *by-mesh* instances by hand: a thread culls a camera, counts and scatters its objects by mesh, and records one draw a mesh. It
+//!   is the best plain code there is here. On two threads, a thread takes a camera at a time.
+//! - *drawloom* is this crate by default, and *drawloom-…* are its recording strategies, each alone.
+//!
+//! Techniques that issue 10,000 single draws a camera have another:
 //!
 //! - *naive* is a plain engine: the same culling, and then all state for each object, in the order of the scene, on one thread,
 //!   directly into the pass.
 //! - *rayon* splits the objects of each camera into chunks, culls them and records a bundle of each in parallel; all meshes are in
 //!   one buffer and all objects in another, so no state is set between draws.
 //! - *encoder-per-thread* has a thread per camera, which culls and records directly into an encoder of its own, in the same form.
-//! - *by-mesh* instances by hand: a thread culls a camera, counts and scatters its objects by mesh, and records one draw a mesh. It
-//!   is the best plain code there is here, and the peer to compare with; the others issue single draws.
-//! - *drawloom* is this crate by default, and *drawloom-…* are its recording strategies, each alone.
+//! - *drawloom-not-instanced* is this crate without instancing.
 //!
-//! All draw the same picture, which is checked first, upload the moving objects in every frame, and use wgpu alike. They are
+//! All draw the same picture, which is checked first, upload what moved in every frame, and use wgpu alike. They are
 //! interleaved; a sample is as many frames as fill some milliseconds. The table shows medians, and how often a frame allocates
 //! memory, counted over the whole process in frames that are not timed. For Drawloom it also shows the renderer's own
 //! allocations, counted on a backend that does nothing.
 //!
-//! `target/drawloom/record.json` and `.svg` have the same.
+//! On noop a third table shows how frames of this crate grow with the number of objects and of cameras. The last line names the
+//! targets that were missed.
+//!
+//! `target/drawloom/record.json` and `.svg`, and `record_extents.json`, have the same.
 
 mod allocations;
 mod by_mesh;
 mod draw_only;
 mod encoders;
+mod extents;
 mod fixture;
 mod independent_threads;
 mod measure;
@@ -41,6 +52,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
 
 use allocations::Counting;
@@ -90,6 +102,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut report = Report::new(&extent);
     for backend in arguments.backend.backends() {
         report.measured.push(measure::measure(&extent, backend, &progress)?);
+    }
+    if arguments.backend.backends().any(|backend| backend == BackendName::Noop) {
+        report.extents = extents::measure(&extent, &progress)?;
     }
     progress.finish_and_clear();
     report.print();

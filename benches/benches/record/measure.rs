@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::clouds::around_one;
 use drawloom_benches::harness::{Harness, Rounds};
-use drawloom_benches::moving::Moving;
+use drawloom_benches::moving::{Motion, Moving};
 use drawloom_benches::statistics::median;
 use drawloom_benches::stopwatch::mean_frame;
 use indicatif::ProgressBar;
@@ -29,18 +29,21 @@ pub struct Measured {
     pub independent: f64,
     /// The speed-up of two workers over one, and of two independent threads over one worker.
     pub speed_ups: [f64; 2],
-    /// The speed-up of one worker over by-mesh on one thread, and of two workers over two threads.
-    pub speed_ups_over_by_mesh: [f64; 2],
+    /// The time of one worker as a share of by-mesh on one thread, and of two workers of two threads.
+    pub of_by_mesh: [f64; 2],
+    /// The time of two workers without instancing as a share of the fastest peer with an encoder a camera.
+    pub of_encoders: f64,
+    /// The time of each scene, with one worker, as a share of the scene in which everything moves.
+    pub of_moving: Vec<(&'static str, f64)>,
 }
 
 /// # Errors
 /// Returns an error if a frame cannot be drawn, or if a technique draws another picture.
 pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Measured, Failure> {
     let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
-    let mut world = Moving::new(around_one(CAMERAS, extent.objects)?);
-    let mut contenders = Contender::all(backend, &world.as_scene_ref())?;
+    let mut contenders = Contender::all(backend, extent.objects)?;
     progress.set_message(backend.name());
-    pictures::compare(&mut contenders, world.as_scene_ref(), backend == BackendName::Adapter)?;
+    pictures::compare(&mut contenders, backend == BackendName::Adapter)?;
 
     let independent = IndependentThreads::new(backend, extent.objects);
     let mut independent_times = Vec::new();
@@ -48,7 +51,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     let mut harness = Harness::new(rounds, progress);
     for round in harness.rounds(contenders.len()) {
         let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
-        let samples = harness.round(&mut contenders, |contender| sample(contender, &mut world, at_least))?;
+        let samples = harness.round(&mut contenders, |contender| sample(contender, at_least))?;
         let independent_time = independent.sample()?;
         if !round.is_warm_up() {
             times.iter_mut().zip(samples).for_each(|(times, sample)| times.push(sample));
@@ -57,7 +60,10 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     }
     let nanoseconds = |seconds: f64| seconds * 1e9 / (CAMERAS * extent.objects) as f64;
     let mut rows = Vec::new();
-    let find = |name, workers| contenders.iter().position(|one| (one.name, one.workers) == (name, workers));
+    let find_in = |name, workers, motion| {
+        contenders.iter().position(|one| (one.name, one.workers, one.motion) == (name, workers, motion))
+    };
+    let find = |name, workers| find_in(name, workers, Motion::Everything);
     let [naive, one, two] = [("naive", 1), ("drawloom", 1), ("drawloom", 2)].map(|(name, workers)| find(name, workers));
     // The ratio of two samples of the same round, so that a disturbance meets both.
     let speed_up = |slow: Option<usize>, fast: &[f64]| {
@@ -65,18 +71,25 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         median(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
     };
     let speed_ups = [speed_up(one, two.map_or(&[][..], |two| &times[two])), speed_up(one, &independent_times)];
-    let by_mesh = [(1, one), (2, two)]
-        .map(|(threads, drawloom)| speed_up(find("by-mesh", threads), drawloom.map_or(&[][..], |index| &times[index])));
+    let share = |drawloom: Option<usize>, peer: Option<usize>| {
+        1.0 / speed_up(peer, drawloom.map_or(&[][..], |index| &times[index]))
+    };
+    let of_by_mesh = [(1, one), (2, two)].map(|(threads, drawloom)| share(drawloom, find("by-mesh", threads)));
+    let of_encoders = share(find("drawloom-not-instanced", 2), find("encoder-per-thread", CAMERAS));
+    let of_moving = Motion::ALL[1..].iter().map(|&motion| (motion.name(), share(find_in("drawloom", 1, motion), one)));
+    let of_moving = of_moving.collect();
     for (contender, times) in contenders.iter_mut().zip(&times) {
-        let own = contender.is_drawloom().then(|| own_requests(contender.workers, rounds.warm_up, &mut world));
+        let own = contender.is_drawloom().then(|| own_requests(contender, rounds.warm_up, extent.objects));
         rows.push(Row {
             technique: contender.name,
+            scene: contender.motion.name(),
             backend,
             workers: contender.workers,
+            is_instanced: contender.is_instanced(),
             ns_per_object_view: nanoseconds(median(times.iter().copied())),
             speed_up_over_naive: speed_up(naive, times),
             own_allocations_per_frame: own.transpose()?,
-            allocations_per_frame: requests(&mut world, |world| {
+            allocations_per_frame: requests(&mut contender.world, |world| {
                 let (result, requests) = requests_in(|| contender.technique.frame(world.as_scene_ref()));
                 result?;
                 contender.technique.wait()?;
@@ -89,18 +102,21 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         rows,
         independent: nanoseconds(median(independent_times)),
         speed_ups,
-        speed_ups_over_by_mesh: by_mesh,
+        of_by_mesh,
+        of_encoders,
+        of_moving,
     })
 }
 
 /// Draws one frame, and more until they have taken `at_least`; returns seconds per frame.
-fn sample(contender: &mut Contender, world: &mut Moving, at_least: Duration) -> Result<f64, Failure> {
+pub fn sample(contender: &mut Contender, at_least: Duration) -> Result<f64, Failure> {
+    let Contender { technique, world, .. } = contender;
     mean_frame(at_least, || {
         world.step();
         let start = Instant::now();
-        contender.technique.frame(world.as_scene_ref())?;
+        technique.frame(world.as_scene_ref())?;
         let elapsed = start.elapsed();
-        contender.technique.wait()?;
+        technique.wait()?;
         Ok(elapsed)
     })
 }
@@ -117,8 +133,9 @@ fn requests(world: &mut Moving, mut frame: impl FnMut(&Moving) -> Result<usize, 
 }
 
 /// The number of allocations of a frame of this crate on the no-op backend.
-fn own_requests(workers: usize, warm_up: usize, world: &mut Moving) -> Result<usize, Failure> {
-    let (mut renderer, submitter) = renderer(NoopBackend, workers)?;
+fn own_requests(contender: &Contender, warm_up: usize, objects: usize) -> Result<usize, Failure> {
+    let world = &mut Moving::new(around_one(CAMERAS, objects)?, contender.motion);
+    let (mut renderer, submitter) = renderer(NoopBackend, contender.workers, contender.is_instanced())?;
     for _ in 0..warm_up {
         world.step();
         submitter.submit(renderer.record(world.as_scene_ref())?)?;

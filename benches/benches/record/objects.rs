@@ -33,8 +33,8 @@ impl GpuObject {
 /// A bounding sphere, by which all techniques cull.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sphere {
-    center: DVec3,
-    radius: f32,
+    pub center: DVec3,
+    pub radius: f32,
 }
 
 impl Sphere {

@@ -2,7 +2,6 @@
 
 use std::sync::mpsc;
 
-use drawloom::scene::SceneRef;
 use drawloom::wgpu;
 
 use crate::technique::{Contender, Failure};
@@ -43,10 +42,11 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
 ///
 /// # Errors
 /// Returns an error if one does not draw all objects, or draws another picture.
-pub fn compare(contenders: &mut [Contender], scene: SceneRef<'_>, has_pictures: bool) -> Result<(), Failure> {
+pub fn compare(contenders: &mut [Contender], has_pictures: bool) -> Result<(), Failure> {
     let mut first = Vec::new();
     for contender in contenders {
         let name = contender.name;
+        let scene = contender.world.as_scene_ref();
         contender.technique.frame(scene)?;
         contender.technique.wait()?;
         let (drawn, all) = (contender.technique.drawn(), scene.object_count() * scene.cameras.len());

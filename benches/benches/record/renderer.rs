@@ -19,15 +19,20 @@ pub struct Drawloom {
 }
 
 impl Drawloom {
-    pub fn new(backend: WgpuBackend, workers: usize) -> Result<Self, Failure> {
-        let (renderer, submitter) = renderer(backend, workers)?;
+    pub fn new(backend: WgpuBackend, workers: usize, instancing: bool) -> Result<Self, Failure> {
+        let (renderer, submitter) = renderer(backend, workers, instancing)?;
         Ok(Self { renderer, submitter, last: None, drawn: 0 })
     }
 }
 
 /// A renderer with this process, on any backend.
-pub fn renderer<B: Backend>(backend: B, workers: usize) -> Result<(Renderer<B>, Submitter<B>), Failure> {
-    Ok(Renderer::builder(backend).process(Surfaces).output(COLOR).build(Arc::new(Scheduler::new(workers)?))?)
+pub fn renderer<B: Backend>(
+    backend: B,
+    workers: usize,
+    instancing: bool,
+) -> Result<(Renderer<B>, Submitter<B>), Failure> {
+    let builder = Renderer::builder(backend).process(Surfaces).output(COLOR).instancing(instancing);
+    Ok(builder.build(Arc::new(Scheduler::new(workers)?))?)
 }
 
 impl Technique for Drawloom {

@@ -8,15 +8,22 @@ use drawloom_benches::results;
 use drawloom_benches::table::Table;
 use serde::Serialize;
 
+use drawloom_benches::moving::Motion;
+
 use crate::Extent;
+use crate::extents::{self, ExtentRow};
 use crate::measure::Measured;
 
 /// A technique on a number of workers.
 #[derive(Serialize)]
 pub struct Row {
     pub technique: &'static str,
+    pub scene: &'static str,
     pub backend: BackendName,
     pub workers: usize,
+    /// Whether equal objects are one draw.
+    #[serde(skip)]
+    pub is_instanced: bool,
     pub ns_per_object_view: f64,
     /// Speed-up over naive.
     #[serde(skip)]
@@ -33,11 +40,45 @@ pub struct Report {
     rounds: [usize; 2],
     objects: usize,
     pub measured: Vec<Measured>,
+    pub extents: Vec<ExtentRow>,
+}
+
+/// A figure to reach.
+struct Target {
+    figure: &'static str,
+    is_upper_bound: bool,
+    bound: f64,
+    reached: f64,
+}
+
+impl Target {
+    fn at_most(figure: &'static str, bound: f64, reached: f64) -> Self {
+        Self { figure, is_upper_bound: true, bound, reached }
+    }
+
+    fn at_least(figure: &'static str, bound: f64, reached: f64) -> Self {
+        Self { figure, is_upper_bound: false, bound, reached }
+    }
+
+    fn wanted(&self) -> String {
+        format!("{} {}", if self.is_upper_bound { "≤" } else { "≥" }, self.bound)
+    }
+
+    /// NaN, where a figure is missing, meets no target.
+    fn is_met(&self) -> bool {
+        if self.is_upper_bound { self.reached <= self.bound } else { self.reached >= self.bound }
+    }
 }
 
 impl Report {
     pub fn new(extent: &Extent) -> Self {
-        Self { extent: extent.name, rounds: extent.rounds, objects: extent.objects, measured: Vec::new() }
+        Self {
+            extent: extent.name,
+            rounds: extent.rounds,
+            objects: extent.objects,
+            measured: Vec::new(),
+            extents: Vec::new(),
+        }
     }
 
     pub fn print(&self) {
@@ -45,14 +86,35 @@ impl Report {
         let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
         println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
-        println!("4 cameras × {} moving objects; ns: from visibility to submit, per object and view", self.objects);
+        println!("4 cameras × {} objects; ns: from visibility to submit, per object and view", self.objects);
         println!("requests: for memory, a frame; own: where the backend does nothing");
         println!("of naive: the median of rounds, of two turns of one round each\n");
-        let headings = ["technique", "backend", "workers", "ns", "of naive", "requests", "own requests"];
+        println!("Instanced draws: 64 a camera\n");
+        self.print_rows(|row| row.is_instanced);
+        println!("\nSingle draws: {} a camera\n", self.objects);
+        self.print_rows(|row| !row.is_instanced);
+        println!();
+        for Measured { backend, independent, speed_ups, .. } in &self.measured {
+            println!(
+                "{}: two threads that draw a frame each, and share nothing, take {independent:.1} ns: {:.2} times as fast as one",
+                backend.name(),
+                speed_ups[1]
+            );
+        }
+        println!();
+        if !self.extents.is_empty() {
+            extents::print(&self.extents);
+        }
+        self.print_targets();
+    }
+
+    fn print_rows(&self, is_shown: impl Fn(&Row) -> bool) {
+        let headings = ["technique", "scene", "backend", "workers", "ns", "of naive", "requests", "own requests"];
         let mut table = Table::new(&headings);
-        for row in self.rows() {
+        for row in self.rows().filter(|row| is_shown(row)) {
             table.row([
                 row.technique.to_owned(),
+                row.scene.to_owned(),
                 row.backend.name().to_owned(),
                 row.workers.to_string(),
                 format!("{:.1}", row.ns_per_object_view),
@@ -62,34 +124,53 @@ impl Report {
             ]);
         }
         table.print();
-        for Measured { backend, independent, speed_ups, .. } in &self.measured {
-            println!(
-                "{}: two threads that draw a frame each, and share nothing, take {independent:.1} ns: {:.2} times as fast as one",
-                backend.name(),
-                speed_ups[1]
-            );
-        }
-        println!();
-        self.print_targets();
     }
 
     /// Prints the targets on `noop`, and what was reached.
     fn print_targets(&self) {
         let Some(noop) = self.measured.iter().find(|measured| measured.backend == BackendName::Noop) else { return };
-        let two = noop.rows.iter().find(|row| (row.technique, row.workers) == ("drawloom", 2));
-        let of_naive = two.map_or(f64::NAN, |two| two.speed_up_over_naive);
+        let of_moving =
+            |name| noop.of_moving.iter().find(|(scene, _)| *scene == name).map_or(f64::NAN, |(_, share)| *share);
+        let microseconds = |scene, workers| {
+            let row = self.extents.iter().find(|row| (row.scene, row.workers) == (scene, workers));
+            row.map_or(f64::NAN, |row| row.microseconds_per_frame)
+        };
+        let per_object = |scene| {
+            let row = self.extents.iter().find(|row| (row.scene, row.workers) == (scene, 2));
+            row.map_or(f64::NAN, |row| row.microseconds_per_frame / (row.objects * row.cameras) as f64)
+        };
+        let [two, independent] = noop.speed_ups;
+        let targets = [
+            Target::at_most("drawloom with 1 worker ÷ by-mesh on 1 thread", 0.6, noop.of_by_mesh[0]),
+            Target::at_most("drawloom with 2 workers ÷ by-mesh on 2 threads", 0.6, noop.of_by_mesh[1]),
+            Target::at_least("drawloom with 1 worker ÷ 2 workers", 1.8, two),
+            Target::at_least("the same ÷ that of two independent threads", 0.9, two / independent),
+            Target::at_most("not instanced with 2 workers ÷ encoder-per-thread", 0.5, noop.of_encoders),
+            Target::at_most("one percent moving ÷ moving", 0.2, of_moving(Motion::OnePercent.name())),
+            Target::at_most("still, cameras moving ÷ moving", 0.5, of_moving(Motion::Cameras.name())),
+            Target::at_most("still, 100,000 objects in one view, µs a frame", 30.0, microseconds(extents::STILL, 1)),
+            Target::at_most(
+                "64 cameras, 50 of 100,000 ÷ 50 of 3,200 objects",
+                1.5,
+                microseconds(extents::FEW_OF_MANY, 1) / microseconds(extents::FEW_OF_FEW, 1),
+            ),
+            Target::at_most(
+                "1,000,000 ÷ 10,000 objects, an object and view, 2 workers",
+                1.3,
+                per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
+            ),
+        ];
         println!("Targets and results on noop\n");
         let mut table = Table::new(&["figure", "target", "reached"]);
-        for (figure, target, reached) in [
-            ("naive, of drawloom with 2 workers", 20.0, of_naive),
-            ("by-mesh on 1 thread, of drawloom with 1 worker", 1.67, noop.speed_ups_over_by_mesh[0]),
-            ("by-mesh on 2 threads, of drawloom with 2 workers", 1.67, noop.speed_ups_over_by_mesh[1]),
-            ("drawloom with 1 worker, of 2", 1.8, noop.speed_ups[0]),
-        ] {
-            let note = if reached >= target { "" } else { ", short" };
-            table.row([figure.to_owned(), format!("{target:.2}"), format!("{reached:.2}{note}")]);
+        for target in &targets {
+            table.row([target.figure.to_owned(), target.wanted(), format!("{:.2}", target.reached)]);
         }
         table.print();
+        let missed: Vec<_> = targets.iter().filter(|target| !target.is_met()).map(|target| target.figure).collect();
+        match &missed[..] {
+            [] => println!("\nAll targets are met."),
+            missed => println!("\nMissed: {}.", missed.join("; ")),
+        }
     }
 
     fn rows(&self) -> impl Iterator<Item = &Row> {
@@ -100,6 +181,7 @@ impl Report {
     /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         results::write_json("record.json", &self.rows().collect::<Vec<_>>())?;
+        results::write_json("record_extents.json", &self.extents)?;
         let panel = |&backend: &BackendName| {
             let rows = self.rows().filter(|row| row.backend == backend);
             let mut bars: Vec<_> = rows.map(bar).collect();
@@ -114,12 +196,12 @@ impl Report {
 
 /// Hand-written techniques are grey; this crate's are blue, and its default is green.
 fn bar(row: &Row) -> (String, f64, usize) {
-    let Row { technique, workers, .. } = row;
+    let Row { technique, scene, workers, .. } = row;
     let plural = if *workers == 1 { "" } else { "s" };
     let color = match *technique {
         "drawloom" => 6,
         name if name.starts_with("drawloom") => 3,
         _ => 0,
     };
-    (format!("{technique}, {workers} thread{plural}"), row.ns_per_object_view, color)
+    (format!("{technique}, {scene}, {workers} thread{plural}"), row.ns_per_object_view, color)
 }

@@ -6,6 +6,9 @@ use drawloom::backend::RecordingStrategy;
 use drawloom::scene::SceneRef;
 use drawloom_benches::backends::BackendName;
 
+use drawloom_benches::clouds::around_one;
+use drawloom_benches::moving::{Motion, Moving};
+
 use crate::CAMERAS;
 use crate::by_mesh::ByMesh;
 use crate::draw_only::DrawOnly;
@@ -32,26 +35,40 @@ pub trait Technique {
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure>;
 }
 
-/// A technique on a number of threads.
+/// A technique on a number of threads, in a scene.
 pub struct Contender {
     pub name: &'static str,
     pub workers: usize,
+    pub motion: Motion,
     pub technique: Box<dyn Technique>,
+    /// A world of its own, because what is told of changes holds for one renderer.
+    pub world: Moving,
 }
 
 impl Contender {
     /// All contenders, in the order of the table.
-    pub fn all(backend: BackendName, scene: &SceneRef<'_>) -> Result<Vec<Self>, Failure> {
+    pub fn all(backend: BackendName, objects: usize) -> Result<Vec<Self>, Failure> {
+        let scene = around_one(CAMERAS, objects)?;
+        let scene = &scene.as_scene_ref();
         let fixture = || Fixture::new(&backend.open()?, scene);
         let draw_only = || Ok::<_, Failure>(DrawOnly::new(fixture()?, scene));
-        let of = |name, workers, technique| Self { name, workers, technique };
+        let in_scene = |name, workers, motion, technique| {
+            Ok::<_, Failure>(Self {
+                name,
+                workers,
+                motion,
+                technique,
+                world: Moving::new(around_one(CAMERAS, objects)?, motion),
+            })
+        };
+        let of = |name, workers, technique| in_scene(name, workers, Motion::Everything, technique);
         let mut all = vec![
-            of("naive", 1, Box::new(Naive::new(fixture()?, scene)) as Box<dyn Technique>),
-            of("rayon", 1, Box::new(Parallel::new(draw_only()?, 1)?)),
-            of("rayon", 2, Box::new(Parallel::new(draw_only()?, 2)?)),
-            of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?)),
-            of("by-mesh", 1, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 1)?)),
-            of("by-mesh", 2, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 2)?)),
+            of("naive", 1, Box::new(Naive::new(fixture()?, scene)) as Box<dyn Technique>)?,
+            of("rayon", 1, Box::new(Parallel::new(draw_only()?, 1)?))?,
+            of("rayon", 2, Box::new(Parallel::new(draw_only()?, 2)?))?,
+            of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?))?,
+            of("by-mesh", 1, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 1)?))?,
+            of("by-mesh", 2, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 2)?))?,
         ];
         let strategies = [
             ("drawloom", None),
@@ -74,7 +91,12 @@ impl Contender {
                         }
                     },
                 };
-                all.push(of(name, workers, Box::new(Drawloom::new(opened, workers)?)));
+                all.push(of(name, workers, Box::new(Drawloom::new(opened, workers, true)?))?);
+            }
+            all.push(of("drawloom-not-instanced", workers, Box::new(Drawloom::new(backend.open()?, workers, false)?))?);
+            for motion in Motion::ALL.into_iter().filter(|motion| *motion != Motion::Everything) {
+                let technique = Box::new(Drawloom::new(backend.open()?, workers, true)?);
+                all.push(in_scene("drawloom", workers, motion, technique)?);
             }
         }
         Ok(all)
@@ -83,5 +105,10 @@ impl Contender {
     /// Whether it is a technique of this crate.
     pub fn is_drawloom(&self) -> bool {
         self.name.starts_with("drawloom")
+    }
+
+    /// Whether equal objects are one draw.
+    pub fn is_instanced(&self) -> bool {
+        matches!(self.name, "by-mesh") || self.is_drawloom() && self.name != "drawloom-not-instanced"
     }
 }
