@@ -93,7 +93,7 @@ impl Bins {
     }
 
     /// The number of bins.
-    #[allow(clippy::len_without_is_empty)] // Nobody asks.
+    #[allow(clippy::len_without_is_empty)] // It would have no caller.
     pub fn len(&self) -> usize {
         self.bins.len()
     }
