@@ -32,8 +32,7 @@ pub(super) struct StageGraph<B: Backend> {
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
 #[derive(Debug)]
 struct GraphKey {
-    /// Of each view the name, the kind, whether its picture is cached, and whether it is a paraboloid.
-    views: Vec<(String, ViewKind, bool, bool)>,
+    views: Vec<ViewKey>,
     /// For each process, the objects that it draws, and whether these hide what is behind them.
     draws: Vec<(Option<Selection>, bool)>,
     options: StageOptions,
@@ -50,18 +49,40 @@ pub(super) struct StageOptions {
     pub(super) opaque_order: DepthKey,
 }
 
-fn of_view(view: &RenderView) -> (&str, ViewKind, bool, bool) {
-    (view.name(), view.kind(), view.is_cached, view.camera.projection == Projection::Paraboloid)
+/// What decides which stages a view has.
+#[derive(Debug)]
+struct ViewKey {
+    name: String,
+    kind: ViewKind,
+    /// Whether its picture is cached.
+    is_cached: bool,
+    is_paraboloid: bool,
+}
+
+impl ViewKey {
+    fn new(view: &RenderView) -> Self {
+        Self {
+            name: view.name().to_owned(),
+            kind: view.kind(),
+            is_cached: view.is_cached,
+            is_paraboloid: is_paraboloid(view),
+        }
+    }
+
+    fn fits(&self, view: &RenderView) -> bool {
+        (self.name.as_str(), self.kind, self.is_cached, self.is_paraboloid)
+            == (view.name(), view.kind(), view.is_cached, is_paraboloid(view))
+    }
+}
+
+fn is_paraboloid(view: &RenderView) -> bool {
+    view.camera.projection == Projection::Paraboloid
 }
 
 impl GraphKey {
     fn new(draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> Self {
         Self {
-            views: views
-                .iter()
-                .map(of_view)
-                .map(|(name, kind, is_cached, is_paraboloid)| (name.to_owned(), kind, is_cached, is_paraboloid))
-                .collect(),
+            views: views.iter().map(ViewKey::new).collect(),
             draws: draws.iter().map(|draws| (draws.selection(), draws.hides())).collect(),
             options,
         }
@@ -69,12 +90,9 @@ impl GraphKey {
 
     /// Whether the key matches the inputs of a frame. Allocates nothing.
     fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> bool {
-        let views_of_key = self
-            .views
-            .iter()
-            .map(|(name, kind, is_cached, is_paraboloid)| (name.as_str(), *kind, *is_cached, *is_paraboloid));
         self.options == options
-            && views_of_key.eq(views.iter().map(of_view))
+            && self.views.len() == views.len()
+            && self.views.iter().zip(views).all(|(key, view)| key.fits(view))
             && self.draws.iter().copied().eq(draws.iter().map(|draws| (draws.selection(), draws.hides())))
     }
 }

@@ -7,7 +7,8 @@ use crate::command::Version;
 use crate::quality::CullingVolume;
 use crate::view::{Frustum, GroupBounds, ObjectTable, Overlap, RenderView, VisibleSet};
 
-/// The visible set of a view, and what it was found with. While the view stays as it is, a frame tests the objects that changed.
+/// The visible set of a view, and what it was found with. While the view does not change, a frame tests the
+/// objects that changed.
 #[derive(Debug, Default)]
 pub(super) struct ViewVisibility {
     pub(super) set: VisibleSet,
@@ -53,6 +54,7 @@ impl ViewVisibility {
             (&before.frustum, before.volume, before.objects) == (&now.frustum, now.volume, now.objects)
         };
         self.tests = match &self.tested_with {
+            _ if tests_occlusion => TestScope::All,
             Some(before) if *before == now => TestScope::None,
             Some(before) if is_same_view(before) && before.epoch + 1 == now.epoch && !table.all_changed() => {
                 TestScope::Changed
@@ -61,9 +63,6 @@ impl ViewVisibility {
         };
         // Occlusion removes objects from the set, so it is not the result of the frustum's test.
         self.tested_with = (!tests_occlusion).then_some(now);
-        if tests_occlusion {
-            self.tests = TestScope::All;
-        }
         if self.tests == TestScope::All {
             self.set.reset(table.len());
         }

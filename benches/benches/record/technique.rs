@@ -41,7 +41,7 @@ pub struct Contender {
     pub workers: usize,
     pub motion: Motion,
     pub technique: Box<dyn Technique>,
-    /// A world of its own, because what is told of changes holds for one renderer.
+    /// A world of its own, because the reported changes hold for one renderer.
     pub world: Moving,
 }
 
