@@ -39,15 +39,29 @@ impl Browser {
         programs.find(|program| program.is_file()).map(|program| Self { program })
     }
 
-    /// Opens the log's page, with a script added to it. The page has to become ready without writing to the console.
-    ///
+    /// Opens the log's page. The page has to become ready without writing to the console.
+    pub fn open(&self, name: &str, log: &Log) -> Result<LoadedPage, Failed> {
+        self.load_until(name, log, "", |page| page.value("ready") == "true")
+    }
+
+    /// Opens the log's page with a script added to it, which writes the body's data attribute `outcome` when it is done.
+    pub fn open_with(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
+        self.load_until(name, log, script, |page| !page.value("outcome").is_empty())
+    }
+
     /// The browser runs on virtual time, which advances while nothing happens. On a busy machine its budget may be spent before
     /// the compositor has drawn anything, so a page that is not ready is loaded again.
-    pub fn open(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
+    fn load_until(
+        &self,
+        name: &str,
+        log: &Log,
+        script: &str,
+        is_ready: impl Fn(&LoadedPage) -> bool,
+    ) -> Result<LoadedPage, Failed> {
         let mut body = String::new();
         for _ in 0..ATTEMPTS {
             let page = self.load(name, log, script)?;
-            if page.value("ready") == "true" {
+            if is_ready(&page) {
                 return Ok(page);
             }
             body = page.body;
