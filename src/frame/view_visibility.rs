@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
-use crate::chunked_array::block_ranges;
 use crate::command::Version;
 use crate::quality::CullingVolume;
-use crate::view::{Frustum, GroupBounds, ObjectTable, Overlap, RenderView, VisibleSet};
+use crate::view::{ChangedWord, Frustum, ObjectTable, RenderView, VisibleSet};
 
 /// The visible set of a view, and what it was found with. While the view does not change, a frame tests the
 /// objects that changed.
@@ -97,38 +96,26 @@ impl ViewVisibility {
         volume: CullingVolume,
     ) {
         if self.tests == TestScope::Changed {
-            indices.for_each(|index| {
-                let word = table.changed_word(index);
-                self.test_block(word / WORDS_PER_BLOCK, word..word + 1, table, frustum, volume);
-            });
-        } else {
-            let bounds = table.block_bounds();
-            for (group, words) in block_ranges(indices, WORDS_PER_BLOCK * GroupBounds::GROUPS) {
-                let overlaps = frustum.overlaps(&bounds[group]);
-                for (block, words) in block_ranges(words, WORDS_PER_BLOCK) {
-                    if overlaps[block % GroupBounds::GROUPS] == Overlap::Outside && volume != CullingVolume::None {
-                        self.set.test(objects_of(words, table), |_| 0);
-                    } else {
-                        self.test_block(block, words, table, frustum, volume);
-                    }
-                }
+            for ChangedWord { word, mask } in indices.map(|index| table.changed_word(index)) {
+                let block = table.block(word / WORDS_PER_BLOCK);
+                self.set.replace(word, mask, block.visible_among(frustum, volume, word % WORDS_PER_BLOCK, mask));
             }
+            return;
         }
-    }
-
-    /// Tests some words of a block.
-    fn test_block(
-        &self,
-        index: usize,
-        words: Range<usize>,
-        table: &ObjectTable,
-        frustum: &Frustum,
-        volume: CullingVolume,
-    ) {
-        let first = index * WORDS_PER_BLOCK;
-        table.block(index).visible_words(frustum, volume, words.start - first..words.end - first, |word, bits| {
-            self.set.test(objects_of(first + word..first + word + 1, table), |_| bits);
-        });
+        let blocks = indices.start / WORDS_PER_BLOCK..indices.end.div_ceil(WORDS_PER_BLOCK);
+        let test_block = |block: usize| {
+            let first = block * WORDS_PER_BLOCK;
+            let words = indices.start.max(first) - first..(indices.end - first).min(WORDS_PER_BLOCK);
+            table.block(block).visible_words(frustum, volume, words, |word, bits| {
+                self.set.replace(first + word, u64::MAX, bits);
+            });
+        };
+        // The set is empty, so blocks outside need no more work.
+        if volume == CullingVolume::None {
+            blocks.for_each(test_block);
+        } else {
+            table.block_bounds().visit_overlapping(frustum, blocks, test_block);
+        }
     }
 
     /// Completes the set when all tests are done and hidden objects removed.
@@ -137,10 +124,4 @@ impl ViewVisibility {
             self.set.compact(version);
         }
     }
-}
-
-/// The objects of some words.
-fn objects_of(words: Range<usize>, table: &ObjectTable) -> Range<usize> {
-    let end = words.end * VisibleSet::OBJECTS_PER_WORD;
-    words.start * VisibleSet::OBJECTS_PER_WORD..end.min(table.len())
 }

@@ -15,9 +15,9 @@ pub(super) struct ChangedObjects {
 
 /// Changed objects among 64: bit `b` of the mask is object `word × 64 + b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ChangedWord {
-    pub(super) word: usize,
-    pub(super) mask: u64,
+pub(crate) struct ChangedWord {
+    pub(crate) word: usize,
+    pub(crate) mask: u64,
 }
 
 impl ChangedObjects {

@@ -60,12 +60,14 @@ impl DrawStates {
     }
 
     /// The state of an object; `None` if a handle is stale.
-    #[inline]
+    #[inline(always)]
     pub(super) fn get(&self, mesh: Handle<Mesh>, material: Handle<Material>, scale: Vec3) -> Option<DrawState> {
         let MeshEntry { mesh: known_mesh, topology, .. } = (*self.meshes.get(mesh.index() as usize)?)?;
         let (known_material, states) = (*self.materials.get(material.index() as usize)?)?;
-        let is_mirrored = scale.is_negative_bitmask().count_ones() as usize % 2;
-        (known_mesh == mesh && known_material == material).then(|| states[is_mirrored].with_topology(topology))
+        let is_mirrored = (scale.x.to_bits() ^ scale.y.to_bits() ^ scale.z.to_bits()) >> 31 == 1;
+        let [as_is, mirrored] = states;
+        let state = if is_mirrored { mirrored } else { as_is };
+        (known_mesh == mesh && known_material == material).then(|| state.with_topology(topology))
     }
 }
 

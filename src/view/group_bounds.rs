@@ -25,6 +25,9 @@ pub(crate) struct GroupBounds {
 /// One number of each group.
 type Lane = [f64; GroupBounds::GROUPS];
 
+/// One number of each sphere of a word.
+type Word<T> = [T; Frustum::WORD];
+
 /// How the spheres of a group lie relative to a frustum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Overlap {
@@ -43,20 +46,12 @@ impl GroupBounds {
     /// Computes the bounds of a word of spheres. Empty spheres make no difference.
     #[inline(always)]
     pub(super) fn set_word(&mut self, word: usize, spheres: &BoundingSpheres) {
-        let entries = word * Frustum::WORD..(word + 1) * Frustum::WORD;
-        let radii = &spheres.radii()[entries.clone()];
-        let mut radius = f32::NEG_INFINITY;
-        for &other in radii {
-            radius = if other > radius { other } else { radius };
-        }
-        self.radii[word] = f64::from(radius);
+        let radii = word_of(spheres.radii(), word);
+        let has_empty = radii.iter().fold(false, |found, radius| found | (*radius < 0.0));
+        self.radii[word] = f64::from(reduce(radii, |one, other| if other > one { other } else { one }));
         for (axis, coordinates) in spheres.coordinates().iter().enumerate() {
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for (&coordinate, &radius) in coordinates[entries.clone()].iter().zip(radii) {
-                let [from, to] = if radius >= 0.0 { [coordinate; 2] } else { [f64::INFINITY, f64::NEG_INFINITY] };
-                low = if from < low { from } else { low };
-                high = if to > high { to } else { high };
-            }
+            let coordinates = word_of(coordinates, word);
+            let [low, high] = if has_empty { filled_extent(coordinates, radii) } else { extent(coordinates) };
             self.lows[axis][word] = low;
             self.highs[axis][word] = high;
         }
@@ -81,6 +76,46 @@ impl GroupBounds {
             self.highs[axis][group] = parts.highs[axis].into_iter().fold(f64::NEG_INFINITY, f64::max);
         }
     }
+}
+
+/// The entries of a word.
+#[inline(always)]
+fn word_of<T>(column: &[T; BoundingSpheres::COUNT], word: usize) -> &Word<T> {
+    column[word * Frustum::WORD..].first_chunk().expect("a column is of whole words")
+}
+
+/// The least and the greatest of some coordinates.
+#[inline(always)]
+fn extent(coordinates: &Word<f64>) -> [f64; 2] {
+    let least = reduce(coordinates, |one, other| if other < one { other } else { one });
+    let greatest = reduce(coordinates, |one, other| if other > one { other } else { one });
+    [least, greatest]
+}
+
+/// The least and the greatest coordinate of the spheres that are not empty.
+#[cold]
+fn filled_extent(coordinates: &Word<f64>, radii: &Word<f32>) -> [f64; 2] {
+    let filled = coordinates.iter().zip(radii).filter(|(_, radius)| **radius >= 0.0);
+    filled.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (&coordinate, _)| {
+        [low.min(coordinate), high.max(coordinate)]
+    })
+}
+
+/// One number made of all of them, in the order of a tournament: each round makes one number of two, all of which compile to a few
+/// vector instructions. `choose` must not depend on the order.
+#[inline(always)]
+fn reduce<T: Copy + Default>(numbers: &Word<T>, choose: impl Fn(T, T) -> T) -> T {
+    const HALF: usize = Frustum::WORD / 2;
+    let mut chosen = [T::default(); HALF];
+    for index in 0..HALF {
+        chosen[index] = choose(numbers[index], numbers[index + HALF]);
+    }
+    for half in [16, 8, 4, 2, 1] {
+        for index in 0..half {
+            chosen[index] = choose(chosen[index], chosen[index + half]);
+        }
+    }
+    chosen[0]
 }
 
 impl Default for GroupBounds {

@@ -3,6 +3,7 @@
 //! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts.
 
 mod bin;
+mod block_bounds;
 mod bounding_boxes;
 mod bounding_spheres;
 mod changed_objects;
@@ -14,6 +15,7 @@ mod gpu_light;
 mod gpu_object;
 mod gpu_view;
 mod group_bounds;
+mod group_columns;
 mod light_table;
 mod object_block;
 mod object_description;
@@ -31,13 +33,13 @@ pub(crate) use bin::bin_visible;
 pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;
 pub use bounding_spheres::{BoundingSphere, BoundingSpheres};
+pub(crate) use changed_objects::ChangedWord;
 pub(crate) use fill::Fill;
 pub use fixed_position::FixedPosition;
 pub use frustum::Frustum;
 pub use gpu_light::GpuLight;
 pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
-pub(crate) use group_bounds::{GroupBounds, Overlap};
 pub use light_table::{LightClass, LightTable};
 pub use object_block::ObjectBlock;
 pub use object_description::ObjectDraw;

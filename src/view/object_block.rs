@@ -5,8 +5,9 @@ use std::ops::Range;
 use super::bounding_spheres::{BoundingSphere, BoundingSpheres};
 use super::frustum::Classified;
 use super::group_bounds::{GroupBounds, Overlap};
-use super::object_description::{LANES, ObjectDescription, ObjectDraw};
-use super::{BoundingBoxes, Frustum, GpuObject, OrientedBox, RejectionReason};
+use super::group_columns::{GroupColumns, LANES};
+use super::object_description::{GroupDescription, ObjectDescription, ObjectDraw};
+use super::{BoundingBoxes, Frustum, GpuObject, OrientedBox, RejectionReason, set_bits};
 use crate::quality::CullingVolume;
 use crate::scene::Blend;
 
@@ -44,21 +45,45 @@ impl ObjectBlock {
     /// The number of words in a block.
     pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
 
-    /// Replaces an object. Returns whether its mesh, material or state changed, and with them perhaps its bin.
+    /// Replaces objects of a group, from `entry` on, by their descriptions: those in the mask. Returns a mask of the objects whose mesh,
+    /// material or state changed, and with them perhaps their bin.
     #[inline(always)]
-    pub(super) fn set(&mut self, entry: usize, description: &ObjectDescription) -> bool {
-        let ObjectDescription { gpu_object, bounds, draw } = description;
-        self.gpu_objects[entry] = *gpu_object;
-        self.spheres.set(entry, *bounds);
-        self.set_rejected(entry, None);
-        let is_new = self.bins[entry] == NO_BIN;
-        let draw_changed = is_new || self.draws[entry] != *draw;
-        if draw_changed {
-            self.draws[entry] = *draw;
-            let (word, bit) = (entry / Frustum::WORD, entry % Frustum::WORD);
-            self.opaque[word] = self.opaque[word] & !(1 << bit) | u64::from(draw.state.blend() == Blend::None) << bit;
+    pub(super) fn set_group(
+        &mut self,
+        entry: usize,
+        mask: u8,
+        group: &GroupDescription,
+        columns: &GroupColumns<'_>,
+    ) -> u8 {
+        self.spheres.set_group(entry, mask, group.valid, &group.centers, &group.radii);
+        let gpu_objects = self.gpu_objects[entry..].first_chunk_mut::<LANES>().expect("groups do not cross blocks");
+        let draws = self.draws[entry..].first_chunk::<LANES>().expect("groups do not cross blocks");
+        let valid = mask & group.valid;
+        let mut draws_changed = 0;
+        if valid == u8::MAX {
+            for lane in 0..LANES {
+                gpu_objects[lane] = group.gpu_object(columns, lane);
+                draws_changed |= u8::from(draws[lane] != group.draws[lane]) << lane;
+            }
+        } else {
+            for lane in set_bits(valid.into()) {
+                gpu_objects[lane] = group.gpu_object(columns, lane);
+                draws_changed |= u8::from(draws[lane] != group.draws[lane]) << lane;
+            }
         }
-        draw_changed
+        if self.rejected_count > 0 {
+            set_bits(valid.into()).for_each(|lane| self.set_rejected(entry + lane, None));
+        }
+        for lane in set_bits(draws_changed.into()) {
+            self.set_draw(entry + lane, group.draws[lane]);
+        }
+        draws_changed
+    }
+
+    fn set_draw(&mut self, entry: usize, draw: ObjectDraw) {
+        self.draws[entry] = draw;
+        let (word, bit) = (entry / Frustum::WORD, entry % Frustum::WORD);
+        self.opaque[word] = self.opaque[word] & !(1 << bit) | u64::from(draw.state.blend() == Blend::None) << bit;
     }
 
     /// Replaces an object's box, if the culling volume is a box.
@@ -68,16 +93,10 @@ impl ObjectBlock {
         }
     }
 
-    /// The description of an object, or why it is rejected.
-    pub(super) fn description(&self, entry: usize) -> Result<ObjectDescription, RejectionReason> {
-        match self.rejected[entry] {
-            Some(reason) => Err(reason),
-            None => Ok(ObjectDescription {
-                gpu_object: self.gpu_objects[entry],
-                bounds: self.spheres.get(entry),
-                draw: self.draws[entry],
-            }),
-        }
+    /// The description of an object; `None` if it is rejected.
+    pub(super) fn description(&self, entry: usize) -> Option<ObjectDescription> {
+        let (gpu_object, bounds, draw) = (self.gpu_objects[entry], self.spheres.get(entry), self.draws[entry]);
+        self.rejected[entry].is_none().then_some(ObjectDescription { gpu_object, bounds, draw })
     }
 
     /// The rejected objects.
@@ -92,13 +111,11 @@ impl ObjectBlock {
         self.set_rejected(entry, None);
     }
 
-    /// Rejects an object: no view sees it.
+    /// Rejects an object that its group's description left empty: no view sees it.
     pub(super) fn reject(&mut self, entry: usize, reason: RejectionReason) {
-        self.spheres.set(entry, BoundingSphere::EMPTY);
         self.set_rejected(entry, Some(reason));
     }
 
-    #[inline(always)]
     fn set_rejected(&mut self, entry: usize, reason: Option<RejectionReason>) {
         if self.rejected[entry] != reason {
             let before = std::mem::replace(&mut self.rejected[entry], reason);
@@ -108,7 +125,7 @@ impl ObjectBlock {
 
     /// Removes the objects from their bins, whose numbers are about to be given anew.
     pub(super) fn forget_bins(&mut self) {
-        self.bins = [NO_BIN; Self::SIZE];
+        self.draws = [ObjectDraw::NONE; Self::SIZE];
     }
 
     /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see [`ObjectBlock::visible`]. Calls
@@ -138,6 +155,16 @@ impl ObjectBlock {
                 },
             );
         }
+    }
+
+    /// Tests objects of a word against a frustum: see [`ObjectBlock::visible`]. The mask that it returns is among `tested`; bit 0 of
+    /// both is the word's first object.
+    pub(crate) fn visible_among(&self, frustum: &Frustum, volume: CullingVolume, word: usize, tested: u64) -> u64 {
+        let first = word * Frustum::WORD;
+        if tested.count_ones() as usize >= WORD_TEST_THRESHOLD {
+            return self.visible(frustum, volume, first..first + Frustum::WORD) & tested;
+        }
+        set_bits(tested).fold(0, |mask, bit| mask | self.visible(frustum, volume, first + bit..first + bit + 1) << bit)
     }
 
     /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
@@ -183,9 +210,6 @@ impl ObjectBlock {
     }
 }
 
-/// The number of an entry's bin before it has one.
-const NO_BIN: u32 = u32::MAX;
-
 /// Fewer objects than this are tested one by one, which takes less time than testing a whole word.
 const WORD_TEST_THRESHOLD: usize = 12;
 
@@ -195,8 +219,8 @@ impl Default for ObjectBlock {
             gpu_objects: [bytemuck::Zeroable::zeroed(); Self::SIZE],
             spheres: BoundingSpheres::default(),
             boxes: None,
-            draws: [ObjectDraw::default(); Self::SIZE],
-            bins: [NO_BIN; Self::SIZE],
+            draws: [ObjectDraw::NONE; Self::SIZE],
+            bins: [0; Self::SIZE],
             opaque: [0; Self::WORDS],
             word_bounds: GroupBounds::default(),
             changed_in: [0; Self::SIZE / Self::GROUP],

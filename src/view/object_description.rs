@@ -3,15 +3,14 @@
 // Loops over the indices of arrays of a fixed length compile to vector instructions; chains of iterators do not always.
 #![allow(clippy::needless_range_loop)]
 
-use std::array::from_fn;
-
-use glam::{DMat3, DVec3, Quat, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::draw_states::DrawStates;
 use super::fixed_position::{is_within_reach, nearest_step};
+use super::group_columns::{GroupColumns, LANES, Lanes};
 use super::{BoundingSphere, FixedPosition, GpuObject, OrientedBox, RejectionReason};
 use crate::command::DrawState;
-use crate::scene::{Bounds, SceneRef, is_unit};
+use crate::scene::{SceneRef, is_unit};
 
 /// How an object is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,10 +23,9 @@ pub struct ObjectDraw {
     pub state: DrawState,
 }
 
-impl Default for ObjectDraw {
-    fn default() -> Self {
-        Self { mesh: 0, material: 0, state: DrawState::PLAIN }
-    }
+impl ObjectDraw {
+    /// How no object is drawn: there are fewer meshes.
+    pub(super) const NONE: Self = Self { mesh: u32::MAX, material: 0, state: DrawState::PLAIN };
 }
 
 /// What every view needs to know of an object.
@@ -38,61 +36,75 @@ pub(super) struct ObjectDescription {
     pub(super) draw: ObjectDraw,
 }
 
-/// The most objects that are described at once.
-pub(super) const LANES: usize = 8;
+/// What every view needs to know of a group of objects.
+pub(super) struct GroupDescription {
+    /// A mask of the objects that can be drawn; the numbers of the others mean nothing.
+    pub(super) valid: u8,
+    pub(super) draws: Lanes<ObjectDraw>,
+    /// The bounding spheres, as in [`BoundingSphere`].
+    pub(super) centers: [Lanes<f64>; 3],
+    pub(super) radii: Lanes<f32>,
+    /// The positions in fixed point.
+    steps: [Lanes<i64>; 3],
+    /// Quaternions of unit length.
+    orientations: [Lanes<f32>; 4],
+}
 
-/// One number of each object.
-type Lane<T> = [T; LANES];
-
-/// Describes objects among the [`LANES`] from `first` on: bit `b` of `mask` stands for the object `first + b`. Calls `put` with the
-/// index of each, and its description, or why it cannot be drawn.
-///
-/// What is computed is computed in loops over arrays of a fixed length, which compile to vector instructions.
-#[inline(always)]
-pub(super) fn describe_objects(
-    scene: &SceneRef<'_>,
-    draw_states: &DrawStates,
-    first: usize,
-    mask: u8,
-    mut put: impl FnMut(usize, Result<ObjectDescription, RejectionReason>),
-) {
-    let inputs = ObjectInputs::gather(scene, first);
-    let orientations = normalized(&inputs.orientations);
-    let offsets = rotated(&orientations, &inputs.scales, &inputs.centers);
-    let (centers, radii) = bounding_spheres(&inputs, &offsets);
-    let is_valid = inputs.are_valid(&radii);
-    let steps = nearest_steps(&inputs.positions);
-
-    for lane in (0..LANES).filter(|lane| mask >> lane & 1 == 1) {
-        let object = first + lane;
-        let (mesh, material, scale) = (scene.meshes[object], scene.materials[object], scene.scales[object]);
-        let description = match draw_states.get(mesh, material, scale) {
-            Some(state) if is_valid[lane] => {
-                let (position_low, position_high) =
-                    FixedPosition::from_steps([steps[0][lane], steps[1][lane], steps[2][lane]]).halves();
-                let gpu_object = GpuObject {
-                    position_low,
-                    material: material.index(),
-                    position_high,
-                    padding: 0,
-                    orientation: from_fn(|axis| orientations[axis][lane]),
-                    scale: scale.to_array(),
-                    object: object as u32,
-                };
-                let center = from_fn::<_, 3, _>(|axis| centers[axis][lane]).into();
-                let bounds = BoundingSphere { center, radius: radii[lane] };
-                let draw = ObjectDraw { mesh: mesh.index(), material: material.index(), state };
-                Ok(ObjectDescription { gpu_object, bounds, draw })
-            }
-            _ => Err(rejection_reason(scene, object)),
-        };
-        put(object, description);
+impl GroupDescription {
+    /// Describes the objects of a group.
+    ///
+    /// What is computed is computed in loops over arrays of a fixed length, which compile to vector instructions.
+    #[inline(always)]
+    pub(super) fn new(columns: &GroupColumns<'_>, draw_states: &DrawStates) -> Self {
+        let inputs = ObjectInputs::new(columns);
+        let orientations = normalized(&inputs.orientations);
+        let offsets = rotated(&orientations, &inputs.scales, &inputs.centers);
+        let (centers, radii) = bounding_spheres(&inputs, &offsets);
+        let steps = nearest_steps(&inputs.positions);
+        let (draws, known) = find_draws(columns, draw_states);
+        Self { valid: known & inputs.are_valid(&radii), draws, centers, radii, steps, orientations }
     }
+
+    /// The GPU layout of an object.
+    #[inline(always)]
+    pub(super) fn gpu_object(&self, columns: &GroupColumns<'_>, lane: usize) -> GpuObject {
+        let (position_low, position_high) = FixedPosition::from_steps(lane_of(&self.steps, lane)).halves();
+        GpuObject {
+            position_low,
+            material: self.draws[lane].material,
+            position_high,
+            padding: 0,
+            orientation: lane_of(&self.orientations, lane),
+            scale: columns.scales[lane].to_array(),
+            object: (columns.first + lane) as u32,
+        }
+    }
+
+    /// The description of one object; `None` if it cannot be drawn.
+    pub(super) fn object(&self, columns: &GroupColumns<'_>, lane: usize) -> Option<ObjectDescription> {
+        let bounds = BoundingSphere { center: lane_of(&self.centers, lane).into(), radius: self.radii[lane] };
+        let gpu_object = self.gpu_object(columns, lane);
+        (self.valid >> lane & 1 == 1).then(|| ObjectDescription { gpu_object, bounds, draw: self.draws[lane] })
+    }
+}
+
+/// How the objects of a group are drawn, and a mask of those whose mesh and material exist.
+#[inline(always)]
+fn find_draws(columns: &GroupColumns<'_>, draw_states: &DrawStates) -> (Lanes<ObjectDraw>, u8) {
+    let (mut draws, mut known) = ([ObjectDraw::NONE; LANES], 0);
+    for lane in 0..LANES {
+        let (mesh, material) = (columns.meshes[lane], columns.materials[lane]);
+        if let Some(state) = draw_states.get(mesh, material, columns.scales[lane]) {
+            draws[lane] = ObjectDraw { mesh: mesh.index(), material: material.index(), state };
+            known |= 1 << lane;
+        }
+    }
+    (draws, known)
 }
 
 /// The positions in fixed point.
 #[inline(always)]
-fn nearest_steps(positions: &[Lane<f64>; 3]) -> [Lane<i64>; 3] {
+fn nearest_steps(positions: &[Lanes<f64>; 3]) -> [Lanes<i64>; 3] {
     let mut steps = [[0; LANES]; 3];
     for axis in 0..3 {
         for lane in 0..LANES {
@@ -104,7 +116,7 @@ fn nearest_steps(positions: &[Lane<f64>; 3]) -> [Lane<i64>; 3] {
 
 /// Why an object cannot be drawn.
 #[cold]
-fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> RejectionReason {
+pub(super) fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> RejectionReason {
     let [x, y, z, w] = scene.orientations[object].to_array();
     // Rounded as where it was found to be invalid.
     let is_rotation = is_unit(x * x + y * y + z * z + w * w);
@@ -123,30 +135,18 @@ fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> RejectionReason {
 
 /// The numbers that objects are described by: an array for each coordinate.
 struct ObjectInputs {
-    positions: [Lane<f64>; 3],
-    orientations: [Lane<f32>; 4],
-    scales: [Lane<f32>; 3],
+    positions: [Lanes<f64>; 3],
+    orientations: [Lanes<f32>; 4],
+    scales: [Lanes<f32>; 3],
     /// The centres and radii of the bounds, in object space.
-    centers: [Lane<f32>; 3],
-    radii: Lane<f32>,
+    centers: [Lanes<f32>; 3],
+    radii: Lanes<f32>,
 }
 
 impl ObjectInputs {
-    /// The numbers of the objects from `first` on; zeros in lanes without an object.
     #[inline(always)]
-    fn gather(scene: &SceneRef<'_>, first: usize) -> Self {
-        let (positions, orientations) = (&scene.positions[first..], &scene.orientations[first..]);
-        let (scales, bounds) = (&scene.scales[first..], &scene.bounds[first..]);
-        let chunks = (positions.first_chunk(), orientations.first_chunk(), scales.first_chunk(), bounds.first_chunk());
-        if let (Some(positions), Some(orientations), Some(scales), Some(bounds)) = chunks {
-            Self::of(positions, orientations, scales, bounds)
-        } else {
-            Self::of(&padded(positions), &padded(orientations), &padded(scales), &padded(bounds))
-        }
-    }
-
-    #[inline(always)]
-    fn of(positions: &Lane<DVec3>, orientations: &Lane<Quat>, scales: &Lane<Vec3>, bounds: &Lane<Bounds>) -> Self {
+    fn new(columns: &GroupColumns<'_>) -> Self {
+        let GroupColumns { positions, orientations, scales, bounds, .. } = columns;
         let mut inputs = Self {
             positions: [[0.0; LANES]; 3],
             orientations: [[0.0; LANES]; 4],
@@ -170,9 +170,9 @@ impl ObjectInputs {
         inputs
     }
 
-    /// Whether objects have valid transforms and bounds. `world_radii` are those of their bounding spheres.
+    /// A mask of the objects that have valid transforms and bounds. `world_radii` are those of their bounding spheres.
     #[inline(always)]
-    fn are_valid(&self, world_radii: &Lane<f32>) -> Lane<bool> {
+    fn are_valid(&self, world_radii: &Lanes<f32>) -> u8 {
         let mut valid = [false; LANES];
         for lane in 0..LANES {
             let [x, y, z, w] = lane_of(&self.orientations, lane);
@@ -187,28 +187,22 @@ impl ObjectInputs {
                 & (self.radii[lane] >= 0.0)
                 & (world_radii[lane] <= MAX_RADIUS);
         }
-        valid
+        let mut mask = 0;
+        for lane in 0..LANES {
+            mask |= u8::from(valid[lane]) << lane;
+        }
+        mask
     }
 }
 
 /// The numbers of one lane.
 #[inline(always)]
-fn lane_of<T: Copy + Default, const N: usize>(numbers: &[Lane<T>; N], lane: usize) -> [T; N] {
+fn lane_of<T: Copy + Default, const N: usize>(numbers: &[Lanes<T>; N], lane: usize) -> [T; N] {
     let mut of_lane = [T::default(); N];
     for index in 0..N {
         of_lane[index] = numbers[index][lane];
     }
     of_lane
-}
-
-/// The first entries of a column; defaults in lanes beyond its end.
-#[cold]
-fn padded<T: Copy + Default>(column: &[T]) -> Lane<T> {
-    let mut lanes = [T::default(); LANES];
-    for (lane, entry) in lanes.iter_mut().zip(column) {
-        *lane = *entry;
-    }
-    lanes
 }
 
 /// Normalizes quaternions whose lengths differ from 1 by no more than [`is_unit`] allows.
@@ -217,7 +211,7 @@ fn padded<T: Copy + Default>(column: &[T]) -> Lane<T> {
 /// is below f32's precision, and take a fraction of the time of a square root and a division. They run in f64, because
 /// an error of one rounding in the length moves rotated vectors by four.
 #[inline(always)]
-fn normalized(orientations: &[Lane<f32>; 4]) -> [Lane<f32>; 4] {
+fn normalized(orientations: &[Lanes<f32>; 4]) -> [Lanes<f32>; 4] {
     let (mut widened, mut normalized) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
     for axis in 0..4 {
         for lane in 0..LANES {
@@ -241,7 +235,7 @@ fn normalized(orientations: &[Lane<f32>; 4]) -> [Lane<f32>; 4] {
 /// Scales vectors, and rotates the results v by quaternions of unit length, with the vector part b and the real part w:
 /// (w² − b·b) v + 2 (v·b) b + 2w (b × v).
 #[inline(always)]
-fn rotated(orientations: &[Lane<f32>; 4], scales: &[Lane<f32>; 3], vectors: &[Lane<f32>; 3]) -> [Lane<f32>; 3] {
+fn rotated(orientations: &[Lanes<f32>; 4], scales: &[Lanes<f32>; 3], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
     let mut rotated = [[0.0; LANES]; 3];
     for lane in 0..LANES {
         let [x, y, z, w] = lane_of(orientations, lane);
@@ -260,7 +254,7 @@ fn rotated(orientations: &[Lane<f32>; 4], scales: &[Lane<f32>; 3], vectors: &[La
 /// The bounding spheres of objects in the world: centres and radii. The radii include an upper bound of the distance in metres
 /// between an object's computed centre and where devices draw it. If a sphere is not finite, its radius is NaN or infinite.
 #[inline(always)]
-fn bounding_spheres(inputs: &ObjectInputs, offsets: &[Lane<f32>; 3]) -> ([Lane<f64>; 3], Lane<f32>) {
+fn bounding_spheres(inputs: &ObjectInputs, offsets: &[Lanes<f32>; 3]) -> ([Lanes<f64>; 3], Lanes<f32>) {
     let ObjectInputs { positions, scales, radii, .. } = inputs;
     let (mut centers, mut world_radii) = ([[0.0; LANES]; 3], [0.0; LANES]);
     for lane in 0..LANES {

@@ -5,11 +5,12 @@ use std::ops::Range;
 use multiversion::multiversion;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
+use super::block_bounds::BlockBounds;
 use super::changed_objects::{ChangedObjects, ChangedWord};
 use super::draw_states::DrawStates;
-use super::group_bounds::GroupBounds;
+use super::group_columns::{GroupColumns, LANES};
 use super::object_block::ObjectBlock;
-use super::object_description::{LANES, ObjectDraw, bounding_box, describe_objects};
+use super::object_description::{GroupDescription, ObjectDraw, bounding_box, rejection_reason};
 use super::{BoundingBoxes, Frustum, GpuObject, Rejections, set_bits};
 use crate::chunked_array::block_ranges;
 use crate::command::{Bin, Bins};
@@ -26,8 +27,7 @@ use crate::scene::{Changes, SceneRef};
 #[derive(Debug, Default)]
 pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
-    /// The bounds of the blocks, in groups.
-    block_bounds: RwLock<Vec<GroupBounds>>,
+    block_bounds: RwLock<BlockBounds>,
     bins: RwLock<Bins>,
     rejections: Rejections,
     length: usize,
@@ -88,7 +88,7 @@ impl ObjectTable {
         let old_count = self.blocks.len();
         let blocks = self.block_count().max(old_count);
         self.blocks.resize_with(blocks, RwLock::default);
-        self.block_bounds.get_mut().resize_with(blocks.div_ceil(GroupBounds::GROUPS), GroupBounds::default);
+        self.block_bounds.get_mut().resize(blocks);
         // Blocks whose boxes are already right stay untouched.
         let up_to_date = if self.boxes_volume == self.culling { old_count } else { 0 };
         for block in &mut self.blocks[up_to_date..] {
@@ -120,8 +120,8 @@ impl ObjectTable {
     ///
     /// # Panics
     /// If `index` is not below [`ObjectTable::changed_word_count`].
-    pub(crate) fn changed_word(&self, index: usize) -> usize {
-        self.changed.word(index).word
+    pub(crate) fn changed_word(&self, index: usize) -> ChangedWord {
+        self.changed.word(index)
     }
 
     /// Whether all objects have to be described.
@@ -162,8 +162,7 @@ impl ObjectTable {
         for index in 0..self.changed.word_count() {
             let block = self.changed.word(index).word * Frustum::WORD / Self::BLOCK_SIZE;
             if latest.replace(block) != Some(block) {
-                let parts = &self.blocks[block].read().word_bounds;
-                bounds[block / GroupBounds::GROUPS].set_union(block % GroupBounds::GROUPS, parts);
+                bounds.set(block, &self.blocks[block].read().word_bounds);
             }
         }
         drop(bounds);
@@ -183,9 +182,9 @@ impl ObjectTable {
     pub(crate) fn unreported_change(&self, scene: &SceneRef<'_>) -> Option<usize> {
         let is_as_before = |&object: &usize| {
             let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
-            let mut is_same = false;
-            describe_objects(scene, &self.draw_states, object, 1, |_, now| is_same = now == before);
-            is_same
+            let mut padded = None;
+            let columns = GroupColumns::new(scene, object, &mut padded);
+            GroupDescription::new(&columns, &self.draw_states).object(&columns, 0) == before
         };
         let unreported = |object: &usize| !self.changed.contains(*object);
         (0..self.length).filter(unreported).find(|object| !is_as_before(object))
@@ -272,8 +271,8 @@ impl ObjectTable {
         self.blocks[index].read()
     }
 
-    /// The bounds of the blocks, in groups of [`GroupBounds::GROUPS`].
-    pub(crate) fn block_bounds(&self) -> RwLockReadGuard<'_, Vec<GroupBounds>> {
+    /// The bounds of the blocks.
+    pub(crate) fn block_bounds(&self) -> RwLockReadGuard<'_, BlockBounds> {
         self.block_bounds.read()
     }
 
@@ -318,22 +317,24 @@ fn describe_word(table: &ObjectTable, scene: &SceneRef, word: usize, mask: u64) 
             continue;
         }
         block.changed_in[(first + group) % ObjectTable::BLOCK_SIZE / ObjectBlock::GROUP] = table.epoch;
-        describe_objects(scene, &table.draw_states, first + group, changed, |object, description| {
-            let entry = object % ObjectTable::BLOCK_SIZE;
-            match description {
-                Ok(description) => {
-                    if block.set(entry, &description) {
-                        block.bins[entry] = table.bin_of(description.draw);
-                        found.draws_changed = true;
-                    }
-                    block.set_box(entry, |sphere| bounding_box(scene, object, sphere));
-                }
-                Err(reason) => {
-                    block.reject(entry, reason);
-                    found.rejects = true;
-                }
-            }
-        });
+        let (object, entry) = (first + group, (first + group) % ObjectTable::BLOCK_SIZE);
+        let mut padded = None;
+        let columns = GroupColumns::new(scene, object, &mut padded);
+        let described = GroupDescription::new(&columns, &table.draw_states);
+        let draws_changed = block.set_group(entry, changed, &described, &columns);
+        found.draws_changed |= draws_changed != 0;
+        for lane in set_bits(draws_changed.into()) {
+            block.bins[entry + lane] = table.bin_of(described.draws[lane]);
+        }
+        let rejected = changed & !described.valid;
+        found.rejects |= rejected != 0;
+        for lane in set_bits(rejected.into()) {
+            block.reject(entry + lane, rejection_reason(scene, object + lane));
+        }
+        let boxed = if block.boxes.is_some() { changed & described.valid } else { 0 };
+        for lane in set_bits(boxed.into()) {
+            block.set_box(entry + lane, |sphere| bounding_box(scene, object + lane, sphere));
+        }
     }
     let word = first % ObjectTable::BLOCK_SIZE / Frustum::WORD;
     let ObjectBlock { spheres, word_bounds, .. } = &mut **block;

@@ -8,7 +8,8 @@ use parking_lot::RwLock;
 use crate::chunked_array::block_ranges;
 use crate::command::Version;
 
-/// The objects that a view sees: a bit for each object, and a prefix sum over words of 64.
+/// The objects that a view sees: a bit for each object, in words of 64, and a prefix sum over the words that are not empty. A view
+/// that sees few of many objects pays for the few.
 ///
 /// Frustum culling sets bits and occlusion culling clears them. Any worker may do either for any object; the result does
 /// not depend on which. So the compacted order is always that of the objects.
@@ -17,44 +18,64 @@ use crate::command::Version;
 #[derive(Debug, Default)]
 pub struct VisibleSet {
     words: Vec<AtomicU64>,
+    /// A bit for each word. A word whose bit is not set is 0.
+    filled: Vec<AtomicU64>,
     compacted: RwLock<Compacted>,
 }
 
 #[derive(Debug, Default)]
 struct Compacted {
-    /// For each word, the number of bits set in the words before it; the last entry is the total.
-    offsets: Vec<u32>,
-    /// The words that `version` is of.
-    words: Vec<u64>,
+    /// The words that are not empty, in order.
+    words: Vec<VisibleWord>,
+    /// The number of visible objects.
+    total: u32,
+    /// The version of `words`.
     version: Version,
 }
 
+/// Visible objects among 64: bit `b` is object `word × 64 + b`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct VisibleWord {
+    word: u32,
+    /// The number of visible objects in the words before it.
+    rank: u32,
+    bits: u64,
+}
+
 impl VisibleSet {
-    /// Resizes the set for `objects` objects, all of which have to be tested.
+    /// The number of objects in a word.
+    pub const OBJECTS_PER_WORD: usize = u64::BITS as usize;
+
+    /// Empties the set, and resizes it for `objects` objects.
     pub fn reset(&mut self, objects: usize) {
-        self.words.resize_with(objects.div_ceil(Self::OBJECTS_PER_WORD), AtomicU64::default);
-        // No object is tested for the bits after the last one.
-        if let Some(last) = self.words.last_mut() {
-            *last.get_mut() = 0;
+        for (index, filled) in self.filled.iter_mut().enumerate() {
+            for bit in set_bits(std::mem::take(filled.get_mut())) {
+                *self.words[index * Self::OBJECTS_PER_WORD + bit].get_mut() = 0;
+            }
         }
-        self.compacted.get_mut().offsets.clear();
+        let words = objects.div_ceil(Self::OBJECTS_PER_WORD);
+        self.words.resize_with(words, AtomicU64::default);
+        self.filled.resize_with(words.div_ceil(Self::OBJECTS_PER_WORD), AtomicU64::default);
+        self.compacted.get_mut().total = 0;
     }
 
-    /// Tests a range of objects. `is_visible` is called with the part of the range in each word of [`VisibleSet::OBJECTS_PER_WORD`]
-    /// objects, and returns a mask whose bit 0 is the first object of the part; excess bits are ignored. Ranges tested
-    /// at the same time must not share objects, but may share words.
-    pub fn test(&self, objects: Range<usize>, is_visible: impl Fn(Range<usize>) -> u64) {
-        for (word, part) in block_ranges(objects, Self::OBJECTS_PER_WORD) {
-            let shift = part.start % Self::OBJECTS_PER_WORD;
-            let mask = (u64::MAX >> (Self::OBJECTS_PER_WORD - part.len())) << shift;
-            let bits = (is_visible(part) << shift) & mask;
-            // Relaxed: jobs that read the bits depend on this job.
-            if mask == u64::MAX {
-                self.words[word].store(bits, Ordering::Relaxed);
-            } else {
-                self.words[word].fetch_and(!mask, Ordering::Relaxed);
-                self.words[word].fetch_or(bits, Ordering::Relaxed);
-            }
+    /// Replaces the objects of a word that are in a mask: those in `visible` are visible, the others are not. Objects replaced at the
+    /// same time must differ, but may share words.
+    pub fn replace(&self, word: usize, mask: u64, visible: u64) {
+        // Relaxed, here and below: jobs that read the bits depend on this job.
+        let bits = visible & mask;
+        if self.words[word].load(Ordering::Relaxed) & mask == bits {
+            return;
+        }
+        if mask == u64::MAX {
+            self.words[word].store(bits, Ordering::Relaxed);
+        } else {
+            self.words[word].fetch_and(!mask, Ordering::Relaxed);
+            self.words[word].fetch_or(bits, Ordering::Relaxed);
+        }
+        let (index, bit) = (word / Self::OBJECTS_PER_WORD, word % Self::OBJECTS_PER_WORD);
+        if self.filled[index].load(Ordering::Relaxed) >> bit & 1 == 0 {
+            self.filled[index].fetch_or(1 << bit, Ordering::Relaxed);
         }
     }
 
@@ -81,25 +102,33 @@ impl VisibleSet {
         self.words.get(word).map_or(0, |bits| bits.load(Ordering::Relaxed))
     }
 
-    /// The number of objects in a word.
-    pub const OBJECTS_PER_WORD: usize = u64::BITS as usize;
-
-    /// Computes the prefix sum over words. Call it once, after all objects have been tested and hidden ones removed. If the set
-    /// differs from the one that was compacted before, it gets `version`, which no other set has.
+    /// Computes the prefix sum. Call it once, after all objects have been tested and hidden ones removed. If the set differs from the
+    /// one that was compacted before, it gets `version`, which no other set has.
     pub fn compact(&self, version: Version) {
-        let Compacted { offsets, words, version: current } = &mut *self.compacted.write();
-        offsets.clear();
-        let mut total = 0;
-        let mut differs = words.len() != self.words.len();
-        words.resize(self.words.len(), 0);
-        for (word, before) in self.words.iter().zip(words) {
-            offsets.push(total);
-            let bits = word.load(Ordering::Relaxed);
-            total += bits.count_ones();
-            differs |= *before != bits;
-            *before = bits;
+        let Compacted { words, total, version: current } = &mut *self.compacted.write();
+        let (mut length, mut rank, mut differs) = (0, 0, false);
+        for (index, filled) in self.filled.iter().enumerate() {
+            for bit in set_bits(filled.load(Ordering::Relaxed)) {
+                let word = index * Self::OBJECTS_PER_WORD + bit;
+                let bits = self.words[word].load(Ordering::Relaxed);
+                if bits == 0 {
+                    continue;
+                }
+                let now = VisibleWord { word: word as u32, rank, bits };
+                match words.get_mut(length) {
+                    Some(before) => differs |= std::mem::replace(before, now) != now,
+                    None => {
+                        differs = true;
+                        words.push(now);
+                    }
+                }
+                length += 1;
+                rank += bits.count_ones();
+            }
         }
-        offsets.push(total);
+        differs |= words.len() != length;
+        words.truncate(length);
+        *total = rank;
         if differs {
             *current = version;
         }
@@ -115,34 +144,47 @@ impl VisibleSet {
         self.words.len()
     }
 
-    /// The number of visible objects; 0 before [`VisibleSet::compact`].
+    /// The number of visible objects; 0 between a reset and [`VisibleSet::compact`].
     pub fn count(&self) -> usize {
-        self.compacted.read().offsets.last().map_or(0, |&total| total as usize)
+        self.compacted.read().total as usize
+    }
+
+    /// The number of words that were not empty when the set was last compacted.
+    pub fn filled_word_count(&self) -> usize {
+        self.compacted.read().words.len()
+    }
+
+    /// Calls `visit(word, bits)` for words that are not empty, in order: those whose index among them is in `indices`.
+    ///
+    /// # Panics
+    /// If `indices` are not below [`VisibleSet::filled_word_count`].
+    pub fn visit_words(&self, indices: Range<usize>, mut visit: impl FnMut(usize, u64)) {
+        for &VisibleWord { word, bits, .. } in &self.compacted.read().words[indices] {
+            visit(word as usize, bits);
+        }
     }
 
     /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the
     /// visible objects) is in `ranks`. Bit `b` is object `word × OBJECTS_PER_WORD + b`; the lowest set bit has the rank `rank`.
     /// Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
-        let offsets = &self.compacted.read().offsets;
-        let end = ranks.end.min(offsets.last().map_or(0, |&total| total as usize));
-        let mut rank = ranks.start;
-        // The last word whose first rank is not beyond `rank`: empty words before it have the same first rank.
-        let mut word = offsets.partition_point(|&offset| offset as usize <= rank).saturating_sub(1);
-        while rank < end {
-            let mut bits = self.words[word].load(Ordering::Relaxed);
-            for _ in offsets[word] as usize..rank {
-                bits &= bits - 1;
+        let compacted = self.compacted.read();
+        let first = compacted.words.partition_point(|word| word.rank as usize <= ranks.start).saturating_sub(1);
+        for &VisibleWord { word, rank, mut bits } in &compacted.words[first..] {
+            let rank = rank as usize;
+            if rank >= ranks.end {
+                break;
             }
-            let excess = (offsets[word + 1] as usize).saturating_sub(end);
+            let excess = (rank + bits.count_ones() as usize).saturating_sub(ranks.end);
             for _ in 0..excess {
                 bits &= !(1 << (u64::BITS - 1 - bits.leading_zeros()));
             }
-            if bits != 0 {
-                visit(rank, word, bits);
-                rank += bits.count_ones() as usize;
+            for _ in rank..ranks.start {
+                bits &= bits.wrapping_sub(1);
             }
-            word += 1;
+            if bits != 0 {
+                visit(rank.max(ranks.start), word as usize, bits);
+            }
         }
     }
 }
@@ -179,7 +221,11 @@ mod tests {
             let mut starts: Vec<usize> = (0..visible.len()).step_by(chunk).collect();
             starts.reverse();
             for start in starts {
-                set.test(start..(start + chunk).min(visible.len()), |part| mask_of(part, |object| visible[object]));
+                for (word, part) in block_ranges(start..(start + chunk).min(visible.len()), VisibleSet::OBJECTS_PER_WORD) {
+                    let shift = part.start % VisibleSet::OBJECTS_PER_WORD;
+                    let mask = mask_of(part.clone(), |_| true) << shift;
+                    set.replace(word, mask, mask_of(part, |object| visible[object]) << shift);
+                }
             }
             set.compact(Version::default());
             prop_assert_eq!(set.count(), expected.len());
@@ -196,15 +242,44 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_clears_the_set() {
+    fn a_reset_empties_the_set() {
         let mut set = VisibleSet::default();
         set.reset(3);
-        set.test(0..3, |_| u64::MAX);
+        set.replace(0, 0b111, u64::MAX);
         set.compact(Version::default());
+        assert_eq!(set.count(), 3);
         set.reset(130);
-        assert_eq!(set.count(), 0);
-        set.test(0..130, |part| mask_of(part, |object| object == 129));
         set.compact(Version::default());
-        assert_eq!(set.count(), 1);
+        assert_eq!(set.count(), 0);
+        set.replace(2, 0b11, 0b10);
+        set.compact(Version::default());
+        assert_eq!((set.count(), set.word(2)), (1, 0b10));
+        set.reset(65);
+        set.reset(130);
+        assert_eq!((set.word(0), set.word(2)), (0, 0));
+    }
+
+    #[test]
+    fn a_set_gets_a_version_where_it_differs_from_the_one_before() {
+        let version = |frame| Version { frame, index: 0 };
+        let mut set = VisibleSet::default();
+        set.reset(200);
+        let compact = |set: &VisibleSet, frame| {
+            set.compact(version(frame));
+            set.version()
+        };
+        set.replace(1, u64::MAX, 0b100);
+        assert_eq!(compact(&set, 1), version(1));
+        set.reset(200);
+        set.replace(1, u64::MAX, 0b100);
+        assert_eq!(compact(&set, 2), version(1));
+        set.replace(3, u64::MAX, 0b1);
+        assert_eq!(compact(&set, 3), version(3));
+        set.replace(1, 0b100, 0);
+        assert_eq!(compact(&set, 4), version(4));
+        set.replace(1, 0b1000, 0);
+        assert_eq!(compact(&set, 5), version(4));
+        set.reset(0);
+        assert_eq!(compact(&set, 6), version(6));
     }
 }

@@ -17,12 +17,12 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     table.update(scene);
     let mut visible = VisibleSet::default();
     visible.reset(count);
-    visible.test(0..count, |objects| {
-        objects.enumerate().fold(0, |mask, (bit, object)| {
-            let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
-            mask | u64::from(view.frustum.intersects_sphere(bounds.center, bounds.radius)) << bit
-        })
-    });
+    for object in 0..count {
+        let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);
+        let sees = view.frustum.intersects_sphere(bounds.center, bounds.radius);
+        let bit = 1 << (object % VisibleSet::OBJECTS_PER_WORD);
+        visible.replace(object / VisibleSet::OBJECTS_PER_WORD, bit, if sees { bit } else { 0 });
+    }
     let bits = |visible: &VisibleSet| {
         (0..count)
             .map(|object| {

@@ -102,8 +102,10 @@ impl<'a> CameraCase<'a> {
         let mut times: [Vec<f64>; 3] = Default::default();
         for _ in 0..rounds {
             visible.reset(count);
-            let bits = |(bit, object): (usize, usize)| u64::from(in_frustum[object]) << bit;
-            visible.test(0..count, |objects| objects.enumerate().fold(0, |all, object| all | bits(object)));
+            for (word, sees) in in_frustum.chunks(VisibleSet::OBJECTS_PER_WORD).enumerate() {
+                let bits = sees.iter().enumerate().fold(0, |bits, (bit, &sees)| bits | u64::from(sees) << bit);
+                visible.replace(word, u64::MAX, bits);
+            }
             occlusion.reset(view, side);
             let start = Instant::now();
             occlusion.select_occluders(scene, table, &visible, meshes, |draw| draw.state.blend() == Blend::None);

@@ -194,7 +194,7 @@ impl<B: Backend> Stage<B> for Bin {
         let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
         let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
         let selection = table.selection.unwrap_or_default();
-        let (words, segments) = (visible.word_count(), frame.segment_count(self.pass));
+        let (words, segments) = (visible.filled_word_count(), frame.segment_count(self.pass));
         for segment in job.items {
             let words = segment * words / segments..(segment + 1) * words / segments;
             let mut segment = table.segments[segment].write();

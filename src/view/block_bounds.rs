@@ -1,0 +1,87 @@
+//! The bounds of all blocks of objects: a hierarchy above those of their words.
+
+use std::ops::Range;
+
+use super::frustum::Frustum;
+use super::group_bounds::{GroupBounds, Overlap};
+use crate::chunked_array::block_ranges;
+
+/// Bounds of blocks, and of groups of [`GroupBounds::GROUPS`] blocks. Each level tests four groups at once.
+#[derive(Debug, Default)]
+pub(crate) struct BlockBounds {
+    /// The blocks, in groups.
+    blocks: Vec<GroupBounds>,
+    /// The groups of blocks, in groups.
+    groups: Vec<GroupBounds>,
+}
+
+impl BlockBounds {
+    /// Makes room for some blocks. New ones have no objects.
+    pub(super) fn resize(&mut self, blocks: usize) {
+        let groups = blocks.div_ceil(GroupBounds::GROUPS);
+        self.blocks.resize_with(groups, GroupBounds::default);
+        self.groups.resize_with(groups.div_ceil(GroupBounds::GROUPS), GroupBounds::default);
+    }
+
+    /// Replaces the bounds of a block by those around its words.
+    pub(super) fn set(&mut self, block: usize, words: &GroupBounds) {
+        let group = block / GroupBounds::GROUPS;
+        self.blocks[group].set_union(block % GroupBounds::GROUPS, words);
+        self.groups[group / GroupBounds::GROUPS].set_union(group % GroupBounds::GROUPS, &self.blocks[group]);
+    }
+
+    /// Calls `visit` with the blocks of a range, in order, but for those that lie outside a frustum as a whole.
+    pub(crate) fn visit_overlapping(&self, frustum: &Frustum, blocks: Range<usize>, mut visit: impl FnMut(usize)) {
+        const BLOCKS: usize = GroupBounds::GROUPS;
+        for (index, blocks) in block_ranges(blocks, BLOCKS * GroupBounds::GROUPS) {
+            let overlaps_of_groups = frustum.overlaps(&self.groups[index]);
+            for (group, blocks) in block_ranges(blocks, BLOCKS) {
+                if overlaps_of_groups[group % GroupBounds::GROUPS] == Overlap::Outside {
+                    continue;
+                }
+                let overlaps = frustum.overlaps(&self.blocks[group]);
+                blocks.filter(|block| overlaps[block % BLOCKS] != Overlap::Outside).for_each(&mut visit);
+            }
+        }
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::scene::Camera;
+    use crate::view::{BoundingSphere, BoundingSpheres};
+
+    proptest! {
+        /// Blocks of one object each: those that the sphere's own test finds are visited, and few others.
+        #[test]
+        fn no_block_with_a_visible_object_is_left_out(
+            centers in prop::collection::vec(prop::array::uniform3(-20.0..20.0_f64), 1..70),
+            range in (0_usize..70, 0_usize..70),
+        ) {
+            let frustum = Frustum::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+            let spheres = centers.iter().map(|&center| BoundingSphere { center: center.into(), radius: 0.5 });
+            let mut bounds = BlockBounds::default();
+            bounds.resize(centers.len());
+            let mut expected = Vec::new();
+            let range = range.0.min(centers.len())..range.1.min(centers.len());
+            for (block, sphere) in spheres.enumerate() {
+                let mut table = BoundingSpheres::default();
+                table.set(0, sphere);
+                let mut words = GroupBounds::default();
+                words.set_word(0, &table);
+                bounds.set(block, &words);
+                if range.contains(&block) && frustum.intersects_sphere(sphere.center, sphere.radius) {
+                    expected.push(block);
+                }
+            }
+            let mut visited = Vec::new();
+            bounds.visit_overlapping(&frustum, range, |block| visited.push(block));
+            prop_assert!(visited.is_sorted() && expected.iter().all(|block| visited.contains(block)));
+            prop_assert!(visited.len() <= expected.len() + 2 + centers.len() / 10, "{visited:?} {expected:?}");
+        }
+    }
+}
