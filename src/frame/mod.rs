@@ -7,6 +7,7 @@ mod context;
 mod cost_model;
 mod error;
 mod granularity;
+mod job_size;
 mod list_inputs;
 mod occluders;
 mod occlusion_control;
