@@ -11,12 +11,13 @@
 //! rounds' own ratios. Large scenes are measured on `noop` alone.
 //!
 //! Results for more workers are predicted: measured frames are replayed. A replay for the actual number of workers shows the error
-//! of predictions. A replay keeps the jobs of the measured frame, so *adaptive* is shown with the granularity for the actual
-//! workers; and it does not model the other thread of `interrupted`.
+//! of predictions. Frames of *adaptive* are cut for the predicted workers, and a table shows what bounds them. A replay does not
+//! model the other thread of `interrupted`.
 //!
 //! `target/drawloom/load_balance.json` and `.svg` have the same.
 
 mod block;
+mod bounds;
 mod charts;
 mod interruption;
 mod mode;
