@@ -115,8 +115,8 @@ impl MeasuredNode {
     fn work_of_first(&self, items: usize) -> u64 {
         let size = self.chunks.range(0).len();
         let (whole, rest) = (items / size, items % size);
-        if rest == 0 || whole >= self.chunks.count() {
-            return self.sums[whole.min(self.chunks.count())];
+        if rest == 0 {
+            return self.sums[whole];
         }
         let (work, length) = (self.work(whole..whole + 1), self.chunks.range(whole).len());
         self.sums[whole] + (u128::from(work) * rest as u128 / length as u128) as u64
@@ -155,13 +155,17 @@ pub(super) fn nanoseconds(time: Duration) -> u64 {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
+    use std::sync::Arc;
+
     use proptest::prelude::*;
 
     use super::super::test_run::{TestNode, TestRun, any_test_run};
     use super::*;
 
+    const COSTS: SchedulerCosts = SchedulerCosts::ZERO;
+
     fn measured(test_run: &TestRun) -> MeasuredRun {
-        MeasuredRun::new(&test_run.run(&SchedulerCosts::ZERO), &SchedulerCosts::ZERO)
+        MeasuredRun::new(&test_run.run(&COSTS), &COSTS)
     }
 
     fn counts(run: &MeasuredRun) -> Vec<usize> {
@@ -195,6 +199,22 @@ mod tests {
         assert_eq!(works(&run.cut_for(2).nodes[0]), two);
         let three = [vec![16_500; 6], vec![47_500], vec![49_500; 5], vec![6_000]].concat();
         assert_eq!(works(&run.cut_for(3).nodes[0]), three);
+    }
+
+    #[test]
+    fn a_node_with_fixed_chunks_keeps_them_beside_others_of_its_kind() {
+        let mut run = TestRun::new().add_by_cost("fill", 100, &[400]).add_by_cost("fill", 100, &[400]).run(&COSTS);
+        Arc::make_mut(&mut run.graph).nodes[0].chunked_by_cost = false;
+        assert_eq!(counts(&MeasuredRun::new(&run, &COSTS).cut_for(2)), [1, 9]);
+    }
+
+    #[test]
+    fn a_recorded_cut_is_kept_while_it_is_nearly_right() {
+        // On two workers 50, 48 and 48.75 µs are best: 1.25, 1.5 and 1.63 times the recorded chunks. 1.6 times is wrong.
+        let cut =
+            |size, time, count| measured(&TestRun::new().add_by_cost("fill", size, &vec![time; count])).cut_for(2);
+        let sizes = [cut(40, 40, 10), cut(32, 32, 12), cut(30, 30, 13)].map(|run| run.nodes[0].chunks.range(0).len());
+        assert_eq!(sizes, [40, 32, 48]);
     }
 
     #[test]

@@ -73,7 +73,6 @@ impl TestRun {
                 pinned: node.pinned,
                 labels: Labels { process: node.cost_kind.clone(), ..Labels::default() },
                 chunked_by_cost: node.cost_kind.is_some(),
-                ..NodeInfo::default()
             });
             let opened = now;
             for (chunk, &cost) in node.chunks.iter().enumerate() {
