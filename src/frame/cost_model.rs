@@ -239,8 +239,11 @@ mod tests {
 
     #[test]
     fn one_worker_has_one_job() {
-        let model = CostModel::new(vec![0]);
-        model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
-        assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
+        let mut model = CostModel::new(vec![0]);
+        for _frame in 0..3 {
+            assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
+            model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
+            model.update();
+        }
     }
 }
