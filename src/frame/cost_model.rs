@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use super::job_size::job_size;
 use crate::timeline::{JobSize, Labels};
-use crate::tuning::{Estimate, Filter, Hysteresis};
-use crate::view::ObjectTable;
+use crate::tuning::{Estimate, Filter};
 
 /// What the items of a frame's stages cost. The nodes of one cost kind share an estimate; each node has its own width, and so a job
 /// size of its own. Nodes are counted in the order of the stage graph.
@@ -42,20 +42,6 @@ struct NodeSize {
 }
 
 const FILTER: Filter = Filter::limiting_outliers(6.0);
-
-/// Work that is worth a second job: more than it costs another worker to take the job and to fetch what the job reads into its
-/// caches.
-const PARALLEL_THRESHOLD: Duration = Duration::from_micros(12);
-
-/// Jobs per worker: with several, workers do not wait long for the last one to end.
-const JOBS_PER_WORKER: f32 = 4.0;
-
-/// The shortest job: its scheduling costs a few percent. The longest job: an urgent one does not queue behind it for long.
-const MIN_JOB: Duration = Duration::from_micros(6);
-const MAX_JOB: Duration = Duration::from_micros(60);
-
-/// A job that is too long or too short by less costs next to nothing.
-const HYSTERESIS: Hysteresis = Hysteresis::new(1.6);
 
 impl CostModel {
     /// An empty model. For each node the index of its cost kind.
@@ -95,19 +81,16 @@ impl CostModel {
         self.sizes.iter_mut().for_each(|size| *size.width.get_mut() = 0);
     }
 
-    /// The number of a node's `width` items that make a job on this number of workers.
-    ///
-    /// One job is best for little work, and for a single worker. Otherwise each worker gets several jobs, none shorter than
-    /// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping.
+    /// The number of a node's `width` items that make a job on this number of workers: see [`job_size`].
     pub(super) fn items_per_job(&self, node: usize, width: usize, workers: usize) -> usize {
         let size = &self.sizes[node];
         let used = match self.costs[self.kinds[node]].estimate.get() {
-            _ if workers == 1 => usize::MAX,
+            None if workers == 1 => usize::MAX,
             None => FIRST_JOB_ITEMS,
             Some(per_item) => {
                 let before = size.chosen.load(Ordering::Relaxed);
                 let previous = Some(before).filter(|&items| items != 0 && items != usize::MAX);
-                let best = best_size(per_item, width, workers, previous);
+                let best = job_size(per_item, width, workers, previous);
                 if best != before {
                     size.chosen.store(best, Ordering::Relaxed);
                 }
@@ -140,31 +123,12 @@ impl CostModel {
     }
 }
 
-/// The best number of items per job, if the latest choice was to have jobs of `previous` items, or a single job.
-fn best_size(per_item: f32, width: usize, workers: usize, previous: Option<usize>) -> usize {
-    let nanoseconds = |time: Duration| time.as_nanos() as f32;
-    let work = per_item * width as f32;
-    if !HYSTERESIS.is_above(work, nanoseconds(PARALLEL_THRESHOLD), previous.is_some()) {
-        return usize::MAX;
-    }
-    let job = work / (JOBS_PER_WORKER * workers as f32);
-    let items = job.clamp(nanoseconds(MIN_JOB), nanoseconds(MAX_JOB)) / per_item;
-    match previous {
-        Some(previous) if HYSTERESIS.keeps(previous as f32, items) => previous,
-        _ => whole_blocks(items as usize),
-    }
-}
-
 /// The job size in items before the first sample.
 const FIRST_JOB_ITEMS: usize = 512;
 
-/// Rounds down to whole blocks of objects and commands: jobs that share no block do not contend for its lock.
-fn whole_blocks(items: usize) -> usize {
-    if items < ObjectTable::BLOCK_SIZE { items.max(1) } else { items - items % ObjectTable::BLOCK_SIZE }
-}
-
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
+    use super::super::job_size::{MAX_JOB, MIN_JOB, PARALLEL_THRESHOLD};
     use super::*;
     use crate::tuning::signal::{ControllerBounds, check_controller};
 
@@ -275,8 +239,11 @@ mod tests {
 
     #[test]
     fn one_worker_has_one_job() {
-        let model = CostModel::new(vec![0]);
-        model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
-        assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
+        let mut model = CostModel::new(vec![0]);
+        for _frame in 0..3 {
+            assert_eq!(model.items_per_job(NODE, 1_000_000, 1), usize::MAX);
+            model.add_sample(NODE, 1_000_000, Duration::from_secs(1));
+            model.update();
+        }
     }
 }

@@ -7,6 +7,7 @@ mod context;
 mod cost_model;
 mod error;
 mod granularity;
+mod job_size;
 mod list_inputs;
 mod occluders;
 mod occlusion_control;
@@ -33,6 +34,8 @@ mod warnings;
 pub use builder::RendererBuilder;
 pub use error::{BuildError, FrameError, SubmitError};
 pub use granularity::Granularity;
+#[cfg(feature = "report")]
+pub(crate) use job_size::job_size;
 pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
 pub use statistics::{FrameStatistics, StageTimes, ViewStatistics};

@@ -123,6 +123,10 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         }
     }
 
+    fn chunked_by_cost(&self, frame: &FrameContext<'_, B>) -> bool {
+        frame.granularity == Granularity::Adaptive && matches!(self.stage.info().chunking, Chunking::ByCost { .. })
+    }
+
     fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
         let job = StageJob { items: items.clone(), worker, node: self.node };
         let (result, took) = frame.clock.measure(self.stage.info().group, || self.stage.run(frame, job));

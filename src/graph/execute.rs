@@ -49,7 +49,7 @@ impl<P> Schedule<P> {
         } else {
             self.policy.choose(worker.wake_up_cost())
         };
-        self.describe(worker);
+        self.describe(worker, context);
         // Caught here because a subscriber of spans may panic between two nodes, too.
         let execution = catch(|| match ActiveInstrument::new(worker, self.description.as_ref()) {
             Some(instrument) => self.execute(mode, worker, context, instrument),
@@ -109,7 +109,7 @@ impl<P> Schedule<P> {
     }
 
     /// Builds the description of the schedule, if the run is to be instrumented and there is none yet.
-    fn describe<C>(&mut self, worker: &Worker)
+    fn describe<C>(&mut self, worker: &Worker, context: &C)
     where
         C: ?Sized,
         P: Node<C>,
@@ -120,6 +120,7 @@ impl<P> Schedule<P> {
                 labels: self.labels[index].clone(),
                 dependencies: self.dependencies(index).to_vec(),
                 pinned: catch(|| self.nodes[index].pinned()).unwrap_or(false),
+                chunked_by_cost: catch(|| self.nodes[index].chunked_by_cost(context)).unwrap_or(false),
             };
             self.description = Some(Arc::new(Graph { nodes: (0..self.len()).map(node).collect() }));
         }

@@ -28,6 +28,16 @@ pub trait Node<C: ?Sized>: Send + Sync {
         1
     }
 
+    /// Whether the [chunk](Self::chunk) size follows from the cost of an item and the number of workers, by the rule of
+    /// [`Granularity::Adaptive`](crate::Granularity::Adaptive). Replays of the node cut it by that rule for other numbers of
+    /// workers. Nodes with the same process and stage count as having items of the same cost.
+    ///
+    /// It is called for the first run that is recorded or traced, and holds for all later ones.
+    fn chunked_by_cost(&self, context: &C) -> bool {
+        let _ = context;
+        false
+    }
+
     /// Whether the node is pinned to the thread that called [`Schedule::run`](super::Schedule::run). All its calls are then made on
     /// that thread, and its chunks run one after another, from first to last.
     fn pinned(&self) -> bool {
@@ -53,6 +63,10 @@ impl<C: ?Sized, T: Node<C> + ?Sized> Node<C> for Box<T> {
 
     fn chunk(&self, context: &C) -> usize {
         (**self).chunk(context)
+    }
+
+    fn chunked_by_cost(&self, context: &C) -> bool {
+        (**self).chunked_by_cost(context)
     }
 
     fn pinned(&self) -> bool {

@@ -1,9 +1,9 @@
 //! Why a frame took as long as it did, and how long it would take on a machine with more workers.
 //!
 //! The [timeline](crate::timeline) records how long each chunk of a frame took. A [`FrameReport`] computes from that which
-//! nodes are to blame for the frame's time. A [`Replay`] simulates the same chunks on any number of workers, by the rules of
-//! this crate's scheduler: which worker takes what, who is woken when, and what each of these operations
-//! [costs](SchedulerCosts). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
+//! nodes are to blame for the frame's time. A [`Replay`] simulates the same work on any number of workers, by the rules of
+//! this crate's renderer and scheduler: into which chunks it is cut, which worker takes what, who is woken when, and what each
+//! of these operations [costs](SchedulerCosts). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
 //!
 //! ```
 //! use std::hint::black_box;

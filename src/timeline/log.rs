@@ -105,6 +105,9 @@ pub struct NodeInfo {
     pub dependencies: Vec<usize>,
     /// Whether it has to run on the calling thread.
     pub pinned: bool,
+    /// Whether its chunk size follows from the cost of its items and the number of workers: see
+    /// [`Node::chunked_by_cost`](crate::graph::Node::chunked_by_cost).
+    pub chunked_by_cost: bool,
 }
 
 /// A range of a node's items, which one worker ran without interruption.

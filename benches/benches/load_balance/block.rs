@@ -8,7 +8,7 @@ use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::report::SchedulerCosts;
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, Submitter};
+use drawloom::{Granularity, Renderer, Submitter};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::stopwatch::{mean_frame, timed_frame};
@@ -63,7 +63,7 @@ impl Block<'_> {
             let scheduler = if mode.is_serial { &one } else { &all };
             let builder = Renderer::builder(self.backend.open()?).deferred(Deferred::to_picture());
             let (renderer, submitter) = builder.granularity(mode.granularity).build(Arc::clone(scheduler))?;
-            let prediction = Prediction::new(self.costs, self.workers);
+            let prediction = Prediction::new(self.costs, self.workers, mode.granularity == Granularity::Adaptive);
             Ok::<_, Box<dyn Error>>((Runner { renderer, submitter }, prediction))
         };
         let mut modes = Mode::ALL.iter().map(open).collect::<Result<Vec<_>, _>>()?;

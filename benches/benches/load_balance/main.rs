@@ -1,4 +1,4 @@
-//! How finely should a frame be cut? Compares all fixed granularities on six scenes with one thread and with the adaptive
+//! How finely should a frame be cut? Compares all fixed granularities on eight scenes with one thread and with the adaptive
 //! granularity (M 10.5, "Better Load Balancing").
 //!
 //!     cargo bench -p drawloom-benches --bench load_balance
@@ -8,15 +8,16 @@
 //! A block is one scene on one backend. Its modes are interleaved; a sample is as many frames as fill some milliseconds, from
 //! hand-over to the return of submit. The first half of the rounds determines the best fixed mode, and the second half gives the
 //! results: in the rounds that select it, the best of seven modes is also the luckiest. A ratio is the median of the
-//! rounds' own ratios.
+//! rounds' own ratios. Large scenes are measured on `noop` alone.
 //!
 //! Results for more workers are predicted: measured frames are replayed. A replay for the actual number of workers shows the error
-//! of predictions. A replay keeps the jobs of the measured frame, so *adaptive* is shown with the granularity for the actual
-//! workers; and it does not model the other thread of `interrupted`.
+//! of predictions. Frames of *adaptive* are cut for the predicted workers, and a table shows what bounds them. A replay does not
+//! model the other thread of `interrupted`.
 //!
 //! `target/drawloom/load_balance.json` and `.svg` have the same.
 
 mod block;
+mod bounds;
 mod charts;
 mod interruption;
 mod mode;
@@ -31,10 +32,12 @@ use std::time::Duration;
 use clap::Parser;
 use drawloom::report::SchedulerCosts;
 use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
 
 use block::Block;
 use report::Report;
+use scenes::Case;
 
 /// Compares granularities.
 #[derive(Parser)]
@@ -84,7 +87,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
     for backend in arguments.backend.backends() {
-        for case in &cases {
+        let is_measured = |case: &&Case| backend == BackendName::Noop || !case.is_large;
+        for case in cases.iter().filter(is_measured) {
             for workers in worker_counts()? {
                 let block = Block { case, backend, workers, costs, extent: &extent, progress: &progress };
                 report.add(&block, block.measure()?);

@@ -10,6 +10,8 @@ use drawloom::{Renderer, Submitter};
 use drawloom_benches::statistics::median;
 use drawloom_benches::stopwatch::timed_frame;
 
+use crate::bounds::Bounds;
+
 /// More workers than most machines have.
 pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 
@@ -20,15 +22,18 @@ pub struct Prediction {
     costs: SchedulerCosts,
     times: Vec<(usize, Vec<f64>)>,
     measured: Vec<f64>,
+    /// What bounds the predictions of frames that are cut for the workers; `None` for others.
+    bounds: Option<Bounds>,
 }
 
 impl Prediction {
     /// Predicts for `workers` workers, for one, and for [`PREDICTED`].
-    pub fn new(costs: SchedulerCosts, workers: usize) -> Self {
+    pub fn new(costs: SchedulerCosts, workers: usize, is_adaptive: bool) -> Self {
         let mut counts: Vec<_> = [1, workers].into_iter().chain(PREDICTED).collect();
         counts.sort_unstable();
         counts.dedup();
-        Self { costs, times: counts.into_iter().map(|count| (count, Vec::new())).collect(), measured: Vec::new() }
+        let times = counts.into_iter().map(|count| (count, Vec::new())).collect();
+        Self { costs, times, measured: Vec::new(), bounds: is_adaptive.then(Bounds::default) }
     }
 
     /// Draws two frames, and replays the second.
@@ -54,7 +59,15 @@ impl Prediction {
         for (workers, times) in &mut self.times {
             times.push(replay.frame_time(*workers).as_secs_f64());
         }
+        if let Some(bounds) = &mut self.bounds {
+            bounds.add(&log, log.frames[0].number, self.costs)?;
+        }
         Ok(())
+    }
+
+    /// What bounds the predictions; `None` for a fixed granularity.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_ref()
     }
 
     /// The median time of the frames before the replayed ones.

@@ -9,6 +9,7 @@ use drawloom_benches::table::Table;
 use serde::Serialize;
 
 use crate::block::{Block, Measured, Times};
+use crate::bounds::{self, Bounds};
 use crate::mode::Mode;
 use crate::prediction::{PREDICTED, Prediction};
 use crate::{Extent, charts};
@@ -32,6 +33,8 @@ pub struct Report {
     rounds: [usize; 2],
     pub rows: Vec<Row>,
     errors: Vec<ReplayError>,
+    /// What bounds the predictions for adaptive, by scene and backend.
+    bounds: Vec<(&'static str, BackendName, Bounds)>,
     /// On `uneven`, adaptive against per-camera.
     against_per_camera: Vec<(BackendName, usize, f64)>,
 }
@@ -54,6 +57,7 @@ impl Report {
             rounds: extent.rounds,
             rows: Vec::new(),
             errors: Vec::new(),
+            bounds: Vec::new(),
             against_per_camera: Vec::new(),
         }
     }
@@ -122,6 +126,11 @@ impl Report {
                 });
             }
         }
+        if let Some(bounds) = predictions[Mode::ADAPTIVE].bounds()
+            && !self.bounds.iter().any(|known| (known.0, known.1) == (scene, backend))
+        {
+            self.bounds.push((scene, backend, bounds.clone()));
+        }
         for (mode, prediction) in Mode::ALL.iter().zip(predictions) {
             let workers = if mode.is_serial { 1 } else { block.workers };
             self.errors.push(ReplayError {
@@ -143,6 +152,7 @@ impl Report {
         println!("ns: record + submit, per object and view that sees it; best: of the fixed modes, in other rounds\n");
         self.print_measured();
         self.print_predicted();
+        self.print_bounds();
         self.print_errors();
         self.print_targets();
     }
@@ -187,6 +197,18 @@ impl Report {
         table.print();
     }
 
+    fn print_bounds(&self) {
+        println!("What adaptive would save on {} predicted workers without one of its parts\n", bounds::WORKERS);
+        let mut table = Table::new(&["scene", "backend", "part", "µs", "of the frame, %"]);
+        for (scene, backend, bounds) in &self.bounds {
+            for (part, seconds, share) in bounds.parts() {
+                let (scene, backend, part) = ((*scene).to_owned(), backend.name().to_owned(), part.to_owned());
+                table.row([scene, backend, part, format!("{:.1}", seconds * 1e6), format!("{:.0}", share * 100.0)]);
+            }
+        }
+        table.print();
+    }
+
     fn print_errors(&self) {
         println!("The replay for the actual number of workers\n");
         let mut table = Table::new(&["scene", "backend", "workers", "mode", "predicted ms", "measured ms", "error %"]);
@@ -204,7 +226,7 @@ impl Report {
         table.print();
     }
 
-    /// Prints the targets and the results on `noop` with two workers.
+    /// Prints the targets and the results on `noop` with two workers, or with those that are predicted.
     fn print_targets(&self) {
         println!("Targets and results on noop with two workers\n");
         let mut table = Table::new(&["figure", "scene", "target", "reached"]);
@@ -224,6 +246,15 @@ impl Report {
             self.against_per_camera.iter().filter(|block| (block.0, block.1) == (BackendName::Noop, 2))
         {
             target_row("adaptive, of per-camera", "uneven", 1.5, ratio);
+        }
+        let has_target = |row: &&Row| {
+            row.backend == BackendName::Noop
+                && row.workers == bounds::WORKERS
+                && row.mode == "adaptive"
+                && row.predicted
+        };
+        for row in self.rows.iter().filter(has_target).filter(|row| row.scene.ends_with("-large")) {
+            target_row("adaptive on 16 predicted workers, of serial", row.scene, 10.0, row.speedup_vs_serial);
         }
         let has_target = |error: &&ReplayError| error.backend == BackendName::Noop && error.scene != "interrupted";
         let worst = self.errors.iter().filter(has_target).map(|error| (error.predicted / error.measured - 1.0).abs());

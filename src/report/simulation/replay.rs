@@ -18,6 +18,12 @@ use crate::timeline::{Log, Run};
 /// A replay stands for one of many such frames, one after another: workers are asleep when it begins, and schedules have
 /// learnt how long their nodes take and whether it is worth running them in parallel.
 ///
+/// A renderer with [`Granularity::Adaptive`](crate::Granularity::Adaptive) cuts a frame by what its items cost and by the number
+/// of workers. Such [nodes](crate::timeline::NodeInfo::chunked_by_cost) are cut anew for the workers of the replay, by the rule
+/// of the renderer, as if its estimates were the costs of the recorded frame. The time of a recorded chunk is spread evenly
+/// over its items; what it costs whatever its size is not known apart. All other nodes keep their chunks. So do
+/// the stages that sort, instance or bin the objects of a pass, which a renderer divides by rules of their own.
+///
 /// Where several workers ran, chunks have waited for each other's locks and cache lines. So a record of one worker is best
 /// for predicting the time on one worker, and a lower bound for many. A record of several workers is better for predicting
 /// the time on as many. Where chunks are shorter than half a microsecond, recording disturbs them, and all predicted times
@@ -37,6 +43,8 @@ pub struct ReplayedFrame {
     pub time: Duration,
     /// Whether the calling thread executes all runs serially, because that is faster.
     pub serial: bool,
+    /// The number of chunks that the frame is cut into.
+    pub chunks: usize,
     /// How long each worker is in chunks, without the serial time.
     pub busy: Vec<Duration>,
 }
@@ -108,9 +116,11 @@ impl Replay {
     /// Replays the frame on this many workers, clamped to 1 to [`Scheduler::MAX_WORKERS`].
     pub fn run(&self, workers: usize) -> ReplayedFrame {
         let workers = workers.clamp(1, Scheduler::MAX_WORKERS);
-        let mut frame = ReplayedFrame { time: self.serial, serial: true, busy: vec![Duration::ZERO; workers] };
+        let mut frame =
+            ReplayedFrame { time: self.serial, serial: true, chunks: 0, busy: vec![Duration::ZERO; workers] };
         for run in &self.runs {
-            let replayed = self.replay(run, workers);
+            let replayed = self.replay(&run.cut_for(workers), workers);
+            frame.chunks += replayed.chunks;
             frame.time += replayed.time;
             frame.serial &= replayed.serial;
             frame.busy.iter_mut().zip(replayed.busy).for_each(|(sum, busy)| *sum += busy);
@@ -123,12 +133,12 @@ impl Replay {
         if workers > 1 {
             let parallel = self.simulate(run, workers);
             if run.always_parallel || !chooses_serial(serial_time, parallel.time, &self.costs) {
-                return replayed(false, parallel.time, parallel.busy);
+                return replayed(run, false, parallel.time, parallel.busy);
             }
         }
         let mut busy = vec![0; workers];
         busy[0] = run.work();
-        replayed(true, serial_time, busy)
+        replayed(run, true, serial_time, busy)
     }
 
     /// Simulates the parallel run of a schedule that knows how long its nodes take.
@@ -144,9 +154,9 @@ impl Replay {
     }
 }
 
-fn replayed(serial: bool, time: u64, busy: Vec<u64>) -> ReplayedFrame {
+fn replayed(run: &MeasuredRun, serial: bool, time: u64, busy: Vec<u64>) -> ReplayedFrame {
     let busy = busy.into_iter().map(Duration::from_nanos).collect();
-    ReplayedFrame { time: Duration::from_nanos(time), serial, busy }
+    ReplayedFrame { time: Duration::from_nanos(time), serial, chunks: run.chunk_count(), busy }
 }
 
 /// Whether the policy chooses serial execution for these two times, in nanoseconds.
@@ -172,7 +182,7 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::test_run::{TestRun, any_test_run};
+    use super::super::test_run::{TestNode, TestRun, any_test_run};
     use super::{Replay, ReplayedFrame, Scheduler, SchedulerCosts};
 
     fn micros(count: u64) -> Duration {
@@ -214,6 +224,21 @@ mod tests {
     }
 
     #[test]
+    fn nodes_that_are_chunked_by_cost_are_cut_for_the_workers_of_the_replay() {
+        // 1,000 items of 1 µs. On 16 workers 66 chunks of 15 items, and one of 10: five for each of three workers.
+        let by_cost = replay(&TestRun::new().add_by_cost("fill", 1_000, &[1_000]), SchedulerCosts::ZERO);
+        let of = |replay: &Replay| [1, 16].map(|workers| replay.run(workers)).map(|frame| (frame.chunks, frame.time));
+        assert_eq!(of(&by_cost), [(1, micros(1_000)), (67, micros(75))]);
+        assert_eq!(of(&by_cost.without_work_of("fill")), [(0, micros(0)); 2]);
+        let fixed = replay(&TestRun::new().add(&[], &[1_000]), SchedulerCosts::ZERO);
+        assert_eq!(of(&fixed), [(1, micros(1_000)); 2]);
+        // Each of the 67 chunks, and each ticket, has its cost.
+        let costs = SchedulerCosts { ticket: micros(1), chunk: micros(1), ..SchedulerCosts::ZERO };
+        let by_cost = replay(&TestRun::new().add_by_cost("fill", 1_000, &[1_000]), costs);
+        assert_eq!(of(&by_cost), [(1, micros(1_001)), (67, micros(75 + 5 * 2))]);
+    }
+
+    #[test]
     fn one_ticket_takes_many_short_chunks() {
         let wide = TestRun::new().add(&[], &[1; 4_000]);
         let costs = SchedulerCosts { ticket: micros(1), ..SchedulerCosts::ZERO };
@@ -229,7 +254,8 @@ mod tests {
         assert_eq!(times(&replay(&fork, SchedulerCosts::ZERO), [1, 2, 3]), [430, 330, 330].map(micros));
         // The worker that wakes the other goes on with the longer branch.
         let replayed = replay(&fork, costly_wake_ups()).run(2);
-        let expected = ReplayedFrame { time: micros(340), serial: false, busy: vec![micros(330), micros(100)] };
+        let expected =
+            ReplayedFrame { time: micros(340), serial: false, chunks: 4, busy: vec![micros(330), micros(100)] };
         assert_eq!(replayed, expected);
         // The second worker begins 5 µs after it has woken up, and still finishes first.
         let costs = SchedulerCosts { steal: micros(5), ..costly_wake_ups() };
@@ -244,7 +270,7 @@ mod tests {
             busy[0] = micros(20);
             assert_eq!(
                 replay(&small, costly_wake_ups()).run(workers),
-                ReplayedFrame { time: micros(20), serial: true, busy }
+                ReplayedFrame { time: micros(20), serial: true, chunks: 10, busy }
             );
         }
         let mut parallel = small.run(&SchedulerCosts::ZERO);
@@ -257,7 +283,10 @@ mod tests {
     fn pinned_nodes_run_on_the_calling_thread() {
         let pinned = TestRun::new().add_pinned(&[], &[50, 50]).add_pinned(&[], &[100]).add(&[], &[150]);
         let replayed = replay(&pinned, SchedulerCosts::ZERO).run(2);
-        assert_eq!(replayed, ReplayedFrame { time: micros(200), serial: false, busy: vec![micros(200), micros(150)] });
+        assert_eq!(
+            replayed,
+            ReplayedFrame { time: micros(200), serial: false, chunks: 4, busy: vec![micros(200), micros(150)] }
+        );
     }
 
     #[test]
@@ -348,17 +377,22 @@ mod tests {
     }
 
     /// The longest path through the graph, if `cost` says how long a node takes.
-    fn longest_path(test_run: &TestRun, cost: impl Fn(&[u64]) -> u64) -> Duration {
+    fn longest_path(test_run: &TestRun, cost: impl Fn(&TestNode) -> u64) -> Duration {
         let mut ends: Vec<u64> = Vec::new();
         for node in &test_run.nodes {
             let start = node.dependencies.iter().map(|&dependency| ends[dependency]).max().unwrap_or(0);
-            ends.push(start + cost(&node.chunks));
+            ends.push(start + cost(node));
         }
         micros(ends.into_iter().max().unwrap_or(0))
     }
 
-    fn sum(chunks: &[u64]) -> u64 {
-        chunks.iter().sum()
+    fn sum(node: &TestNode) -> u64 {
+        node.chunks.iter().sum()
+    }
+
+    /// What a node takes at least on any number of workers.
+    fn longest_chunk(node: &TestNode) -> u64 {
+        if node.cost_kind.is_some() { 0 } else { node.chunks.iter().copied().max().unwrap_or(0) }
     }
 
     fn any_cost() -> impl Strategy<Value = Duration> {
@@ -371,11 +405,11 @@ mod tests {
             test_run in any_test_run(false),
             workers in 1..12_usize,
         ) {
-            let work = micros(test_run.nodes.iter().map(|node| sum(&node.chunks)).sum());
+            let work = micros(test_run.nodes.iter().map(sum).sum());
             let replay = replay(&test_run, SchedulerCosts::ZERO);
             prop_assert_eq!(replay.frame_time(1), work);
             let time = replay.frame_time(workers);
-            prop_assert!(time >= longest_path(&test_run, |chunks| chunks.iter().copied().max().unwrap_or(0)));
+            prop_assert!(time >= longest_path(&test_run, longest_chunk));
             prop_assert!(time * workers as u32 >= work);
             // Graham, "Bounds on Multiprocessing Timing Anomalies", 1969.
             prop_assert!(time <= work / workers as u32 + longest_path(&test_run, sum));
@@ -389,7 +423,7 @@ mod tests {
         ) {
             let [wake, waker, steal, uncounted_search, ticket, node] = costs;
             let costs = SchedulerCosts { wake, waker, steal, uncounted_search, ticket, node, ..SchedulerCosts::ZERO };
-            let work = micros(test_run.nodes.iter().map(|node| sum(&node.chunks)).sum());
+            let work = micros(test_run.nodes.iter().map(sum).sum());
             let mut run = test_run.run(&costs);
             let replay = Replay::new(&run, costs).unwrap();
             let replayed = replay.run(workers);
@@ -397,13 +431,13 @@ mod tests {
             prop_assert_eq!(replayed.busy.iter().sum::<Duration>(), work);
             prop_assert!(replayed.busy.iter().all(|&busy| busy <= replayed.time));
             let pinned = test_run.nodes.iter().filter(|node| node.pinned);
-            prop_assert!(replayed.busy[0] >= micros(pinned.map(|node| sum(&node.chunks)).sum()));
-            prop_assert!(replayed.time >= longest_path(&test_run, |chunks| chunks.iter().copied().max().unwrap_or(0)));
+            prop_assert!(replayed.busy[0] >= micros(pinned.map(sum).sum()));
+            prop_assert!(replayed.time >= longest_path(&test_run, longest_chunk));
             prop_assert!(replayed.time * workers as u32 >= work);
             // Unless it is always parallel, a schedule does not choose a mode that is much slower.
             prop_assert!(replayed.time <= replay.frame_time(1).mul_f64(1.25) + micros(1));
             run.always_parallel = true;
-            let steps = (run.graph.nodes.len() + run.chunks.len() + workers) as u32;
+            let steps = (run.graph.nodes.len() + replayed.chunks + workers) as u32;
             let max = work + (wake + waker * 2 + steal + ticket + node) * steps;
             prop_assert!(Replay::new(&run, costs).unwrap().frame_time(workers) <= max);
         }

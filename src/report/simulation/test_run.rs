@@ -7,7 +7,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use super::SchedulerCosts;
-use crate::timeline::{Chunk, Graph, NodeInfo, Run};
+use crate::timeline::{Chunk, Graph, Labels, NodeInfo, Run};
+use crate::view::ObjectTable;
 
 /// A graph with the costs of its chunks.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,19 @@ pub(super) struct TestNode {
     pub(super) pinned: bool,
     /// How long each chunk takes, in microseconds.
     pub(super) chunks: Vec<u64>,
+    /// The number of items in a chunk. The last one may have fewer.
+    pub(super) items_per_chunk: usize,
+    /// The number of items that the last chunk lacks.
+    pub(super) missing_items: usize,
+    /// For a node that is chunked by cost: the name that the nodes of one cost kind share.
+    pub(super) cost_kind: Option<String>,
+}
+
+impl Default for TestNode {
+    fn default() -> Self {
+        let (dependencies, chunks) = (Vec::new(), Vec::new());
+        Self { dependencies, pinned: false, chunks, items_per_chunk: 3, missing_items: 0, cost_kind: None }
+    }
 }
 
 impl TestRun {
@@ -30,8 +44,16 @@ impl TestRun {
 
     pub(super) fn add(mut self, dependencies: &[usize], chunks: &[u64]) -> Self {
         let (dependencies, chunks) = (dependencies.to_vec(), chunks.to_vec());
-        self.nodes.push(TestNode { dependencies, pinned: false, chunks });
+        self.nodes.push(TestNode { dependencies, chunks, ..TestNode::default() });
         self
+    }
+
+    /// Adds a node of this cost kind that waits for none.
+    pub(super) fn add_by_cost(self, cost_kind: &str, items_per_chunk: usize, chunks: &[u64]) -> Self {
+        let mut test_run = self.add(&[], chunks);
+        let node = test_run.nodes.last_mut().expect("a node was added");
+        (node.items_per_chunk, node.cost_kind) = (items_per_chunk, Some(cost_kind.to_owned()));
+        test_run
     }
 
     pub(super) fn add_pinned(self, dependencies: &[usize], chunks: &[u64]) -> Self {
@@ -40,7 +62,7 @@ impl TestRun {
         test_run
     }
 
-    /// The record of a run on one thread, with these recording costs. Chunks have three items.
+    /// The record of a run on one thread, with these recording costs.
     pub(super) fn run(&self, costs: &SchedulerCosts) -> Run {
         let mut now = Duration::ZERO;
         let (mut nodes, mut chunks) = (Vec::new(), Vec::new());
@@ -49,12 +71,15 @@ impl TestRun {
                 name: format!("p{index}"),
                 dependencies: node.dependencies.clone(),
                 pinned: node.pinned,
-                ..NodeInfo::default()
+                labels: Labels { process: node.cost_kind.clone(), ..Labels::default() },
+                chunked_by_cost: node.cost_kind.is_some(),
             });
             let opened = now;
             for (chunk, &cost) in node.chunks.iter().enumerate() {
                 let ended = now + Duration::from_micros(cost) + costs.recording;
-                let items = chunk * 3..chunk * 3 + 3;
+                let is_last = chunk + 1 == node.chunks.len();
+                let start = chunk * node.items_per_chunk;
+                let items = start..start + node.items_per_chunk - if is_last { node.missing_items } else { 0 };
                 chunks.push(Chunk { node: index, items, opened, started: now, ended, ..Chunk::default() });
                 now = ended;
             }
@@ -72,15 +97,22 @@ pub(super) fn any_test_run(may_be_pinned: bool) -> impl Strategy<Value = TestRun
         vec(0..3_u64, 0..200),
         (0..100_usize, 0..20_u64).prop_map(|(count, cost)| vec![cost; count]),
     ];
-    let node = (vec(any::<prop::sample::Index>(), 0..4), prop::bool::weighted(0.2), chunks);
+    let cost_kind = prop::option::weighted(0.3, prop::sample::select(vec!["fill", "sort"]));
+    // The sizes that nodes which are chunked by cost can have.
+    let size = prop_oneof![1..256_usize, (1..4_usize).prop_map(|blocks| blocks * ObjectTable::BLOCK_SIZE)];
+    let items = size.prop_flat_map(|items| (Just(items), 0..items));
+    let node = (vec(any::<prop::sample::Index>(), 0..4), prop::bool::weighted(0.2), chunks, cost_kind, items);
     vec(node, 0..16).prop_map(move |picks| {
         let mut nodes = Vec::new();
-        for (index, (picks, pinned, chunks)) in picks.into_iter().enumerate() {
+        for (index, (picks, pinned, chunks, cost_kind, (items_per_chunk, missing_items))) in
+            picks.into_iter().enumerate()
+        {
             let mut dependencies: Vec<usize> =
                 picks.iter().filter(|_| index > 0).map(|pick| pick.index(index)).collect();
             dependencies.sort_unstable();
             dependencies.dedup();
-            nodes.push(TestNode { dependencies, pinned: pinned && may_be_pinned, chunks });
+            let (pinned, cost_kind) = (pinned && may_be_pinned, cost_kind.map(str::to_owned));
+            nodes.push(TestNode { dependencies, pinned, chunks, items_per_chunk, missing_items, cost_kind });
         }
         TestRun { nodes }
     })
