@@ -2,6 +2,7 @@
 
 pub mod boxes;
 pub mod cameras;
+pub mod lanes;
 pub mod naive;
 pub mod oracle;
 pub mod spheres;

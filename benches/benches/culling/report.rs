@@ -42,7 +42,9 @@ impl Report {
         for (volume, tallies) in VOLUMES.iter().zip(boxes.volumes) {
             tests.push(drawloom(&format!("object, {volume:?}"), tallies));
         }
-        tests.push(Line { test: "naive sphere, f32".to_owned(), is_drawloom: false, tallies: spheres.naive });
+        let peer = |test: &str, tallies| Line { test: test.to_owned(), is_drawloom: false, tallies };
+        tests.push(peer("naive sphere, f32", spheres.naive));
+        tests.push(peer("naive sphere, SIMD, f32", spheres.lanes));
         Self { extent, speeds, tests, rejected: boxes.rejected }
     }
 

@@ -11,9 +11,12 @@ use drawloom::view::{BoundingSphere, Frustum, ObjectTable};
 use drawloom_benches::boxes::new_box;
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::statistics::median;
+use drawloom_testing::culling::lanes::SphereArrays;
 use drawloom_testing::culling::naive::Naive;
 use drawloom_testing::random::Random;
 use indicatif::ProgressBar;
+use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
 use serde::Serialize;
 
 /// The result of one test.
@@ -43,7 +46,8 @@ impl Speed {
     }
 }
 
-type Test<'a> = (&'static str, Box<dyn Fn() -> u64 + 'a>);
+/// Writes a mask of the visible objects for each word of [`Frustum::WORD`].
+type Test<'a> = Box<dyn Fn(&mut [u64]) + 'a>;
 
 /// Runs all tests on all objects of two scenes, interleaved.
 ///
@@ -51,6 +55,7 @@ type Test<'a> = (&'static str, Box<dyn Fn() -> u64 + 'a>);
 /// Returns an error if a scene rejects a mesh, a material or an object.
 pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<Vec<Speed>, SceneError> {
     let mut speeds = Vec::new();
+    let mut words = vec![0; objects.div_ceil(Frustum::WORD)];
     // In a cloud of 2 km few objects of some metres intersect a plane, and most of the large ones do.
     for (name, size) in [("small objects", 3.0), ("large objects", 400.0)] {
         let scene = cloud(objects, size)?;
@@ -65,26 +70,28 @@ pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<
         let rounds = Rounds { warm_up: 0, measured: rounds };
         let samples = Harness::new(rounds, progress).measure(&mut tests, |(_, test), _round| {
             let start = Instant::now();
-            let visible = test();
-            Ok::<_, SceneError>((visible, start.elapsed().as_nanos() as f64 / objects as f64))
+            test(black_box(&mut words));
+            let nanoseconds = start.elapsed().as_nanos() as f64 / objects as f64;
+            let visible: u32 = words.iter().map(|word| word.count_ones()).sum();
+            Ok::<_, SceneError>((visible, nanoseconds))
         })?;
         speeds.extend(tests.iter().zip(samples).map(|(&(test, _), samples)| Speed {
             scene: name,
             test,
             objects,
             nanoseconds: median(samples.iter().map(|&(_, nanoseconds)| nanoseconds)),
-            visible: samples.last().map_or(0.0, |&(visible, _)| visible as f64 / objects as f64),
+            visible: samples.last().map_or(0.0, |&(visible, _)| f64::from(visible) / objects as f64),
         }));
     }
     Ok(speeds)
 }
 
-fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
+fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<(&'static str, Test<'a>)> {
     let [spheres, boxes, oriented] = tables;
     let frustum = Frustum::new(camera);
-    let each = |table: &'a ObjectTable, volume| -> Box<dyn Fn() -> u64 + 'a> {
+    let each = |table: &'a ObjectTable, volume| -> Test<'a> {
         let frustum = frustum.clone();
-        Box::new(move || visible_by_words(table, &frustum, volume))
+        Box::new(move |words| by_blocks(table, &frustum, volume, words))
     };
     let mut all = vec![
         ("none", each(spheres, CullingVolume::None)),
@@ -92,10 +99,6 @@ fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
         ("box", each(boxes, CullingVolume::Box)),
         ("oriented box", each(oriented, CullingVolume::OrientedBox)),
     ];
-    all.push((
-        "sphere, one by one",
-        Box::new(move || one_by_one(spheres, |bounds| frustum.intersects_sphere(bounds.center, bounds.radius))),
-    ));
     // The spheres in f32, 16 bytes each, as engines with this test store them.
     let plain: Vec<(Vec3, f32)> = (0..spheres.len())
         .map(|object| {
@@ -103,32 +106,53 @@ fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<Test<'a>> {
             (bounds.center.as_vec3(), bounds.radius)
         })
         .collect();
-    if let Some(naive) = Naive::new(camera) {
-        let count = move || plain.iter().filter(|(center, radius)| naive.sees(*center, *radius)).count() as u64;
-        all.push(("naive sphere, one by one, f32", Box::new(count)));
+    all.push(("sphere, one by one", Box::new(move |words| one_by_one(spheres, &frustum, words))));
+    if let (Some(single), Some(several)) = (Naive::new(camera), Naive::new(camera)) {
+        let arrays = SphereArrays::new(&plain);
+        all.push(("naive sphere, one by one, f32", Box::new(move |words| naive_one_by_one(&plain, &single, words))));
+        all.push(("naive sphere, SIMD, f32", Box::new(move |words| in_lanes(&arrays, &several, words))));
     }
     all
 }
 
-/// Culls like a frame: one word of objects at a time, with one lock of its block.
-fn visible_by_words(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
-    let word = |first: usize| {
-        let count = (table.len() - first).min(Frustum::WORD);
-        let entry = first % ObjectTable::BLOCK_SIZE;
-        let bits =
-            table.block(first / ObjectTable::BLOCK_SIZE).visible(black_box(frustum), volume, entry..entry + count);
-        u64::from((bits & u64::MAX >> (Frustum::WORD - count)).count_ones())
-    };
-    (0..table.len()).step_by(Frustum::WORD).map(word).sum()
+/// Culls like a frame: one block of objects at a time, with one lock.
+fn by_blocks(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume, words: &mut [u64]) {
+    let in_block = ObjectTable::BLOCK_SIZE / Frustum::WORD;
+    for (index, words) in words.chunks_mut(in_block).enumerate() {
+        table.block(index).visible_words(frustum, volume, 0..words.len(), |word, bits| words[word] = bits);
+    }
 }
 
-fn one_by_one(table: &ObjectTable, sees: impl Fn(BoundingSphere) -> bool) -> u64 {
-    let block = |index: usize| {
+/// One call of the crate's test for each sphere.
+fn one_by_one(table: &ObjectTable, frustum: &Frustum, words: &mut [u64]) {
+    let in_block = ObjectTable::BLOCK_SIZE / Frustum::WORD;
+    for (index, words) in words.chunks_mut(in_block).enumerate() {
         let block = table.block(index);
-        let count = (table.len() - index * ObjectTable::BLOCK_SIZE).min(ObjectTable::BLOCK_SIZE);
-        (0..count).filter(|&entry| sees(block.spheres.get(entry))).count() as u64
-    };
-    (0..table.block_count()).map(block).sum()
+        for (word, bits) in words.iter_mut().enumerate() {
+            *bits = mask(Frustum::WORD, |bit| {
+                let BoundingSphere { center, radius } = block.spheres.get(word * Frustum::WORD + bit);
+                frustum.intersects_sphere(center, radius)
+            });
+        }
+    }
+}
+
+/// The usual loop.
+fn naive_one_by_one(spheres: &[(Vec3, f32)], naive: &Naive, words: &mut [u64]) {
+    for (bits, spheres) in words.iter_mut().zip(spheres.chunks(Frustum::WORD)) {
+        *bits = mask(spheres.len(), |bit| naive.sees(spheres[bit].0, spheres[bit].1));
+    }
+}
+
+/// The same planes, written for speed.
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn in_lanes(spheres: &SphereArrays, naive: &Naive, words: &mut [u64]) {
+    const HAS_FUSED: bool = target_cfg_f!(target_feature = "fma");
+    spheres.visible(naive, words, |a, b, c| if HAS_FUSED { a.mul_add(b, c) } else { a * b + c });
+}
+
+fn mask(count: usize, sees: impl Fn(usize) -> bool) -> u64 {
+    (0..count).fold(0, |mask, bit| mask | u64::from(sees(bit)) << bit)
 }
 
 /// Boxes up to `size` metres long, scattered in a cloud of 2 km around the camera.

@@ -5,18 +5,19 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::{Picture, WgpuBackend, WgpuSubmission};
-use drawloom::process::Draws;
+use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom::{FrameStatistics, Renderer, RendererBuilder, Submitter};
+use drawloom::{Renderer, RendererBuilder};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::{Harness, Rounds, WARM_UP};
 use drawloom_benches::statistics::median_duration;
-use drawloom_benches::stopwatch::{FrameTime, timed_frame};
+use drawloom_benches::stopwatch::FrameTime;
 use indicatif::ProgressBar;
 
 use crate::Extent;
+use crate::contender::{Contender, Counts};
+use crate::drawloom_pipeline::DrawloomPipeline;
 
 /// The settings of one table on one backend.
 pub struct Block<'a> {
@@ -29,11 +30,8 @@ pub struct Block<'a> {
 /// A pipeline that draws a scene, and its frame times.
 pub struct Setting {
     scene: Rc<Scene>,
-    renderer: Renderer<WgpuBackend>,
-    submitter: Submitter<WgpuBackend>,
+    contender: Box<dyn Contender>,
     times: Vec<FrameTime>,
-    statistics: FrameStatistics,
-    submission: Option<WgpuSubmission>,
 }
 
 impl<'a> Block<'a> {
@@ -41,7 +39,7 @@ impl<'a> Block<'a> {
         Self { backend, progress, schedulers: Vec::new(), settings: Vec::new() }
     }
 
-    /// Adds a setting with a device of its own. Settings with equally many workers share a scheduler.
+    /// Adds a pipeline of this crate with a device of its own. Settings with equally many workers share a scheduler.
     ///
     /// # Errors
     /// Returns an error if the renderer cannot be built.
@@ -58,9 +56,13 @@ impl<'a> Block<'a> {
         };
         self.schedulers.push(Arc::clone(&scheduler));
         let (renderer, submitter) = pipeline(Renderer::builder(self.backend.open()?)).build(scheduler)?;
-        let (times, statistics) = (Vec::new(), FrameStatistics::default());
-        self.settings.push(Setting { scene, renderer, submitter, times, statistics, submission: None });
+        self.add_contender(scene, Box::new(DrawloomPipeline::new(renderer, submitter)));
         Ok(())
+    }
+
+    /// Adds any pipeline.
+    pub fn add_contender(&mut self, scene: Rc<Scene>, contender: Box<dyn Contender>) {
+        self.settings.push(Setting { scene, contender, times: Vec::new() });
     }
 
     /// Measures all settings, one frame of each per round, and returns them in the order they were added.
@@ -71,11 +73,8 @@ impl<'a> Block<'a> {
         self.progress.set_message(format!("{block}, {}", self.backend.name()));
         let rounds = Rounds { warm_up: WARM_UP, measured: self.backend.of(extent.rounds) };
         let times = Harness::new(rounds, self.progress).measure(&mut self.settings, |setting, _round| {
-            let Setting { scene, renderer, submitter, statistics, submission, .. } = setting;
-            let (submitted, time) = timed_frame(renderer, submitter, scene.as_scene_ref(), WgpuSubmission::wait)?;
-            *statistics = submitted.statistics;
-            *submission = Some(submitted.submission);
-            Ok::<_, Box<dyn Error>>(time)
+            let Setting { scene, contender, .. } = setting;
+            contender.frame(scene.as_scene_ref())
         })?;
         self.settings.iter_mut().zip(times).for_each(|(setting, times)| setting.times = times);
         Ok(self.settings)
@@ -93,26 +92,9 @@ impl Setting {
         median_duration(self.times.iter().map(|time| time.device))
     }
 
-    /// Statistics of the last frame.
-    pub fn statistics(&self) -> &FrameStatistics {
-        &self.statistics
-    }
-
-    /// Commands of the last frame in all views.
-    pub fn commands(&self) -> usize {
-        self.statistics.views.iter().map(|view| view.commands).sum()
-    }
-
-    pub fn processes(&self) -> usize {
-        self.renderer.plan().processes().len()
-    }
-
-    /// Instanced draws: all batches of objects, and one for each process that draws lights. Every class of lights must be in view.
-    pub fn draws(&self) -> usize {
-        let batches: usize = self.statistics.views.iter().map(|view| view.batches).sum();
-        let draws_lights = |draws: Draws<'_>| matches!(draws, Draws::Lights(_));
-        let processes = self.renderer.plan().processes().iter();
-        batches + processes.filter(|planned| draws_lights(planned.process.draws())).count()
+    /// What the last frame drew.
+    pub fn counts(&self) -> Counts {
+        self.contender.counts()
     }
 
     /// The picture of the last frame.
@@ -120,7 +102,6 @@ impl Setting {
     /// # Errors
     /// Returns an error if no frame was drawn, or if the picture cannot be read.
     pub fn picture(&self) -> Result<Picture, Box<dyn Error>> {
-        let submission = self.submission.as_ref().ok_or("no frame was drawn")?;
-        Ok(submission.read(0, "picture")?)
+        self.contender.picture()
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, SceneError};
+use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
 use drawloom_benches::boxes::new_box;
 use drawloom_testing::random::Random;
 
@@ -21,8 +21,6 @@ pub struct Field {
     pub lights: usize,
     /// Spot lights that cast shadows, high above the field.
     pub shadow_maps: usize,
-    /// Whether each object has an additive copy, which [`pass_per_light`](crate::forward::pass_per_light) draws for each light.
-    pub has_copies: bool,
 }
 
 impl Field {
@@ -39,27 +37,22 @@ impl Field {
         for index in 0..MATERIALS {
             let paint =
                 Material { name: format!("paint {index}"), diffuse: random.vector(0.3, 0.9), ..Material::default() };
-            paints.push([scene.add(paint.clone())?, scene.add(Material { blend: Blend::Additive, ..paint })?]);
+            paints.push(scene.add(paint)?);
         }
         let mut objects = vec![RenderObject {
             scale: Vec3::new(HALF as f32, 0.1, HALF as f32),
-            ..RenderObject::new(cube, paints[0][0], DVec3::Y * -0.1)
+            ..RenderObject::new(cube, paints[0], DVec3::Y * -0.1)
         }];
-        let mut materials = vec![0];
         for _ in 0..extent.boxes {
             let position =
                 DVec3::new(random.between(-HALF, HALF), random.between(0.2, 0.8), random.between(-HALF, HALF));
             let scale = random.vector(0.15, 0.5);
             let orientation = Quat::from_axis_angle(random.direction().as_vec3(), random.between(0.0, TAU) as f32);
-            let material = random.below(MATERIALS);
-            materials.push(material);
-            objects.push(RenderObject { orientation, scale, ..RenderObject::new(cube, paints[material][0], position) });
+            let paint = paints[random.below(MATERIALS)];
+            objects.push(RenderObject { orientation, scale, ..RenderObject::new(cube, paint, position) });
         }
-        for (object, &material) in objects.iter().zip(&materials) {
-            scene.add_object(*object)?;
-            if self.has_copies {
-                scene.add_object(RenderObject { material: paints[material][1], ..*object })?;
-            }
+        for object in objects {
+            scene.add_object(object)?;
         }
         scene.lights = (0..self.lights).map(|index| small_light(index, &mut random)).collect();
         scene.lights.extend((0..self.shadow_maps).map(|index| high_light(index, self.shadow_maps)));
@@ -72,7 +65,7 @@ impl Field {
 
     /// Number of objects.
     pub fn objects(self, extent: &Extent) -> usize {
-        (extent.boxes + 1) * if self.has_copies { 2 } else { 1 }
+        extent.boxes + 1
     }
 }
 

@@ -1,4 +1,4 @@
-//! Cost by the number of lights: N + L against N × L.
+//! Cost by the number of lights, beside other ways to light the same picture.
 
 use std::error::Error;
 use std::rc::Rc;
@@ -13,7 +13,8 @@ use serde::Serialize;
 use crate::Extent;
 use crate::block::{Block, Setting};
 use crate::field::Field;
-use crate::forward::{loop_over_lights, pass_per_light};
+use crate::loop_over_lights::loop_over_lights;
+use crate::plain_forward::{Clusters, DrawPerLight, PlainForward};
 use crate::report::milliseconds;
 
 /// A row of the table.
@@ -40,21 +41,23 @@ pub struct Row {
 enum Pipeline {
     /// Drawloom's pipeline.
     Deferred,
-    /// See [`pass_per_light`].
-    #[serde(rename = "pass-a-light")]
-    PassPerLight,
+    /// See [`DrawPerLight`].
+    DrawPerLight,
     /// See [`loop_over_lights`].
     LoopOverLights,
+    /// See [`Clusters`].
+    Clustered,
 }
 
 impl Pipeline {
-    const ALL: [Self; 3] = [Self::Deferred, Self::PassPerLight, Self::LoopOverLights];
+    const ALL: [Self; 4] = [Self::Deferred, Self::DrawPerLight, Self::LoopOverLights, Self::Clustered];
 
     fn name(self) -> &'static str {
         match self {
             Self::Deferred => "deferred",
-            Self::PassPerLight => "pass per light",
+            Self::DrawPerLight => "draw per light",
             Self::LoopOverLights => "loop per pixel",
+            Self::Clustered => "clustered",
         }
     }
 }
@@ -65,21 +68,25 @@ const WORKERS: usize = 1;
 /// # Errors
 /// Returns an error if a frame cannot be drawn, an object or light is not visible, or pipelines draw different pictures.
 pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
-    let max_passes = backend.of(extent.max_passes);
     let mut block = Block::new(backend, progress);
     let mut drawn = Vec::new();
     for &lights in extent.lights {
+        let field = Field { lights, ..Field::default() };
+        let scene = Rc::new(field.scene(extent)?);
         for pipeline in Pipeline::ALL {
-            if pipeline == Pipeline::PassPerLight && lights > max_passes {
-                continue;
+            let scene = Rc::clone(&scene);
+            match pipeline {
+                Pipeline::Deferred => block.add(scene, WORKERS, |builder| builder.deferred(Deferred::to_picture()))?,
+                Pipeline::LoopOverLights => block.add(scene, WORKERS, loop_over_lights)?,
+                Pipeline::DrawPerLight => {
+                    let contender = PlainForward::new(&backend.open()?, &scene.as_scene_ref(), DrawPerLight::new)?;
+                    block.add_contender(scene, Box::new(contender));
+                }
+                Pipeline::Clustered => {
+                    let contender = PlainForward::new(&backend.open()?, &scene.as_scene_ref(), Clusters::new)?;
+                    block.add_contender(scene, Box::new(contender));
+                }
             }
-            let field = Field { lights, has_copies: pipeline == Pipeline::PassPerLight, ..Field::default() };
-            let scene = Rc::new(field.scene(extent)?);
-            block.add(scene, WORKERS, |builder| match pipeline {
-                Pipeline::Deferred => builder.deferred(Deferred::to_picture()),
-                Pipeline::PassPerLight => pass_per_light(builder, lights),
-                Pipeline::LoopOverLights => loop_over_lights(builder),
-            })?;
             drawn.push((pipeline, field));
         }
     }
@@ -95,9 +102,9 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
                 backend,
                 pipeline,
                 lights: field.lights,
-                processes: setting.processes(),
-                draws: setting.draws(),
-                commands: setting.commands(),
+                processes: setting.counts().processes,
+                draws: setting.counts().draws,
+                commands: setting.counts().commands,
                 cpu_ms,
                 device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
                 ns_per_light: above.map(|above| (cpu_ms - above.cpu_ms) * 1e6 / (field.lights - above.lights) as f64),
@@ -115,8 +122,8 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
 
 /// All objects and lights must be visible, so that a row measures the stated number of lights.
 fn check_visible(setting: &Setting, field: Field, extent: &Extent) -> Result<(), Box<dyn Error>> {
-    let view = &setting.statistics().views[0];
-    let (visible, expected) = ([view.visible, view.lights], [field.objects(extent), field.lights]);
+    let counts = setting.counts();
+    let (visible, expected) = ([counts.visible, counts.lights], [field.objects(extent), field.lights]);
     if visible != expected {
         return Err(format!("the camera sees {visible:?} objects and lights instead of {expected:?}").into());
     }

@@ -1,4 +1,4 @@
-//! The cost of the deferred pipeline: by the number of lights, beside two forward pipelines that draw the same picture; by the
+//! The cost of the deferred pipeline: by the number of lights, beside three forward pipelines that draw the same picture; by the
 //! number of shadow maps; and with and without a depth pre-pass.
 //!
 //!     cargo bench -p drawloom-benches --bench deferred
@@ -6,12 +6,21 @@
 //!
 //! A block is one table on one backend: wgpu's `noop`, which measures the CPU alone, or the machine's adapter. The settings of a block
 //! are interleaved, one frame each per round. The tables show medians. Without an adapter its blocks are left out.
+//! The forward pipelines:
+//!
+//! - *loop per pixel* is a process of this crate, whose shader loops over all lights that reach the view.
+//! - *draw per light* is written in plain wgpu: it draws all objects, and then adds each light to the objects that it reaches.
+//! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its cluster.
+//!
 //! `target/drawloom/deferred.json` has the same.
 
 mod block;
+mod contender;
+mod drawloom_pipeline;
 mod field;
-mod forward;
 mod lights;
+mod loop_over_lights;
+mod plain_forward;
 mod pre_pass;
 mod report;
 mod shadows;
@@ -45,8 +54,6 @@ pub struct Extent {
     picture: [u32; 2],
     boxes: usize,
     lights: &'static [usize],
-    /// The maximum number of lights of the pipeline with a pass per light, on `noop` and on the adapter.
-    max_passes: [usize; 2],
     shadow_maps: &'static [usize],
 }
 
@@ -57,19 +64,11 @@ impl Extent {
         picture: [640, 360],
         boxes: 1_000,
         lights: &[0, 1, 3, 10, 30, 100, 300, 1_000],
-        max_passes: [300, 100],
         shadow_maps: &[0, 1, 2, 4, 8, 16],
     };
-    const QUICK: Self = Self { name: "quick", rounds: [15, 5], max_passes: [100, 30], ..Self::FULL };
-    const TRIAL: Self = Self {
-        name: "trial",
-        rounds: [1, 1],
-        picture: [64, 36],
-        boxes: 50,
-        lights: &[0, 1, 4],
-        max_passes: [4, 4],
-        shadow_maps: &[0, 2],
-    };
+    const QUICK: Self = Self { name: "quick", rounds: [15, 5], ..Self::FULL };
+    const TRIAL: Self =
+        Self { name: "trial", rounds: [1, 1], picture: [64, 36], boxes: 50, lights: &[0, 1, 4], shadow_maps: &[0, 2] };
 
     fn new(arguments: &Arguments) -> Self {
         match (arguments.bench, arguments.quick) {

@@ -56,7 +56,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
         backend,
         scene,
         depth_pre_pass,
-        draws: setting.draws(),
+        draws: setting.counts().draws,
         cpu_ms: milliseconds(setting.cpu()),
         device_ms: (backend == BackendName::Adapter).then(|| milliseconds(setting.device())),
     };

@@ -27,15 +27,20 @@ pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
 fn ratios(backend: BackendName, off: &[&Row]) -> Bars {
     Bars {
         title: format!("Multi against single by objects, instancing off, {}", backend.name()),
-        series: vec!["L 6, on two cores of 2009".to_owned(), "2 workers".to_owned()],
-        groups: off
-            .iter()
-            .map(|row| (chart::grouped(row.objects as f64), vec![paper_ratio(row.objects), row.ratio]))
-            .collect(),
+        series: ["L 6, on two cores of 2009", "1 worker, cached", "2 workers, direct", "2 workers"]
+            .map(str::to_owned)
+            .into(),
+        groups: off.iter().map(|row| (chart::grouped(row.objects as f64), bars(row))).collect(),
         marks: off.iter().map(|row| row.ceiling).collect(),
         mark_name: "ceiling".to_owned(),
         line: 1.0,
     }
+}
+
+/// In the order of the series.
+fn bars(row: &Row) -> Vec<f64> {
+    let [cached, direct] = [row.cached_ratio, row.direct_ratio].map(|ratio| ratio.unwrap_or(f64::NAN));
+    vec![paper_ratio(row.objects), cached, direct, row.ratio]
 }
 
 /// The ratio that L reports. For fewer objects L says that two cores were slightly worse than one.

@@ -10,6 +10,8 @@
 //!
 //! - *single* is L's first scenario: the same processes on one thread, recorded directly into the passes, one draw per object.
 //! - *multi* is this crate on two workers, with instancing and without.
+//! - Two scenarios in between separate the effect of threads from that of bundles that are kept: *one worker, cached* is single with
+//!   cached bundles, and *two workers, direct* is single on two workers.
 //!
 //! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
 //! the device's time. Frames per second are those of the median round, and a ratio is the median of the rounds' own ratios.

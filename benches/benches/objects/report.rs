@@ -38,7 +38,7 @@ impl Report {
         println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
         println!(
-            "fps: frames of record + submit per second, without the device's time; held: the time, and the share of the frame, in which the world is borrowed\n"
+            "fps: frames of record + submit per second, without the device's time; ratios: of fps, to single; held: the time, and the share of the frame, in which the world is borrowed\n"
         );
         let mut table = Table::new(&[
             "objects",
@@ -47,6 +47,8 @@ impl Report {
             "single fps",
             "multi fps",
             "ratio",
+            "one worker, cached",
+            "two workers, direct",
             "ceiling",
             "single held ms",
             "multi held ms",
@@ -61,6 +63,8 @@ impl Report {
                 format!("{:.1}", row.single_fps),
                 format!("{:.1}", row.multi_fps),
                 format!("{:.2}", row.ratio),
+                row.cached_ratio.map_or_else(String::new, |ratio| format!("{ratio:.2}")),
+                row.direct_ratio.map_or_else(String::new, |ratio| format!("{ratio:.2}")),
                 format!("{:.2}", row.ceiling),
                 format!("{:.4}", row.single_held_ms),
                 format!("{:.4}", row.multi_held_ms),

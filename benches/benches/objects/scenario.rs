@@ -1,4 +1,4 @@
-//! L's two scenarios, by the number of objects.
+//! L's two scenarios, by the number of objects, and two between them.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -27,6 +27,10 @@ pub struct Row {
     pub single_fps: f64,
     pub multi_fps: f64,
     pub ratio: f64,
+    /// The ratio of one worker that replays cached bundles. Without instancing only, like the next.
+    pub cached_ratio: Option<f64>,
+    /// The ratio of two workers that record directly.
+    pub direct_ratio: Option<f64>,
     pub ceiling: f64,
     /// The time in which the world is borrowed.
     pub single_held_ms: f64,
@@ -47,13 +51,16 @@ pub fn measure(
     let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
     progress.set_message(format!("{objects} objects, {}", backend.name()));
     let (one, two) = (Arc::new(Scheduler::new(1)?), Arc::new(Scheduler::new(WORKERS)?));
+    let with = |strategy| Ok::<_, Box<dyn Error>>(backend.open()?.recording_strategy(strategy)?);
     let mut runners = [
-        Runner::new(backend.open()?.recording_strategy(RecordingStrategy::Direct)?, &one, false)?,
+        Runner::new(with(RecordingStrategy::Direct)?, &one, false)?,
+        Runner::new(with(RecordingStrategy::CachedBundles)?, &one, false)?,
+        Runner::new(with(RecordingStrategy::Direct)?, &two, false)?,
         Runner::new(backend.open()?, &two, false)?,
         Runner::new(backend.open()?, &two, true)?,
     ];
     let mut world = world::new(objects)?;
-    let mut samples: [Vec<Sample>; 3] = Default::default();
+    let mut samples: [Vec<Sample>; 5] = Default::default();
     let mut serial = Vec::new();
     let mut harness = Harness::new(rounds, progress);
     for round in harness.rounds(runners.len()) {
@@ -67,7 +74,8 @@ pub fn measure(
     let frame = |samples: &[Sample]| median(samples.iter().map(|sample| sample.frame));
     let borrowed = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed));
     let borrowed_share = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed / sample.frame));
-    let [single, multi @ ..] = &samples;
+    let [single, cached, direct, multi @ ..] = &samples;
+    let ratio = |to: &[Sample]| median(single.iter().zip(to).map(|(single, sample)| single.frame / sample.frame));
     let ceiling = ceiling(frame(single), median(serial), two.wake_up_cost().as_secs_f64());
     let row = |instancing: bool| {
         let multi = &multi[usize::from(instancing)];
@@ -77,7 +85,9 @@ pub fn measure(
             instancing,
             single_fps: frame(single).recip(),
             multi_fps: frame(multi).recip(),
-            ratio: median(single.iter().zip(multi).map(|(single, multi)| single.frame / multi.frame)),
+            ratio: ratio(multi),
+            cached_ratio: (!instancing).then(|| ratio(cached)),
+            direct_ratio: (!instancing).then(|| ratio(direct)),
             ceiling,
             single_held_ms: borrowed(single) * 1e3,
             multi_held_ms: borrowed(multi) * 1e3,

@@ -1,26 +1,30 @@
 //! Spheres that almost touch a frustum, and spheres anywhere.
 
+use std::array;
 use std::ops::Range;
 
 use drawloom::view::{BoundingSphere, BoundingSpheres, Frustum};
 
 use super::cameras::{any_camera, magnitude};
+use super::lanes::SphereArrays;
 use super::naive::Naive;
 use super::oracle::{Classification, Oracle};
 use super::tally::Tallies;
 use crate::random::Random;
 
-/// The tallies of this crate's test, and of the naive one for cameras that it supports.
+/// The tallies of this crate's test, and of the naive one for cameras that it supports: one by one, and many at a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SphereTallies {
     pub drawloom: Tallies,
     pub naive: Tallies,
+    pub lanes: Tallies,
 }
 
 impl SphereTallies {
     pub fn add(&mut self, other: &Self) {
         self.drawloom.add(&other.drawloom);
         self.naive.add(&other.naive);
+        self.lanes.add(&other.lanes);
     }
 }
 
@@ -47,9 +51,16 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
             }
         }
         if let Some(naive) = naive {
-            for (entry, &(is_tangent, classification)) in cases.iter().enumerate() {
+            let in_world: [_; BoundingSpheres::COUNT] = array::from_fn(|entry| {
                 let BoundingSphere { center, radius } = spheres.get(entry);
-                tallies.naive.of(is_tangent).count(classification, naive.sees_in_world(center, radius));
+                (center.as_vec3(), radius)
+            });
+            let mut words = [0; BoundingSpheres::COUNT / Frustum::WORD];
+            SphereArrays::new(&in_world).visible(&naive, &mut words, f32::mul_add);
+            for (entry, (&(is_tangent, classification), (center, radius))) in cases.iter().zip(in_world).enumerate() {
+                tallies.naive.of(is_tangent).count(classification, naive.sees(center, radius));
+                let is_visible = words[entry / Frustum::WORD] >> (entry % Frustum::WORD) & 1 == 1;
+                tallies.lanes.of(is_tangent).count(classification, is_visible);
             }
         }
     }
