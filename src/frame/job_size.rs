@@ -24,8 +24,8 @@ const HYSTERESIS: Hysteresis = Hysteresis::new(1.6);
 /// `previous` is the latest choice; `None` if that was a single job, or if there was none.
 ///
 /// One job is best for little work, and for a single worker. Otherwise each worker gets several jobs, none shorter than
-/// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping. After the same choice of this function, more
-/// workers never have larger jobs.
+/// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping. For equal choices before, which this function made,
+/// more workers never get larger jobs.
 pub(crate) fn job_size(per_item: f32, width: usize, workers: usize, previous: Option<usize>) -> usize {
     let nanoseconds = |time: Duration| time.as_nanos() as f32;
     let work = per_item * width as f32;
