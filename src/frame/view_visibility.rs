@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::command::Version;
 use crate::quality::CullingVolume;
-use crate::view::{ChangedWord, Frustum, ObjectTable, RenderView, VisibleSet};
+use crate::view::{ChangedWord, Frustum, ObjectTable, Overlap, RenderView, VisibleSet};
 
 /// The visible set of a view, and what it was found with. While the view does not change, a frame tests the
 /// objects that changed.
@@ -103,16 +103,19 @@ impl ViewVisibility {
             return;
         }
         let blocks = indices.start / WORDS_PER_BLOCK..indices.end.div_ceil(WORDS_PER_BLOCK);
-        let test_block = |block: usize| {
-            let first = block * WORDS_PER_BLOCK;
+        let test_block = |index: usize, overlap: Overlap| {
+            let (first, block) = (index * WORDS_PER_BLOCK, table.block(index));
             let words = indices.start.max(first) - first..(indices.end - first).min(WORDS_PER_BLOCK);
-            table.block(block).visible_words(frustum, volume, words, |word, bits| {
-                self.set.replace(first + word, u64::MAX, bits);
-            });
+            let put = |word: usize, bits: u64| self.set.replace(first + word, u64::MAX, bits);
+            if overlap == Overlap::Inside {
+                words.for_each(|word| put(word, block.drawable(word)));
+            } else {
+                block.visible_words(frustum, volume, words, put);
+            }
         };
         // The set is empty, so blocks outside need no more work.
         if volume == CullingVolume::None {
-            blocks.for_each(test_block);
+            blocks.for_each(|block| test_block(block, Overlap::Inside));
         } else {
             table.block_bounds().visit_overlapping(frustum, blocks, test_block);
         }

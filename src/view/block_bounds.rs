@@ -30,8 +30,13 @@ impl BlockBounds {
         self.groups[group / GroupBounds::GROUPS].set_union(group % GroupBounds::GROUPS, &self.blocks[group]);
     }
 
-    /// Calls `visit` with the blocks of a range, in order, but for those that lie outside a frustum as a whole.
-    pub(crate) fn visit_overlapping(&self, frustum: &Frustum, blocks: Range<usize>, mut visit: impl FnMut(usize)) {
+    /// Calls `visit` with the blocks of a range, in order, and how they lie; not with those that lie outside a frustum as a whole.
+    pub(crate) fn visit_overlapping(
+        &self,
+        frustum: &Frustum,
+        blocks: Range<usize>,
+        mut visit: impl FnMut(usize, Overlap),
+    ) {
         const BLOCKS: usize = GroupBounds::GROUPS;
         for (index, blocks) in block_ranges(blocks, BLOCKS * GroupBounds::GROUPS) {
             let overlaps_of_groups = frustum.overlaps(&self.groups[index]);
@@ -40,7 +45,9 @@ impl BlockBounds {
                     continue;
                 }
                 let overlaps = frustum.overlaps(&self.blocks[group]);
-                blocks.filter(|block| overlaps[block % BLOCKS] != Overlap::Outside).for_each(&mut visit);
+                for block in blocks.filter(|block| overlaps[block % BLOCKS] != Overlap::Outside) {
+                    visit(block, overlaps[block % BLOCKS]);
+                }
             }
         }
     }
@@ -79,7 +86,7 @@ mod tests {
                 }
             }
             let mut visited = Vec::new();
-            bounds.visit_overlapping(&frustum, range, |block| visited.push(block));
+            bounds.visit_overlapping(&frustum, range, |block, _| visited.push(block));
             prop_assert!(visited.is_sorted() && expected.iter().all(|block| visited.contains(block)));
             prop_assert!(visited.len() <= expected.len() + 2 + centers.len() / 10, "{visited:?} {expected:?}");
         }

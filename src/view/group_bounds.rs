@@ -9,21 +9,20 @@ use super::frustum::ROUNDING_TOLERANCE;
 use super::{BoundingSphere, BoundingSpheres, Frustum};
 
 /// The bounds of [`GroupBounds::GROUPS`] groups of spheres: for each an axis-aligned box around the centres, and the largest radius.
-/// A group is a word of spheres, or a block.
+/// A group is a word of spheres, a block, or a group of blocks.
 ///
-/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms", 1976) of two
-/// levels. The groups are tested together, in about the time of four spheres.
+/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms", 1976). The groups are tested together, in about the time of four spheres.
 #[derive(Clone, Debug)]
 pub(crate) struct GroupBounds {
     /// The corners of the boxes in the world, in metres.
-    lows: [Lane; 3],
-    highs: [Lane; 3],
+    lows: [PerGroup; 3],
+    highs: [PerGroup; 3],
     /// In metres; negative infinity for a group without spheres.
-    radii: Lane,
+    radii: PerGroup,
 }
 
 /// One number of each group.
-type Lane = [f64; GroupBounds::GROUPS];
+type PerGroup = [f64; GroupBounds::GROUPS];
 
 /// One number of each sphere of a word.
 type Word<T> = [T; Frustum::WORD];

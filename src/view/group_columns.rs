@@ -24,7 +24,7 @@ pub(super) struct GroupColumns<'a> {
     pub(super) materials: &'a Lanes<Handle<Material>>,
 }
 
-/// The entries of a scene's last objects, which are no whole group. What is left of the group repeats the first of them.
+/// The entries of a partial last group. Unused lanes repeat its first object.
 pub(super) struct PaddedColumns {
     first: usize,
     positions: Lanes<DVec3>,

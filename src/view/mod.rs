@@ -40,6 +40,7 @@ pub use frustum::Frustum;
 pub use gpu_light::GpuLight;
 pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
+pub(crate) use group_bounds::Overlap;
 pub use light_table::{LightClass, LightTable};
 pub use object_block::ObjectBlock;
 pub use object_description::ObjectDraw;

@@ -26,6 +26,8 @@ pub struct ObjectBlock {
     pub bins: [u32; Self::SIZE],
     /// The objects without blending: a mask for each word.
     pub(crate) opaque: [u64; Self::WORDS],
+    /// The objects that a view may see, because they are neither rejected nor removed: a mask for each word.
+    drawable: [u64; Self::WORDS],
     /// The bounds of each word.
     pub(super) word_bounds: GroupBounds,
     /// The table's epoch when an object of a group of [`ObjectBlock::GROUP`] last changed.
@@ -59,6 +61,8 @@ impl ObjectBlock {
         let gpu_objects = self.gpu_objects[entry..].first_chunk_mut::<LANES>().expect("groups do not cross blocks");
         let draws = self.draws[entry..].first_chunk::<LANES>().expect("groups do not cross blocks");
         let valid = mask & group.valid;
+        let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
+        self.drawable[word] = self.drawable[word] & !(u64::from(mask) << shift) | u64::from(valid) << shift;
         let mut draws_changed = 0;
         if valid == u8::MAX {
             for lane in 0..LANES {
@@ -93,10 +97,10 @@ impl ObjectBlock {
         }
     }
 
-    /// The description of an object; `None` if it is rejected.
-    pub(super) fn description(&self, entry: usize) -> Option<ObjectDescription> {
+    /// The description of an object, or why it is rejected.
+    pub(super) fn description(&self, entry: usize) -> Result<ObjectDescription, RejectionReason> {
         let (gpu_object, bounds, draw) = (self.gpu_objects[entry], self.spheres.get(entry), self.draws[entry]);
-        self.rejected[entry].is_none().then_some(ObjectDescription { gpu_object, bounds, draw })
+        self.rejected[entry].map_or(Ok(ObjectDescription { gpu_object, bounds, draw }), Err)
     }
 
     /// The rejected objects.
@@ -108,6 +112,7 @@ impl ObjectBlock {
     /// Removes an object: no view sees it.
     pub(super) fn remove(&mut self, entry: usize) {
         self.spheres.set(entry, BoundingSphere::EMPTY);
+        self.drawable[entry / Frustum::WORD] &= !(1 << (entry % Frustum::WORD));
         self.set_rejected(entry, None);
     }
 
@@ -141,20 +146,24 @@ impl ObjectBlock {
         words: Range<usize>,
         mut put: impl FnMut(usize, u64),
     ) {
-        let overlaps = frustum.overlaps(&self.word_bounds);
+        let overlaps = match volume {
+            CullingVolume::None => [Overlap::Inside; Self::WORDS],
+            _ => frustum.overlaps(&self.word_bounds),
+        };
         for word in words {
-            let entries = word * Frustum::WORD..(word + 1) * Frustum::WORD;
-            let all = || self.visible(frustum, CullingVolume::None, entries.clone());
-            put(
-                word,
-                match overlaps[word] {
-                    _ if volume == CullingVolume::None => all(),
-                    Overlap::Outside => 0,
-                    Overlap::Inside => all(),
-                    Overlap::Partial => self.visible(frustum, volume, entries),
-                },
-            );
+            let entries = || word * Frustum::WORD..(word + 1) * Frustum::WORD;
+            let mask = match overlaps[word] {
+                Overlap::Outside => 0,
+                Overlap::Inside => self.drawable[word],
+                Overlap::Partial => self.visible(frustum, volume, entries()),
+            };
+            put(word, mask);
         }
+    }
+
+    /// The objects of a word that a view may see, whatever its frustum: a mask.
+    pub(crate) fn drawable(&self, word: usize) -> u64 {
+        self.drawable[word]
     }
 
     /// Tests objects of a word against a frustum: see [`ObjectBlock::visible`]. The mask that it returns is among `tested`; bit 0 of
@@ -179,9 +188,9 @@ impl ObjectBlock {
     pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
         let offset = entries.start % Frustum::WORD;
         let first = entries.start - offset;
+        let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
         if volume == CullingVolume::None {
-            let is_valid = |mask, (bit, &radius): (usize, &f32)| mask | u64::from(radius >= 0.0) << bit;
-            return self.spheres.radii()[entries].iter().enumerate().fold(0, is_valid);
+            return (self.drawable[first / Frustum::WORD] & tested) >> offset;
         }
         if entries.len() < WORD_TEST_THRESHOLD {
             let intersects = |entry: usize| {
@@ -192,11 +201,11 @@ impl ObjectBlock {
             return self.test_boxes(frustum, first, entries.clone().fold(0, test) << offset) >> offset;
         }
         match &self.boxes {
-            None => frustum.intersects_spheres(&self.spheres, first) >> offset,
+            None => (frustum.intersects_spheres(&self.spheres, first) & tested) >> offset,
             Some(_) => {
                 let Classified { intersecting, inside } = frustum.classify_spheres(&self.spheres, first);
-                let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
-                (intersecting & inside | self.test_boxes(frustum, first, intersecting & !inside & tested)) >> offset
+                let intersecting = intersecting & tested;
+                (intersecting & inside | self.test_boxes(frustum, first, intersecting & !inside)) >> offset
             }
         }
     }
@@ -222,6 +231,7 @@ impl Default for ObjectBlock {
             draws: [ObjectDraw::NONE; Self::SIZE],
             bins: [0; Self::SIZE],
             opaque: [0; Self::WORDS],
+            drawable: [0; Self::WORDS],
             word_bounds: GroupBounds::default(),
             changed_in: [0; Self::SIZE / Self::GROUP],
             rejected_count: 0,

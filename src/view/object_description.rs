@@ -24,7 +24,7 @@ pub struct ObjectDraw {
 }
 
 impl ObjectDraw {
-    /// How no object is drawn: there are fewer meshes.
+    /// Equal to no object's draw: no mesh has this slot.
     pub(super) const NONE: Self = Self { mesh: u32::MAX, material: 0, state: DrawState::PLAIN };
 }
 

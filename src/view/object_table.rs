@@ -184,7 +184,8 @@ impl ObjectTable {
             let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
             let mut padded = None;
             let columns = GroupColumns::new(scene, object, &mut padded);
-            GroupDescription::new(&columns, &self.draw_states).object(&columns, 0) == before
+            let now = GroupDescription::new(&columns, &self.draw_states).object(&columns, 0);
+            now.ok_or_else(|| rejection_reason(scene, object)) == before
         };
         let unreported = |object: &usize| !self.changed.contains(*object);
         (0..self.length).filter(unreported).find(|object| !is_as_before(object))

@@ -18,7 +18,7 @@ use crate::command::Version;
 #[derive(Debug, Default)]
 pub struct VisibleSet {
     words: Vec<AtomicU64>,
-    /// A bit for each word. A word whose bit is not set is 0.
+    /// A bit for each word. A word whose bit is not set is empty; compaction clears those of words that became empty.
     filled: Vec<AtomicU64>,
     compacted: RwLock<Compacted>,
 }
@@ -40,6 +40,13 @@ struct VisibleWord {
     /// The number of visible objects in the words before it.
     rank: u32,
     bits: u64,
+}
+
+impl Compacted {
+    /// The words that are not empty; none between a reset and a compaction, when `words` are those of the set before.
+    fn filled_words(&self) -> &[VisibleWord] {
+        if self.total > 0 { &self.words } else { &[] }
+    }
 }
 
 impl VisibleSet {
@@ -112,6 +119,7 @@ impl VisibleSet {
                 let word = index * Self::OBJECTS_PER_WORD + bit;
                 let bits = self.words[word].load(Ordering::Relaxed);
                 if bits == 0 {
+                    filled.fetch_and(!(1 << bit), Ordering::Relaxed);
                     continue;
                 }
                 let now = VisibleWord { word: word as u32, rank, bits };
@@ -149,9 +157,9 @@ impl VisibleSet {
         self.compacted.read().total as usize
     }
 
-    /// The number of words that were not empty when the set was last compacted.
+    /// The number of words that are not empty; 0 between a reset and [`VisibleSet::compact`].
     pub fn filled_word_count(&self) -> usize {
-        self.compacted.read().words.len()
+        self.compacted.read().filled_words().len()
     }
 
     /// Calls `visit(word, bits)` for words that are not empty, in order: those whose index among them is in `indices`.
@@ -159,7 +167,7 @@ impl VisibleSet {
     /// # Panics
     /// If `indices` are not below [`VisibleSet::filled_word_count`].
     pub fn visit_words(&self, indices: Range<usize>, mut visit: impl FnMut(usize, u64)) {
-        for &VisibleWord { word, bits, .. } in &self.compacted.read().words[indices] {
+        for &VisibleWord { word, bits, .. } in &self.compacted.read().filled_words()[indices] {
             visit(word as usize, bits);
         }
     }
@@ -169,8 +177,9 @@ impl VisibleSet {
     /// Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
         let compacted = self.compacted.read();
-        let first = compacted.words.partition_point(|word| word.rank as usize <= ranks.start).saturating_sub(1);
-        for &VisibleWord { word, rank, mut bits } in &compacted.words[first..] {
+        let words = compacted.filled_words();
+        let first = words.partition_point(|word| word.rank as usize <= ranks.start).saturating_sub(1);
+        for &VisibleWord { word, rank, mut bits } in &words[first..] {
             let rank = rank as usize;
             if rank >= ranks.end {
                 break;
@@ -249,8 +258,10 @@ mod tests {
         set.compact(Version::default());
         assert_eq!(set.count(), 3);
         set.reset(130);
+        assert_eq!((set.count(), set.filled_word_count()), (0, 0));
+        set.visit(0..10, |_, word, _| panic!("{word}"));
         set.compact(Version::default());
-        assert_eq!(set.count(), 0);
+        assert_eq!((set.count(), set.filled_word_count()), (0, 0));
         set.replace(2, 0b11, 0b10);
         set.compact(Version::default());
         assert_eq!((set.count(), set.word(2)), (1, 0b10));
