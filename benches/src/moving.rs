@@ -1,6 +1,6 @@
 //! A scene in which objects or cameras move.
 
-use drawloom::glam::DVec3;
+use drawloom::glam::{DVec3, Quat};
 use drawloom::scene::{Camera, Changes, Scene, SceneRef};
 use drawloom_testing::random::Random;
 
@@ -27,14 +27,22 @@ pub enum Motion {
     Nothing,
     /// The cameras alone, and the engine says that no object does.
     Cameras,
+    /// All objects, and all cameras turn a little in each frame, so that other objects are seen. The engine says nothing about it.
+    EverythingInTurningViews,
 }
 
 /// The distance that an object moves per frame, in metres, and the number of frames after which it turns around.
 const STEP: f64 = 1e-3;
 const FRAMES: u32 = 64;
 
+/// How far cameras are turned at least, and how much farther they turn per frame, in radians. At the least, the border of the picture
+/// cuts a cloud of [`clouds`](crate::clouds).
+const MIN_TURN: f32 = 0.2;
+const TURN: f32 = 0.003;
+
 impl Motion {
-    pub const ALL: [Self; 4] = [Self::Everything, Self::OnePercent, Self::Nothing, Self::Cameras];
+    pub const ALL: [Self; 5] =
+        [Self::Everything, Self::OnePercent, Self::Nothing, Self::Cameras, Self::EverythingInTurningViews];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -42,6 +50,7 @@ impl Motion {
             Self::OnePercent => "one percent moving",
             Self::Nothing => "still",
             Self::Cameras => "still, cameras moving",
+            Self::EverythingInTurningViews => "moving, cameras turning",
         }
     }
 }
@@ -59,7 +68,9 @@ impl Moving {
         let step = DVec3::new(STEP, STEP / 2.0, 0.0) * if forward { 1.0 } else { -1.0 };
         self.moved.clear();
         match self.motion {
-            Motion::Everything => self.positions.iter_mut().for_each(|position| *position += step),
+            Motion::Everything | Motion::EverythingInTurningViews => {
+                self.positions.iter_mut().for_each(|position| *position += step);
+            }
             Motion::OnePercent => {
                 for _ in 0..self.positions.len().div_ceil(100) {
                     let object = self.random.below(self.positions.len());
@@ -70,13 +81,20 @@ impl Moving {
             Motion::Nothing => {}
             Motion::Cameras => self.cameras.iter_mut().for_each(|camera| camera.position += step),
         }
+        if self.motion == Motion::EverythingInTurningViews {
+            let frame = self.frame % (2 * FRAMES);
+            let turn = MIN_TURN + TURN * frame.min(2 * FRAMES - frame) as f32;
+            for (camera, original) in self.cameras.iter_mut().zip(&self.scene.cameras) {
+                camera.orientation = Quat::from_rotation_y(turn) * original.orientation;
+            }
+        }
         self.frame += 1;
     }
 
     /// The scene. Only one renderer may draw it, because it tells what changed since the step before.
     pub fn as_scene_ref(&self) -> SceneRef<'_> {
         let changes = match self.motion {
-            Motion::Everything => Changes::Unknown,
+            Motion::Everything | Motion::EverythingInTurningViews => Changes::Unknown,
             Motion::OnePercent | Motion::Nothing | Motion::Cameras => Changes::Objects(&self.moved),
         };
         SceneRef { positions: &self.positions, cameras: &self.cameras, changes, ..self.scene.as_scene_ref() }

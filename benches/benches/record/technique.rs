@@ -70,6 +70,11 @@ impl Contender {
             of("by-mesh", 1, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 1)?))?,
             of("by-mesh", 2, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 2)?))?,
         ];
+        let turning = Motion::EverythingInTurningViews;
+        for threads in [1, 2] {
+            let technique = Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), threads)?);
+            all.push(in_scene("by-mesh", threads, turning, technique)?);
+        }
         let strategies = [
             ("drawloom", None),
             ("drawloom-direct", Some(RecordingStrategy::Direct)),
