@@ -282,7 +282,7 @@ fn open_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
         ..wgpu::RequestAdapterOptions::default()
     };
     let adapter = pollster::block_on(instance.request_adapter(&options))?;
-    let optional = adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES);
+    let optional = WgpuBackend::optional_features(&adapter);
     let descriptor = wgpu::DeviceDescriptor {
         required_features: WgpuBackend::REQUIRED_FEATURES | optional,
         required_limits: adapter.limits(),

@@ -7,6 +7,11 @@ use drawloom::wgpu;
 
 /// Opens a device on the machine's best adapter.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    device_without(wgpu::Features::empty())
+}
+
+/// Opens a device on the machine's best adapter, as if the adapter lacked some optional features.
+pub fn device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::HighPerformance,
@@ -16,7 +21,7 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
         |_| "no graphics adapter found; on Debian, `apt install mesa-vulkan-drivers` provides one in software",
     )?;
     // Higher limits than Drawloom requires allow larger pictures and more objects.
-    open(&adapter, adapter.limits())
+    open(&adapter, missing, adapter.limits())
 }
 
 /// Opens a device on wgpu's no-op backend.
@@ -29,12 +34,15 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
     // The adapter claims limits that wgpu itself does not support.
-    open(&adapter, wgpu::Limits::default())
+    open(&adapter, wgpu::Features::empty(), wgpu::Limits::default())
 }
 
-fn open(adapter: &wgpu::Adapter, required_limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    // Optional features allow indirect draws and pass times.
-    let optional = adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES);
+fn open(
+    adapter: &wgpu::Adapter,
+    missing: wgpu::Features,
+    required_limits: wgpu::Limits,
+) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    let optional = WgpuBackend::optional_features(adapter) - missing;
     let descriptor = wgpu::DeviceDescriptor {
         required_features: WgpuBackend::REQUIRED_FEATURES | optional,
         required_limits,

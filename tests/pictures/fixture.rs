@@ -34,7 +34,16 @@ impl Fixture {
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<Self, Failed> {
-        let (device, queue) = device().ok_or("there is no graphics adapter")?;
+        Self::on(device(), workers, build)
+    }
+
+    /// On another device; `None` if there is no adapter.
+    pub fn on(
+        device: Option<(wgpu::Device, wgpu::Queue)>,
+        workers: usize,
+        build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+    ) -> Result<Self, Failed> {
+        let (device, queue) = device.ok_or("there is no graphics adapter")?;
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let (renderer, submitter) = build(Renderer::builder(WgpuBackend::new(device, queue)?)).build(scheduler)?;
         Ok(Self { renderer, submitter })

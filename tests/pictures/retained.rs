@@ -1,18 +1,35 @@
 //! Frames that upload what changed, against frames of new renderers, which upload everything.
 
+use std::sync::OnceLock;
+
+use drawloom::backend::WgpuBackend;
+use drawloom::process::Deferred;
 use drawloom::scene::{Changes, SceneRef};
+use drawloom::wgpu;
+use drawloom_testing::adapter;
 use drawloom_testing::changing_world::ChangingWorld;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::Fixture;
 
-pub const CASES: &[Case] =
-    &[("reported_changes_make_the_picture_of_a_new_renderer", reported_changes_make_the_picture_of_a_new_renderer)];
+pub const CASES: &[Case] = &[
+    ("reported_changes_make_the_picture_of_a_new_renderer", || {
+        changes_make_the_picture_of_a_new_renderer(Fixture::new)
+    }),
+    ("so_do_changes_that_are_staged", || changes_make_the_picture_of_a_new_renderer(staging_fixture)),
+];
 
-fn reported_changes_make_the_picture_of_a_new_renderer() -> Result<(), Failed> {
+/// A fixture whose device maps no memory, so objects are staged.
+fn staging_fixture() -> Result<Fixture, Failed> {
+    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+    let open = || adapter::device_without(WgpuBackend::MAPPING_FEATURES).ok();
+    Fixture::on(DEVICE.get_or_init(open).clone(), 2, |builder| builder.deferred(Deferred::to_picture()))
+}
+
+fn changes_make_the_picture_of_a_new_renderer(fixture: fn() -> Result<Fixture, Failed>) -> Result<(), Failed> {
     let mut world = ChangingWorld::new(3, 600);
-    let mut fixture = Fixture::new()?;
+    let mut fixture = fixture()?;
     let mut log = Vec::new();
     // A frame in flight has buffers of its own, so the next frame writes others, which hold an older scene.
     let mut in_flight = None;

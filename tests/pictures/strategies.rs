@@ -48,7 +48,7 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
         };
         let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|error| error.to_string())?;
         let descriptor = wgpu::DeviceDescriptor {
-            required_features: adapter.features() & (WgpuBackend::OPTIONAL_FEATURES | WgpuBackend::TIMING_FEATURES),
+            required_features: WgpuBackend::optional_features(&adapter),
             required_limits: adapter.limits(),
             ..wgpu::DeviceDescriptor::default()
         };

@@ -9,7 +9,7 @@ use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::PipelineCache;
 use super::resources::{
-    AssetCache, BindGroupLayouts, LightMeshes, SubdividedMesh, TargetCache, UploadQueue, new_buffer,
+    AssetCache, BindGroupLayouts, LightMeshes, SubdividedMesh, TargetCache, UploadQueue, new_buffer, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::timing::{DeviceClock, DeviceTiming};
@@ -55,6 +55,17 @@ impl WgpuBackend {
     /// Optional features, used by [`RecordingStrategy::Indirect`].
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
 
+    /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it only for such
+    /// devices: see [`WgpuBackend::optional_features`].
+    pub const MAPPING_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+
+    /// The optional features that an adapter has and that pay on it: request them with
+    /// [`WgpuBackend::REQUIRED_FEATURES`].
+    pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
+        let mapping = if shares_memory(&adapter.get_info()) { Self::MAPPING_FEATURES } else { wgpu::Features::empty() };
+        adapter.features() & (Self::OPTIONAL_FEATURES | Self::TIMING_FEATURES | mapping)
+    }
+
     /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times
     /// raw passes as well.
     pub const TIMING_FEATURES: wgpu::Features =
@@ -86,6 +97,7 @@ impl WgpuBackend {
         // On the noop backend wgpu panics over the arguments' alignment, unless its check of indirect calls is switched
         // off.
         let tunes_indirect = supports_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
+        let maps_memory = device.features().contains(Self::MAPPING_FEATURES) && shares_memory(&device.adapter_info());
         Ok(Self {
             device,
             uploads: UploadQueue::new(queue),
@@ -95,7 +107,7 @@ impl WgpuBackend {
             assets: Mutex::default(),
             subdivisions: SubdivisionCache::default(),
             targets: Mutex::default(),
-            buffers: Arc::default(),
+            buffers: Arc::new(BufferPool::new(maps_memory)),
             strategies: StrategySet::new(supports_indirect, tunes_indirect),
             frames: AtomicU64::new(0),
             workers: AtomicUsize::new(1),

@@ -46,6 +46,7 @@ impl Backend for WgpuBackend {
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
         with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, objects, blocks))
+            .flatten()
             .inspect_err(|_| self.buffers.clear())
     }
 

@@ -31,8 +31,8 @@ impl WgpuBackend {
         })??;
         let targets =
             with_error_scope(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
+        let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
-            let mut buffers = self.buffers.take();
             buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
             if let Some(timing) = &self.device_timing {
                 buffers.begin_timestamps(&self.device, request, timing.times_raw_passes)?;

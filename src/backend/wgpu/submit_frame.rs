@@ -44,7 +44,9 @@ impl WgpuBackend {
             let readback =
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copy, readback) = readback.unzip();
+            frame.buffers.objects().unmap();
             let index = self.queue().submit(finished.into_iter().chain(copy));
+            frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), readback))
         })

@@ -10,8 +10,8 @@ use parking_lot::{Mutex, RwLock};
 use super::pass_state::WgpuPassState;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::resources::{
-    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
-    check_storage_binding_size, size_with_headroom,
+    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, ObjectBuffer, SubdividedMesh, UploadQueue,
+    append_aligned, check_storage_binding_size, poll, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
@@ -21,11 +21,12 @@ use crate::view::{GpuObject, GpuView, ObjectTable};
 
 /// A pool of frame buffers.
 ///
-/// A frame owns its buffers from `begin` until it is submitted or dropped. Then the next frame may write them at once, because
-/// wgpu orders the writes after earlier submissions.
-#[derive(Default)]
+/// A frame owns its buffers from `begin` until it is submitted or dropped. Then the next frame may stage writes to them at once,
+/// because wgpu orders these after earlier submissions. It may map them when the device is done with them.
 pub(crate) struct BufferPool {
     free: Mutex<FreeBuffers>,
+    /// Whether objects are written into mapped memory.
+    maps_memory: bool,
 }
 
 #[derive(Default)]
@@ -38,6 +39,15 @@ struct FreeBuffers {
 impl BufferPool {
     /// Buffers that no frame has taken for this many frames lose their bundles and bind groups.
     const MAX_UNUSED_FRAMES: u32 = 8;
+
+    /// Where objects are written into mapped memory, and while the device reads all free buffers, a frame takes new ones if there are
+    /// fewer than these.
+    const MAX_ROTATING: usize = 3;
+
+    /// An empty pool. `maps_memory`: whether objects are written into mapped memory.
+    pub(crate) fn new(maps_memory: bool) -> Self {
+        Self { free: Mutex::default(), maps_memory }
+    }
 
     /// The size of all pooled buffers in bytes.
     pub(crate) fn bytes(&self) -> u64 {
@@ -55,17 +65,37 @@ impl BufferPool {
         free.generation += 1;
     }
 
-    pub(crate) fn take(self: &Arc<Self>) -> FrameBuffers {
-        let mut free = self.free.lock();
-        let mut buffers = free.buffers.pop().unwrap_or_default();
-        buffers.unused = 0;
-        for idle in &mut free.buffers {
-            idle.unused += 1;
-            if idle.unused == Self::MAX_UNUSED_FRAMES {
-                idle.passes.iter_mut().for_each(WgpuPassState::clear_caches);
-            }
+    /// Takes buffers for a frame, with mapped memory for its objects if the device is done with free buffers.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(crate) fn take(self: &Arc<Self>, device: &wgpu::Device) -> Result<FrameBuffers, BackendError> {
+        if self.maps_memory {
+            poll(device)?;
         }
-        FrameBuffers { buffers, pool: Arc::clone(self), generation: free.generation, held_epoch: 0, objects_epoch: 0 }
+        let (mut buffers, generation) = self.take_free();
+        buffers.objects.map(device)?;
+        buffers.unused = 0;
+        Ok(FrameBuffers { buffers, pool: Arc::clone(self), generation, held_epoch: 0, objects_epoch: 0 })
+    }
+
+    fn take_free(&self) -> (Buffers, u64) {
+        let mut free = self.free.lock();
+        // Those that were used last, because they hold the newest objects.
+        let ready = free.buffers.iter().rposition(|buffers| buffers.objects.is_ready());
+        let taken = match ready {
+            Some(index) => Some(free.buffers.remove(index)),
+            None if self.maps_memory && free.buffers.len() < Self::MAX_ROTATING => None,
+            None => free.buffers.pop(),
+        };
+        free.buffers.iter_mut().for_each(|idle| idle.unused += 1);
+        if self.maps_memory {
+            free.buffers.retain(|idle| idle.unused < Self::MAX_UNUSED_FRAMES);
+        } else {
+            let unused = free.buffers.iter_mut().filter(|idle| idle.unused == Self::MAX_UNUSED_FRAMES);
+            unused.for_each(|idle| idle.passes.iter_mut().for_each(WgpuPassState::clear_caches));
+        }
+        (taken.unwrap_or_else(|| Buffers::new(self.maps_memory)), free.generation)
     }
 }
 
@@ -86,7 +116,7 @@ impl Drop for FrameBuffers {
         self.buffers.subdivided.get_mut().clear();
         let mut free = self.pool.free.lock();
         if free.generation == self.generation {
-            free.buffers.push(mem::take(&mut self.buffers));
+            free.buffers.push(mem::replace(&mut self.buffers, Buffers::new(false)));
         }
     }
 }
@@ -135,7 +165,8 @@ impl FrameBuffers {
         }
         if reallocated || buffers.key != buffers.next_key {
             mem::swap(&mut buffers.key, &mut buffers.next_key);
-            let objects_bound = buffers.objects.size().min(limits.max_storage_buffer_binding_size & !3) as usize;
+            let objects_bound =
+                buffers.objects.on_device().size().min(limits.max_storage_buffer_binding_size & !3) as usize;
             for index in 0..buffers.passes.len() {
                 let bind_group = buffers.new_frame_bind_group(device, layouts, index, objects_bound);
                 let pass = &mut buffers.passes[index];
@@ -199,22 +230,52 @@ impl FrameBuffers {
         &self.buffers.subdivided
     }
 
-    /// Uploads what changed in blocks of objects since [`FrameBuffers::held_epoch`]: one write for each run of objects, because each
-    /// write has a fixed cost.
-    pub(crate) fn write_objects(&self, uploads: &UploadQueue, objects: &ObjectTable, blocks: Range<usize>) {
-        objects.for_each_change(blocks, self.held_epoch, MIN_UNCHANGED, |run| self.write_run(uploads, objects, run));
+    /// The buffer of the frame's objects.
+    pub(crate) fn objects(&self) -> &ObjectBuffer {
+        &self.buffers.objects
     }
 
-    fn write_run(&self, uploads: &UploadQueue, objects: &ObjectTable, run: Range<usize>) {
-        let bytes = |objects: usize| objects * size_of::<GpuObject>();
-        let size = NonZeroU64::new(bytes(run.len()) as u64);
-        let Some((buffer, size)) = self.buffers.objects.buffer().zip(size) else { return };
-        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes(run.start) as u64, size) else { return };
-        for (block, part) in ObjectTable::block_ranges(run.clone()) {
-            let gpu_objects = &objects.block(block).gpu_objects[part.start % ObjectTable::BLOCK_SIZE..][..part.len()];
-            let range = bytes(part.start - run.start)..bytes(part.end - run.start);
-            staged.slice(range).copy_from_slice(bytemuck::cast_slice(gpu_objects));
+    /// Uploads what changed in blocks of objects since [`FrameBuffers::held_epoch`].
+    ///
+    /// # Errors
+    /// If wgpu refuses.
+    pub(crate) fn write_objects(
+        &self,
+        uploads: &UploadQueue,
+        objects: &ObjectTable,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        let first = blocks.start * ObjectTable::BLOCK_SIZE;
+        let end = (blocks.end * ObjectTable::BLOCK_SIZE).min(objects.len());
+        if let Some(mut mapped) = self.buffers.objects.mapped(bytes_of(first)..bytes_of(end))? {
+            let mut written = 0;
+            objects.for_each_change(blocks, self.held_epoch, 1, |run| {
+                written += run.len();
+                for_each_part(objects, run, |part, bytes| {
+                    let range = bytes_of(part.start - first)..bytes_of(part.end - first);
+                    mapped.slice(range).copy_from_slice(bytes);
+                });
+            });
+            uploads.count(bytes_of(written) as u64);
+            return Ok(());
         }
+        // One write for each run of objects, because each write has a fixed cost.
+        objects.for_each_change(blocks, self.held_epoch, MIN_UNCHANGED, |run| {
+            for start in run.clone().step_by(MAX_STAGED) {
+                self.stage_run(uploads, objects, start..run.end.min(start + MAX_STAGED));
+            }
+        });
+        Ok(())
+    }
+
+    fn stage_run(&self, uploads: &UploadQueue, objects: &ObjectTable, run: Range<usize>) {
+        let size = NonZeroU64::new(bytes_of(run.len()) as u64);
+        let Some((buffer, size)) = self.buffers.objects.on_device().buffer().zip(size) else { return };
+        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes_of(run.start) as u64, size) else { return };
+        for_each_part(objects, run.clone(), |part, bytes| {
+            let range = bytes_of(part.start - run.start)..bytes_of(part.end - run.start);
+            staged.slice(range).copy_from_slice(bytes);
+        });
     }
 
     /// Uploads the objects that a pass draws, in the order of instances, unless the buffer holds them already.
@@ -234,8 +295,24 @@ impl FrameBuffers {
 /// Fewer unchanged objects between two runs are uploaded with them: that takes less time than another write.
 const MIN_UNCHANGED: usize = 64;
 
+/// The most objects in one staged write, 1 MiB: larger staging memory is mapped by the system anew in each frame.
+const MAX_STAGED: usize = (1 << 20) / size_of::<GpuObject>();
+
+/// The size of some objects in bytes.
+fn bytes_of(objects: usize) -> usize {
+    objects * size_of::<GpuObject>()
+}
+
+/// Calls `visit` with the parts of a range of objects that lie in one block each, and the bytes of their GPU layouts.
+fn for_each_part(objects: &ObjectTable, range: Range<usize>, mut visit: impl FnMut(Range<usize>, &[u8])) {
+    for (block, part) in ObjectTable::block_ranges(range) {
+        let gpu_objects = &objects.block(block).gpu_objects[part.start % ObjectTable::BLOCK_SIZE..][..part.len()];
+        visit(part, bytemuck::cast_slice(gpu_objects));
+    }
+}
+
 struct Buffers {
-    objects: GrowingBuffer,
+    objects: ObjectBuffer,
     /// One [`GpuView`] per view.
     views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
@@ -266,11 +343,11 @@ struct BindGroupKey {
     object_indices_stride: usize,
 }
 
-impl Default for Buffers {
-    fn default() -> Self {
+impl Buffers {
+    fn new(maps_memory: bool) -> Self {
         use wgpu::BufferUsages;
         Self {
-            objects: GrowingBuffer::new("objects", BufferUsages::STORAGE),
+            objects: ObjectBuffer::new(maps_memory),
             views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
             lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
             object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
@@ -289,7 +366,7 @@ impl Default for Buffers {
 impl Buffers {
     fn all(&self) -> [&GrowingBuffer; 5] {
         let Self { objects, views, lights, object_indices, parameters, .. } = self;
-        [objects, &views.on_device, &lights.on_device, object_indices, &parameters.on_device]
+        [objects.on_device(), &views.on_device, &lights.on_device, object_indices, &parameters.on_device]
     }
 
     /// Sets the passes of this frame, and collects their parameters.
@@ -344,7 +421,7 @@ impl Buffers {
         let (offset, size) = command_pass_index.map_or((0, ALIGNMENT), |index| (index * stride, stride));
         let bindings = [
             self.views.on_device.binding(view * ALIGNMENT, size_of::<GpuView>()),
-            self.objects.binding(0, objects_bound),
+            self.objects.on_device().binding(0, objects_bound),
             self.object_indices.binding(offset, size),
             self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
         ];

@@ -7,6 +7,7 @@ mod gpu_material;
 mod growing_buffer;
 mod light_meshes;
 mod mirrored_buffer;
+mod object_buffer;
 mod subdivided_mesh;
 mod target_cache;
 mod texture_arrays;
@@ -21,6 +22,7 @@ pub(crate) use growing_buffer::{
 };
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use mirrored_buffer::MirroredBuffer;
+pub(crate) use object_buffer::{ObjectBuffer, poll, shares_memory};
 pub(crate) use subdivided_mesh::SubdividedMesh;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
 pub(crate) use upload_queue::UploadQueue;

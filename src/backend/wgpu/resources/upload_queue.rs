@@ -51,7 +51,8 @@ impl UploadQueue {
         self.queue.write_texture(texture, bytes, layout, size);
     }
 
-    fn count(&self, bytes: u64) {
+    /// Counts bytes that were written into mapped memory.
+    pub(crate) fn count(&self, bytes: u64) {
         self.bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 }
