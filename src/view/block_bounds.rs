@@ -62,25 +62,35 @@ mod tests {
     use crate::scene::Camera;
     use crate::view::{BoundingSphere, BoundingSpheres};
 
+    fn bounds_of(sphere: BoundingSphere) -> GroupBounds {
+        let mut table = BoundingSpheres::default();
+        table.set(0, sphere);
+        let mut words = GroupBounds::default();
+        words.set_word(0, &table);
+        words
+    }
+
     proptest! {
         /// Blocks of one object each: those that the sphere's own test finds are visited, and few others.
         #[test]
         fn no_block_with_a_visible_object_is_left_out(
+            before in prop::collection::vec(prop::array::uniform3(-20.0..20.0_f64), 0..40),
             centers in prop::collection::vec(prop::array::uniform3(-20.0..20.0_f64), 1..70),
             range in (0_usize..70, 0_usize..70),
         ) {
             let frustum = Frustum::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
             let spheres = centers.iter().map(|&center| BoundingSphere { center: center.into(), radius: 0.5 });
             let mut bounds = BlockBounds::default();
+            // Earlier objects lie somewhere else.
+            bounds.resize(before.len());
+            for (block, &center) in before.iter().enumerate() {
+                bounds.set(block, &bounds_of(BoundingSphere { center: center.into(), radius: 0.5 }));
+            }
             bounds.resize(centers.len());
             let mut expected = Vec::new();
             let range = range.0.min(centers.len())..range.1.min(centers.len());
             for (block, sphere) in spheres.enumerate() {
-                let mut table = BoundingSpheres::default();
-                table.set(0, sphere);
-                let mut words = GroupBounds::default();
-                words.set_word(0, &table);
-                bounds.set(block, &words);
+                bounds.set(block, &bounds_of(sphere));
                 if range.contains(&block) && frustum.intersects_sphere(sphere.center, sphere.radius) {
                     expected.push(block);
                 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::group_columns::{LANES, Lanes};
+use super::packet_columns::{LANES, Lanes};
 use super::set_bits;
 
 /// A bounding sphere in the world.
@@ -58,7 +58,7 @@ impl BoundingSpheres {
     /// Replaces spheres among the eight from `entry` on: bit `b` of `mask` stands for the sphere at `entry + b`. Those that are not in
     /// `valid` become empty.
     #[inline(always)]
-    pub(super) fn set_group(
+    pub(super) fn set_packet(
         &mut self,
         entry: usize,
         mask: u8,

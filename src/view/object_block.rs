@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::bounding_spheres::{BoundingSphere, BoundingSpheres};
 use super::frustum::Classified;
 use super::group_bounds::{GroupBounds, Overlap};
-use super::group_columns::{GroupColumns, LANES};
-use super::object_description::{GroupDescription, ObjectDescription, ObjectDraw};
+use super::object_description::{ObjectDescription, ObjectDraw, PacketDescription};
+use super::packet_columns::{LANES, PacketColumns};
 use super::{BoundingBoxes, Frustum, GpuObject, OrientedBox, RejectionReason, set_bits};
 use crate::quality::CullingVolume;
 use crate::scene::Blend;
@@ -30,8 +30,8 @@ pub struct ObjectBlock {
     drawable: [u64; Self::WORDS],
     /// The bounds of each word.
     pub(super) word_bounds: GroupBounds,
-    /// The table's epoch when an object of a group of [`ObjectBlock::GROUP`] last changed.
-    pub(super) changed_in: [u64; Self::SIZE / Self::GROUP],
+    /// The table's epoch when an object of a packet of [`ObjectBlock::PACKET`] last changed.
+    pub(super) changed_in: [u64; Self::SIZE / Self::PACKET],
     /// The number of objects that are rejected, and why they are.
     rejected_count: usize,
     rejected: [Option<RejectionReason>; Self::SIZE],
@@ -41,45 +41,45 @@ impl ObjectBlock {
     /// The number of objects in a block.
     pub const SIZE: usize = BoundingSpheres::COUNT;
 
-    /// The number of objects in a group, which are described and uploaded together.
-    pub(super) const GROUP: usize = LANES;
+    /// The number of objects in a packet, which are described and uploaded together.
+    pub(super) const PACKET: usize = LANES;
 
     /// The number of words in a block.
     pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
 
-    /// Replaces objects of a group, from `entry` on, by their descriptions: those in the mask. Returns a mask of the objects whose mesh,
+    /// Replaces objects of a packet, from `entry` on, by their descriptions: those in the mask. Returns a mask of the objects whose mesh,
     /// material or state changed, and with them perhaps their bin.
     #[inline(always)]
-    pub(super) fn set_group(
+    pub(super) fn set_packet(
         &mut self,
         entry: usize,
         mask: u8,
-        group: &GroupDescription,
-        columns: &GroupColumns<'_>,
+        packet: &PacketDescription,
+        columns: &PacketColumns<'_>,
     ) -> u8 {
-        self.spheres.set_group(entry, mask, group.valid, &group.centers, &group.radii);
-        let gpu_objects = self.gpu_objects[entry..].first_chunk_mut::<LANES>().expect("groups do not cross blocks");
-        let draws = self.draws[entry..].first_chunk::<LANES>().expect("groups do not cross blocks");
-        let valid = mask & group.valid;
+        self.spheres.set_packet(entry, mask, packet.valid, &packet.centers, &packet.radii);
+        let gpu_objects = self.gpu_objects[entry..].first_chunk_mut::<LANES>().expect("packets do not cross blocks");
+        let draws = self.draws[entry..].first_chunk::<LANES>().expect("packets do not cross blocks");
+        let valid = mask & packet.valid;
         let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
         self.drawable[word] = self.drawable[word] & !(u64::from(mask) << shift) | u64::from(valid) << shift;
         let mut draws_changed = 0;
         if valid == u8::MAX {
             for lane in 0..LANES {
-                gpu_objects[lane] = group.gpu_object(columns, lane);
-                draws_changed |= u8::from(draws[lane] != group.draws[lane]) << lane;
+                gpu_objects[lane] = packet.gpu_object(columns, lane);
+                draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
             }
         } else {
             for lane in set_bits(valid.into()) {
-                gpu_objects[lane] = group.gpu_object(columns, lane);
-                draws_changed |= u8::from(draws[lane] != group.draws[lane]) << lane;
+                gpu_objects[lane] = packet.gpu_object(columns, lane);
+                draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
             }
         }
         if self.rejected_count > 0 {
             set_bits(valid.into()).for_each(|lane| self.set_rejected(entry + lane, None));
         }
         for lane in set_bits(draws_changed.into()) {
-            self.set_draw(entry + lane, group.draws[lane]);
+            self.set_draw(entry + lane, packet.draws[lane]);
         }
         draws_changed
     }
@@ -116,7 +116,7 @@ impl ObjectBlock {
         self.set_rejected(entry, None);
     }
 
-    /// Rejects an object that its group's description left empty: no view sees it.
+    /// Rejects an object that its packet's description left empty: no view sees it.
     pub(super) fn reject(&mut self, entry: usize, reason: RejectionReason) {
         self.set_rejected(entry, Some(reason));
     }
@@ -233,7 +233,7 @@ impl Default for ObjectBlock {
             opaque: [0; Self::WORDS],
             drawable: [0; Self::WORDS],
             word_bounds: GroupBounds::default(),
-            changed_in: [0; Self::SIZE / Self::GROUP],
+            changed_in: [0; Self::SIZE / Self::PACKET],
             rejected_count: 0,
             rejected: [None; Self::SIZE],
         }

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::draw_states::DrawStates;
 use super::fixed_position::{is_within_reach, nearest_step};
-use super::group_columns::{GroupColumns, LANES, Lanes};
+use super::packet_columns::{LANES, Lanes, PacketColumns};
 use super::{BoundingSphere, FixedPosition, GpuObject, OrientedBox, RejectionReason};
 use crate::command::DrawState;
 use crate::scene::{SceneRef, is_unit};
@@ -36,8 +36,8 @@ pub(super) struct ObjectDescription {
     pub(super) draw: ObjectDraw,
 }
 
-/// What every view needs to know of a group of objects.
-pub(super) struct GroupDescription {
+/// What every view needs to know of a packet of objects.
+pub(super) struct PacketDescription {
     /// A mask of the objects that can be drawn; the numbers of the others mean nothing.
     pub(super) valid: u8,
     pub(super) draws: Lanes<ObjectDraw>,
@@ -50,12 +50,12 @@ pub(super) struct GroupDescription {
     orientations: [Lanes<f32>; 4],
 }
 
-impl GroupDescription {
-    /// Describes the objects of a group.
+impl PacketDescription {
+    /// Describes the objects of a packet.
     ///
     /// What is computed is computed in loops over arrays of a fixed length, which compile to vector instructions.
     #[inline(always)]
-    pub(super) fn new(columns: &GroupColumns<'_>, draw_states: &DrawStates) -> Self {
+    pub(super) fn new(columns: &PacketColumns<'_>, draw_states: &DrawStates) -> Self {
         let inputs = ObjectInputs::new(columns);
         let orientations = normalized(&inputs.orientations);
         let offsets = rotated(&orientations, &inputs.scales, &inputs.centers);
@@ -67,7 +67,7 @@ impl GroupDescription {
 
     /// The GPU layout of an object.
     #[inline(always)]
-    pub(super) fn gpu_object(&self, columns: &GroupColumns<'_>, lane: usize) -> GpuObject {
+    pub(super) fn gpu_object(&self, columns: &PacketColumns<'_>, lane: usize) -> GpuObject {
         let (position_low, position_high) = FixedPosition::from_steps(lane_of(&self.steps, lane)).halves();
         GpuObject {
             position_low,
@@ -81,16 +81,16 @@ impl GroupDescription {
     }
 
     /// The description of one object; `None` if it cannot be drawn.
-    pub(super) fn object(&self, columns: &GroupColumns<'_>, lane: usize) -> Option<ObjectDescription> {
+    pub(super) fn object(&self, columns: &PacketColumns<'_>, lane: usize) -> Option<ObjectDescription> {
         let bounds = BoundingSphere { center: lane_of(&self.centers, lane).into(), radius: self.radii[lane] };
         let gpu_object = self.gpu_object(columns, lane);
         (self.valid >> lane & 1 == 1).then(|| ObjectDescription { gpu_object, bounds, draw: self.draws[lane] })
     }
 }
 
-/// How the objects of a group are drawn, and a mask of those whose mesh and material exist.
+/// How the objects of a packet are drawn, and a mask of those whose mesh and material exist.
 #[inline(always)]
-fn find_draws(columns: &GroupColumns<'_>, draw_states: &DrawStates) -> (Lanes<ObjectDraw>, u8) {
+fn find_draws(columns: &PacketColumns<'_>, draw_states: &DrawStates) -> (Lanes<ObjectDraw>, u8) {
     let (mut draws, mut known) = ([ObjectDraw::NONE; LANES], 0);
     for lane in 0..LANES {
         let (mesh, material) = (columns.meshes[lane], columns.materials[lane]);
@@ -145,8 +145,8 @@ struct ObjectInputs {
 
 impl ObjectInputs {
     #[inline(always)]
-    fn new(columns: &GroupColumns<'_>) -> Self {
-        let GroupColumns { positions, orientations, scales, bounds, .. } = columns;
+    fn new(columns: &PacketColumns<'_>) -> Self {
+        let PacketColumns { positions, orientations, scales, bounds, .. } = columns;
         let mut inputs = Self {
             positions: [[0.0; LANES]; 3],
             orientations: [[0.0; LANES]; 4],

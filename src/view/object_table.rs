@@ -8,9 +8,9 @@ use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 use super::block_bounds::BlockBounds;
 use super::changed_objects::{ChangedObjects, ChangedWord};
 use super::draw_states::DrawStates;
-use super::group_columns::{GroupColumns, LANES};
 use super::object_block::ObjectBlock;
-use super::object_description::{GroupDescription, ObjectDraw, bounding_box, rejection_reason};
+use super::object_description::{ObjectDraw, PacketDescription, bounding_box, rejection_reason};
+use super::packet_columns::{LANES, PacketColumns};
 use super::{BoundingBoxes, Frustum, GpuObject, Rejections, set_bits};
 use crate::chunked_array::block_ranges;
 use crate::command::{Bin, Bins};
@@ -183,8 +183,8 @@ impl ObjectTable {
         let is_as_before = |&object: &usize| {
             let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
             let mut padded = None;
-            let columns = GroupColumns::new(scene, object, &mut padded);
-            let now = GroupDescription::new(&columns, &self.draw_states).object(&columns, 0);
+            let columns = PacketColumns::new(scene, object, &mut padded);
+            let now = PacketDescription::new(&columns, &self.draw_states).object(&columns, 0);
             now.ok_or_else(|| rejection_reason(scene, object)) == before
         };
         let unreported = |object: &usize| !self.changed.contains(*object);
@@ -235,8 +235,8 @@ impl ObjectTable {
         let mut run = 0..0;
         for index in blocks {
             let changed_in = self.block(index).changed_in;
-            for (group, _) in changed_in.iter().enumerate().filter(|(_, changed_in)| **changed_in > epoch) {
-                let first = index * Self::BLOCK_SIZE + group * ObjectBlock::GROUP;
+            for (packet, _) in changed_in.iter().enumerate().filter(|(_, changed_in)| **changed_in > epoch) {
+                let first = index * Self::BLOCK_SIZE + packet * ObjectBlock::PACKET;
                 if first >= self.length {
                     break;
                 }
@@ -246,7 +246,7 @@ impl ObjectTable {
                         visit(before);
                     }
                 }
-                run.end = (first + ObjectBlock::GROUP).min(self.length);
+                run.end = (first + ObjectBlock::PACKET).min(self.length);
             }
         }
         if !run.is_empty() {
@@ -312,17 +312,17 @@ fn describe_word(table: &ObjectTable, scene: &SceneRef, word: usize, mask: u64) 
     let mut found = WordSummary::default();
     let first = word * Frustum::WORD;
     let mut block = table.blocks[first / ObjectTable::BLOCK_SIZE].write();
-    for group in (0..Frustum::WORD).step_by(LANES) {
-        let changed = (mask >> group) as u8;
+    for packet in (0..Frustum::WORD).step_by(LANES) {
+        let changed = (mask >> packet) as u8;
         if changed == 0 {
             continue;
         }
-        block.changed_in[(first + group) % ObjectTable::BLOCK_SIZE / ObjectBlock::GROUP] = table.epoch;
-        let (object, entry) = (first + group, (first + group) % ObjectTable::BLOCK_SIZE);
+        block.changed_in[(first + packet) % ObjectTable::BLOCK_SIZE / ObjectBlock::PACKET] = table.epoch;
+        let (object, entry) = (first + packet, (first + packet) % ObjectTable::BLOCK_SIZE);
         let mut padded = None;
-        let columns = GroupColumns::new(scene, object, &mut padded);
-        let described = GroupDescription::new(&columns, &table.draw_states);
-        let draws_changed = block.set_group(entry, changed, &described, &columns);
+        let columns = PacketColumns::new(scene, object, &mut padded);
+        let described = PacketDescription::new(&columns, &table.draw_states);
+        let draws_changed = block.set_packet(entry, changed, &described, &columns);
         found.draws_changed |= draws_changed != 0;
         for lane in set_bits(draws_changed.into()) {
             block.bins[entry + lane] = table.bin_of(described.draws[lane]);

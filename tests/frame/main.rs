@@ -6,6 +6,7 @@ mod deferred;
 mod determinism;
 mod failing_process;
 mod null_backend;
+mod object_table;
 mod occlusion;
 mod quality;
 mod retained;

@@ -1,20 +1,20 @@
-//! The columns of a scene, cut into groups of objects that are described together.
+//! The columns of a scene, cut into packets: eight objects that are described together, as packets of rays are traced.
 
 use glam::{DVec3, Quat, Vec3};
 
 use crate::handle::Handle;
 use crate::scene::{Bounds, Material, Mesh, SceneRef};
 
-/// The number of objects in a group.
+/// The number of objects in a packet.
 pub(super) const LANES: usize = 8;
 
-/// One number of each object of a group.
+/// One number of each object of a packet.
 pub(super) type Lanes<T> = [T; LANES];
 
-/// The columns of a scene for a group of objects: an entry for each.
+/// The columns of a scene for a packet of objects: an entry for each.
 #[derive(Clone, Copy)]
-pub(super) struct GroupColumns<'a> {
-    /// The index of the group's first object.
+pub(super) struct PacketColumns<'a> {
+    /// The index of the packet's first object.
     pub(super) first: usize,
     pub(super) positions: &'a Lanes<DVec3>,
     pub(super) orientations: &'a Lanes<Quat>,
@@ -24,7 +24,7 @@ pub(super) struct GroupColumns<'a> {
     pub(super) materials: &'a Lanes<Handle<Material>>,
 }
 
-/// The entries of a partial last group. Unused lanes repeat its first object.
+/// The entries of a partial last packet. Unused lanes repeat its first object.
 pub(super) struct PaddedColumns {
     first: usize,
     positions: Lanes<DVec3>,
@@ -35,8 +35,8 @@ pub(super) struct PaddedColumns {
     materials: Lanes<Handle<Material>>,
 }
 
-impl<'a> GroupColumns<'a> {
-    /// The group from the object `first` on. If it is not whole, it is in `padded`.
+impl<'a> PacketColumns<'a> {
+    /// The packet from the object `first` on. If it is not whole, it is in `padded`.
     ///
     /// # Panics
     /// If there is no object `first`.
@@ -76,13 +76,13 @@ impl PaddedColumns {
         }
     }
 
-    fn columns(&self) -> GroupColumns<'_> {
+    fn columns(&self) -> PacketColumns<'_> {
         let Self { first, positions, orientations, scales, bounds, meshes, materials } = self;
-        GroupColumns { first: *first, positions, orientations, scales, bounds, meshes, materials }
+        PacketColumns { first: *first, positions, orientations, scales, bounds, meshes, materials }
     }
 }
 
-/// The entries of a column that is shorter than a group, and its first entry in the other lanes.
+/// The entries of a column that is shorter than a packet, and its first entry in the other lanes.
 fn padded<T: Copy>(column: &[T]) -> Lanes<T> {
     let mut lanes = [column[0]; LANES];
     for (lane, entry) in lanes.iter_mut().zip(column) {
