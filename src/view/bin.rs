@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::block_reader::BlockReader;
 use super::{ObjectTable, VisibleSet, set_bits};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 
@@ -14,13 +15,9 @@ pub(crate) fn bin_visible(
     segment: &mut BinnedSegment,
 ) {
     let in_block = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
-    // Words come in order, so a block stays open for several of them.
-    let mut open = None;
+    let mut reader = BlockReader::new(table);
     visible.visit_words(words, |word, bits| {
-        let (_, block) = match open.take() {
-            Some((index, block)) if index == word / in_block => open.insert((index, block)),
-            _ => open.insert((word / in_block, table.block(word / in_block))),
-        };
+        let block = reader.block(word / in_block);
         let first = word * VisibleSet::OBJECTS_PER_WORD;
         for object in set_bits(bits & block.opaque[word % in_block]).map(|bit| first + bit) {
             let entry = object % ObjectTable::BLOCK_SIZE;

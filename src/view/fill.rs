@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
 use super::{ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
 use crate::chunked_array::ChunkedArray;
@@ -48,15 +49,10 @@ impl Fill<'_> {
         };
         for (block, part) in ChunkedArray::<RenderCommand>::block_ranges(ranks) {
             let mut slots = commands.write(block);
-            // Visible objects come in order, so a block stays open for many of them.
-            let mut open = None;
+            let mut reader = BlockReader::new(self.table);
             self.visible.visit(part, |rank, word, bits| {
                 let first = word * VisibleSet::OBJECTS_PER_WORD;
-                let index = first / ObjectTable::BLOCK_SIZE;
-                let (_, objects) = match open.take() {
-                    Some((current, guard)) if current == index => open.insert((current, guard)),
-                    _ => open.insert((index, self.table.block(index))),
-                };
+                let objects = reader.block(first / ObjectTable::BLOCK_SIZE);
                 let start = rank % ChunkedArray::<RenderCommand>::BLOCK_SIZE;
                 for (slot, bit) in slots[start..].iter_mut().zip(set_bits(bits)) {
                     *slot = self.command(first + bit, objects, &order);

@@ -11,7 +11,8 @@ use super::{BoundingSphere, BoundingSpheres, Frustum};
 /// The bounds of [`GroupBounds::GROUPS`] groups of spheres: for each an axis-aligned box around the centres, and the largest radius.
 /// A group is a word of spheres, a block, or a group of blocks.
 ///
-/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms", 1976). The groups are tested together, in about the time of four spheres.
+/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms", 1976). The groups
+/// are tested together, in about the time of four spheres.
 #[derive(Clone, Debug)]
 pub(crate) struct GroupBounds {
     /// The corners of the boxes in the world, in metres.

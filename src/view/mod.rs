@@ -4,6 +4,7 @@
 
 mod bin;
 mod block_bounds;
+mod block_reader;
 mod bounding_boxes;
 mod bounding_spheres;
 mod changed_objects;

@@ -64,6 +64,7 @@ impl ObjectBlock {
         let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
         self.drawable[word] = self.drawable[word] & !(u64::from(mask) << shift) | u64::from(valid) << shift;
         let mut draws_changed = 0;
+        // A loop of its own: without a mask it is unrolled.
         if valid == u8::MAX {
             for lane in 0..LANES {
                 gpu_objects[lane] = packet.gpu_object(columns, lane);
@@ -151,11 +152,10 @@ impl ObjectBlock {
             _ => frustum.overlaps(&self.word_bounds),
         };
         for word in words {
-            let entries = || word * Frustum::WORD..(word + 1) * Frustum::WORD;
             let mask = match overlaps[word] {
                 Overlap::Outside => 0,
                 Overlap::Inside => self.drawable[word],
-                Overlap::Partial => self.visible(frustum, volume, entries()),
+                Overlap::Partial => self.visible(frustum, volume, word * Frustum::WORD..(word + 1) * Frustum::WORD),
             };
             put(word, mask);
         }

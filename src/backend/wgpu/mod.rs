@@ -20,6 +20,8 @@ mod backend_impl;
 mod begin_frame;
 mod error_scope;
 mod frame;
+#[cfg(all(test, not(drawloom_loom)))]
+mod noop_device;
 mod pipelines;
 mod recording;
 mod resources;

@@ -361,9 +361,7 @@ impl Buffers {
             objects_epoch: 0,
         }
     }
-}
 
-impl Buffers {
     fn all(&self) -> [&GrowingBuffer; 5] {
         let Self { objects, views, lights, object_indices, parameters, .. } = self;
         [objects.on_device(), &views.on_device, &lights.on_device, object_indices, &parameters.on_device]

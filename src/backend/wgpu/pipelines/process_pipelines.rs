@@ -308,16 +308,12 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
     use crate::process::{GeometryBuffer, GeometryFormats};
 
     #[test]
     fn inserting_no_pipelines_does_not_wait_for_recording() {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::NOOP;
-        descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
-        let instance = wgpu::Instance::new(descriptor);
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
-        let (device, _) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
+        let (device, _) = noop_device();
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
         let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();

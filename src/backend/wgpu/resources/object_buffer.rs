@@ -154,17 +154,7 @@ pub(crate) fn shares_memory(adapter: &wgpu::AdapterInfo) -> bool {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
-
-    fn noop_device() -> (wgpu::Device, wgpu::Queue) {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::NOOP;
-        descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
-        let instance = wgpu::Instance::new(descriptor);
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
-        let required_features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
-        let descriptor = wgpu::DeviceDescriptor { required_features, ..wgpu::DeviceDescriptor::default() };
-        pollster::block_on(adapter.request_device(&descriptor)).unwrap()
-    }
+    use crate::backend::wgpu::noop_device::noop_device;
 
     fn submit(buffer: &ObjectBuffer, queue: &wgpu::Queue) {
         buffer.unmap();
