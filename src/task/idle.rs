@@ -1,8 +1,8 @@
 //! What a worker without jobs does: it looks for jobs for a while, and then sleeps.
 //!
 //! Looking costs processor time, sleeping costs a wake-up. Within a frame more jobs are likely, so a worker looks for as long as a
-//! wake-up takes, which at worst doubles the cost of waiting. Between frames it looks for [`SPIN_BETWEEN_FRAMES`], so that a frame
-//! that follows at once finds the workers awake. Then it sleeps.
+//! wake-up takes, which at worst doubles the cost of waiting. After a frame it looks for as long as `frame_gaps.rs` says. Then it
+//! sleeps.
 
 use std::time::Duration;
 
@@ -13,10 +13,7 @@ use super::sleep::WakeFor;
 use crate::sync::{Instant, spin_loop};
 use crate::timeline::IdleKind;
 
-/// How long workers stay awake after the end of a frame.
-const SPIN_BETWEEN_FRAMES: Duration = Duration::from_micros(10);
-
-/// How long they look for jobs at most, whatever a wake-up costs.
+/// How long a worker looks for jobs in a frame at most, whatever a wake-up costs.
 pub(crate) const MAX_SPIN: Duration = Duration::from_micros(100);
 
 /// The most pause instructions between two looks.
@@ -101,7 +98,7 @@ impl Idle {
             _ => now,
         };
         self.since = Some((since, is_in_frame));
-        let limit = if is_in_frame { shared.wake_up_cost().min(MAX_SPIN) } else { SPIN_BETWEEN_FRAMES };
+        let limit = if is_in_frame { shared.wake_up_cost().min(MAX_SPIN) } else { shared.frame_gaps().spin() };
         now.duration_since(since) >= limit
     }
 

@@ -173,8 +173,9 @@
 //!
 //! # What it costs
 //!
-//! A job that captures up to four words is spawned without an allocation; others need one each. A loop allocates nothing. Workers
-//! look for work for some microseconds after the end of a frame, and within a frame for as long as a wake-up takes. Then they
+//! A job that captures up to four words is spawned without an allocation; others need one each. A loop allocates nothing. Within a
+//! frame, workers look for work for as long as a wake-up takes. After it they look for up to two wake-ups for each worker of the
+//! scheduler, and half a millisecond at most, if recent frames followed each other that soon, and not at all otherwise. Then they
 //! sleep and use no processor time. [The cost of a wake-up](Scheduler::wake_up_cost) is measured when the scheduler is built. A
 //! loop should be worth more than that, and a graph that is not runs on the calling thread alone.
 
@@ -187,6 +188,7 @@ mod background_queue;
 mod caller_slot;
 mod chunks;
 mod closure;
+mod frame_gaps;
 mod job;
 mod latch;
 mod locked_queue;
@@ -233,6 +235,8 @@ pub use worker::Worker;
 pub use crate::unwind::{JobPanic, catch};
 
 pub(crate) use chunks::Chunks;
+#[cfg(feature = "report")]
+pub(crate) use frame_gaps::{MAX_SPIN_BETWEEN_FRAMES, are_awake_after};
 #[cfg(feature = "report")]
 pub(crate) use idle::{MAX_SPIN, uncounted_pauses};
 pub(crate) use priority::Priority;

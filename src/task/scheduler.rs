@@ -254,6 +254,27 @@ mod tests {
     }
 
     #[test]
+    fn a_worker_that_was_awake_between_frames_sleeps_in_the_end() {
+        let builder = Scheduler::builder().workers(2).wake_up_cost(Duration::from_millis(1));
+        let scheduler = builder.build().unwrap();
+        let spin = || scheduler.shared.frame_gaps().spin();
+        let frame = || scheduler.scope(|scope| scope.spawn(|_scope, _worker| thread::yield_now())).unwrap();
+        let is_awake_after_a_frame = |_attempt| {
+            frame();
+            spin() == Duration::from_micros(500)
+        };
+        // On a busy machine some gaps are long.
+        assert!((0..1000).any(is_awake_after_a_frame));
+        assert_eq!(sleepers(&scheduler, 1), 1);
+        for _frame in 0..40 {
+            thread::sleep(Duration::from_millis(1));
+            frame();
+        }
+        assert_eq!(spin(), Duration::ZERO);
+        assert_eq!(sleepers(&scheduler, 1), 1);
+    }
+
+    #[test]
     fn the_owner_of_a_scope_sleeps_while_its_last_job_runs() {
         let scheduler = Scheduler::new(2).unwrap();
         let (started, has_started) = mpsc::channel();

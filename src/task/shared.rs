@@ -6,12 +6,13 @@ use crossbeam_utils::CachePadded;
 
 use super::background_queue::BackgroundQueue;
 use super::caller_slot::CallerSlot;
+use super::frame_gaps::FrameGaps;
 use super::mailbox::Mailbox;
 use super::placement::Placement;
 use super::queues::{Queues, Stealers};
 use super::region::JobContext;
 use super::sleep::Sleep;
-use crate::sync::{AtomicBool, AtomicUsize, Ordering};
+use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
 use crate::timeline::Timeline;
 
 /// The workers' queues as others see them, their mailboxes, and the state of the scheduler.
@@ -29,10 +30,14 @@ pub(super) struct Shared<W: JobContext> {
     /// In nanoseconds.
     wake_up_cost: AtomicUsize,
     is_in_frame: AtomicBool,
+    frame_gaps: FrameGaps,
     shut_down: AtomicBool,
 }
 
 impl<W: JobContext> Shared<W> {
+    /// Under a model checker workers never stay awake, and gaps would only be more branches.
+    const MEASURES_GAPS: bool = cfg!(not(any(drawloom_loom, drawloom_shuttle)));
+
     /// `stealers` has one entry for each worker, and `first` is the queues of worker 0.
     pub(super) fn new(
         stealers: Box<[Stealers<W>]>,
@@ -51,6 +56,7 @@ impl<W: JobContext> Shared<W> {
             is_shuffled,
             wake_up_cost: AtomicUsize::new(0),
             is_in_frame: AtomicBool::new(false),
+            frame_gaps: FrameGaps::new(),
             shut_down: AtomicBool::new(false),
         }
     }
@@ -123,9 +129,24 @@ impl<W: JobContext> Shared<W> {
         self.is_in_frame.load(Ordering::Relaxed)
     }
 
+    pub(super) fn begin_frame(&self) {
+        self.is_in_frame.store(true, Ordering::Relaxed);
+        if Self::MEASURES_GAPS {
+            self.frame_gaps.begin_frame(Instant::now(), self.workers(), self.wake_up_cost());
+        }
+    }
+
+    pub(super) fn end_frame(&self) {
+        self.is_in_frame.store(false, Ordering::Relaxed);
+        if Self::MEASURES_GAPS {
+            self.frame_gaps.end_frame(Instant::now());
+        }
+    }
+
+    /// The gaps between the frames that threads from outside have waited for.
     #[inline]
-    pub(super) fn set_in_frame(&self, is_in_frame: bool) {
-        self.is_in_frame.store(is_in_frame, Ordering::Relaxed);
+    pub(super) fn frame_gaps(&self) -> &FrameGaps {
+        &self.frame_gaps
     }
 
     #[inline]

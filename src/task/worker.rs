@@ -228,14 +228,14 @@ impl Worker {
         let outer = (self.awaited.replace((!is_outermost).then_some(region)), self.queues.start_wait());
         if is_outermost {
             self.shared.placement().avoid_current_processor();
-            self.shared.set_in_frame(true);
+            self.shared.begin_frame();
         }
         let result = body();
         // The count that the latch began with is that of the body.
         self.release_count(region);
         self.work(ExitCondition::Finished { region });
         if is_outermost {
-            self.shared.set_in_frame(false);
+            self.shared.end_frame();
         }
         self.awaited.set(outer.0);
         self.queues.end_wait(outer.1);

@@ -25,7 +25,8 @@ impl Filter {
         Self { time_constant, limits_outliers: true }
     }
 
-    /// A filter for samples that are too rare to tell an outlier from a change.
+    /// A filter that counts each sample as it is: for samples that are too rare to tell an outlier from a change, or that have a
+    /// limit of their own.
     pub(crate) const fn unlimited(time_constant: f32) -> Self {
         Self { time_constant, limits_outliers: false }
     }

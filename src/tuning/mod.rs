@@ -9,6 +9,7 @@
 //! | `TicketSize` (`task/tickets.rs`) | the chunks that a worker claims at once | every 8 chunks, at most once a ticket: time of a chunk | none: the latest sample | it is wrong at all |
 //! | `NodeCosts` (`graph/costs.rs`) | which ready node runs first | each measured run: time from a node's start to its end | 4 measured runs | the order of the costs changes |
 //! | `ExecutionPolicy` (`graph/execution_policy.rs`) | a serial or a parallel run | each serial run and each measured parallel one: its time | 8 serial or 4/3 measured parallel runs | the other mode is faster by 1.25; a parallel run counts as at least one wake-up |
+//! | `FrameGaps` (`task/frame_gaps.rs`) | whether workers look for jobs between frames | each frame: the time since the one before, at most twice the longest search | 8 frames | searching costs more, or less, than a wake-up |
 //! | [`Tuner`] of recording (`backend/wgpu/strategy`) | how a pass is recorded and encoded | each frame: thread time a batch, and the time that other workers wait for it | 8 frames | another way is cheaper by 1.11 |
 //! | [`Tuner`] of occlusion tests (`frame/occlusion_control.rs`) | whether a view tests for occlusion | each frame: thread time an object | 8 frames | the other way is cheaper by 1.11 |
 //!
@@ -39,6 +40,9 @@
 //! `TicketSize` follows none of the rules 2 to 4: it works within one loop, whose chunks may differ much, and a ticket that is too
 //! large holds up all workers, so the latest chunks count alone. The mode of a run has no pauses either: of a serial schedule with more work
 //! than a wake-up, one run in 128 is parallel.
+//!
+//! `FrameGaps` does not follow rules 2 to 4 either: gaps differ because engines do different things between frames, and each counts
+//! as its cost, which is limited. It has no hysteresis, because a choice that changes costs nothing by itself.
 //!
 //! What a frame's cost model, tuners and execution policy chose, and by which costs, is in
 //! [`FrameTuning`](crate::timeline::FrameTuning). Of any schedule, [`run_mode`](crate::graph::Schedule::run_mode),

@@ -15,7 +15,7 @@ use crate::bounds::Bounds;
 /// More workers than most machines have.
 pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 
-/// Predicted seconds of each replayed frame, by number of workers. `measured` has the time of the frame before each, with equally
+/// Predicted seconds of each replayed frame, by number of workers. `measured` has the time of a frame shortly before each, with equally
 /// warm caches: the prediction for the actual number of workers is compared with it.
 #[derive(Clone)]
 pub struct Prediction {
@@ -36,7 +36,7 @@ impl Prediction {
         Self { costs, times, measured: Vec::new(), bounds: is_adaptive.then(Bounds::default) }
     }
 
-    /// Draws two frames, and replays the second.
+    /// Draws three frames, one after another, and replays the last.
     ///
     /// # Errors
     /// Returns an error if a frame cannot be drawn or replayed.
@@ -50,17 +50,19 @@ impl Prediction {
         self.measured.push(time.cpu.as_secs_f64());
         let timeline = Arc::clone(renderer.scheduler().timeline());
         timeline.start();
-        let recorded = renderer.record(scene)?;
-        let submitted = submitter.submit(recorded)?;
+        for _ in 0..2 {
+            let recorded = renderer.record(scene)?;
+            submitter.submit(recorded)?.submission.wait()?;
+        }
         timeline.stop();
-        submitted.submission.wait()?;
         let log = timeline.take();
-        let replay = Replay::of_frame(&log, log.frames[0].number, self.costs)?;
+        let frame = log.frames.last().ok_or("no frame was recorded")?.number;
+        let replay = Replay::of_frame(&log, frame, self.costs)?;
         for (workers, times) in &mut self.times {
             times.push(replay.frame_time(*workers).as_secs_f64());
         }
         if let Some(bounds) = &mut self.bounds {
-            bounds.add(&log, log.frames[0].number, self.costs)?;
+            bounds.add(&log, frame, self.costs)?;
         }
         Ok(())
     }

@@ -8,15 +8,17 @@ use super::scheduler_costs::SchedulerCosts;
 use crate::graph::{ExecutionPolicy, RankedAdjacency, RunMode};
 use crate::report::consistency::check_run;
 use crate::report::error::ReportError;
-use crate::report::intervals::{frame_intervals, outermost_runs, total_length, union};
+use crate::report::intervals::{frame_intervals, gaps_up_to, outermost_runs, total_length, union};
 use crate::task::Scheduler;
 use crate::timeline::{Log, Run};
 
 /// A recorded frame, to be replayed by any number of workers: by the scheduler's rules, on a simulated clock. The same record
 /// and costs always give the same times.
 ///
-/// A replay stands for one of many such frames, one after another: workers are asleep when it begins, and schedules have
-/// learnt how long their nodes take and whether it is worth running them in parallel.
+/// A replay stands for one of many such frames, one after another: schedules have learnt how long their nodes take and whether it
+/// is worth running them in parallel. Workers are awake when a run begins if they would have looked for jobs for that long after the
+/// run before, by the gaps between the runs of the log up to there. So a log of a single frame has them asleep, and loops and scopes
+/// that the engine ran between its frames are not known.
 ///
 /// A renderer with [`Granularity::Adaptive`](crate::Granularity::Adaptive) cuts a frame by what its items cost and by the number
 /// of workers. Such [nodes](crate::timeline::NodeInfo::chunked_by_cost) are cut anew for the workers of the replay, by the rule
@@ -61,7 +63,7 @@ impl Replay {
     /// # Errors
     /// Returns [`ReportError::Incomplete`], [`ReportError::Failed`] or [`ReportError::Contradictory`] if the run is.
     pub fn new(run: &Run, costs: SchedulerCosts) -> Result<Self, ReportError> {
-        Self::of_runs([run], Duration::ZERO, costs)
+        Self::of_runs([(run, Vec::new())], Duration::ZERO, costs)
     }
 
     /// A replay of the frame of that number: its runs one after another, and what its threads did outside of them.
@@ -76,21 +78,21 @@ impl Replay {
         let of_runs = union(runs.iter().map(|run| run.began..run.ended));
         let of_frame = frame_intervals(log, frame, &runs);
         let serial = total_length(&of_frame).saturating_sub(total_length(&of_runs));
-        Self::of_runs(runs, serial, costs)
+        Self::of_runs(runs.into_iter().map(|run| (run, gaps_up_to(log, run))), serial, costs)
     }
 
     fn of_runs<'log>(
-        runs: impl IntoIterator<Item = &'log Run>,
+        runs: impl IntoIterator<Item = (&'log Run, Vec<Duration>)>,
         serial: Duration,
         costs: SchedulerCosts,
     ) -> Result<Self, ReportError> {
-        let measured = |run: &Run| match run {
+        let measured = |(run, gaps): (&Run, Vec<Duration>)| match run {
             Run { failed: true, frame, .. } => Err(ReportError::Failed { frame: *frame }),
             Run { complete: false, frame, .. } => Err(ReportError::Incomplete { frame: *frame }),
             Run { frame, .. } if check_run(run, "the run", run.workers).is_err() => {
                 Err(ReportError::Contradictory { frame: *frame })
             }
-            _ => Ok(MeasuredRun::new(run, &costs)),
+            _ => Ok(MeasuredRun::new(run, gaps, &costs)),
         };
         Ok(Self { runs: runs.into_iter().map(measured).collect::<Result<_, _>>()?, serial, costs })
     }
@@ -221,6 +223,22 @@ mod tests {
         // Each of 32 chunks begins with a ticket.
         let costs = SchedulerCosts { ticket: micros(1), chunk: micros(1), ..SchedulerCosts::ZERO };
         assert_eq!(times(&replay(&wide, costs), [1, 2]), [704, 384].map(micros));
+    }
+
+    #[test]
+    fn workers_are_awake_when_a_run_begins_that_follows_another_at_once() {
+        let run = TestRun::new().add(&[], &[10; 64]).run(&SchedulerCosts::ZERO);
+        let after = |gaps: &[u64]| {
+            let gaps = gaps.iter().copied().map(micros).collect();
+            let replay = Replay::of_runs([(&run, gaps)], Duration::ZERO, costly_wake_ups()).unwrap();
+            times(&replay, [1, 2, 4])
+        };
+        assert_eq!(after(&[119]), [640, 320, 160].map(micros));
+        // It is worth more to four workers, who would be woken one after the other.
+        assert_eq!(after(&[120]), [640, 340, 160].map(micros));
+        for gaps in [&[][..], &[240], &[10, 10, 16_000], &[16_000, 16_000, 10]] {
+            assert_eq!(after(gaps), [640, 340, 220].map(micros), "{gaps:?}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::scheduler_costs::SchedulerCosts;
 use super::workers::{Event, SimulatedWorkers};
 use crate::graph::RankedAdjacency;
 use crate::sync::Instant;
-use crate::task::{Priority, TicketSize, Tickets};
+use crate::task::{Priority, TicketSize, Tickets, are_awake_after};
 
 /// Simulates runs of one schedule, one after another.
 pub(super) struct Simulation<'replay> {
@@ -39,11 +39,12 @@ impl<'replay> Simulation<'replay> {
     /// Simulates one run, with the ranks that `adjacency` gives the nodes.
     pub(super) fn run(&self, adjacency: &RankedAdjacency) -> Outcome {
         let nodes = self.run.nodes.len();
+        let are_awake = are_awake_after(&self.run.gaps, self.workers, self.costs.wake);
         let mut run = SimulatedRun {
             simulation: self,
             adjacency,
             start: Instant::now(),
-            workers: SimulatedWorkers::new(self.workers, self.costs, Action::Begin),
+            workers: SimulatedWorkers::new(self.workers, self.costs, are_awake, Action::Begin),
             dependencies_left: (0..nodes as u32).map(|node| adjacency.dependency_count(node)).collect(),
             chunks_done: vec![0; nodes],
             nodes_left: nodes,
@@ -275,7 +276,7 @@ mod tests {
             test_run in any_test_run(true),
             workers in 1..8_usize,
         ) {
-            let run = MeasuredRun::new(&test_run.run(&SchedulerCosts::ZERO), &SchedulerCosts::ZERO);
+            let run = MeasuredRun::new(&test_run.run(&SchedulerCosts::ZERO), Vec::new(), &SchedulerCosts::ZERO);
             let adjacency = RankedAdjacency::new(&run.dependencies);
             let outcome = Simulation::new(&run, &SchedulerCosts::ZERO, workers).run(&adjacency);
             for (node, span) in test_run.nodes.iter().zip(&outcome.node_spans) {

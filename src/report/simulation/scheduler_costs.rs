@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::graph::{Closure, FrameGraph, Schedule};
 use crate::sync::{Instant, spin_loop};
-use crate::task::{Chunks, Scheduler, SchedulerError, Tickets, uncounted_pauses};
+use crate::task::{Chunks, MAX_SPIN_BETWEEN_FRAMES, Scheduler, SchedulerError, Tickets, uncounted_pauses};
 use crate::timeline::Run;
 
 /// What the scheduler's own operations cost.
@@ -45,7 +45,7 @@ const CHUNKS: usize = 2_048;
 const WORK_STEPS: usize = 32;
 
 /// After this time without work a worker certainly sleeps.
-const FALL_ASLEEP: Duration = Duration::from_micros(200);
+const FALL_ASLEEP: Duration = MAX_SPIN_BETWEEN_FRAMES.saturating_mul(2);
 
 /// Timeout for a worker to start.
 const TIMEOUT: Duration = Duration::from_millis(1);
@@ -64,7 +64,7 @@ impl SchedulerCosts {
         recording: Duration::ZERO,
     };
 
-    /// Measures them on this machine, which takes some 20 ms. It starts schedulers of one and of two workers for that,
+    /// Measures them on this machine, which takes some 50 ms. It starts schedulers of one and of two workers for that,
     /// and stops it.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
 //! The simulated workers: their queues, which of them search for work or sleep, and who wakes whom. This follows
-//! `task/worker.rs`, `task/queues.rs`, `task/idle.rs` and `task/sleep.rs`.
+//! `task/worker.rs`, `task/queues.rs`, `task/idle.rs`, `task/frame_gaps.rs` and `task/sleep.rs`.
 //!
 //! It is a discrete-event simulation: the clock jumps from one event to the next. A worker that searches does so all the
 //! time, so it reacts as soon as a token is pushed. All tokens lie in queues, as in a run that a thread outside
@@ -68,8 +68,8 @@ pub(super) enum Event<T, A> {
 }
 
 impl<T, A> SimulatedWorkers<T, A> {
-    /// Worker 0, the calling thread, is awake and begins with `first`. All others sleep.
-    pub(super) fn new(workers: usize, costs: &SchedulerCosts, first: A) -> Self {
+    /// Worker 0, the calling thread, begins with `first`. All others look for work if they `are_awake`, and sleep otherwise.
+    pub(super) fn new(count: usize, costs: &SchedulerCosts, are_awake: bool, first: A) -> Self {
         let worker = |_| SimulatedWorker {
             state: State::Asleep,
             queues: Default::default(),
@@ -80,8 +80,8 @@ impl<T, A> SimulatedWorkers<T, A> {
         };
         let mut workers = Self {
             now: 0,
-            workers: (0..workers).map(worker).collect(),
-            sleepers: (1..workers).rev().collect(),
+            workers: (0..count).map(worker).collect(),
+            sleepers: if are_awake { Vec::new() } else { (1..count).rev().collect() },
             pinned: VecDeque::new(),
             events: BinaryHeap::new(),
             events_scheduled: 0,
@@ -90,6 +90,9 @@ impl<T, A> SimulatedWorkers<T, A> {
             uncounted_search: nanoseconds(costs.uncounted_search),
         };
         workers.schedule(0, State::Busy(first), 0);
+        if are_awake {
+            (1..count).for_each(|worker| workers.schedule(worker, State::WillSearch, 0));
+        }
         workers
     }
 
