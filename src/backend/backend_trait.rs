@@ -17,9 +17,9 @@ use crate::view::ObjectTable;
 /// The order within a frame:
 ///
 /// 1. `begin`.
-/// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and the
-///    passes. Of each pass of
-///    commands `prepare`, then `record` for each range of its parts; of every pass `finish`.
+/// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and
+///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`. If
+///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
 /// 4. Later, on the device thread, `submit`.
 ///
@@ -66,7 +66,8 @@ pub trait Backend: Send + Sync + 'static {
         0
     }
 
-    /// Uploads blocks of the object table: at least what changed since [`Backend::objects_epoch`].
+    /// Uploads blocks of the object table: at least what changed since [`Backend::objects_epoch`]. Other blocks may be written
+    /// meanwhile.
     ///
     /// # Errors
     /// If the device refuses.

@@ -85,6 +85,47 @@ impl BinnedSegment {
         }
     }
 
+    /// Makes this segment the objects in a range of positions of another one's order that `is_visible`, in the bins that `is_drawn`. They
+    /// are in order.
+    pub(crate) fn select(
+        &mut self,
+        all: &Self,
+        positions: Range<usize>,
+        is_drawn: impl Fn(u32) -> bool,
+        is_visible: impl Fn(u32) -> bool,
+    ) {
+        let Self { by_bin, ends, .. } = self;
+        ends.clear();
+        by_bin.resize(positions.len(), 0);
+        let (mut start, mut count) = (positions.start, 0);
+        let first = all.ends.partition_point(|&(_, end)| end as usize <= positions.start);
+        for &(bin, end) in &all.ends[first..] {
+            let run = start..(end as usize).min(positions.end);
+            if run.is_empty() {
+                break;
+            }
+            start = run.end;
+            if !is_drawn(bin) {
+                continue;
+            }
+            let count_before = count;
+            for &object in &all.by_bin[run] {
+                // Branchless: a mispredicted branch costs more than a wasted store.
+                by_bin[count] = object;
+                count += usize::from(is_visible(object));
+            }
+            if count > count_before {
+                ends.push((bin, count as u32));
+            }
+        }
+        by_bin.truncate(count);
+    }
+
+    /// The number of objects in the segment.
+    pub(crate) fn len(&self) -> usize {
+        self.by_bin.len()
+    }
+
     /// The ordered objects, for the list that takes them.
     pub(super) fn by_bin_mut(&mut self) -> &mut Vec<u32> {
         &mut self.by_bin
@@ -148,6 +189,28 @@ mod tests {
             }).collect();
             let mut list = DrawList::default();
             list.join_bins(&mut segments, &bins, |mesh| mesh != unmergeable);
+
+            // The same list, selected from all objects in order.
+            let mut all = BinnedSegment::default();
+            (0_u32..).zip(&kinds).for_each(|(object, (kind, _))| all.push(object, bins.insert(bin_of(*kind))));
+            bins.sort();
+            all.order(&bins);
+            let mut edges: Vec<_> = cuts.iter().map(|cut| cut % (kinds.len() + 1)).chain([0, kinds.len()]).collect();
+            edges.sort_unstable();
+            let mut selected: Vec<_> = edges.windows(2).map(|edge| {
+                let mut segment = BinnedSegment::default();
+                segment.select(&all, edge[0]..edge[1], |_| true, |object| kinds[object as usize].1);
+                Box::new(segment)
+            }).collect();
+            let mut selected_list = DrawList::default();
+            selected_list.join_bins(&mut selected, &bins, |mesh| mesh != unmergeable);
+            prop_assert_eq!((&selected_list.objects, &selected_list.batches), (&list.objects, &list.batches));
+            let mut of_some_bins = BinnedSegment::default();
+            of_some_bins.select(&all, 0..kinds.len(), |bin| bins.get(bin).mesh < 20, |_| true);
+            let is_expected = |object: &u32| bin_of(kinds[*object as usize].0).mesh < 20;
+            prop_assert!(of_some_bins.by_bin.iter().all(is_expected));
+            let expected_count = (0..kinds.len() as u32).filter(is_expected).count();
+            prop_assert_eq!(of_some_bins.len(), expected_count);
 
             let mut expected = drawn;
             expected.sort_by_key(|&(object, bin)| (bin.state, bin.mesh, object));

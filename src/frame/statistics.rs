@@ -55,7 +55,7 @@ pub struct ViewStatistics {
 /// The thread time of each group of stages, summed over workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageTimes {
-    /// Checking objects, and finding the objects and lights that each view sees.
+    /// Checking objects, uploading them if all changed, and finding the objects and lights that each view sees.
     pub visibility: Duration,
     /// Filling commands.
     pub fill: Duration,
@@ -63,7 +63,7 @@ pub struct StageTimes {
     pub sort: Duration,
     /// Merging commands into batches, joining these to draw lists, and culling triangles.
     pub instance: Duration,
-    /// Uploading, recording and finishing passes.
+    /// Other uploads, recording and finishing passes.
     pub record: Duration,
     /// Submitting; 0 until the frame is submitted.
     pub submit: Duration,

@@ -31,7 +31,8 @@ pub struct Quality {
     /// Error: pairs drawn back to front, which cause overdraw but do not change the picture, except that of coinciding
     /// surfaces the first drawn wins. Cost: with 0 bits, objects are counted by state and mesh, and a draw list is kept while
     /// the same objects are seen. From 1 bit on, every visible object becomes a command, and commands are sorted anew in every
-    /// frame in which an object or the camera moves.
+    /// frame in which an object or the camera moves: 9 to 16 ns an object and view. That saves from half of the fragments of a city
+    /// of one mesh to next to none where meshes are many (`benches/README.md`, "The order of opaque objects").
     pub opaque_order: DepthKey,
     /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
     ///

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::packet_columns::{LANES, Lanes};
-use super::set_bits;
 
 /// A bounding sphere in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,30 +54,13 @@ impl BoundingSpheres {
         self.radii[entry] = bounds.radius;
     }
 
-    /// Replaces spheres among the eight from `entry` on: bit `b` of `mask` stands for the sphere at `entry + b`. Those that are not in
-    /// `valid` become empty.
+    /// Replaces the eight spheres from `entry` on.
     #[inline(always)]
-    pub(super) fn set_packet(
-        &mut self,
-        entry: usize,
-        mask: u8,
-        valid: u8,
-        centers: &[Lanes<f64>; 3],
-        radii: &Lanes<f32>,
-    ) {
-        if mask & valid == u8::MAX {
-            for (coordinates, new) in self.centers.iter_mut().zip(centers) {
-                coordinates[entry..entry + LANES].copy_from_slice(new);
-            }
-            self.radii[entry..entry + LANES].copy_from_slice(radii);
-            return;
+    pub(super) fn set_packet(&mut self, entry: usize, centers: &[Lanes<f64>; 3], radii: &Lanes<f32>) {
+        for (coordinates, new) in self.centers.iter_mut().zip(centers) {
+            coordinates[entry..entry + LANES].copy_from_slice(new);
         }
-        for lane in set_bits(mask.into()) {
-            let center = DVec3::new(centers[0][lane], centers[1][lane], centers[2][lane]);
-            let is_valid = valid >> lane & 1 == 1;
-            let sphere = BoundingSphere { center, radius: radii[lane] };
-            self.set(entry + lane, if is_valid { sphere } else { BoundingSphere::EMPTY });
-        }
+        self.radii[entry..entry + LANES].copy_from_slice(radii);
     }
 
     /// The centres' world-space x, y and z in metres.

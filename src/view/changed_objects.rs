@@ -1,5 +1,9 @@
-//! The objects that a frame describes anew, as words of 64.
+//! The objects that a frame describes anew, as words of 64, and the blocks that these lie in.
 
+use std::ops::Range;
+
+use super::object_block::ObjectBlock;
+use super::set_bits;
 use crate::scene::Changes;
 
 /// The objects that a frame describes anew: all of them, or those that changed.
@@ -9,6 +13,8 @@ pub(super) struct ChangedObjects {
     all: Option<usize>,
     /// Otherwise each word with changed objects, ascending.
     words: Vec<ChangedWord>,
+    /// For each block with changed objects, ascending, where its words are in `words`.
+    blocks: Vec<Range<usize>>,
     /// While changes are collected, a mask for each word; zeros otherwise.
     masks: Vec<u64>,
 }
@@ -20,17 +26,34 @@ pub(crate) struct ChangedWord {
     pub(crate) mask: u64,
 }
 
+/// Changed objects of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ChangedBlock {
+    /// The index of the block.
+    pub(super) block: usize,
+    /// A mask for each of its words.
+    pub(super) masks: [u64; ObjectBlock::WORDS],
+}
+
+impl ChangedWord {
+    fn block(self) -> usize {
+        self.word / ObjectBlock::WORDS
+    }
+}
+
 impl ChangedObjects {
     /// All objects of a scene.
     pub(super) fn set_all(&mut self, objects: usize) {
         self.all = Some(objects);
         self.words.clear();
+        self.blocks.clear();
     }
 
     /// The reported objects, and those at indices that the last frame did not have. Indices beyond `objects` are ignored.
     pub(super) fn set(&mut self, changes: Changes<'_>, objects_before: usize, objects: usize) {
         self.all = None;
         self.words.clear();
+        self.blocks.clear();
         self.masks.resize(objects.div_ceil(WORD), 0);
         match changes {
             Changes::Unknown => return self.set_all(objects),
@@ -47,6 +70,11 @@ impl ChangedObjects {
         self.words.sort_unstable_by_key(|changed| changed.word);
         for changed in &mut self.words {
             changed.mask = std::mem::take(&mut self.masks[changed.word]);
+        }
+        let mut end = 0;
+        for words in self.words.chunk_by(|one, next| one.block() == next.block()) {
+            self.blocks.push(end..end + words.len());
+            end += words.len();
         }
     }
 
@@ -71,6 +99,37 @@ impl ChangedObjects {
     /// The number of words with changed objects.
     pub(super) fn word_count(&self) -> usize {
         self.all.map_or(self.words.len(), |objects| objects.div_ceil(WORD))
+    }
+
+    /// The number of blocks with changed objects.
+    pub(super) fn block_count(&self) -> usize {
+        self.all.map_or(self.blocks.len(), |objects| objects.div_ceil(ObjectBlock::SIZE))
+    }
+
+    /// A block with changed objects, by its index among them. They ascend.
+    ///
+    /// # Panics
+    /// If `index` is not below [`ChangedObjects::block_count`].
+    pub(super) fn block(&self, index: usize) -> ChangedBlock {
+        let words = if self.are_all() {
+            let first = index * ObjectBlock::WORDS;
+            first..self.word_count().min(first + ObjectBlock::WORDS)
+        } else {
+            self.blocks[index].clone()
+        };
+        let mut changed = ChangedBlock { block: self.word(words.start).block(), masks: [0; ObjectBlock::WORDS] };
+        for ChangedWord { word, mask } in words.map(|index| self.word(index)) {
+            changed.masks[word % ObjectBlock::WORDS] = mask;
+        }
+        changed
+    }
+
+    /// The changed objects of a range of blocks, where not all objects changed. They ascend.
+    pub(super) fn objects_of_blocks(&self, blocks: Range<usize>) -> impl Iterator<Item = usize> {
+        debug_assert!(!self.are_all());
+        let index_of = |block: usize| self.words.partition_point(|changed| changed.block() < block);
+        let words = &self.words[index_of(blocks.start)..index_of(blocks.end)];
+        words.iter().flat_map(|changed| set_bits(changed.mask).map(|bit| changed.word * WORD + bit))
     }
 
     /// Whether all objects are described, reported or not.
@@ -104,7 +163,6 @@ const WORD: usize = u64::BITS as usize;
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use std::collections::BTreeSet;
-    use std::ops::Range;
 
     use proptest::prelude::*;
 
@@ -119,6 +177,18 @@ mod tests {
             .collect()
     }
 
+    /// The changed objects, as the blocks have them.
+    fn objects_by_block(changed: &ChangedObjects) -> Vec<usize> {
+        let blocks: Vec<_> = (0..changed.block_count()).map(|index| changed.block(index)).collect();
+        assert!(blocks.is_sorted_by(|one, next| one.block < next.block), "{blocks:?}");
+        assert!(blocks.iter().all(|block| block.masks != [0; 4]), "{blocks:?}");
+        let bits = |block: &ChangedBlock| {
+            let ChangedBlock { block, masks } = *block;
+            (0..256).filter(move |bit| masks[bit / 64] >> (bit % 64) & 1 == 1).map(move |bit| block * 256 + bit)
+        };
+        blocks.iter().flat_map(bits).collect()
+    }
+
     proptest! {
         #[test]
         fn reported_and_new_objects_are_found_once_each(
@@ -126,6 +196,7 @@ mod tests {
             ranges in prop::collection::vec((0_u32..700, 0_u32..200), 0..5),
             before in 0_usize..600,
             objects in 0_usize..600,
+            blocks in (0_usize..3, 0_usize..3).prop_map(|(start, length)| start..start + length),
         ) {
             // A range that ends before it starts is empty.
             let ranges: Vec<Range<u32>> = ranges.iter().map(|&(start, length)| start..start + length.saturating_sub(5)).collect();
@@ -139,10 +210,15 @@ mod tests {
                 let reported = reported.into_iter().map(|index| index as usize).filter(|&index| index < objects);
                 let expected: BTreeSet<_> = reported.chain(new.iter().copied()).collect();
                 prop_assert_eq!(objects_of(&changed), expected.iter().copied().collect::<Vec<_>>());
+                prop_assert_eq!(objects_by_block(&changed), objects_of(&changed));
+                let of_blocks: Vec<_> = changed.objects_of_blocks(blocks.clone()).collect();
+                let expected_of_blocks = expected.iter().copied().filter(|object| blocks.contains(&(object / 256)));
+                prop_assert_eq!(of_blocks, expected_of_blocks.collect::<Vec<_>>());
                 prop_assert!((0..objects).all(|object| changed.contains(object) == expected.contains(&object)));
             }
             changed.set(Changes::Unknown, before, objects);
             prop_assert_eq!(objects_of(&changed), (0..objects).collect::<Vec<_>>());
+            prop_assert_eq!(objects_by_block(&changed), objects_of(&changed));
         }
     }
 }

@@ -8,6 +8,7 @@ mod block_reader;
 mod bounding_boxes;
 mod bounding_spheres;
 mod changed_objects;
+mod describe_block;
 mod draw_states;
 mod fill;
 mod fixed_position;
@@ -29,7 +30,7 @@ mod subdivision_level;
 mod triangle_culling;
 mod visible_set;
 
-pub(crate) use bin::bin_visible;
+pub(crate) use bin::{bin_visible, may_walk};
 #[doc(hidden)]
 pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;

@@ -41,48 +41,76 @@ impl ObjectBlock {
     /// The number of objects in a block.
     pub const SIZE: usize = BoundingSpheres::COUNT;
 
-    /// The number of objects in a packet, which are described and uploaded together.
+    /// The number of objects in a packet: whole packets are described together.
     pub(super) const PACKET: usize = LANES;
 
     /// The number of words in a block.
     pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
 
-    /// Replaces objects of a packet, from `entry` on, by their descriptions: those in the mask. Returns a mask of the objects whose mesh,
-    /// material or state changed, and with them perhaps their bin.
+    /// Replaces eight objects, from `object` of the scene on, by their descriptions. Returns a mask of those whose mesh, material or
+    /// state changed, and with them perhaps their bin.
+    ///
+    /// # Panics
+    /// If not all of them are in the same block.
     #[inline(always)]
-    pub(super) fn set_packet(
-        &mut self,
-        entry: usize,
-        mask: u8,
-        packet: &PacketDescription,
-        columns: &PacketColumns<'_>,
-    ) -> u8 {
-        self.spheres.set_packet(entry, mask, packet.valid, &packet.centers, &packet.radii);
+    pub(super) fn set_packet(&mut self, object: usize, packet: &PacketDescription, columns: &PacketColumns<'_>) -> u8 {
+        if packet.valid != u8::MAX {
+            return self.set_partly_valid(object, packet, columns);
+        }
+        let entry = object % Self::SIZE;
+        let mut draws_changed = 0;
+        self.spheres.set_packet(entry, &packet.centers, &packet.radii);
         let gpu_objects = self.gpu_objects[entry..].first_chunk_mut::<LANES>().expect("packets do not cross blocks");
         let draws = self.draws[entry..].first_chunk::<LANES>().expect("packets do not cross blocks");
-        let valid = mask & packet.valid;
-        let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
-        self.drawable[word] = self.drawable[word] & !(u64::from(mask) << shift) | u64::from(valid) << shift;
-        let mut draws_changed = 0;
-        // A loop of its own: without a mask it is unrolled.
-        if valid == u8::MAX {
-            for lane in 0..LANES {
-                gpu_objects[lane] = packet.gpu_object(columns, lane);
-                draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
-            }
-        } else {
-            for lane in set_bits(valid.into()) {
-                gpu_objects[lane] = packet.gpu_object(columns, lane);
-                draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
-            }
+        for lane in 0..LANES {
+            gpu_objects[lane] = packet.gpu_object(columns, lane, object + lane);
+            draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
         }
+        let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
+        self.drawable[word] |= u64::from(u8::MAX) << shift;
         if self.rejected_count > 0 {
-            set_bits(valid.into()).for_each(|lane| self.set_rejected(entry + lane, None));
+            (0..LANES).for_each(|lane| self.set_rejected(entry + lane, None));
         }
         for lane in set_bits(draws_changed.into()) {
             self.set_draw(entry + lane, packet.draws[lane]);
         }
         draws_changed
+    }
+
+    #[cold]
+    fn set_partly_valid(&mut self, object: usize, packet: &PacketDescription, columns: &PacketColumns<'_>) -> u8 {
+        let set = |changed, lane| changed | u8::from(self.set_object(object + lane, packet, columns, lane)) << lane;
+        (0..LANES).fold(0, set)
+    }
+
+    /// Replaces an object of the scene by its description in a packet. Returns whether its mesh, material or state changed. If it is invalid, no
+    /// view sees it.
+    #[inline(always)]
+    pub(super) fn set_object(
+        &mut self,
+        object: usize,
+        packet: &PacketDescription,
+        columns: &PacketColumns<'_>,
+        lane: usize,
+    ) -> bool {
+        let entry = object % Self::SIZE;
+        let (word, bit) = (entry / Frustum::WORD, 1 << (entry % Frustum::WORD));
+        let Some(ObjectDescription { gpu_object, bounds, draw }) = packet.object(columns, lane, object) else {
+            self.spheres.set(entry, BoundingSphere::EMPTY);
+            self.drawable[word] &= !bit;
+            return false;
+        };
+        self.spheres.set(entry, bounds);
+        self.drawable[word] |= bit;
+        self.gpu_objects[entry] = gpu_object;
+        if self.rejected_count > 0 {
+            self.set_rejected(entry, None);
+        }
+        let draw_changed = self.draws[entry] != draw;
+        if draw_changed {
+            self.set_draw(entry, draw);
+        }
+        draw_changed
     }
 
     fn set_draw(&mut self, entry: usize, draw: ObjectDraw) {
@@ -132,6 +160,8 @@ impl ObjectBlock {
     /// Removes the objects from their bins, whose numbers are about to be given anew.
     pub(super) fn forget_bins(&mut self) {
         self.draws = [ObjectDraw::NONE; Self::SIZE];
+        // Objects without a bin have a number as well, which must be one that exists.
+        self.bins = [0; Self::SIZE];
     }
 
     /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see [`ObjectBlock::visible`]. Calls

@@ -65,9 +65,9 @@ impl PacketDescription {
         Self { valid: known & inputs.are_valid(&radii), draws, centers, radii, steps, orientations }
     }
 
-    /// The GPU layout of an object.
+    /// The GPU layout of the object of that index in the scene, in a lane of the packet.
     #[inline(always)]
-    pub(super) fn gpu_object(&self, columns: &PacketColumns<'_>, lane: usize) -> GpuObject {
+    pub(super) fn gpu_object(&self, columns: &PacketColumns<'_>, lane: usize, object: usize) -> GpuObject {
         let (position_low, position_high) = FixedPosition::from_steps(lane_of(&self.steps, lane)).halves();
         GpuObject {
             position_low,
@@ -76,14 +76,14 @@ impl PacketDescription {
             padding: 0,
             orientation: lane_of(&self.orientations, lane),
             scale: columns.scales[lane].to_array(),
-            object: (columns.first + lane) as u32,
+            object: object as u32,
         }
     }
 
-    /// The description of one object; `None` if it cannot be drawn.
-    pub(super) fn object(&self, columns: &PacketColumns<'_>, lane: usize) -> Option<ObjectDescription> {
+    /// The description of the object of that index in the scene, in a lane of the packet; `None` if it cannot be drawn.
+    pub(super) fn object(&self, columns: &PacketColumns<'_>, lane: usize, object: usize) -> Option<ObjectDescription> {
         let bounds = BoundingSphere { center: lane_of(&self.centers, lane).into(), radius: self.radii[lane] };
-        let gpu_object = self.gpu_object(columns, lane);
+        let gpu_object = self.gpu_object(columns, lane, object);
         (self.valid >> lane & 1 == 1).then(|| ObjectDescription { gpu_object, bounds, draw: self.draws[lane] })
     }
 }

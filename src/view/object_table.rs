@@ -2,18 +2,18 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::block_bounds::BlockBounds;
 use super::changed_objects::{ChangedObjects, ChangedWord};
+use super::describe_block::{DescriptionInputs, Findings, describe_block};
 use super::draw_states::DrawStates;
 use super::object_block::ObjectBlock;
-use super::object_description::{ObjectDraw, PacketDescription, bounding_box, rejection_reason};
-use super::packet_columns::{LANES, PacketColumns};
-use super::{BoundingBoxes, Frustum, GpuObject, Rejections, set_bits};
+use super::object_description::{PacketDescription, rejection_reason};
+use super::packet_columns::GatheredColumns;
+use super::{BoundingBoxes, GpuObject, Rejections};
 use crate::chunked_array::block_ranges;
-use crate::command::{Bin, Bins};
+use crate::command::{BinnedSegment, Bins};
 use crate::quality::CullingVolume;
 use crate::scene::{Changes, SceneRef};
 
@@ -41,6 +41,26 @@ pub struct ObjectTable {
     is_current: bool,
     epoch: u64,
     summary: RwLock<Summary>,
+    by_bin: RwLock<ObjectsByBin>,
+}
+
+/// All objects ordered by bin, and what the order depends on.
+#[derive(Debug, Default)]
+struct ObjectsByBin {
+    /// What the order is of; `None` before the objects are ordered.
+    made_for: Option<BinInputs>,
+    /// The inputs in the latest frame that asked for the order.
+    latest: Option<BinInputs>,
+    objects: BinnedSegment,
+}
+
+/// What the bins of a scene's objects follow from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct BinInputs {
+    /// The epoch in which an object was last drawn in another way.
+    draws_changed_in: u64,
+    /// The number of objects.
+    objects: usize,
 }
 
 /// What jobs find out about the objects that they describe.
@@ -111,8 +131,13 @@ impl ObjectTable {
         self.is_current = false;
     }
 
-    /// The number of words of [`Frustum::WORD`] objects in which an object has to be described.
-    pub fn changed_word_count(&self) -> usize {
+    /// The number of blocks in which an object has to be described.
+    pub fn changed_block_count(&self) -> usize {
+        self.changed.block_count()
+    }
+
+    /// The number of words of [`Frustum::WORD`](super::Frustum::WORD) objects in which an object has to be described.
+    pub(crate) fn changed_word_count(&self) -> usize {
         self.changed.word_count()
     }
 
@@ -129,43 +154,32 @@ impl ObjectTable {
         self.changed.are_all()
     }
 
-    /// Describes the objects that changed in a range of words, which are counted as [`ObjectTable::changed_word_count`] counts
-    /// them.
-    pub fn describe(&self, scene: &SceneRef<'_>, words: Range<usize>) {
-        let (mut draws_changed, mut rejects) = (false, false);
-        for ChangedWord { word, mask } in words.map(|index| self.changed.word(index)) {
-            let found = describe_word(self, scene, word, mask);
-            draws_changed |= found.draws_changed;
-            rejects |= found.rejects;
+    /// Describes the objects that changed in some blocks, which are counted as [`ObjectTable::changed_block_count`] counts them.
+    pub fn describe(&self, scene: &SceneRef<'_>, blocks: Range<usize>) {
+        let Self { draw_states, bins, epoch, .. } = self;
+        let inputs = DescriptionInputs { scene, draw_states, bins, epoch: *epoch };
+        let mut findings = Findings::default();
+        for changed in blocks.clone().map(|index| self.changed.block(index)) {
+            findings |= describe_block(&inputs, &mut self.blocks[changed.block].write(), &changed);
         }
-        if draws_changed || rejects {
+        // One lock a job.
+        let mut block_bounds = self.block_bounds.write();
+        for block in blocks.map(|index| self.changed.block(index).block) {
+            block_bounds.set(block, &self.block(block).word_bounds);
+        }
+        drop(block_bounds);
+        if findings != Findings::default() {
             let mut summary = self.summary.write();
-            if draws_changed {
+            if findings.draws_changed {
                 summary.draws_changed_in = self.epoch;
             }
-            summary.has_rejected |= rejects;
+            summary.has_rejected |= findings.rejects;
         }
     }
 
-    fn bin_of(&self, draw: ObjectDraw) -> u32 {
-        let bin = Bin { state: draw.state, mesh: draw.mesh };
-        let known = self.bins.read().find(bin);
-        known.unwrap_or_else(|| self.bins.write().insert(bin))
-    }
-
-    /// Completes the table when all changed objects are described: orders new bins, updates the bounds of blocks, and counts the
-    /// objects that are rejected.
+    /// Completes the table when all changed objects are described: orders new bins, and counts the objects that are rejected.
     pub fn finish(&self) {
         self.bins.write().sort();
-        let mut bounds = self.block_bounds.write();
-        let mut latest = None;
-        for index in 0..self.changed.word_count() {
-            let block = self.changed.word(index).word * Frustum::WORD / Self::BLOCK_SIZE;
-            if latest.replace(block) != Some(block) {
-                bounds.set(block, &self.blocks[block].read().word_bounds);
-            }
-        }
-        drop(bounds);
         if self.summary.read().has_rejected {
             let mut has_rejected = false;
             for (index, block) in self.blocks[..self.block_count()].iter().enumerate() {
@@ -178,13 +192,48 @@ impl ObjectTable {
         }
     }
 
+    /// Orders the objects by bin, unless they are, for passes that use [`ObjectTable::objects_by_bin`]. Call it once a frame, when the
+    /// table is complete.
+    ///
+    /// It waits for a frame with the same inputs as the one before: where an object is drawn in another way in every frame, or
+    /// their number changes, ordering all of them each time would cost more than it saves.
+    pub(crate) fn order_by_bin(&self) {
+        let by_bin = &mut *self.by_bin.write();
+        let inputs = Some(self.bin_inputs());
+        if std::mem::replace(&mut by_bin.latest, inputs) != inputs || by_bin.made_for == inputs {
+            return;
+        }
+        let bins = self.bins.read();
+        by_bin.objects.clear();
+        let with_bins = if bins.len() > 0 { self.block_count() } else { 0 };
+        for index in 0..with_bins {
+            let first = index * Self::BLOCK_SIZE;
+            let objects = first..self.length.min(first + Self::BLOCK_SIZE);
+            let block = self.block(index);
+            objects.zip(&block.bins).for_each(|(object, &bin)| by_bin.objects.push(object as u32, bin));
+        }
+        by_bin.objects.order(&bins);
+        by_bin.made_for = inputs;
+    }
+
+    /// All objects ordered by bin, those that no view sees among them; `None` in a frame for which they are not ordered.
+    pub(crate) fn objects_by_bin(&self) -> Option<MappedRwLockReadGuard<'_, BinnedSegment>> {
+        let by_bin = self.by_bin.read();
+        let is_current = by_bin.made_for == Some(self.bin_inputs());
+        is_current.then(|| RwLockReadGuard::map(by_bin, |by_bin| &by_bin.objects))
+    }
+
+    fn bin_inputs(&self) -> BinInputs {
+        BinInputs { draws_changed_in: self.draws_changed_in(), objects: self.length }
+    }
+
     /// An object that changed although it was not reported; `None` if there is none. Call it when the table is complete.
     pub(crate) fn unreported_change(&self, scene: &SceneRef<'_>) -> Option<usize> {
         let is_as_before = |&object: &usize| {
             let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
-            let mut padded = None;
-            let columns = PacketColumns::new(scene, object, &mut padded);
-            let now = PacketDescription::new(&columns, &self.draw_states).object(&columns, 0);
+            let gathered = GatheredColumns::new(scene, &[object]);
+            let columns = gathered.columns();
+            let now = PacketDescription::new(&columns, &self.draw_states).object(&columns, 0, object);
             now.ok_or_else(|| rejection_reason(scene, object)) == before
         };
         let unreported = |object: &usize| !self.changed.contains(*object);
@@ -194,7 +243,7 @@ impl ObjectTable {
     /// Begins a frame, and describes all its objects.
     pub fn update(&mut self, scene: &SceneRef<'_>) {
         self.begin_frame(&SceneRef { changes: Changes::Unknown, ..*scene });
-        self.describe(scene, 0..self.changed_word_count());
+        self.describe(scene, 0..self.changed_block_count());
         self.finish();
         self.end_frame();
     }
@@ -231,27 +280,21 @@ impl ObjectTable {
 
     /// Calls `visit` with ranges of objects that contain all objects of some blocks that changed after an epoch. The ranges ascend;
     /// between two of them are at least `gap` objects.
-    pub fn for_each_change(&self, blocks: Range<usize>, epoch: u64, gap: usize, mut visit: impl FnMut(Range<usize>)) {
-        let mut run = 0..0;
-        for index in blocks {
-            let changed_in = self.block(index).changed_in;
-            for (packet, _) in changed_in.iter().enumerate().filter(|(_, changed_in)| **changed_in > epoch) {
-                let first = index * Self::BLOCK_SIZE + packet * ObjectBlock::PACKET;
-                if first >= self.length {
-                    break;
+    pub fn for_each_change(&self, blocks: Range<usize>, epoch: u64, gap: usize, visit: impl FnMut(Range<usize>)) {
+        let mut ranges = RangeMerger { merged: 0..0, gap, visit };
+        if epoch + 1 == self.epoch && self.changed.word_count() > 0 && !self.all_changed() {
+            // This frame began the epoch, so its changes are all there are, and they are known one by one.
+            self.changed.objects_of_blocks(blocks).for_each(|object| ranges.add(object..object + 1));
+        } else {
+            for index in blocks {
+                let changed_in = self.block(index).changed_in;
+                for (packet, _) in changed_in.iter().enumerate().filter(|(_, changed_in)| **changed_in > epoch) {
+                    let first = index * Self::BLOCK_SIZE + packet * ObjectBlock::PACKET;
+                    ranges.add(first..(first + ObjectBlock::PACKET).min(self.length));
                 }
-                if run.is_empty() || first >= run.end + gap {
-                    let before = std::mem::replace(&mut run, first..first);
-                    if !before.is_empty() {
-                        visit(before);
-                    }
-                }
-                run.end = (first + ObjectBlock::PACKET).min(self.length);
             }
         }
-        if !run.is_empty() {
-            visit(run);
-        }
+        ranges.end();
     }
 
     /// The first object of a block, and the GPU layouts of all its objects, 64 bytes each.
@@ -288,64 +331,34 @@ impl ObjectTable {
     }
 }
 
-/// What is found out about the objects of a word.
-#[derive(Clone, Copy, Debug, Default)]
-struct WordSummary {
-    /// Whether one is drawn in another way than before.
-    draws_changed: bool,
-    /// Whether one is rejected.
-    rejects: bool,
+/// Merges ranges that ascend, and are less than `gap` apart.
+struct RangeMerger<V> {
+    merged: Range<usize>,
+    gap: usize,
+    visit: V,
+}
+
+impl<V: FnMut(Range<usize>)> RangeMerger<V> {
+    fn add(&mut self, range: Range<usize>) {
+        if !self.merged.is_empty() && range.start < self.merged.end + self.gap {
+            self.merged.end = self.merged.end.max(range.end);
+        } else {
+            let before = std::mem::replace(&mut self.merged, range);
+            self.visit(before);
+        }
+    }
+
+    fn end(mut self) {
+        let last = self.merged.clone();
+        self.visit(last);
+    }
+
+    fn visit(&mut self, range: Range<usize>) {
+        if !range.is_empty() {
+            (self.visit)(range);
+        }
+    }
 }
 
 /// Unused bins that are not worth removing.
 const MIN_UNUSED_BINS: usize = 64;
-
-/// If fewer objects of a word change, its bounds are extended. Otherwise they are computed anew.
-const EXTENSION_LIMIT: u32 = 16;
-
-/// After this many frames with changes, the bounds of a word are computed anew in any case: objects that travel would leave them large.
-const EXTENDED_FRAMES: u64 = 32;
-
-/// Describes the objects of a word that are in the mask.
-#[multiversion(targets("x86_64+avx2"))]
-fn describe_word(table: &ObjectTable, scene: &SceneRef, word: usize, mask: u64) -> WordSummary {
-    let mut found = WordSummary::default();
-    let first = word * Frustum::WORD;
-    let mut block = table.blocks[first / ObjectTable::BLOCK_SIZE].write();
-    for packet in (0..Frustum::WORD).step_by(LANES) {
-        let changed = (mask >> packet) as u8;
-        if changed == 0 {
-            continue;
-        }
-        block.changed_in[(first + packet) % ObjectTable::BLOCK_SIZE / ObjectBlock::PACKET] = table.epoch;
-        let (object, entry) = (first + packet, (first + packet) % ObjectTable::BLOCK_SIZE);
-        let mut padded = None;
-        let columns = PacketColumns::new(scene, object, &mut padded);
-        let described = PacketDescription::new(&columns, &table.draw_states);
-        let draws_changed = block.set_packet(entry, changed, &described, &columns);
-        found.draws_changed |= draws_changed != 0;
-        for lane in set_bits(draws_changed.into()) {
-            block.bins[entry + lane] = table.bin_of(described.draws[lane]);
-        }
-        let rejected = changed & !described.valid;
-        found.rejects |= rejected != 0;
-        for lane in set_bits(rejected.into()) {
-            block.reject(entry + lane, rejection_reason(scene, object + lane));
-        }
-        let boxed = if block.boxes.is_some() { changed & described.valid } else { 0 };
-        for lane in set_bits(boxed.into()) {
-            block.set_box(entry + lane, |sphere| bounding_box(scene, object + lane, sphere));
-        }
-    }
-    let word = first % ObjectTable::BLOCK_SIZE / Frustum::WORD;
-    let ObjectBlock { spheres, word_bounds, .. } = &mut **block;
-    // Words take turns.
-    let is_due = (table.epoch + first as u64 / Frustum::WORD as u64).is_multiple_of(EXTENDED_FRAMES);
-    if mask.count_ones() < EXTENSION_LIMIT && !is_due {
-        let entries = set_bits(mask).map(|bit| word * Frustum::WORD + bit);
-        entries.for_each(|entry| word_bounds.extend_word(word, spheres.get(entry)));
-    } else {
-        word_bounds.set_word(word, spheres);
-    }
-    found
-}

@@ -14,8 +14,6 @@ pub(super) type Lanes<T> = [T; LANES];
 /// The columns of a scene for a packet of objects: an entry for each.
 #[derive(Clone, Copy)]
 pub(super) struct PacketColumns<'a> {
-    /// The index of the packet's first object.
-    pub(super) first: usize,
     pub(super) positions: &'a Lanes<DVec3>,
     pub(super) orientations: &'a Lanes<Quat>,
     pub(super) scales: &'a Lanes<Vec3>,
@@ -24,9 +22,8 @@ pub(super) struct PacketColumns<'a> {
     pub(super) materials: &'a Lanes<Handle<Material>>,
 }
 
-/// The entries of a partial last packet. Unused lanes repeat its first object.
-pub(super) struct PaddedColumns {
-    first: usize,
+/// The entries of up to eight objects that do not lie side by side in the columns. Unused lanes repeat the first object.
+pub(super) struct GatheredColumns {
     positions: Lanes<DVec3>,
     orientations: Lanes<Quat>,
     scales: Lanes<Vec3>,
@@ -36,57 +33,59 @@ pub(super) struct PaddedColumns {
 }
 
 impl<'a> PacketColumns<'a> {
-    /// The packet from the object `first` on. If it is not whole, it is in `padded`.
+    /// The packet of eight objects from `first` on.
     ///
     /// # Panics
-    /// If there is no object `first`.
+    /// If there are fewer.
     #[inline(always)]
-    pub(super) fn new(scene: &SceneRef<'a>, first: usize, padded: &'a mut Option<PaddedColumns>) -> Self {
-        match Self::whole(scene, first) {
-            Some(columns) => columns,
-            None => padded.insert(PaddedColumns::new(scene, first)).columns(),
-        }
-    }
-
-    #[inline(always)]
-    fn whole(scene: &SceneRef<'a>, first: usize) -> Option<Self> {
-        Some(Self {
-            first,
-            positions: scene.positions[first..].first_chunk()?,
-            orientations: scene.orientations[first..].first_chunk()?,
-            scales: scene.scales[first..].first_chunk()?,
-            bounds: scene.bounds[first..].first_chunk()?,
-            meshes: scene.meshes[first..].first_chunk()?,
-            materials: scene.materials[first..].first_chunk()?,
-        })
-    }
-}
-
-impl PaddedColumns {
-    #[cold]
-    fn new(scene: &SceneRef<'_>, first: usize) -> Self {
+    pub(super) fn new(scene: &SceneRef<'a>, first: usize) -> Self {
         Self {
-            first,
-            positions: padded(&scene.positions[first..]),
-            orientations: padded(&scene.orientations[first..]),
-            scales: padded(&scene.scales[first..]),
-            bounds: padded(&scene.bounds[first..]),
-            meshes: padded(&scene.meshes[first..]),
-            materials: padded(&scene.materials[first..]),
+            positions: packet(scene.positions, first),
+            orientations: packet(scene.orientations, first),
+            scales: packet(scene.scales, first),
+            bounds: packet(scene.bounds, first),
+            meshes: packet(scene.meshes, first),
+            materials: packet(scene.materials, first),
         }
-    }
-
-    fn columns(&self) -> PacketColumns<'_> {
-        let Self { first, positions, orientations, scales, bounds, meshes, materials } = self;
-        PacketColumns { first: *first, positions, orientations, scales, bounds, meshes, materials }
     }
 }
 
-/// The entries of a column that is shorter than a packet, and its first entry in the other lanes.
-fn padded<T: Copy>(column: &[T]) -> Lanes<T> {
-    let mut lanes = [column[0]; LANES];
-    for (lane, entry) in lanes.iter_mut().zip(column) {
-        *lane = *entry;
+impl GatheredColumns {
+    /// The packet of these objects: one to eight.
+    ///
+    /// # Panics
+    /// If there are more or none, or if one does not exist.
+    #[inline(always)]
+    pub(super) fn new(scene: &SceneRef<'_>, objects: &[usize]) -> Self {
+        let first = objects[0];
+        let mut columns = Self {
+            positions: [scene.positions[first]; LANES],
+            orientations: [scene.orientations[first]; LANES],
+            scales: [scene.scales[first]; LANES],
+            bounds: [scene.bounds[first]; LANES],
+            meshes: [scene.meshes[first]; LANES],
+            materials: [scene.materials[first]; LANES],
+        };
+        for (lane, &object) in objects.iter().enumerate().skip(1) {
+            columns.positions[lane] = scene.positions[object];
+            columns.orientations[lane] = scene.orientations[object];
+            columns.scales[lane] = scene.scales[object];
+            columns.bounds[lane] = scene.bounds[object];
+            columns.meshes[lane] = scene.meshes[object];
+            columns.materials[lane] = scene.materials[object];
+        }
+        columns
     }
-    lanes
+
+    #[inline(always)]
+    pub(super) fn columns(&self) -> PacketColumns<'_> {
+        let Self { positions, orientations, scales, bounds, meshes, materials } = self;
+        PacketColumns { positions, orientations, scales, bounds, meshes, materials }
+    }
+}
+
+/// The eight entries of a column from `first` on.
+#[inline(always)]
+fn packet<T>(column: &[T], first: usize) -> &Lanes<T> {
+    column[first..].first_chunk().expect("the packet is whole")
 }

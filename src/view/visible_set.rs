@@ -109,6 +109,16 @@ impl VisibleSet {
         self.words.get(word).map_or(0, |bits| bits.load(Ordering::Relaxed))
     }
 
+    /// Whether the view sees an object.
+    ///
+    /// # Panics
+    /// If the set was not reset for that many objects.
+    #[inline]
+    pub fn contains(&self, object: usize) -> bool {
+        let word = &self.words[object / Self::OBJECTS_PER_WORD];
+        word.load(Ordering::Relaxed) >> (object % Self::OBJECTS_PER_WORD) & 1 == 1
+    }
+
     /// Computes the prefix sum. Call it once, after all objects have been tested and hidden ones removed. If the set differs from the
     /// one that was compacted before, it gets `version`, which no other set has.
     pub fn compact(&self, version: Version) {

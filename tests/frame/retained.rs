@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::command::Batch;
-use drawloom::glam::{DVec3, Vec3};
+use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, DepthCurve, DepthKey, Quality};
 use drawloom::scene::{Camera, Changes, Light, SceneError, SceneRef};
@@ -105,7 +105,10 @@ proptest! {
 fn a_frame_in_which_nothing_changed_tests_describes_and_orders_no_object() {
     let scene = field(5_000);
     let (mut renderer, submitter) = renderer(Quality::balanced(), 1);
-    submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    // The second frame orders all objects by bin.
+    for _frame in 0..2 {
+        submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    }
     renderer.scheduler().timeline().start();
     let still = SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() };
     submitter.submit(renderer.record(still).unwrap()).unwrap();
@@ -115,6 +118,26 @@ fn a_frame_in_which_nothing_changed_tests_describes_and_orders_no_object() {
         let works = ["bins", "compact", "prepare", "record", "finish", "upload"].contains(&stage);
         assert!(works || log.runs[0].width(index) == 0, "{stage} has {} items", log.runs[0].width(index));
     }
+}
+
+/// Enough objects that several jobs order what a view sees.
+#[test]
+fn cameras_that_turn_draw_the_lists_of_a_new_renderer() {
+    let mut scene = field(9_000);
+    scene.cameras.truncate(1);
+    scene.cameras[0].position.z = 100.0;
+    let (mut renderer, submitter) = renderer(Quality::balanced(), 2);
+    let mut visible = Vec::new();
+    for frame in 0..24 {
+        let turned = Quat::from_rotation_y(0.04 * frame as f32);
+        scene.cameras[0].orientation = turned;
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        visible.push(recorded.statistics().views[0].visible);
+        let expected = of_a_new_renderer(Quality::balanced(), scene.as_scene_ref());
+        assert_eq!(difference(&contents(&renderer, recorded.statistics()), &expected), None, "frame {frame}");
+        submitter.submit(recorded).unwrap();
+    }
+    assert!(visible.iter().any(|count| (8_192..9_000).contains(count)), "{visible:?}");
 }
 
 #[test]

@@ -3,10 +3,12 @@
 use super::super::context::FrameContext;
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob};
 use super::super::stage_clock::StageGroup;
+use super::super::tables::PassTable;
 use crate::backend::{Backend, BackendError};
-use crate::view::{Frustum, ObjectTable};
+use crate::view::{self, ObjectTable};
 
-/// Checks the objects that changed, and computes what all views need to know about them. An item is a word of objects.
+/// Checks the objects that changed, and computes what all views need to know about them. If these are all objects, it also uploads
+/// them, while they are in the worker's caches. An item is a block with changed objects.
 pub(super) struct Objects;
 
 impl<B: Backend> Stage<B> for Objects {
@@ -15,23 +17,27 @@ impl<B: Backend> Stage<B> for Objects {
             name: "objects",
             after: &[],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
+            chunking: Chunking::ByCost { units_per_item: ObjectTable::BLOCK_SIZE },
             cost_kind: "objects",
             depends_on_occlusion: false,
         }
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.objects.changed_word_count()
+        frame.tables.objects.changed_block_count()
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        frame.tables.objects.describe(frame.request.scene, job.items);
-        Ok(())
+        let objects = &frame.tables.objects;
+        objects.describe(frame.request.scene, job.items.clone());
+        if !objects.all_changed() {
+            return Ok(());
+        }
+        frame.backend.upload_objects(job.worker, frame.backend_frame, objects, job.items)
     }
 }
 
-/// Orders the bins of objects, if there are new ones.
+/// Completes the object table, and orders its objects by bin if a pass may use that.
 pub(super) struct Bins;
 
 impl<B: Backend> Stage<B> for Bins {
@@ -47,12 +53,18 @@ impl<B: Backend> Stage<B> for Bins {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        frame.tables.objects.finish();
+        let objects = &frame.tables.objects;
+        objects.finish();
+        let may_walk = |table: &PassTable| table.orders_by_bin && table.selection.is_some_and(view::may_walk);
+        if frame.tables.passes.iter().any(may_walk) {
+            objects.order_by_bin();
+        }
         Ok(())
     }
 }
 
-/// Uploads what changed of the object table since the backend's buffers were written. An item is a block of objects.
+/// Uploads what changed of the object table since the backend's buffers were written, unless that is done. An item is a block of
+/// objects.
 pub(super) struct Upload;
 
 impl<B: Backend> Stage<B> for Upload {
@@ -69,7 +81,8 @@ impl<B: Backend> Stage<B> for Upload {
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
         let objects = &frame.tables.objects;
-        if frame.backend.objects_epoch(frame.backend_frame) == objects.epoch() { 0 } else { objects.block_count() }
+        let is_current = frame.backend.objects_epoch(frame.backend_frame) == objects.epoch();
+        if objects.all_changed() || is_current { 0 } else { objects.block_count() }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {

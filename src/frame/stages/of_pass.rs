@@ -194,13 +194,9 @@ impl<B: Backend> Stage<B> for Bin {
         let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
         let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
         let selection = table.selection.unwrap_or_default();
-        let (words, segments) = (visible.filled_word_count(), frame.segment_count(self.pass));
-        for segment in job.items {
-            let words = segment * words / segments..(segment + 1) * words / segments;
-            let mut segment = table.segments[segment].write();
-            segment.clear();
-            view::bin_visible(objects, visible, selection, words, &mut segment);
-            segment.order(&objects.bins());
+        for index in job.items {
+            let part = (index, frame.segment_count(self.pass));
+            view::bin_visible(objects, visible, selection, part, &mut table.segments[index].write());
         }
         Ok(())
     }
