@@ -10,6 +10,7 @@ pub mod arguments;
 pub mod backends;
 pub mod boxes;
 pub mod chart;
+pub mod city;
 pub mod clouds;
 pub mod harness;
 pub mod moving;

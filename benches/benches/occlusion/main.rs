@@ -10,7 +10,6 @@
 //! *Naive* is the usual method: occluders are drawn with one sample in the centre of each tile, and objects are tested by a
 //! rectangle of tiles. `target/drawloom/occlusion.json` has the same.
 
-mod city;
 mod measure;
 mod naive;
 
@@ -19,6 +18,7 @@ use std::error::Error;
 use clap::Parser;
 use drawloom::quality::Quality;
 use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::city;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 

@@ -2,8 +2,9 @@
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
-use drawloom_benches::boxes::new_box;
 use drawloom_testing::random::Random;
+
+use crate::boxes::new_box;
 
 /// In metres: the side of a lot. A street follows after [`LOTS`] lots along each axis.
 const LOT: f64 = 14.0;

@@ -1,16 +1,10 @@
 //! The sorting error by the number of depth bits in a sort key.
 //!
-//!     cargo bench -p drawloom-benches --bench depth_order
-//!
-//! 10,000 random distances of two distributions between 0.1 m and 10 km are sorted by their depth codes. Equal codes stay in random
-//! order, as equal keys are sorted by object index. The result is compared with the distances in sorted order. Nothing is timed, so
-//! the figures are the same on every machine.
-//!
 //! - ties: the share of pairs of neighbours by distance that have the same code;
 //! - inversions: the share of pairs drawn one after the other that are in the wrong order;
 //! - worst: the greatest distance between two that are in the wrong order, as a share of the documented step.
 
-use std::process::ExitCode;
+use std::error::Error;
 
 use drawloom::quality::{DepthCurve, DepthKey};
 use drawloom_benches::table::Table;
@@ -20,7 +14,11 @@ const NEAR: f32 = 0.1;
 const FAR: f32 = 1e4;
 const COUNT: usize = 10_000;
 
-fn main() -> ExitCode {
+/// Prints the table.
+///
+/// # Errors
+/// Returns an error if two distances in the wrong order differ by more than the documented step.
+pub fn print() -> Result<(), Box<dyn Error>> {
     let mut random = Random::new();
     let (low, high) = (f64::from(NEAR), f64::from(FAR));
     let even = (0..COUNT).map(|_| random.between(low, high) as f32).collect();
@@ -45,10 +43,9 @@ fn main() -> ExitCode {
     }
     table.print();
     if within {
-        return ExitCode::SUCCESS;
+        return Ok(());
     }
-    eprintln!("error: two distances in the wrong order differ by more than the documented step");
-    ExitCode::FAILURE
+    Err("two distances in the wrong order differ by more than the documented step".into())
 }
 
 /// The errors of an order.
