@@ -254,6 +254,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(any(miri, drawloom_shuttle), ignore = "time does not pass as usual")]
     fn a_worker_that_was_awake_between_frames_sleeps_in_the_end() {
         let builder = Scheduler::builder().workers(2).wake_up_cost(Duration::from_millis(1));
         let scheduler = builder.build().unwrap();
