@@ -41,7 +41,7 @@ struct GapCost(Estimate);
 
 impl FrameGaps {
     pub(super) fn new() -> Self {
-        Self { history: Mutex::default(), spin: AtomicUsize::new(0) }
+        Self { history: Mutex::new(History::default()), spin: AtomicUsize::new(0) }
     }
 
     /// How long workers look for jobs after the latest frame. A hint, so it is read and written relaxed.
@@ -55,7 +55,7 @@ impl FrameGaps {
         let (mut history, max_spin) = (self.history.lock(), max_spin_between_frames(workers, wake_up_cost));
         // While the wake-up cost is measured, it is 0.
         let Some(ended) = history.ended.filter(|_| !max_spin.is_zero()) else { return };
-        let spin = history.cost.add(now.saturating_duration_since(ended), max_spin);
+        let spin = history.cost.add(now.duration_since(ended), max_spin);
         self.spin.store(spin.as_nanos() as usize, Ordering::Relaxed);
     }
 
