@@ -115,7 +115,8 @@ mod tests {
             engine
         }
 
-        /// Draws a frame after a gap in microseconds. Returns for how many workers look for jobs afterwards.
+        /// Draws a frame after a gap in microseconds. Returns for how many microseconds workers look for jobs
+        /// afterwards.
         fn draw_after(&mut self, gap: f32) -> u128 {
             self.gaps.end_frame(self.now);
             self.now += Duration::from_nanos((gap * 1e3) as u64);

@@ -35,6 +35,13 @@ pub(super) struct ChangedBlock {
     pub(super) masks: [u64; ObjectBlock::WORDS],
 }
 
+impl ChangedBlock {
+    /// The first object of one of the block's words.
+    pub(super) fn first_object(&self, word: usize) -> usize {
+        self.block * ObjectBlock::SIZE + word * WORD
+    }
+}
+
 impl ChangedWord {
     fn block(self) -> usize {
         self.word / ObjectBlock::WORDS

@@ -53,7 +53,7 @@ const EXTENDED_FRAMES: u64 = 32;
 pub(super) fn describe_block(inputs: &DescriptionInputs, block: &mut ObjectBlock, changed: &ChangedBlock) -> Findings {
     let (mut findings, mut gathered) = (Findings::default(), [0; ObjectBlock::WORDS]);
     for (word, &mask) in changed.masks.iter().enumerate().filter(|(_, mask)| **mask != 0) {
-        let first = changed.block * ObjectBlock::SIZE + word * Frustum::WORD;
+        let first = changed.first_object(word);
         let mut whole = 0_u64;
         for packet in (0..Frustum::WORD).step_by(LANES) {
             let changed_in_packet = (mask >> packet) as u8;
@@ -112,7 +112,7 @@ fn describe_gathered(
 ) -> Findings {
     let (mut findings, mut objects, mut count) = (Findings::default(), [0; LANES], 0);
     for (word, &mask) in masks.iter().enumerate() {
-        let first = changed.block * ObjectBlock::SIZE + word * Frustum::WORD;
+        let first = changed.first_object(word);
         for bit in set_bits(mask) {
             objects[count] = first + bit;
             count += 1;
@@ -126,8 +126,7 @@ fn describe_gathered(
         findings |= describe_objects(inputs, block, &objects[..count]);
     }
     for (word, _) in masks.iter().enumerate().filter(|(_, mask)| **mask != 0) {
-        let first = changed.block * ObjectBlock::SIZE + word * Frustum::WORD;
-        update_word_bounds(inputs.epoch, block, first, changed.masks[word]);
+        update_word_bounds(inputs.epoch, block, changed.first_object(word), changed.masks[word]);
     }
     findings
 }

@@ -83,8 +83,8 @@ impl ObjectBlock {
         (0..LANES).fold(0, set)
     }
 
-    /// Replaces an object of the scene by its description in a packet. Returns whether its mesh, material or state changed. If it is invalid, no
-    /// view sees it.
+    /// Replaces an object of the scene by its description in a packet. Returns whether its mesh, material or state changed. If it
+    /// is invalid, no view sees it.
     #[inline(always)]
     pub(super) fn set_object(
         &mut self,

@@ -205,12 +205,9 @@ impl ObjectTable {
         }
         let bins = self.bins.read();
         by_bin.objects.clear();
-        let with_bins = if bins.len() > 0 { self.block_count() } else { 0 };
-        for index in 0..with_bins {
-            let first = index * Self::BLOCK_SIZE;
-            let objects = first..self.length.min(first + Self::BLOCK_SIZE);
-            let block = self.block(index);
-            objects.zip(&block.bins).for_each(|(object, &bin)| by_bin.objects.push(object as u32, bin));
+        let with_bins = if bins.len() > 0 { self.length } else { 0 };
+        for (index, objects) in Self::block_ranges(0..with_bins) {
+            objects.zip(&self.block(index).bins).for_each(|(object, &bin)| by_bin.objects.push(object as u32, bin));
         }
         by_bin.objects.order(&bins);
         by_bin.made_for = inputs;

@@ -17,8 +17,6 @@ pub(super) struct MeasuredRun {
     pub(super) nodes: Vec<MeasuredNode>,
     /// Whether it runs in parallel however little work it is.
     pub(super) always_parallel: bool,
-    /// The gaps between the runs of the log up to this one.
-    pub(super) gaps: Vec<Duration>,
 }
 
 /// A node, and how long its chunks took.
@@ -41,8 +39,8 @@ struct ChunkedByCost {
 }
 
 impl MeasuredRun {
-    /// From a run that is complete, and the gaps between the runs of its log up to it.
-    pub(super) fn new(run: &Run, gaps: Vec<Duration>, costs: &SchedulerCosts) -> Self {
+    /// From a run that is complete.
+    pub(super) fn new(run: &Run, costs: &SchedulerCosts) -> Self {
         let measured = |chunk: &Chunk| nanoseconds(chunk.duration().saturating_sub(costs.recording));
         let item_costs = item_costs(run, measured);
         let nodes = run.graph.nodes.iter().enumerate().map(|(index, node)| {
@@ -63,24 +61,14 @@ impl MeasuredRun {
             }
         });
         let dependencies = run.graph.nodes.iter().map(|node| node.dependencies.clone());
-        Self {
-            dependencies: dependencies.collect(),
-            nodes: nodes.collect(),
-            always_parallel: run.always_parallel,
-            gaps,
-        }
+        Self { dependencies: dependencies.collect(), nodes: nodes.collect(), always_parallel: run.always_parallel }
     }
 
     /// The run as this number of workers would have it: nodes that are chunked by cost have the chunks that are chosen there. The
     /// time of a recorded chunk is spread evenly over its items, and the time of each node stays the same.
     pub(super) fn cut_for(&self, workers: usize) -> Self {
         let nodes = self.nodes.iter().map(|node| node.cut_for(workers)).collect();
-        Self {
-            dependencies: self.dependencies.clone(),
-            nodes,
-            always_parallel: self.always_parallel,
-            gaps: self.gaps.clone(),
-        }
+        Self { dependencies: self.dependencies.clone(), nodes, always_parallel: self.always_parallel }
     }
 
     /// Removes all items from the nodes of a group.
@@ -177,7 +165,7 @@ mod tests {
     const COSTS: SchedulerCosts = SchedulerCosts::ZERO;
 
     fn measured(test_run: &TestRun) -> MeasuredRun {
-        MeasuredRun::new(&test_run.run(&COSTS), Vec::new(), &COSTS)
+        MeasuredRun::new(&test_run.run(&COSTS), &COSTS)
     }
 
     fn counts(run: &MeasuredRun) -> Vec<usize> {
@@ -217,7 +205,7 @@ mod tests {
     fn a_node_with_fixed_chunks_keeps_them_beside_others_of_its_kind() {
         let mut run = TestRun::new().add_by_cost("fill", 100, &[400]).add_by_cost("fill", 100, &[400]).run(&COSTS);
         Arc::make_mut(&mut run.graph).nodes[0].chunked_by_cost = false;
-        assert_eq!(counts(&MeasuredRun::new(&run, Vec::new(), &COSTS).cut_for(2)), [1, 9]);
+        assert_eq!(counts(&MeasuredRun::new(&run, &COSTS).cut_for(2)), [1, 9]);
     }
 
     #[test]

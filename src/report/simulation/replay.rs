@@ -9,7 +9,7 @@ use crate::graph::{ExecutionPolicy, RankedAdjacency, RunMode};
 use crate::report::consistency::check_run;
 use crate::report::error::ReportError;
 use crate::report::intervals::{frame_intervals, gaps_up_to, outermost_runs, total_length, union};
-use crate::task::Scheduler;
+use crate::task::{Scheduler, are_awake_after};
 use crate::timeline::{Log, Run};
 
 /// A recorded frame, to be replayed by any number of workers: by the scheduler's rules, on a simulated clock. The same record
@@ -32,9 +32,17 @@ use crate::timeline::{Log, Run};
 /// are too long.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    runs: Vec<MeasuredRun>,
+    runs: Vec<RunOfLog>,
     serial: Duration,
     costs: SchedulerCosts,
+}
+
+/// A run, and when the runs of its log before it ended.
+#[derive(Clone, Debug)]
+struct RunOfLog {
+    measured: MeasuredRun,
+    /// The gaps between the runs up to this one: see [`gaps_up_to`].
+    gaps: Vec<Duration>,
 }
 
 /// The outcome of a replay.
@@ -92,7 +100,7 @@ impl Replay {
             Run { frame, .. } if check_run(run, "the run", run.workers).is_err() => {
                 Err(ReportError::Contradictory { frame: *frame })
             }
-            _ => Ok(MeasuredRun::new(run, gaps, &costs)),
+            _ => Ok(RunOfLog { measured: MeasuredRun::new(run, &costs), gaps }),
         };
         Ok(Self { runs: runs.into_iter().map(measured).collect::<Result<_, _>>()?, serial, costs })
     }
@@ -106,7 +114,7 @@ impl Replay {
     /// The same frame without the work of a [group](crate::timeline::NodeInfo::group), for example of a render process. The
     /// nodes of the group remain, and wait for their dependencies.
     pub fn without_work_of(mut self, group: &str) -> Self {
-        self.runs.iter_mut().for_each(|run| run.remove_work_of(group));
+        self.runs.iter_mut().for_each(|run| run.measured.remove_work_of(group));
         self
     }
 
@@ -120,8 +128,9 @@ impl Replay {
         let workers = workers.clamp(1, Scheduler::MAX_WORKERS);
         let mut frame =
             ReplayedFrame { time: self.serial, serial: true, chunks: 0, busy: vec![Duration::ZERO; workers] };
-        for run in &self.runs {
-            let replayed = self.replay(&run.cut_for(workers), workers);
+        for RunOfLog { measured, gaps } in &self.runs {
+            let are_awake = are_awake_after(gaps, workers, self.costs.wake);
+            let replayed = self.replay(&measured.cut_for(workers), workers, are_awake);
             frame.chunks += replayed.chunks;
             frame.time += replayed.time;
             frame.serial &= replayed.serial;
@@ -130,10 +139,10 @@ impl Replay {
         frame
     }
 
-    fn replay(&self, run: &MeasuredRun, workers: usize) -> ReplayedFrame {
+    fn replay(&self, run: &MeasuredRun, workers: usize, are_awake: bool) -> ReplayedFrame {
         let serial_time = run.serial_time(&self.costs);
         if workers > 1 {
-            let parallel = self.simulate(run, workers);
+            let parallel = self.simulate(run, workers, are_awake);
             if run.always_parallel || !chooses_serial(serial_time, parallel.time, &self.costs) {
                 return replayed(run, false, parallel.time, parallel.busy);
             }
@@ -144,9 +153,9 @@ impl Replay {
     }
 
     /// Simulates the parallel run of a schedule that knows how long its nodes take.
-    fn simulate(&self, run: &MeasuredRun, workers: usize) -> Outcome {
+    fn simulate(&self, run: &MeasuredRun, workers: usize, are_awake: bool) -> Outcome {
         let mut adjacency = RankedAdjacency::new(&run.dependencies);
-        let simulation = Simulation::new(run, &self.costs, workers);
+        let simulation = Simulation::new(run, &self.costs, workers, are_awake);
         for _run in 0..RUNS_TO_LEARN {
             let spans = simulation.run(&adjacency).node_spans;
             let costs: Vec<u64> = spans.iter().map(|span| span.end - span.start).collect();

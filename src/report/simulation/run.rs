@@ -9,13 +9,15 @@ use super::scheduler_costs::SchedulerCosts;
 use super::workers::{Event, SimulatedWorkers};
 use crate::graph::RankedAdjacency;
 use crate::sync::Instant;
-use crate::task::{Priority, TicketSize, Tickets, are_awake_after};
+use crate::task::{Priority, TicketSize, Tickets};
 
 /// Simulates runs of one schedule, one after another.
 pub(super) struct Simulation<'replay> {
     run: &'replay MeasuredRun,
     costs: &'replay SchedulerCosts,
     workers: usize,
+    /// Whether the other workers look for jobs when a run begins, and do not sleep.
+    are_awake: bool,
     /// One for each node. They remember their sizes from run to run.
     tickets: Vec<Tickets>,
 }
@@ -31,20 +33,24 @@ pub(super) struct Outcome {
 }
 
 impl<'replay> Simulation<'replay> {
-    pub(super) fn new(run: &'replay MeasuredRun, costs: &'replay SchedulerCosts, workers: usize) -> Self {
+    pub(super) fn new(
+        run: &'replay MeasuredRun,
+        costs: &'replay SchedulerCosts,
+        workers: usize,
+        are_awake: bool,
+    ) -> Self {
         let tickets = run.nodes.iter().map(|_| Tickets::new()).collect();
-        Self { run, costs, workers, tickets }
+        Self { run, costs, workers, are_awake, tickets }
     }
 
     /// Simulates one run, with the ranks that `adjacency` gives the nodes.
     pub(super) fn run(&self, adjacency: &RankedAdjacency) -> Outcome {
         let nodes = self.run.nodes.len();
-        let are_awake = are_awake_after(&self.run.gaps, self.workers, self.costs.wake);
         let mut run = SimulatedRun {
             simulation: self,
             adjacency,
             start: Instant::now(),
-            workers: SimulatedWorkers::new(self.workers, self.costs, are_awake, Action::Begin),
+            workers: SimulatedWorkers::new(self.workers, self.costs, self.are_awake, Action::Begin),
             dependencies_left: (0..nodes as u32).map(|node| adjacency.dependency_count(node)).collect(),
             chunks_done: vec![0; nodes],
             nodes_left: nodes,
@@ -276,9 +282,9 @@ mod tests {
             test_run in any_test_run(true),
             workers in 1..8_usize,
         ) {
-            let run = MeasuredRun::new(&test_run.run(&SchedulerCosts::ZERO), Vec::new(), &SchedulerCosts::ZERO);
+            let run = MeasuredRun::new(&test_run.run(&SchedulerCosts::ZERO), &SchedulerCosts::ZERO);
             let adjacency = RankedAdjacency::new(&run.dependencies);
-            let outcome = Simulation::new(&run, &SchedulerCosts::ZERO, workers).run(&adjacency);
+            let outcome = Simulation::new(&run, &SchedulerCosts::ZERO, workers, false).run(&adjacency);
             for (node, span) in test_run.nodes.iter().zip(&outcome.node_spans) {
                 prop_assert!(span.start <= span.end && span.end <= outcome.time);
                 for &dependency in &node.dependencies {
