@@ -95,6 +95,7 @@ mod frame;
 pub mod report;
 
 pub use backend::ViewQueue;
+pub use bytemuck;
 pub use frame::{
     BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
     Submitted, Submitter, ViewStatistics,

@@ -8,7 +8,6 @@ use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
-use crate::view::ObjectTable;
 
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
 /// most of them by several workers at once. Those that record take the worker as proof that they run in a job (M 10.3
@@ -66,8 +65,8 @@ pub trait Backend: Send + Sync + 'static {
         0
     }
 
-    /// Uploads blocks of the object table: at least what changed since [`Backend::objects_epoch`]. Other blocks may be written
-    /// meanwhile.
+    /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the [columns](crate::scene::ObjectColumn) of these
+    /// objects that the plan reads: at least what changed since [`Backend::objects_epoch`]. Other blocks may be described meanwhile.
     ///
     /// # Errors
     /// If the device refuses.
@@ -75,7 +74,7 @@ pub trait Backend: Send + Sync + 'static {
         &self,
         worker: &Worker,
         frame: &Self::Frame,
-        objects: &ObjectTable,
+        request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError>;
 

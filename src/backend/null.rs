@@ -13,7 +13,7 @@ use crate::command::DrawList;
 use crate::process::{Draws, Pass};
 use crate::scene::Mesh;
 use crate::task::Worker;
-use crate::view::{GpuView, ObjectTable};
+use crate::view::GpuView;
 
 /// Draws nothing. It returns an error if the frame breaks one of the rules between frame and backend:
 ///
@@ -112,12 +112,12 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        objects: &ObjectTable,
+        request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
         let mut uploaded = frame.uploaded.lock();
         for block in blocks {
-            let (first, records) = objects.gpu_objects(block);
+            let (first, records) = request.objects.gpu_objects(block);
             for object in first..first + records.len() {
                 ensure(object < frame.object_count, || {
                     format!("uploaded objects are in the scene, but object {object} is not")

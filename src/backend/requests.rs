@@ -4,7 +4,7 @@ use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
 use crate::scene::{Light, SceneRef};
-use crate::view::{LightTable, Rejections, RenderView};
+use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
 
 /// Everything that a backend needs to know of a frame.
 #[derive(Clone, Copy)]
@@ -23,8 +23,8 @@ pub struct FrameRequest<'a> {
     pub passes: &'a [Pass],
     /// The scene.
     pub scene: &'a SceneRef<'a>,
-    /// The epoch of the object table.
-    pub objects_epoch: u64,
+    /// What all views need to know about the scene's objects. It is complete when they are uploaded.
+    pub objects: &'a ObjectTable,
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.

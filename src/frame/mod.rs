@@ -3,6 +3,7 @@
 //! [`Renderer::record`] has the steps of a frame in order, and `stages.rs` lists the stages that its jobs run.
 
 mod builder;
+mod column_check;
 mod context;
 mod cost_model;
 mod error;

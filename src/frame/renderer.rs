@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
+use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::pass_recording::PassRecording;
 use super::plan_cache::{PlanCache, with_quality};
@@ -68,6 +69,7 @@ pub struct Renderer<B: Backend> {
     /// One for each pass of the latest frame.
     recordings: Vec<PassRecording<B>>,
     warnings: Warnings,
+    column_check: ColumnCheck,
 }
 
 impl<B: Backend> Renderer<B> {
@@ -92,6 +94,7 @@ impl<B: Backend> Renderer<B> {
             shadow_cache: ShadowCache::default(),
             recordings: Vec::new(),
             warnings: Warnings::default(),
+            column_check: ColumnCheck::default(),
         }
     }
 
@@ -133,6 +136,7 @@ impl<B: Backend> Renderer<B> {
         let FrameViews { views, lights } = frame_views;
 
         // Views → the job graph of their stages, and what all its jobs share.
+        plan.check_columns(scene)?;
         let draws = plan.draws()?;
         self.tables.cullable_meshes.update(scene.assets);
         // The bounds of triangle culling hold only for camera-relative transforms.
@@ -156,7 +160,7 @@ impl<B: Backend> Renderer<B> {
             light_tables: &self.tables.lights,
             passes: &graph.passes,
             scene,
-            objects_epoch: self.tables.objects.epoch(),
+            objects: &self.tables.objects,
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
@@ -183,11 +187,14 @@ impl<B: Backend> Renderer<B> {
             graph.tuning.costs.discard_frame();
             return Err(error.into());
         }
-        if cfg!(debug_assertions)
-            && let Some(object) = self.tables.objects.unreported_change(scene)
-        {
-            graph.tuning.costs.discard_frame();
-            return Err(SceneError::UnreportedChange { object }.into());
+        if cfg!(debug_assertions) {
+            let (objects, columns) = (&self.tables.objects, plan.columns());
+            let unreported = objects.unreported_change(scene).map(|object| SceneError::UnreportedChange { object });
+            let in_columns = self.column_check.check(scene, columns, objects);
+            if let Err(error) = unreported.map_or(in_columns, Err) {
+                graph.tuning.costs.discard_frame();
+                return Err(error.into());
+            }
         }
         let tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
         self.scheduler.timeline().add_tuning(frame_number, &tuning);

@@ -1,7 +1,9 @@
 //! What a process declares before it draws.
 
+use bytemuck::Pod;
+
 use super::Format;
-use crate::scene::ViewKind;
+use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
 /// of the size of its picture.
@@ -63,6 +65,64 @@ impl Declare {
         self.access(target, Access::SampleLayers(views));
     }
 
+    /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the next 1, and so
+    /// on. Each is an array with one element for each object of the scene, by [`Object::index`](super::SHADER_PRELUDE).
+    ///
+    /// Frames whose scene has no such column fail. A device with the least number of storage buffers a shader,
+    /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS), has none left for columns: request
+    /// `max_storage_buffers_per_shader_stage` of 4 and one for each column.
+    ///
+    /// ```
+    /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+    /// use drawloom::scene::ObjectColumn;
+    ///
+    /// const TINT: ObjectColumn<[f32; 4]> = ObjectColumn::new("tint");
+    ///
+    /// /// Draws every object in its tint.
+    /// struct Tinted;
+    ///
+    /// impl RenderProcess for Tinted {
+    ///     fn name(&self) -> &str {
+    ///         "tinted"
+    ///     }
+    ///
+    ///     fn declare(&self, declare: &mut Declare) {
+    ///         declare.clears_color("picture", Format::Rgba8Srgb, ClearColor::Background);
+    ///         declare.clears_depth("depth", Format::Depth32Float);
+    ///         declare.reads_column(TINT);
+    ///     }
+    ///
+    ///     fn draws(&self) -> Draws<'_> {
+    ///         Draws::Commands(CommandDraws {
+    ///             shader: "
+    ///                 @group(3) @binding(0) var<storage, read> tints: array<vec4<f32>>;
+    ///
+    ///                 struct Corner {
+    ///                     @builtin(position) position: vec4<f32>,
+    ///                     @location(0) tint: vec4<f32>,
+    ///                 }
+    ///
+    ///                 @vertex
+    ///                 fn vertex(in: VertexInput) -> Corner {
+    ///                     let object = drawn_object(in.instance);
+    ///                     let position = clip_position(relative_position(object, in.position));
+    ///                     return Corner(position, tints[object.index]);
+    ///                 }
+    ///
+    ///                 @fragment
+    ///                 fn fragment(in: Corner) -> @location(0) vec4<f32> {
+    ///                     return in.tint;
+    ///                 }
+    ///             ",
+    ///             ..CommandDraws::default()
+    ///         })
+    ///     }
+    /// }
+    /// ```
+    pub fn reads_column<T: Pod>(&mut self, column: ObjectColumn<T>) {
+        self.declaration.columns.push(column.layout());
+    }
+
     /// A raw pass overwrites a target with its own commands; as a storage texture too, if [`Format::can_be_stored`].
     pub fn writes(&mut self, target: &str, format: Format) {
         self.access(target, Access::Write(format));
@@ -110,6 +170,8 @@ pub struct Declaration {
     pub views: ViewKind,
     /// The targets that it uses, and how, in the order declared.
     pub accesses: Vec<(String, Access)>,
+    /// The data of objects that its shader reads, in the order of their bindings.
+    pub columns: Vec<ColumnLayout>,
     /// The processes that it comes after.
     pub after: Vec<String>,
     /// The processes that it comes before.

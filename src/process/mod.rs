@@ -24,8 +24,8 @@ mod render_process;
 #[cfg(feature = "software")]
 pub use cpu_shader::{
     CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, Materials, ObjectCpuShader, ObjectPixel,
-    PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput,
-    VertexOutput, direction_from_octahedral, octahedral_from_direction,
+    PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS,
+    VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
 pub use declaration::{Access, ClearColor, Declaration, Declare};
 pub use deferred::{

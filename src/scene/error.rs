@@ -37,6 +37,17 @@ pub enum SceneError {
         /// The index of the first such object.
         object: usize,
     },
+    /// A value of a [column](super::ObjectColumn) that changed since the last frame, although
+    /// [`SceneRef::changes`](super::SceneRef::changes) does not report its object. It is found with debug assertions only.
+    #[error(
+        "the column {column:?} of object {object} changed since the last frame, but the scene's changes do not report it"
+    )]
+    UnreportedColumnChange {
+        /// The name of the column.
+        column: &'static str,
+        /// The index of the first such object.
+        object: usize,
+    },
     /// A NaN or an infinity in a vertex.
     #[error("mesh `{mesh}`: vertex {vertex} is not finite")]
     NonFiniteVertex {
@@ -108,6 +119,22 @@ pub enum SceneError {
         count: usize,
         /// The length of `positions`.
         positions: usize,
+    },
+    /// A [column](super::ObjectColumn) that has not one value for each object.
+    #[error("the scene has {positions} objects but {count} values of the column {column:?}")]
+    UnequalColumn {
+        /// The name of the column.
+        column: &'static str,
+        /// The number of its values.
+        count: usize,
+        /// The number of objects.
+        positions: usize,
+    },
+    /// Two [columns](super::ObjectColumn) of the same name.
+    #[error("the scene has two columns {column:?}")]
+    RepeatedColumn {
+        /// Their name.
+        column: &'static str,
     },
     /// A stale handle.
     #[error(transparent)]

@@ -12,6 +12,7 @@ mod material;
 mod mesh;
 #[cfg(feature = "obj")]
 pub mod obj;
+mod object_column;
 mod owned_scene;
 mod packed_vertex;
 mod scene_ref;
@@ -25,6 +26,7 @@ pub use error::SceneError;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
+pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;
 pub use scene_ref::SceneRef;

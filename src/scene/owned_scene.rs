@@ -85,6 +85,7 @@ impl Scene {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            columns: &[],
             changes: Changes::Unknown,
             assets: &self.assets,
             lights: &self.lights,

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, SceneError};
+use super::{Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, Light, Material, Mesh, SceneError};
 use crate::handle::Handle;
 
 /// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
@@ -27,6 +27,9 @@ pub struct SceneRef<'a> {
     pub meshes: &'a [Handle<Mesh>],
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
+    /// Data of the engine's own for each object, which shaders of its processes read: see
+    /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.
+    pub columns: &'a [ColumnValues<'a>],
     /// Which objects changed since the last frame.
     pub changes: Changes<'a>,
     /// The assets that the handles refer to.
@@ -47,8 +50,14 @@ impl SceneRef<'_> {
         self.positions.len()
     }
 
+    /// The values of a column; `None` if the scene has none of its name and element size.
+    pub(crate) fn column(&self, layout: ColumnLayout) -> Option<ColumnValues<'_>> {
+        self.columns.iter().find(|values| values.layout() == layout).copied()
+    }
+
     /// # Errors
-    /// If a slice has another length than `positions`. The error names the first such slice.
+    /// If a slice or a column has another length than `positions`, or two columns have the same name. The error names the first
+    /// one.
     pub(crate) fn check_lengths(&self) -> Result<(), SceneError> {
         let positions = self.positions.len();
         let slices = [
@@ -60,8 +69,22 @@ impl SceneRef<'_> {
         ];
         match slices.into_iter().find(|&(_, count)| count != positions) {
             Some((slice, count)) => Err(SceneError::UnequalSlices { slice, count, positions }),
-            None => Ok(()),
+            None => self.check_columns(),
         }
+    }
+
+    fn check_columns(&self) -> Result<(), SceneError> {
+        let positions = self.positions.len();
+        for (index, values) in self.columns.iter().enumerate() {
+            let (column, count) = (values.name(), values.count());
+            if count != positions {
+                return Err(SceneError::UnequalColumn { column, count, positions });
+            }
+            if self.columns[..index].iter().any(|earlier| earlier.name() == column) {
+                return Err(SceneError::RepeatedColumn { column });
+            }
+        }
+        Ok(())
     }
 
     /// Whether the object's transform can be drawn: it is finite, and its orientation is a rotation.

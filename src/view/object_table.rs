@@ -224,6 +224,11 @@ impl ObjectTable {
         BinInputs { draws_changed_in: self.draws_changed_in(), objects: self.length }
     }
 
+    /// Whether an object counts as changed in this frame, because the engine reported it or all objects do.
+    pub(crate) fn is_reported(&self, object: usize) -> bool {
+        self.changed.contains(object)
+    }
+
     /// An object that changed although it was not reported; `None` if there is none. Call it when the table is complete.
     pub(crate) fn unreported_change(&self, scene: &SceneRef<'_>) -> Option<usize> {
         let is_as_before = |&object: &usize| {
@@ -233,7 +238,7 @@ impl ObjectTable {
             let now = PacketDescription::new(&columns, &self.draw_states).object(&columns, 0, object);
             now.ok_or_else(|| rejection_reason(scene, object)) == before
         };
-        let unreported = |object: &usize| !self.changed.contains(*object);
+        let unreported = |object: &usize| !self.is_reported(*object);
         (0..self.length).filter(unreported).find(|object| !is_as_before(object))
     }
 

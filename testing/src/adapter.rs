@@ -12,16 +12,14 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 
 /// Opens a device on the machine's best adapter, as if the adapter lacked some optional features.
 pub fn device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let options = wgpu::RequestAdapterOptions {
-        power_preference: wgpu::PowerPreference::HighPerformance,
-        ..wgpu::RequestAdapterOptions::default()
-    };
-    let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(
-        |_| "no graphics adapter found; on Debian, `apt install mesa-vulkan-drivers` provides one in software",
-    )?;
+    let adapter = best_adapter()?;
     // Higher limits than Drawloom requires allow larger pictures and more objects.
     open(&adapter, missing, adapter.limits())
+}
+
+/// Opens a device on the machine's best adapter, with these limits.
+pub fn device_with_limits(limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    open(&best_adapter()?, wgpu::Features::empty(), limits)
 }
 
 /// Opens a device on wgpu's no-op backend.
@@ -35,6 +33,17 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
     // The adapter claims limits that wgpu itself does not support.
     open(&adapter, wgpu::Features::empty(), wgpu::Limits::default())
+}
+
+fn best_adapter() -> Result<wgpu::Adapter, Box<dyn Error>> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..wgpu::RequestAdapterOptions::default()
+    };
+    Ok(pollster::block_on(instance.request_adapter(&options)).map_err(
+        |_| "no graphics adapter found; on Debian, `apt install mesa-vulkan-drivers` provides one in software",
+    )?)
 }
 
 fn open(

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Blend, Bounds, Changes, Material, Mesh, Scene, SceneError, SceneRef};
+use drawloom::scene::{Blend, Bounds, Changes, ColumnValues, Material, Mesh, Scene, SceneError, SceneRef};
 
 use crate::random::Random;
 use crate::scenes::{cube, field};
+use crate::tinted::TINT;
 
 /// An engine's own storage of objects.
 pub struct ChangingWorld {
@@ -19,6 +20,7 @@ pub struct ChangingWorld {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
+    tints: Vec<[f32; 4]>,
     /// Handles that objects may have; some may be stale.
     known_meshes: Vec<Handle<Mesh>>,
     known_materials: Vec<Handle<Material>>,
@@ -47,6 +49,7 @@ impl ChangingWorld {
             bounds: objects.bounds.to_vec(),
             meshes: objects.meshes.to_vec(),
             materials: objects.materials.to_vec(),
+            tints: vec![[0.5, 0.25, 1.0, 1.0]; count],
             known_meshes: scene.assets().iter().map(|(handle, _)| handle).collect(),
             known_materials: scene.assets().iter().map(|(handle, _)| handle).collect(),
             changes: Report::Unknown,
@@ -65,6 +68,7 @@ impl ChangingWorld {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            columns: &[],
             changes: match &self.changes {
                 Report::Unknown => Changes::Unknown,
                 Report::Objects(objects) => Changes::Objects(objects),
@@ -72,6 +76,11 @@ impl ChangingWorld {
             },
             ..self.scene.as_scene_ref()
         }
+    }
+
+    /// The colour of each object, which `as_scene_ref` leaves out.
+    pub fn tints(&self) -> ColumnValues<'_> {
+        TINT.values(&self.tints)
     }
 
     /// Makes some changes, and returns their names.
@@ -90,8 +99,8 @@ impl ChangingWorld {
     }
 
     fn change(&mut self, changed: &mut Vec<u32>) -> Result<&'static str, SceneError> {
-        let kind = self.random.below(14);
-        if self.positions.is_empty() && kind < 8 {
+        let kind = self.random.below(16);
+        if self.positions.is_empty() && matches!(kind, 0..8 | 14) {
             return Ok("nothing");
         }
         Ok(match kind {
@@ -170,9 +179,16 @@ impl ChangingWorld {
                 self.known_meshes.push(self.scene.add(cube())?);
                 "a mesh added"
             }
+            14 => {
+                let object = self.any_object(changed);
+                let [red, green, blue] = self.random.vector(0.0, 1.0).to_array();
+                self.tints[object] = [red, green, blue, 0.5];
+                "another tint"
+            }
             _ => {
                 self.positions = self.positions.to_vec();
                 self.meshes = self.meshes.to_vec();
+                self.tints = self.tints.to_vec();
                 "other storage"
             }
         })
@@ -192,6 +208,7 @@ impl ChangingWorld {
         self.bounds.swap_remove(object);
         self.meshes.swap_remove(object);
         self.materials.swap_remove(object);
+        self.tints.swap_remove(object);
     }
 
     /// Adds an object, and reports it only if one with its index was removed in the same step.
@@ -207,6 +224,7 @@ impl ChangingWorld {
         self.bounds.push(self.scene.assets().get(mesh).map_or(Bounds::default(), Mesh::bounds));
         self.meshes.push(mesh);
         self.materials.push(self.known_materials[random.below(self.known_materials.len())]);
+        self.tints.push(random.vector(0.0, 1.0).extend(1.0).to_array());
     }
 
     /// Reports changes in one of the possible ways: repeated, in any order, with more objects than changed, and with objects that

@@ -10,3 +10,4 @@ pub mod precision;
 pub mod random;
 pub mod samples;
 pub mod scenes;
+pub mod tinted;

@@ -5,12 +5,19 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::process::{Deferred, GeometryBuffer, GeometryFormats, LightVolumes, PlanError, ToneMapping};
-use drawloom::scene::{Bounds, Camera, Light, LightKind, Mesh, Projection, Scene, SceneError, SceneRef, ViewKind};
+use drawloom::process::{
+    Declare, Deferred, Draws, GeometryBuffer, GeometryFormats, LightVolumes, PlanError, ProcessError, RenderProcess,
+    ToneMapping,
+};
+use drawloom::scene::{
+    Bounds, Camera, Changes, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene, SceneError,
+    SceneRef, ViewKind,
+};
 use drawloom::task::Scheduler;
 use drawloom::view::RejectionReason;
 use drawloom::{BuildError, FrameError, Granularity, Renderer, SubmitError};
 use drawloom_testing::scenes::{cube, field};
+use drawloom_testing::tinted::{TINT, Tinted};
 
 use crate::renderer;
 
@@ -140,6 +147,83 @@ fn slices_of_different_lengths_are_refused_by_name() {
         );
         assert!(named, "{error}");
     }
+}
+
+/// Renders with a process that reads the column `tint`, after which a good scene is drawn. Returns the error of the first scene.
+fn error_of_columns(columns: &[ColumnValues<'_>]) -> FrameError {
+    let builder = Renderer::builder(NullBackend).process(Tinted).output("tinted");
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let (scene, tints) = (field(10), [[0.0; 4]; 10]);
+    let error = renderer.record(SceneRef { columns, ..scene.as_scene_ref() }).map(drop).unwrap_err();
+    let good = SceneRef { columns: &[TINT.values(&tints)], ..scene.as_scene_ref() };
+    drop(renderer.record(good).expect("the next frame is complete"));
+    error
+}
+
+#[test]
+fn columns_that_do_not_fit_are_refused_by_name() {
+    let (tints, narrow) = ([[0.0; 4]; 11], [0.0; 10]);
+    let missing = error_of_columns(&[]);
+    assert!(
+        matches!(&missing, FrameError::Process(ProcessError::MissingColumn { process, column: "tint" }) if process == "tinted"),
+        "{missing}"
+    );
+    let unequal = error_of_columns(&[TINT.values(&tints[..9])]);
+    let is_named =
+        matches!(unequal, FrameError::Scene(SceneError::UnequalColumn { column: "tint", count: 9, positions: 10 }));
+    assert!(is_named, "{unequal}");
+    let repeated = error_of_columns(&[TINT.values(&tints[..10]), TINT.values(&tints[1..])]);
+    assert!(matches!(repeated, FrameError::Scene(SceneError::RepeatedColumn { column: "tint" })), "{repeated}");
+    let other_size = error_of_columns(&[ObjectColumn::<f32>::new("tint").values(&narrow)]);
+    let is_named = matches!(
+        &other_size,
+        FrameError::Process(ProcessError::ColumnSize { process, column: "tint", declared: 16, found: 4 }) if process == "tinted"
+    );
+    assert!(is_named, "{other_size}");
+}
+
+#[test]
+fn processes_that_disagree_about_a_column_are_refused() {
+    struct Other;
+    impl RenderProcess for Other {
+        fn name(&self) -> &str {
+            "other"
+        }
+        fn declare(&self, declare: &mut Declare) {
+            Tinted.declare(declare);
+            declare.after("tinted");
+            declare.reads_column(ObjectColumn::<u32>::new("tint"));
+        }
+        fn draws(&self) -> Draws<'_> {
+            Tinted.draws()
+        }
+    }
+    let builder = Renderer::builder(NullBackend).process(Tinted).process(Other).output("tinted");
+    let error = builder.build(Arc::new(Scheduler::new(1).unwrap())).err().expect("they disagree");
+    let is_named = matches!(
+        &error,
+        BuildError::Plan(PlanError::ConflictingColumns { process, column: "tint", first: 16, second: 4 }) if process == "other"
+    );
+    assert!(is_named, "{error}");
+}
+
+#[cfg(debug_assertions)]
+#[test]
+fn a_column_that_changes_without_a_report_is_named() {
+    let builder = Renderer::builder(NullBackend).process(Tinted).output("tinted");
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let (scene, mut tints) = (field(300), vec![[0.5; 4]; 300]);
+    let mut frame = |tints: &[[f32; 4]], changes| {
+        renderer.record(SceneRef { columns: &[TINT.values(tints)], changes, ..scene.as_scene_ref() }).map(drop)
+    };
+    frame(&tints, Changes::Unknown).unwrap();
+    (tints[70][0], tints[211][3]) = (0.25, 0.25);
+    let error = frame(&tints, Changes::Objects(&[70, 212])).unwrap_err();
+    let is_named =
+        matches!(error, FrameError::Scene(SceneError::UnreportedColumnChange { column: "tint", object: 211 }));
+    assert!(is_named, "{error}");
+    frame(&tints, Changes::NONE).expect("after a failed frame all objects count as changed");
+    frame(&tints, Changes::NONE).expect("nothing changed");
 }
 
 #[test]

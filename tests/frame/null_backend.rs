@@ -32,6 +32,8 @@ fn broken_rule(
     let geometry_buffer = GeometryBuffer::new(GeometryFormats::default());
     let plan = FramePlan::new(Vec::new(), vec![Arc::new(geometry_buffer)], &["diffuse".to_owned()]).unwrap();
     let views = [RenderView::new(&scene.cameras[0])];
+    let mut objects = ObjectTable::default();
+    objects.update(&scene.as_scene_ref());
     let request = FrameRequest {
         plan: &plan,
         draws: &plan.draws().unwrap(),
@@ -40,7 +42,7 @@ fn broken_rule(
         light_tables: &[LightTable::default()],
         passes: &[PASS],
         scene: &scene.as_scene_ref(),
-        objects_epoch: 1,
+        objects: &objects,
         quality: &Quality::balanced(),
         rejections: &Rejections::default(),
     };
@@ -142,10 +144,8 @@ fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
     });
     assert!(twice.contains("finished once"), "{twice}");
     let uploaded = broken_rule(|worker, frame, _, request| {
-        let mut table = ObjectTable::default();
-        table.update(request.scene);
-        NullBackend.upload_objects(worker, frame, &table, 0..table.block_count())?;
-        NullBackend.upload_objects(worker, frame, &table, 0..1)
+        NullBackend.upload_objects(worker, frame, request, 0..request.objects.block_count())?;
+        NullBackend.upload_objects(worker, frame, request, 0..1)
     });
     assert!(uploaded.contains("uploaded once"), "{uploaded}");
 }

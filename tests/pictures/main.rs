@@ -6,6 +6,7 @@
 
 mod changes;
 mod changing_shaders;
+mod columns;
 mod determinism;
 mod device_times;
 mod devices;
@@ -54,6 +55,7 @@ fn main() {
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (changing_shaders::CASES, Needs::Adapter),
+        (columns::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),

@@ -5,9 +5,10 @@ use std::sync::OnceLock;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::Deferred;
 use drawloom::scene::{Changes, SceneRef};
-use drawloom::wgpu;
+use drawloom::{RendererBuilder, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::changing_world::ChangingWorld;
+use drawloom_testing::tinted::Tinted;
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -15,7 +16,7 @@ use crate::fixture::Fixture;
 
 pub const CASES: &[Case] = &[
     ("reported_changes_make_the_picture_of_a_new_renderer", || {
-        changes_make_the_picture_of_a_new_renderer(Fixture::new)
+        changes_make_the_picture_of_a_new_renderer(|| Fixture::with(2, with_tints))
     }),
     ("so_do_changes_that_are_staged", || changes_make_the_picture_of_a_new_renderer(staging_fixture)),
 ];
@@ -24,7 +25,12 @@ pub const CASES: &[Case] = &[
 fn staging_fixture() -> Result<Fixture, Failed> {
     static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
     let open = || adapter::device_without(WgpuBackend::MAPPING_FEATURES).ok();
-    Fixture::on(DEVICE.get_or_init(open).clone(), 2, |builder| builder.deferred(Deferred::to_picture()))
+    Fixture::on(DEVICE.get_or_init(open).clone(), 2, with_tints)
+}
+
+/// The shipped processes, and one that reads a column.
+fn with_tints(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
+    builder.deferred(Deferred::to_picture()).process(Tinted).output("tinted")
 }
 
 fn changes_make_the_picture_of_a_new_renderer(fixture: fn() -> Result<Fixture, Failed>) -> Result<(), Failed> {
@@ -38,7 +44,7 @@ fn changes_make_the_picture_of_a_new_renderer(fixture: fn() -> Result<Fixture, F
         let stands_still = matches!(step % 8, 2 | 4);
         let reported = world.as_scene_ref();
         let changes = if stands_still { Changes::NONE } else { reported.changes };
-        let recorded = fixture.renderer.record(SceneRef { changes, ..reported })?;
+        let recorded = fixture.renderer.record(SceneRef { changes, columns: &[world.tints()], ..reported })?;
         match step % 8 {
             1 => drop(recorded),
             3 => in_flight = Some(recorded),
@@ -47,13 +53,14 @@ fn changes_make_the_picture_of_a_new_renderer(fixture: fn() -> Result<Fixture, F
                 fixture.submit(recorded)?;
             }
             5 => {
-                let scene = SceneRef { changes: Changes::Unknown, ..world.as_scene_ref() };
-                let mut new = Fixture::new()?;
+                let (changes, columns) = (Changes::Unknown, [world.tints()]);
+                let scene = SceneRef { changes, columns: &columns, ..world.as_scene_ref() };
+                let mut new = Fixture::with(2, with_tints)?;
                 let expected = new.renderer.record(scene)?;
                 let (found, expected) = (fixture.submit(recorded)?, new.submit(expected)?);
-                for view in 0..2 {
-                    if found.read(view, "picture")? != expected.read(view, "picture")? {
-                        return Err(format!("view {view} of frame {step} differs after {log:#?}").into());
+                for (view, target) in [(0, "picture"), (1, "picture"), (0, "tinted"), (1, "tinted")] {
+                    if found.read(view, target)? != expected.read(view, target)? {
+                        return Err(format!("{target} of view {view} of frame {step} differs after {log:#?}").into());
                     }
                 }
             }

@@ -7,7 +7,7 @@ use drawloom::backend::BackendError;
 use drawloom::glam::DVec3;
 use drawloom::process::{
     ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader, FullScreenPixel,
-    ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess, ShaderObject, ShaderView, VertexInput, VertexOutput,
+    ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess, ShaderObject, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector4};
 use drawloom::{FrameError, SubmitError};
@@ -51,10 +51,10 @@ impl RenderProcess for PanickingProcess {
 }
 
 impl<R: Real> ObjectCpuShader<R> for PanickingProcess {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         self.panic_in(VERTEX);
         let relative = object.origin + object.orientation.rotate(object.scale * vertex.position);
-        let [x, y, z, w] = view.clip_from_relative;
+        let [x, y, z, w] = pass.view.clip_from_relative;
         let clip = x * relative[0] + y * relative[1] + z * relative[2] + w;
         VertexOutput { clip, varyings: [R::zero(); drawloom::process::VARYINGS] }
     }

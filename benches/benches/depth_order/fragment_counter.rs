@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use drawloom::backend::SoftwareBackend;
 use drawloom::process::{
     ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, ObjectCpuShader, ObjectPixel, PassInputs,
-    RenderProcess, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+    RenderProcess, ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::quality::{DepthKey, Quality};
 use drawloom::raster::{Real, Vector4};
@@ -48,8 +48,8 @@ impl RenderProcess for Surfaces {
 }
 
 impl<R: Real> ObjectCpuShader<R> for Surfaces {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
-        let clip = view.clip_position(object.relative_position(vertex.position));
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        let clip = pass.view.clip_position(object.relative_position(vertex.position));
         VertexOutput { clip, varyings: [R::zero(); VARYINGS] }
     }
 

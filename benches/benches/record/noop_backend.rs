@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use drawloom::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use drawloom::task::Worker;
-use drawloom::view::ObjectTable;
 
 /// Ignores all that it receives.
 pub struct NoopBackend;
@@ -27,7 +26,7 @@ impl Backend for NoopBackend {
         &self,
         _worker: &Worker,
         _frame: &(),
-        _objects: &ObjectTable,
+        _request: &FrameRequest<'_>,
         _blocks: Range<usize>,
     ) -> Result<(), BackendError> {
         Ok(())

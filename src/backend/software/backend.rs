@@ -12,7 +12,6 @@ use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::{Scheduler, Worker};
-use crate::view::ObjectTable;
 
 /// Draws on the CPU.
 ///
@@ -94,10 +93,10 @@ impl Backend for SoftwareBackend {
         &self,
         _worker: &Worker,
         frame: &SoftwareFrame,
-        objects: &ObjectTable,
+        request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        frame.recording.upload(objects, blocks);
+        frame.recording.upload(request.objects, blocks);
         Ok(())
     }
 

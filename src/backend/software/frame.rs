@@ -22,8 +22,9 @@ use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
 use crate::backend::{BackendError, PassRequest, ViewQueue};
 use crate::command::Batch;
+use crate::process::ShaderColumns;
 use crate::quality::VertexFormat;
-use crate::scene::Mesh;
+use crate::scene::{ColumnLayout, Mesh};
 use crate::view::ObjectTable;
 
 /// A frame in one precision, from `begin` until it was submitted.
@@ -33,6 +34,8 @@ pub(super) struct TypedFrame<R: Precision> {
     /// In the order they are submitted.
     pub(super) passes: Vec<SoftwarePass<R>>,
     pub(super) objects: R::Objects,
+    /// The columns that the plan's processes read.
+    pub(super) columns: Vec<(ColumnLayout, Box<[u8]>)>,
     /// The format of the vertices that it draws.
     pub(super) vertices: VertexFormat,
     pub(super) meshes: Meshes,
@@ -75,6 +78,7 @@ impl<R: Precision> TypedFrame<R> {
             view,
             materials: &*self.materials,
             attachments: &pass.attachments,
+            columns: ShaderColumns { columns: &self.columns },
         };
         let outcome = match &pass.draws {
             SoftwareDraws::Objects { shader, writes_depth } => {

@@ -108,6 +108,7 @@ mod tests {
             bounds: &[],
             meshes: &[],
             materials: &[],
+            columns: &[],
             changes: Changes::Unknown,
             assets: &assets,
             lights: &[],

@@ -38,13 +38,13 @@ impl<R: Precision> ObjectPass<'_, R> {
 
     fn draw_tiles<const V: usize>(&self, open: &OpenAttachments<'_, R>) -> Result<(), JobPanic> {
         let Self { context, shader, chunks, object_of, .. } = self;
-        let PassContext { executor, view, attachments, .. } = context;
+        let PassContext { executor, attachments, .. } = context;
         let sampled = open.sampled();
         let inputs = context.inputs(&sampled);
         executor.for_each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
         for chunks in chunks.chunks(CHUNKS_IN_MEMORY) {
             let set_up = |chunk: usize| -> TriangleSetup<R, V> {
-                TriangleSetup::new(*shader, &view.shader_view, &open.tiling, &chunks[chunk], object_of)
+                TriangleSetup::new(*shader, &inputs, &open.tiling, &chunks[chunk], object_of)
             };
             let setups = executor.map(chunks.len(), set_up)?;
             executor.for_each(open.tiles.len(), |index| {
@@ -78,7 +78,7 @@ impl<R: Precision> ObjectPass<'_, R> {
             }
             if draws_pixels {
                 targets = [Vector4::zero(); MAX_COLOR_ATTACHMENTS];
-                let object_pixel = object_pixel(triangle, pixel, state.material);
+                let object_pixel = object_pixel(triangle, pixel, state);
                 if !self.shader.fragment(inputs, &object_pixel, &mut targets[..colors]) {
                     return;
                 }
@@ -94,7 +94,7 @@ impl<R: Precision> ObjectPass<'_, R> {
 fn object_pixel<R: Precision, const V: usize>(
     triangle: &Triangle<R, V>,
     coordinates: [usize; 2],
-    material: u32,
+    state: TriangleState,
 ) -> ObjectPixel<R> {
     let found = triangle.interpolate(coordinates);
     let padded = |numbers: [R; V]| std::array::from_fn(|index| numbers.get(index).copied().unwrap_or_default());
@@ -103,6 +103,7 @@ fn object_pixel<R: Precision, const V: usize>(
         varyings: padded(found.value),
         dpdx: padded(found.dpdx),
         dpdy: padded(found.dpdy),
-        material,
+        material: state.material,
+        object: state.object,
     }
 }

@@ -4,7 +4,7 @@ use super::attachments::Attachments;
 use super::executor::Executor;
 use super::precision::Precision;
 use super::view_state::ViewState;
-use crate::process::{Materials, PassInputs, SampledTexture};
+use crate::process::{Materials, PassInputs, SampledTexture, ShaderColumns};
 
 /// What drawing a pass needs, whatever it draws.
 pub(super) struct PassContext<'a, R: Precision> {
@@ -12,12 +12,13 @@ pub(super) struct PassContext<'a, R: Precision> {
     pub(super) view: &'a ViewState<R>,
     pub(super) materials: &'a dyn Materials<R>,
     pub(super) attachments: &'a Attachments<R>,
+    pub(super) columns: ShaderColumns<'a>,
 }
 
 impl<R: Precision> PassContext<'_, R> {
     /// What the pass's CPU shader reads.
     pub(super) fn inputs<'a>(&'a self, sampled: &'a [&'a dyn SampledTexture<R>]) -> PassInputs<'a, R> {
         let ViewState { shader_view, lights, .. } = self.view;
-        PassInputs { view: shader_view, lights, materials: self.materials, sampled }
+        PassInputs { view: shader_view, lights, materials: self.materials, sampled, columns: self.columns }
     }
 }

@@ -67,11 +67,14 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
         let meshes = self.meshes.lock().update(scene.assets, vertices);
         let materials = self.materials.lock().update(scene.assets, rejections);
+        let column = |&layout: &_| Some((layout, Box::from(scene.column(layout)?.bytes())));
+        let columns = plan.columns().iter().filter_map(column).collect();
         Ok(Box::new(TypedFrame {
             context: Arc::clone(&self.context),
             views: view_states,
             passes,
             objects: R::objects(scene),
+            columns,
             vertices,
             meshes,
             subdivided: Mutex::default(),

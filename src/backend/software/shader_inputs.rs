@@ -57,6 +57,7 @@ impl UploadedObjects {
             orientation: Quaternion(object.orientation),
             scale: Vector(object.scale),
             material: object.material,
+            index: object.object,
         })
     }
 }
@@ -67,6 +68,7 @@ pub(super) struct ExactObject {
     orientation: Quaternion<f64>,
     scale: Vector3<f64>,
     material: u32,
+    index: u32,
 }
 
 impl ExactObject {
@@ -76,17 +78,19 @@ impl ExactObject {
             orientation: Quaternion::of(scene.orientations[object].as_dquat().normalize()),
             scale: Vector3::of_single(scene.scales[object]),
             material: scene.materials[object].index(),
+            index: object as u32,
         }
     }
 
     pub(super) fn relative_to(&self, camera: &CameraPosition) -> ShaderObject<f64> {
-        let Self { position, orientation, scale, material } = *self;
+        let Self { position, orientation, scale, material, index } = *self;
         ShaderObject {
             origin: Vector3::of(position - camera.exact),
             camera: Vector3::zero(),
             orientation,
             scale,
             material,
+            index,
         }
     }
 }

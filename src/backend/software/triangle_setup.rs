@@ -7,7 +7,7 @@ use super::commands::SoftwareCommands;
 use super::precision::Precision;
 use super::tiles::Tiling;
 use crate::command::{Batch, Cull};
-use crate::process::{ObjectCpuShader, ShaderObject, ShaderView, VertexInput, VertexOutput};
+use crate::process::{ObjectCpuShader, PassInputs, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
 use crate::scene::{Blend, Mesh, Vertex};
 
@@ -91,13 +91,15 @@ pub(super) struct TriangleSetup<R: Real, const V: usize> {
 pub(super) struct TriangleState {
     pub(super) material: u32,
     pub(super) blend: Blend,
+    /// The object's index in the scene.
+    pub(super) object: u32,
 }
 
 impl<R: Precision, const V: usize> TriangleSetup<R, V> {
     /// Runs the vertex shader for a chunk, and sets up and bins its triangles.
     pub(super) fn new(
         shader: &dyn ObjectCpuShader<R>,
-        view: &ShaderView<R>,
+        pass: &PassInputs<'_, R>,
         tiling: &Tiling,
         chunk: &[TriangleRange],
         object_of: impl Fn(u32) -> Option<ShaderObject<R>>,
@@ -106,9 +108,10 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
         for range in chunk {
             // Every object that is drawn was uploaded.
             let Some(object) = object_of(range.object) else { continue };
-            let state = TriangleState { material: object.material, blend: range.batch.state.blend() };
+            let state =
+                TriangleState { material: object.material, blend: range.batch.state.blend(), object: object.index };
             let culled = culled_winding(range.batch.state.cull());
-            let mut cache = PostTransformCache::new(shader, view, &object, range.mesh.vertices());
+            let mut cache = PostTransformCache::new(shader, pass, &object, range.mesh.vertices());
             range.each_triangle(|indices| {
                 let corners = indices.map(|index| cache.vertex(index));
                 Triangle::set_up(&corners, tiling.size(), culled, &mut setup.triangles);
@@ -160,7 +163,7 @@ fn culled_winding(cull: Cull) -> Option<Winding> {
 /// vertices.
 struct PostTransformCache<'a, R: Precision, const V: usize> {
     shader: &'a dyn ObjectCpuShader<R>,
-    view: &'a ShaderView<R>,
+    pass: &'a PassInputs<'a, R>,
     object: &'a ShaderObject<R>,
     vertices: &'a [Vertex],
     /// Each with its index in the mesh.
@@ -175,11 +178,11 @@ const CACHE_SIZE: usize = 32;
 impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
     fn new(
         shader: &'a dyn ObjectCpuShader<R>,
-        view: &'a ShaderView<R>,
+        pass: &'a PassInputs<'a, R>,
         object: &'a ShaderObject<R>,
         vertices: &'a [Vertex],
     ) -> Self {
-        Self { shader, view, object, vertices, cached: [None; CACHE_SIZE] }
+        Self { shader, pass, object, vertices, cached: [None; CACHE_SIZE] }
     }
 
     fn vertex(&mut self, index: u32) -> ShadedVertex<R, V> {
@@ -188,7 +191,7 @@ impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
             Some((other, vertex)) if other == index => vertex,
             _ => {
                 let input = vertex_input(&self.vertices[index as usize]);
-                let VertexOutput { clip, varyings } = self.shader.vertex(self.view, self.object, &input);
+                let VertexOutput { clip, varyings } = self.shader.vertex(self.pass, self.object, &input);
                 let vertex = (clip, std::array::from_fn(|varying| varyings[varying]));
                 self.cached[entry] = Some((index, vertex));
                 vertex

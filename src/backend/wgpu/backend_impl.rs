@@ -13,7 +13,6 @@ use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
-use crate::view::ObjectTable;
 
 impl Backend for WgpuBackend {
     type Frame = WgpuFrame;
@@ -42,10 +41,10 @@ impl Backend for WgpuBackend {
         &self,
         _worker: &Worker,
         frame: &WgpuFrame,
-        objects: &ObjectTable,
+        request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, objects, blocks))
+        with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, request, blocks))
             .flatten()
             .inspect_err(|_| self.buffers.clear())
     }

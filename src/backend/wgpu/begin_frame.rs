@@ -6,8 +6,7 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{BundleKey, WgpuFrame};
-use super::pipelines::ProcessBindGroup;
-use super::resources::{LightMeshes, SubdividedMesh};
+use super::resources::{BindingResource, CachedBindGroup, LightMeshes, SubdividedMesh};
 use super::strategy::RecordingStrategy;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -67,19 +66,28 @@ impl WgpuBackend {
     fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) {
         let (strategies, mut may_try) = (self.strategies.strategies(), true);
         let WgpuFrame { number, pipelines, assets, targets, buffers, .. } = frame;
-        let (passes, parameters) = buffers.passes_mut();
+        let (passes, parameters, objects) = buffers.passes_mut();
         for pass in passes {
             let Pass { process_index: process, view_index: view } = pass.pass;
             let pipelines = &pipelines[process];
+            let declaration = &request.plan.processes()[process].declaration;
             let sampled = |(name, access): &(String, Access)| match access {
                 Access::Sample => targets.find(view, name).map(|target| &target.view),
                 Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
                 _ => None,
             };
-            let sampled = request.plan.processes()[process].declaration.accesses.iter().filter_map(sampled);
             let parameters = pass.parameters.and_then(|(offset, length)| parameters.binding(offset, length));
-            let before = pass.process_bind_group.take();
-            pass.process_bind_group = ProcessBindGroup::update(before, &self.device, pipelines, parameters, sampled);
+            let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
+            let sampled = (1..).zip(declaration.accesses.iter().filter_map(sampled).map(BindingResource::Texture));
+            let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
+            let resources = parameters.into_iter().chain(sampled);
+            pass.process_bind_group = CachedBindGroup::update(before, &self.device, "process", layout, resources);
+
+            let columns = declaration.columns.iter();
+            let columns = columns.filter_map(|column| objects.column(*column));
+            let (before, layout) = (pass.columns_bind_group.take(), pipelines.columns_layout.as_ref());
+            let resources = (0..).zip(columns.map(BindingResource::Buffer));
+            pass.columns_bind_group = CachedBindGroup::update(before, &self.device, "columns", layout, resources);
 
             let (mut index, mut is_trial) = (0, false);
             if strategies.len() > 1 && pass.command_pass_index.is_some() {
@@ -94,6 +102,7 @@ impl WgpuBackend {
                 pass.bundle_cache.begin_frame(BundleKey {
                     frame_bind_group: frame_bind_group.clone(),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
+                    columns_bind_group: pass.columns_bind_group.as_ref().map(|columns| columns.group.clone()),
                     assets: Arc::clone(assets),
                     pipelines: Arc::clone(pipelines),
                 });

@@ -33,7 +33,7 @@ impl<B: Backend> Stage<B> for Objects {
         if !objects.all_changed() {
             return Ok(());
         }
-        frame.backend.upload_objects(job.worker, frame.backend_frame, objects, job.items)
+        frame.backend.upload_objects(job.worker, frame.backend_frame, frame.request, job.items)
     }
 }
 
@@ -86,6 +86,6 @@ impl<B: Backend> Stage<B> for Upload {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        frame.backend.upload_objects(job.worker, frame.backend_frame, &frame.tables.objects, job.items)
+        frame.backend.upload_objects(job.worker, frame.backend_frame, frame.request, job.items)
     }
 }

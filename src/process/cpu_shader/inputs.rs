@@ -1,7 +1,9 @@
 //! What CPU shaders are given: the Rust side of the structures and bindings in `drawloom.wgsl`.
 
+use bytemuck::Pod;
+
 use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
-use crate::scene::{Blend, LightKind, Projection};
+use crate::scene::{Blend, ColumnLayout, LightKind, ObjectColumn, Projection};
 
 /// How many numbers a vertex hands on to the pixels.
 pub const VARYINGS: usize = 9;
@@ -28,6 +30,8 @@ pub struct ObjectPixel<R> {
     pub dpdy: [R; VARYINGS],
     /// The object's material slot.
     pub material: u32,
+    /// The object's index in the scene.
+    pub object: u32,
 }
 
 /// A pixel of the picture.
@@ -49,6 +53,28 @@ pub struct PassInputs<'a, R: Real> {
     pub materials: &'a dyn Materials<R>,
     /// The targets that the process samples, in the order declared.
     pub sampled: &'a [&'a dyn SampledTexture<R>],
+    /// The engine's own data of the scene's objects: `@group(3)`.
+    pub columns: ShaderColumns<'a>,
+}
+
+/// The columns of objects that the processes of a frame read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ShaderColumns<'a> {
+    pub(crate) columns: &'a [(ColumnLayout, Box<[u8]>)],
+}
+
+impl ShaderColumns<'_> {
+    /// The value that a column has for an object, by its index in the scene: [`ShaderObject::index`] or [`ObjectPixel::object`].
+    ///
+    /// # Panics
+    /// If no process of the frame [reads the column](crate::process::Declare::reads_column), or the scene has no such object. A
+    /// panic of a CPU shader is an error of the submission.
+    pub fn get<T: Pod>(&self, column: ObjectColumn<T>, object: u32) -> T {
+        let ColumnLayout { name, stride } = column.layout();
+        let values = self.columns.iter().find(|(layout, _)| *layout == column.layout());
+        let (_, values) = values.unwrap_or_else(|| panic!("no process declares that it reads the column {name:?}"));
+        bytemuck::pod_read_unaligned(&values[object as usize * stride..][..stride])
+    }
 }
 
 /// The materials of a scene and their textures: `@group(1)`.
@@ -108,6 +134,8 @@ pub struct ShaderObject<R> {
     pub scale: Vector3<R>,
     /// Its material's slot.
     pub material: u32,
+    /// Its index in the scene.
+    pub index: u32,
 }
 
 /// A vertex: `VertexInput` in `drawloom.wgsl`.

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{
-    FullScreenPixel, ObjectPixel, PassInputs, ShaderLight, ShaderObject, ShaderView, VertexInput, VertexOutput,
-};
+use super::{FullScreenPixel, ObjectPixel, PassInputs, ShaderLight, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 
 /// A process's shader on the CPU, which the software backend runs in place of its WGSL, in f32 and in f64: see
@@ -49,7 +47,7 @@ impl CpuShader {
 /// A vertex and a fragment shader for objects.
 pub trait ObjectCpuShader<R: Real>: Send + Sync {
     /// The entry point `vertex`: a vertex' clip position and varyings.
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R>;
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R>;
 
     /// Whether there is a fragment entry point. Without one, only depth is drawn.
     fn draws_pixels(&self) -> bool {

@@ -127,6 +127,7 @@ mod tests {
             orientation: Quaternion::of(orientation),
             scale: Vector3::of(scale),
             material: 0,
+            index: 0,
         }
     }
 

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 use proptest::prelude::*;
 
-use super::{Materials, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderView};
+use super::{Materials, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderView};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, Camera, Light, Projection, ViewKind};
 use crate::view::{GpuLight, RenderView};
@@ -132,5 +132,5 @@ pub(in crate::process) fn pass<'a, R: Real>(
     materials: &'a dyn Materials<R>,
     sampled: &'a [&'a dyn SampledTexture<R>],
 ) -> PassInputs<'a, R> {
-    PassInputs { view, lights: &[], materials, sampled }
+    PassInputs { view, lights: &[], materials, sampled, columns: ShaderColumns::default() }
 }

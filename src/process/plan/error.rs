@@ -54,6 +54,20 @@ pub enum PlanError {
         /// The process.
         process: String,
     },
+    /// Two processes read columns of one name with elements of different sizes.
+    #[error(
+        "process {process:?} reads {second} bytes of the column {column:?} for each object, another process {first}"
+    )]
+    ConflictingColumns {
+        /// The second process.
+        process: String,
+        /// The column.
+        column: &'static str,
+        /// The size of an element of the first process's column, in bytes.
+        first: usize,
+        /// The same of the second process's column.
+        second: usize,
+    },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {
@@ -93,6 +107,28 @@ pub enum ProcessError {
         process: String,
         /// What the panic said.
         message: String,
+    },
+    /// The scene has no such column.
+    #[error("process {process:?} reads the column {column:?}, which the scene does not have")]
+    MissingColumn {
+        /// The process.
+        process: String,
+        /// The column.
+        column: &'static str,
+    },
+    /// The elements of the scene's column have another size than those that the process declares.
+    #[error(
+        "process {process:?} reads {declared} bytes of the column {column:?} for each object, but the scene has {found}"
+    )]
+    ColumnSize {
+        /// The process.
+        process: String,
+        /// The column.
+        column: &'static str,
+        /// The size of an element that the process declares, in bytes.
+        declared: usize,
+        /// The size of an element of the scene, in bytes.
+        found: usize,
     },
     /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
     /// one by commands of its own.

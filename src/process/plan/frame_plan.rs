@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::columns::{check_columns, columns_of};
 use super::order::{AddedProcess, order_constraints};
 use super::planned_target::targets_of;
 use super::view_group::view_groups;
 use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
 use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters};
-use crate::scene::ViewKind;
+use crate::scene::{ColumnLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
 
 /// What every frame does: its processes in the order they are submitted, and the targets that they use.
@@ -22,6 +23,7 @@ pub struct FramePlan {
     processes: Vec<PlannedProcess>,
     view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
+    columns: Vec<ColumnLayout>,
     dropped: Vec<String>,
     dot: String,
 }
@@ -103,9 +105,10 @@ impl FramePlan {
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
+        let columns = columns_of(&processes)?;
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { identity, alive: Arc::default(), processes, view_groups, targets, dropped, dot })
+        Ok(Self { identity, alive: Arc::default(), processes, view_groups, targets, columns, dropped, dot })
     }
 
     /// A number that no other plan of this program has.
@@ -152,6 +155,19 @@ impl FramePlan {
     /// The targets that views of each kind have.
     pub fn targets(&self) -> &[PlannedTarget] {
         &self.targets
+    }
+
+    /// The columns of objects that the processes read, each once.
+    pub fn columns(&self) -> &[ColumnLayout] {
+        &self.columns
+    }
+
+    /// Checks that a scene has the columns that the processes read.
+    ///
+    /// # Errors
+    /// If it lacks one, or its elements have another size.
+    pub(crate) fn check_columns(&self, scene: &SceneRef<'_>) -> Result<(), ProcessError> {
+        check_columns(&self.processes, scene)
     }
 
     /// The names of the processes that were dropped because no output depends on them.

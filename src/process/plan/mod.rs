@@ -1,6 +1,7 @@
 //! The plan of a frame: its processes in order, and the targets that they use.
 
 mod chain;
+mod columns;
 mod error;
 mod frame_plan;
 mod order;

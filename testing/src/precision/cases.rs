@@ -162,6 +162,7 @@ impl GpuObjects {
             bounds: &scene.bounds[..count],
             meshes: &scene.meshes[..count],
             materials: &scene.materials[..count],
+            columns: &[],
             ..scene
         });
         assert!(self.table.rejections().list().is_empty(), "an object was left out");

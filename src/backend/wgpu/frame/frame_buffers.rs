@@ -1,23 +1,23 @@
 //! The buffers of one frame in flight, pooled for later frames.
 
 use std::mem;
-use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::{Mutex, RwLock};
 
+use super::object_buffers::ObjectBuffers;
 use super::pass_state::WgpuPassState;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::resources::{
-    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, ObjectBuffer, SubdividedMesh, UploadQueue,
-    append_aligned, check_storage_binding_size, poll, size_with_headroom,
+    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
+    check_storage_binding_size, poll, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass};
-use crate::view::{GpuObject, GpuView, ObjectTable};
+use crate::view::GpuView;
 
 /// A pool of frame buffers.
 ///
@@ -53,8 +53,9 @@ impl BufferPool {
     pub(crate) fn bytes(&self) -> u64 {
         let index_bytes =
             |buffers: &Buffers| buffers.passes.iter().map(|pass| pass.partial_indices.read().size()).sum::<u64>();
-        let total =
-            |buffers: &Buffers| buffers.all().map(GrowingBuffer::size).iter().sum::<u64>() + index_bytes(buffers);
+        let total = |buffers: &Buffers| {
+            buffers.all().map(GrowingBuffer::size).iter().sum::<u64>() + buffers.objects.size() + index_bytes(buffers)
+        };
         self.free.lock().buffers.iter().map(total).sum()
     }
 
@@ -82,7 +83,7 @@ impl BufferPool {
     fn take_free(&self) -> (Buffers, u64) {
         let mut free = self.free.lock();
         // Those that were used last, because they hold the newest objects.
-        let ready = free.buffers.iter().rposition(|buffers| buffers.objects.is_ready());
+        let ready = free.buffers.iter().rposition(|buffers| buffers.objects.are_ready());
         let taken = match ready {
             Some(index) => Some(free.buffers.remove(index)),
             None if self.maps_memory && free.buffers.len() < Self::MAX_ROTATING => None,
@@ -136,13 +137,12 @@ impl FrameBuffers {
         let buffers = &mut self.buffers;
         // A frame that fails may have written some of its objects. Only its submission confirms that it wrote all.
         self.held_epoch = mem::take(&mut buffers.objects_epoch);
-        self.objects_epoch = request.objects_epoch;
+        self.objects_epoch = request.objects.epoch();
         buffers.set_passes(request);
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
-        let object_bytes = objects * size_of::<GpuObject>();
         let light_bytes = request.light_tables.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
-        for bytes in [object_bytes, objects * 4, light_bytes] {
+        for bytes in [objects * 4, light_bytes] {
             check_storage_binding_size(device, bytes)?;
         }
         write_views(buffers.views.rewrite(), request)?;
@@ -155,7 +155,7 @@ impl FrameBuffers {
         let stride = size_with_headroom(buffers.key.object_indices_stride, objects * 4, max_stride);
         buffers.next_key.object_indices_stride = stride;
 
-        let mut reallocated = buffers.objects.reserve(device, object_bytes)?;
+        let mut reallocated = buffers.objects.reserve(device, request.plan.columns(), objects)?;
         if reallocated {
             self.held_epoch = 0;
         }
@@ -165,10 +165,8 @@ impl FrameBuffers {
         }
         if reallocated || buffers.key != buffers.next_key {
             mem::swap(&mut buffers.key, &mut buffers.next_key);
-            let objects_bound =
-                buffers.objects.on_device().size().min(limits.max_storage_buffer_binding_size & !3) as usize;
             for index in 0..buffers.passes.len() {
-                let bind_group = buffers.new_frame_bind_group(device, layouts, index, objects_bound);
+                let bind_group = buffers.new_frame_bind_group(device, layouts, index);
                 let pass = &mut buffers.passes[index];
                 pass.frame_bind_group = Some(bind_group);
                 *pass.uploaded_list.get_mut() = Version::default();
@@ -220,9 +218,10 @@ impl FrameBuffers {
         &self.buffers.passes
     }
 
-    /// The passes, and the buffer of their parameters.
-    pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], &GrowingBuffer) {
-        (&mut self.buffers.passes, &self.buffers.parameters.on_device)
+    /// The passes, the buffer of their parameters, and those of the objects.
+    pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], &GrowingBuffer, &ObjectBuffers) {
+        let Buffers { passes, parameters, objects, .. } = &mut self.buffers;
+        (passes, &parameters.on_device, objects)
     }
 
     /// The meshes that the frame draws subdivided.
@@ -230,8 +229,8 @@ impl FrameBuffers {
         &self.buffers.subdivided
     }
 
-    /// The buffer of the frame's objects.
-    pub(crate) fn objects(&self) -> &ObjectBuffer {
+    /// The buffers of the frame's objects.
+    pub(crate) fn objects(&self) -> &ObjectBuffers {
         &self.buffers.objects
     }
 
@@ -242,40 +241,10 @@ impl FrameBuffers {
     pub(crate) fn write_objects(
         &self,
         uploads: &UploadQueue,
-        objects: &ObjectTable,
+        request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        let first = blocks.start * ObjectTable::BLOCK_SIZE;
-        let end = (blocks.end * ObjectTable::BLOCK_SIZE).min(objects.len());
-        if let Some(mut mapped) = self.buffers.objects.mapped(bytes_of(first)..bytes_of(end))? {
-            let mut written = 0;
-            objects.for_each_change(blocks, self.held_epoch, 1, |run| {
-                written += run.len();
-                for_each_part(objects, run, |part, bytes| {
-                    let range = bytes_of(part.start - first)..bytes_of(part.end - first);
-                    mapped.slice(range).copy_from_slice(bytes);
-                });
-            });
-            uploads.count(bytes_of(written) as u64);
-            return Ok(());
-        }
-        // One write for each run of objects, because each write has a fixed cost.
-        objects.for_each_change(blocks, self.held_epoch, MIN_UNCHANGED, |run| {
-            for start in run.clone().step_by(MAX_STAGED) {
-                self.stage_run(uploads, objects, start..run.end.min(start + MAX_STAGED));
-            }
-        });
-        Ok(())
-    }
-
-    fn stage_run(&self, uploads: &UploadQueue, objects: &ObjectTable, run: Range<usize>) {
-        let size = NonZeroU64::new(bytes_of(run.len()) as u64);
-        let Some((buffer, size)) = self.buffers.objects.on_device().buffer().zip(size) else { return };
-        let Some(mut staged) = uploads.write_buffer_with(buffer, bytes_of(run.start) as u64, size) else { return };
-        for_each_part(objects, run.clone(), |part, bytes| {
-            let range = bytes_of(part.start - run.start)..bytes_of(part.end - run.start);
-            staged.slice(range).copy_from_slice(bytes);
-        });
+        self.buffers.objects.write(uploads, request.objects, request.scene, blocks, self.held_epoch)
     }
 
     /// Uploads the objects that a pass draws, in the order of instances, unless the buffer holds them already.
@@ -292,27 +261,8 @@ impl FrameBuffers {
     }
 }
 
-/// Fewer unchanged objects between two runs are uploaded with them: that takes less time than another write.
-const MIN_UNCHANGED: usize = 64;
-
-/// The most objects in one staged write, 1 MiB: larger staging memory is mapped by the system anew in each frame.
-const MAX_STAGED: usize = (1 << 20) / size_of::<GpuObject>();
-
-/// The size of some objects in bytes.
-fn bytes_of(objects: usize) -> usize {
-    objects * size_of::<GpuObject>()
-}
-
-/// Calls `visit` with the parts of a range of objects that lie in one block each, and the bytes of their GPU layouts.
-fn for_each_part(objects: &ObjectTable, range: Range<usize>, mut visit: impl FnMut(Range<usize>, &[u8])) {
-    for (block, part) in ObjectTable::block_ranges(range) {
-        let gpu_objects = &objects.block(block).gpu_objects[part.start % ObjectTable::BLOCK_SIZE..][..part.len()];
-        visit(part, bytemuck::cast_slice(gpu_objects));
-    }
-}
-
 struct Buffers {
-    objects: ObjectBuffer,
+    objects: ObjectBuffers,
     /// One [`GpuView`] per view.
     views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
@@ -347,7 +297,7 @@ impl Buffers {
     fn new(maps_memory: bool) -> Self {
         use wgpu::BufferUsages;
         Self {
-            objects: ObjectBuffer::new(maps_memory),
+            objects: ObjectBuffers::new(maps_memory),
             views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
             lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
             object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
@@ -362,9 +312,10 @@ impl Buffers {
         }
     }
 
-    fn all(&self) -> [&GrowingBuffer; 5] {
-        let Self { objects, views, lights, object_indices, parameters, .. } = self;
-        [objects.on_device(), &views.on_device, &lights.on_device, object_indices, &parameters.on_device]
+    /// All but those of objects.
+    fn all(&self) -> [&GrowingBuffer; 4] {
+        let Self { views, lights, object_indices, parameters, .. } = self;
+        [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]
     }
 
     /// Sets the passes of this frame, and collects their parameters.
@@ -406,20 +357,14 @@ impl Buffers {
         }
     }
 
-    fn new_frame_bind_group(
-        &self,
-        device: &wgpu::Device,
-        layouts: &BindGroupLayouts,
-        pass: usize,
-        objects_bound: usize,
-    ) -> wgpu::BindGroup {
+    fn new_frame_bind_group(&self, device: &wgpu::Device, layouts: &BindGroupLayouts, pass: usize) -> wgpu::BindGroup {
         let WgpuPassState { pass: Pass { view_index: view, .. }, command_pass_index, .. } = self.passes[pass];
         // The layout requires a binding even if the pass draws no commands; it reads nothing from it.
         let stride = self.key.object_indices_stride;
         let (offset, size) = command_pass_index.map_or((0, ALIGNMENT), |index| (index * stride, stride));
         let bindings = [
             self.views.on_device.binding(view * ALIGNMENT, size_of::<GpuView>()),
-            self.objects.on_device().binding(0, objects_bound),
+            self.objects.gpu_objects(),
             self.object_indices.binding(offset, size),
             self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
         ];

@@ -8,8 +8,7 @@ use super::bundle_cache::BundleCache;
 use super::indirect_arguments::IndirectArguments;
 use super::pass_statistics::WgpuPassStatistics;
 use crate::backend::BackendError;
-use crate::backend::wgpu::pipelines::ProcessBindGroup;
-use crate::backend::wgpu::resources::{GrowingBuffer, UploadQueue};
+use crate::backend::wgpu::resources::{CachedBindGroup, GrowingBuffer, UploadQueue};
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
@@ -29,8 +28,10 @@ pub(crate) struct WgpuPassState {
     pub(crate) parameters: Option<(usize, usize)>,
     /// `@group(0)`.
     pub(crate) frame_bind_group: Option<wgpu::BindGroup>,
-    /// `@group(2)`.
-    pub(crate) process_bind_group: Option<ProcessBindGroup>,
+    /// `@group(2)`: the parameters, and the targets that the process samples.
+    pub(crate) process_bind_group: Option<CachedBindGroup>,
+    /// `@group(3)`: the columns that the process reads.
+    pub(crate) columns_bind_group: Option<CachedBindGroup>,
     /// The version of the draw list whose objects the buffers hold.
     pub(crate) uploaded_list: RwLock<Version>,
     pub(crate) strategy: PassStrategy,
@@ -56,6 +57,7 @@ impl Default for WgpuPassState {
             parameters: None,
             frame_bind_group: None,
             process_bind_group: None,
+            columns_bind_group: None,
             uploaded_list: RwLock::default(),
             strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
             strategy_index: 0,
@@ -95,7 +97,7 @@ impl WgpuPassState {
 
     /// Drops the caches that keep other resources alive.
     pub(crate) fn clear_caches(&mut self) {
-        self.process_bind_group = None;
+        (self.process_bind_group, self.columns_bind_group) = (None, None);
         self.bundle_cache.clear();
     }
 

@@ -2,10 +2,8 @@
 
 mod pipeline_cache;
 mod pipeline_key;
-mod process_bind_group;
 mod process_pipelines;
 
 pub(crate) use pipeline_cache::PipelineCache;
 pub(crate) use pipeline_key::fixed_state;
-pub(crate) use process_bind_group::ProcessBindGroup;
 pub(crate) use process_pipelines::ProcessPipelines;

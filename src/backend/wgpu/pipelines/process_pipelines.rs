@@ -6,7 +6,7 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
 use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, SampledTarget, process_layout, texture_format, vertex_attributes, vertex_stride,
+    BindGroupLayouts, SampledTarget, columns_layout, process_layout, texture_format, vertex_attributes, vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
@@ -21,7 +21,11 @@ pub(crate) struct ProcessPipelines {
     key: PipelineKey<'static>,
     attachments: AttachmentFormats,
     /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
-    process_layout: Option<wgpu::BindGroupLayout>,
+    pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
+    /// Of `@group(3)`; `None` for a process that reads no columns.
+    pub(crate) columns_layout: Option<wgpu::BindGroupLayout>,
+    /// How many columns it reads.
+    columns: usize,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
@@ -85,14 +89,17 @@ impl ProcessPipelines {
         let name = planned.name.as_str();
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
+        let columns = planned.declaration.columns.len();
         let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
+        let columns_layout = columns_layout(device, columns);
         let shader = (key.vertices != VertexSource::None).then(|| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(key.source().into()),
             });
-            let groups = [Some(&layouts.frame), Some(&layouts.assets), process_layout.as_ref()];
-            let used = if process_layout.is_some() { 3 } else { 2 };
+            let own = [process_layout.as_ref(), columns_layout.as_ref()];
+            let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
+            let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(name),
                 bind_group_layouts: &groups[..used],
@@ -101,7 +108,8 @@ impl ProcessPipelines {
             CompiledShader { module, layout }
         });
         let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
-        let pipelines = Self { name, key, attachments, process_layout, shader, by_state, tuners };
+        let pipelines =
+            Self { name, key, attachments, process_layout, columns_layout, columns, shader, by_state, tuners };
         if let Some(state) = pipelines.key.state {
             pipelines.insert(pipelines.create(device, state));
         }
@@ -118,6 +126,7 @@ impl ProcessPipelines {
     ) -> bool {
         self.name == planned.name.as_str()
             && self.fits_draws(draws, quality)
+            && self.columns == planned.declaration.columns.len()
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
     }
 
@@ -156,26 +165,6 @@ impl ProcessPipelines {
     /// The pipelines by draw state.
     pub(crate) fn by_state(&self) -> RwLockReadGuard<'_, HashMap<DrawState, wgpu::RenderPipeline>> {
         self.by_state.read()
-    }
-
-    /// Creates the bind group of `@group(2)` of one pass; `None` for a process without one.
-    pub(crate) fn create_bind_group<'a>(
-        &self,
-        device: &wgpu::Device,
-        parameters: Option<wgpu::BufferBinding<'a>>,
-        sampled: impl Iterator<Item = &'a wgpu::TextureView>,
-    ) -> Option<wgpu::BindGroup> {
-        let layout = self.process_layout.as_ref()?;
-        let parameters = parameters.map(|buffer| (0, wgpu::BindingResource::Buffer(buffer)));
-        let sampled = (1..).zip(sampled);
-        let sampled = sampled.map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));
-        let entries: Vec<_> = parameters
-            .into_iter()
-            .chain(sampled)
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        let descriptor = wgpu::BindGroupDescriptor { label: Some("process"), layout, entries: &entries };
-        Some(device.create_bind_group(&descriptor))
     }
 
     /// Describes bundles for passes of this process.

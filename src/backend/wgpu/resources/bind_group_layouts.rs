@@ -1,4 +1,4 @@
-//! Bind group layouts: `@group(0)` and `@group(1)` of `drawloom.wgsl`, and `@group(2)` of each render process.
+//! Bind group layouts: `@group(0)` and `@group(1)` of `drawloom.wgsl`, and `@group(2)` and `@group(3)` of each render process.
 
 use wgpu::ShaderStages;
 
@@ -73,6 +73,14 @@ pub(crate) fn process_layout(
         entries.push(entry(binding, ShaderStages::FRAGMENT, texture));
     }
     let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("process"), entries: &entries };
+    (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+}
+
+/// The layout of a process's `@group(3)`: the columns of objects that it reads. `None` if it reads none.
+pub(crate) fn columns_layout(device: &wgpu::Device, columns: usize) -> Option<wgpu::BindGroupLayout> {
+    let entry = |binding| entry(binding, ShaderStages::VERTEX_FRAGMENT, storage());
+    let entries: Vec<_> = (0..columns as u32).map(entry).collect();
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("columns"), entries: &entries };
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
 }
 

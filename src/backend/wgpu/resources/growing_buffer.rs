@@ -39,7 +39,7 @@ impl GrowingBuffer {
             return Ok(false);
         }
         // Half as much again, so that a scene that grows by one object per frame does not reallocate in every frame.
-        let size = (needed + needed / 2).min(device.limits().max_buffer_size & !3).max(needed);
+        let size = (needed + needed / 2).next_multiple_of(4).min(device.limits().max_buffer_size & !3).max(needed);
         self.buffer = Some(new_buffer(device, self.label, size, self.usage)?);
         Ok(true)
     }

@@ -1,4 +1,4 @@
-//! The buffer of a frame's objects.
+//! A buffer with an element for each of a frame's objects.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,12 +9,13 @@ use super::growing_buffer::GrowingBuffer;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 
-/// The buffer of a frame's objects. Where the device shares the CPU's memory, jobs write straight into it while it is mapped, so
+/// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write straight into it while it is mapped, so
 /// nothing is staged, and nothing copied when the frame is submitted.
 ///
 /// A mapping is requested only when the device is done with all submissions that use the buffer. wgpu would grant a request that
 /// was made and cancelled before when the submission of that time is done, while a later one still reads the buffer.
 pub(crate) struct ObjectBuffer {
+    label: &'static str,
     on_device: GrowingBuffer,
     /// `None` if writes are staged.
     usage: Option<Arc<Mutex<Usage>>>,
@@ -39,13 +40,11 @@ impl Usage {
 }
 
 impl ObjectBuffer {
-    const LABEL: &'static str = "objects";
-
     /// A buffer without room. `maps_memory`: see [`shares_memory`].
-    pub(crate) fn new(maps_memory: bool) -> Self {
+    pub(crate) fn new(label: &'static str, maps_memory: bool) -> Self {
         use wgpu::BufferUsages;
         let usage = if maps_memory { BufferUsages::STORAGE | BufferUsages::MAP_WRITE } else { BufferUsages::STORAGE };
-        Self { on_device: GrowingBuffer::new(Self::LABEL, usage), usage: maps_memory.then(Arc::default) }
+        Self { label, on_device: GrowingBuffer::new(label, usage), usage: maps_memory.then(Arc::default) }
     }
 
     pub(crate) fn on_device(&self) -> &GrowingBuffer {
@@ -87,12 +86,12 @@ impl ObjectBuffer {
             let mut usage = in_callback.lock();
             (usage.is_mapped, usage.is_refused) = (result.is_ok(), result.is_err());
         };
-        with_error_scope(device, Self::LABEL, || buffer.map_async(wgpu::MapMode::Write, .., mapped))?;
+        with_error_scope(device, self.label, || buffer.map_async(wgpu::MapMode::Write, .., mapped))?;
         poll(device)?;
         let maps_memory = !usage.lock().is_refused;
         if !self.is_mapped() {
             // A new buffer, without the request. It is pending if a frame was dropped whose staged writes the device still executes.
-            *self = Self::new(maps_memory);
+            *self = Self::new(self.label, maps_memory);
         }
         Ok(())
     }
@@ -105,7 +104,7 @@ impl ObjectBuffer {
         let Some(buffer) = self.on_device.buffer().filter(|_| self.is_mapped()) else { return Ok(None) };
         let view = buffer.get_mapped_range_mut(bytes.start as u64..bytes.end as u64);
         let refused = |error: wgpu::MapRangeError| BackendError::Validation {
-            label: Self::LABEL.to_owned(),
+            label: self.label.to_owned(),
             message: error.to_string(),
         };
         view.map(Some).map_err(refused)
@@ -169,7 +168,7 @@ mod tests {
     #[test]
     fn a_buffer_is_mapped_when_the_device_is_done_with_it() {
         let (device, queue) = noop_device();
-        let mut buffer = ObjectBuffer::new(true);
+        let mut buffer = ObjectBuffer::new("objects", true);
         for bytes in [1_000, 4_000] {
             buffer.reserve(&device, bytes).unwrap();
             buffer.map(&device).unwrap();
@@ -192,7 +191,7 @@ mod tests {
     #[test]
     fn the_end_of_an_earlier_submission_does_not_free_the_buffer() {
         let (device, queue) = noop_device();
-        let mut buffer = ObjectBuffer::new(true);
+        let mut buffer = ObjectBuffer::new("objects", true);
         buffer.reserve(&device, 64).unwrap();
         submit(&buffer, &queue);
         buffer.unmap();
@@ -211,7 +210,7 @@ mod tests {
     #[test]
     fn without_mapping_writes_are_staged() {
         let (device, queue) = noop_device();
-        let mut buffer = ObjectBuffer::new(false);
+        let mut buffer = ObjectBuffer::new("objects", false);
         buffer.reserve(&device, 64).unwrap();
         submit(&buffer, &queue);
         buffer.map(&device).unwrap();

@@ -1,8 +1,6 @@
 //! `depth_pre_pass.wgsl` on the CPU.
 
-use crate::process::{
-    ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
-};
+use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 
 /// Draws only depth.
@@ -10,9 +8,9 @@ use crate::raster::{Real, Vector4};
 pub(super) struct DepthPrePassCpuShader;
 
 impl<R: Real> ObjectCpuShader<R> for DepthPrePassCpuShader {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         VertexOutput {
-            clip: view.clip_position(object.relative_position(vertex.position)),
+            clip: pass.view.clip_position(object.relative_position(vertex.position)),
             varyings: [R::zero(); VARYINGS],
         }
     }
@@ -32,9 +30,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::process::cpu_shader::test_inputs::{view_values, views};
+    use crate::process::cpu_shader::test_inputs::{material, pass, view_values, views};
     use crate::process::{GeometryBuffer, GeometryFormats, RenderProcess, TypedCpuShader};
     use crate::raster::{Quaternion, Vector, Vector3};
+    use crate::scene::Blend;
 
     proptest! {
         /// What the geometry buffer draws after the pre-pass must have exactly the same depth.
@@ -52,13 +51,16 @@ mod tests {
                 orientation: Quaternion::of(DQuat::from_scaled_axis(turn.into())),
                 scale: Vector3::of(DVec3::new(0.3, -7.0, 1.0)),
                 material: 0,
+                index: 0,
             };
             let vertex =
                 VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero() };
             for view in views() {
                 let view = view_values(&view);
-                let pre_pass: VertexOutput<f32> = DepthPrePassCpuShader.vertex(&view, &object, &vertex);
-                let buffer = buffer.vertex(&view, &object, &vertex);
+                let material = material(Blend::None);
+                let pass = pass(&view, &material, &[]);
+                let pre_pass: VertexOutput<f32> = DepthPrePassCpuShader.vertex(&pass, &object, &vertex);
+                let buffer = buffer.vertex(&pass, &object, &vertex);
                 prop_assert_eq!(pre_pass.clip.0.map(f32::to_bits), buffer.clip.0.map(f32::to_bits));
             }
         }

@@ -4,7 +4,7 @@ use crate::process::cpu_shader::built_in::{rgb, with_alpha};
 use crate::process::deferred::shading::cpu_shader::illumination::MAX_STORED_RADIANCE;
 use crate::process::deferred::shading::cpu_shader::surface::{shading_normal, surface_diffuse, surface_vertex};
 use crate::process::{
-    GeometryFormats, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VertexInput, VertexOutput,
+    GeometryFormats, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VertexInput, VertexOutput,
 };
 use crate::raster::{Real, Vector3, Vector4};
 
@@ -16,8 +16,8 @@ pub(super) struct GeometryBufferCpuShader {
 }
 
 impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
-        surface_vertex(view, object, vertex)
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        surface_vertex(pass.view, object, vertex)
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
@@ -59,6 +59,7 @@ mod tests {
             dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0],
             dpdy: [0.0; VARYINGS],
             material: 0,
+            object: 0,
         };
         for (format, bound) in [(Format::Rg16Float, 1e-15), (Format::Rgba8Unorm, 1e-4), (Format::Rg8Unorm, 0.02)] {
             let formats = GeometryFormats { normal: format, ..GeometryFormats::default() };

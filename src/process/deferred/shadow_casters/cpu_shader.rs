@@ -1,8 +1,6 @@
 //! `shadow_casters.wgsl` on the CPU.
 
-use crate::process::{
-    ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
-};
+use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 use crate::scene::Projection;
 
@@ -17,14 +15,14 @@ pub(super) struct ShadowCastersCpuShader {
 const RIM_MARGIN: f64 = 0.05;
 
 impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         let relative = object.relative_position(vertex.position);
         let mut varyings = [R::zero(); VARYINGS];
-        varyings[0] = match view.projection {
-            Projection::Paraboloid => view.forward.dot(relative) / relative.length().max(R::of(1e-30)),
+        varyings[0] = match pass.view.projection {
+            Projection::Paraboloid => pass.view.forward.dot(relative) / relative.length().max(R::of(1e-30)),
             _ => R::one(),
         };
-        VertexOutput { clip: view.clip_position(relative), varyings }
+        VertexOutput { clip: pass.view.clip_position(relative), varyings }
     }
 
     fn draws_pixels(&self) -> bool {
@@ -42,6 +40,7 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
+    use crate::process::ShaderView;
     use crate::process::cpu_shader::test_inputs::{material, paraboloid, pass, view_values, views};
     use crate::raster::{Quaternion, Vector, Vector3};
     use crate::scene::Blend;
@@ -55,13 +54,16 @@ mod tests {
             orientation: Quaternion([0.0, 0.0, 0.0, 1.0]),
             scale: Vector::splat(1.0),
             material: 0,
+            index: 0,
         };
         let vertex = VertexInput { position: Vector::zero(), normal: Vector::zero(), uv: Vector::zero() };
         let cpu_shader = ShadowCastersCpuShader { hemispheres: true };
-        let VertexOutput { varyings, .. } = cpu_shader.vertex(&view, &object, &vertex);
-        let pixel =
-            ObjectPixel { coordinates: [0, 0], varyings, dpdx: [0.0; VARYINGS], dpdy: [0.0; VARYINGS], material: 0 };
-        cpu_shader.fragment(&pass(&view, &material(Blend::None), &[]), &pixel, &mut [])
+        let material = material(Blend::None);
+        let pass = pass(&view, &material, &[]);
+        let VertexOutput { varyings, .. } = cpu_shader.vertex(&pass, &object, &vertex);
+        let (coordinates, dpdx, dpdy) = ([0, 0], [0.0; VARYINGS], [0.0; VARYINGS]);
+        let pixel = ObjectPixel { coordinates, varyings, dpdx, dpdy, material: 0, object: 0 };
+        cpu_shader.fragment(&pass, &pixel, &mut [])
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
 use crate::process::deferred::shading::cpu_shader::surface::{
     relative_of, shading_normal, surface_diffuse, surface_vertex,
 };
-use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, ShaderView, VertexInput, VertexOutput};
+use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 use crate::scene::Blend;
 use crate::view::ShadowMaps;
@@ -27,8 +27,8 @@ impl TransparencyCpuShader {
 }
 
 impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
-    fn vertex(&self, view: &ShaderView<R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
-        surface_vertex(view, object, vertex)
+    fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
+        surface_vertex(pass.view, object, vertex)
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
@@ -90,6 +90,7 @@ mod tests {
             dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0],
             dpdy: [0.0; VARYINGS],
             material: 0,
+            object: 0,
         };
         let mut targets = [Vector::zero()];
         assert!(cpu_shader.draws_pixels() && cpu_shader.fragment(&pass, &pixel, &mut targets));

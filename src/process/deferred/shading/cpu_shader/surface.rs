@@ -91,6 +91,7 @@ mod tests {
             dpdx: [0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0],
             dpdy: [0.0, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, -0.03, 0.0],
             material: 0,
+            object: 0,
         }
     }
 
@@ -103,6 +104,7 @@ mod tests {
             orientation: Quaternion([0.0, 0.0, 0.0, 1.0]),
             scale: Vector([2.0, 1.0, 1.0]),
             material: 3,
+            index: 0,
         };
         let vertex =
             VertexInput { position: Vector([1.0, 1.0, 1.0]), normal: Vector([0.0, 0.0, 1.0]), uv: Vector([0.75, 0.5]) };
@@ -114,6 +116,7 @@ mod tests {
             dpdx: [0.0; VARYINGS],
             dpdy: [0.0; VARYINGS],
             material: 3,
+            object: 0,
         };
         assert_eq!(relative_of(&pixel), Vector([2.0, 2.0, -4.0]));
         let material = material(Blend::None);

@@ -1,0 +1,41 @@
+//! Finds columns that changed although the engine did not report it.
+
+use crate::scene::{ColumnLayout, SceneError, SceneRef};
+use crate::view::ObjectTable;
+
+/// Copies of the columns that the latest frame read. Only builds with debug assertions have any.
+#[derive(Debug, Default)]
+pub(super) struct ColumnCheck {
+    copies: Vec<(ColumnLayout, Vec<u8>)>,
+}
+
+impl ColumnCheck {
+    /// Compares the columns that a frame read with those of the frame before, and copies them.
+    ///
+    /// # Errors
+    /// If a value changed, and the scene does not report its object.
+    pub(super) fn check(
+        &mut self,
+        scene: &SceneRef<'_>,
+        columns: &[ColumnLayout],
+        objects: &ObjectTable,
+    ) -> Result<(), SceneError> {
+        self.copies.retain(|(layout, _)| columns.contains(layout));
+        let mut outcome = Ok(());
+        for values in columns.iter().filter_map(|layout| scene.column(*layout)) {
+            let (layout, bytes) = (values.layout(), values.bytes());
+            let Some((_, copy)) = self.copies.iter_mut().find(|(known, _)| *known == layout) else {
+                self.copies.push((layout, bytes.to_vec()));
+                continue;
+            };
+            let elements = copy.chunks_exact(layout.stride).zip(bytes.chunks_exact(layout.stride));
+            let changed = elements.enumerate().filter(|(_, (before, now))| before != now).map(|(object, _)| object);
+            if let Some(object) = changed.into_iter().find(|object| !objects.is_reported(*object)) {
+                outcome = outcome.and(Err(SceneError::UnreportedColumnChange { column: layout.name, object }));
+            }
+            copy.clear();
+            copy.extend_from_slice(bytes);
+        }
+        outcome
+    }
+}

@@ -1,0 +1,110 @@
+//! Data of an engine's own for each object.
+
+use std::marker::PhantomData;
+
+use bytemuck::Pod;
+
+/// A name for data that an engine has for each object, such as a tint, the offset of a skinning palette, or the transform of the
+/// frame before. Make it once, as a constant: scenes bring values for it, and processes declare that their shaders read them.
+///
+/// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
+///
+/// ```
+/// use drawloom::scene::{ObjectColumn, Scene, SceneRef};
+///
+/// const TINT: ObjectColumn<[f32; 4]> = ObjectColumn::new("tint");
+///
+/// let world = Scene::new();
+/// let tints: Vec<[f32; 4]> = Vec::new();
+/// // One value for each object; `SceneRef::changes` is about them too.
+/// let scene = SceneRef { columns: &[TINT.values(&tints)], ..world.as_scene_ref() };
+/// # assert_eq!(scene.columns[0].name(), "tint");
+/// ```
+///
+/// A process that reads it says so, and its shader has the array in `@group(3)`:
+/// see [`Declare::reads_column`](crate::process::Declare::reads_column).
+pub struct ObjectColumn<T> {
+    name: &'static str,
+    /// Neither owns nor borrows a `T`.
+    element: PhantomData<fn() -> T>,
+}
+
+impl<T: Pod> ObjectColumn<T> {
+    /// A column of this name. Two columns of one name are the same column.
+    ///
+    /// # Panics
+    /// If the size of `T` is 0 or not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
+    /// the compiler.
+    pub const fn new(name: &'static str) -> Self {
+        assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
+        Self { name, element: PhantomData }
+    }
+
+    /// Its name in errors, and that of its buffer.
+    pub const fn name(self) -> &'static str {
+        self.name
+    }
+
+    /// Its name and the size of an element.
+    pub const fn layout(self) -> ColumnLayout {
+        ColumnLayout { name: self.name, stride: size_of::<T>() }
+    }
+
+    /// Its values, one for each object of a scene, in their order.
+    pub fn values(self, values: &[T]) -> ColumnValues<'_> {
+        ColumnValues { layout: self.layout(), bytes: bytemuck::cast_slice(values) }
+    }
+}
+
+// Derived implementations would require them of `T`.
+impl<T> Clone for ObjectColumn<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for ObjectColumn<T> {}
+
+impl<T> std::fmt::Debug for ObjectColumn<T> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("ObjectColumn").field(&self.name).finish()
+    }
+}
+
+/// An [`ObjectColumn`] without the type of its elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ColumnLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// The size of an element in bytes.
+    pub stride: usize,
+}
+
+/// The values of an [`ObjectColumn`], one for each object: see [`ObjectColumn::values`].
+#[derive(Clone, Copy, Debug)]
+pub struct ColumnValues<'a> {
+    layout: ColumnLayout,
+    bytes: &'a [u8],
+}
+
+impl<'a> ColumnValues<'a> {
+    /// The name of the column.
+    pub fn name(&self) -> &'static str {
+        self.layout.name
+    }
+
+    /// The name of the column and the size of an element.
+    pub fn layout(&self) -> ColumnLayout {
+        self.layout
+    }
+
+    /// The number of values.
+    pub fn count(&self) -> usize {
+        self.bytes.len() / self.layout.stride
+    }
+
+    /// All values, one after the other.
+    pub fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+}
