@@ -30,8 +30,8 @@ impl ObjectBuffers {
         self.all().map(|buffer| buffer.on_device().size()).sum()
     }
 
-    /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated or added: then
-    /// what the buffers hold is not complete.
+    /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated, and lost its
+    /// contents.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
@@ -42,18 +42,17 @@ impl ObjectBuffers {
         objects: usize,
     ) -> Result<bool, BackendError> {
         self.max_binding = device.limits().max_storage_buffer_binding_size & !3;
-        let mut changed = false;
         if !self.columns.iter().map(|(layout, _)| layout).eq(columns) {
             let new = |&layout: &ColumnLayout| (layout, ObjectBuffer::new(layout.name, self.maps_memory));
             self.columns = columns.iter().map(new).collect();
-            changed = true;
         }
+        let mut reallocated = false;
         let strides = columns.iter().map(|layout| layout.stride);
         for (buffer, stride) in self.all_mut().zip(std::iter::once(size_of::<GpuObject>()).chain(strides)) {
             check_storage_binding_size(device, objects * stride)?;
-            changed |= buffer.reserve(device, objects * stride)?;
+            reallocated |= buffer.reserve(device, objects * stride)?;
         }
-        Ok(changed)
+        Ok(reallocated)
     }
 
     /// Whether a frame can write at once: see [`ObjectBuffer::is_ready`].
