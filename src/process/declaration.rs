@@ -54,7 +54,8 @@ impl Declare {
         self.access(target, Access::MatchDepth);
     }
 
-    /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on.
+    /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on. The prelude's
+    /// `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
     pub fn samples(&mut self, target: &str) {
         self.access(target, Access::Sample);
     }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 #[cfg(feature = "wgpu")]
 use super::RawPass;
+use super::ShaderResource;
 use crate::command::Selection;
 use crate::scene::Blend;
 use crate::view::LightClass;
@@ -36,6 +37,8 @@ pub struct CommandDraws<'a> {
     pub writes_depth: bool,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
+    /// The engine's own resources that the shader reads.
+    pub resources: Vec<ShaderResource<'a>>,
 }
 
 impl Default for CommandDraws<'_> {
@@ -46,6 +49,7 @@ impl Default for CommandDraws<'_> {
             selection: Selection::OPAQUE,
             writes_depth: true,
             parameters: Cow::Borrowed(&[]),
+            resources: Vec::new(),
         }
     }
 }
@@ -61,6 +65,8 @@ pub struct FullScreen<'a> {
     pub blend: Blend,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
+    /// The engine's own resources that the shader reads.
+    pub resources: Vec<ShaderResource<'a>>,
 }
 
 /// The pixels that lights reach. Each light is drawn as a light volume (L 4.2.1), all lights of a class in one
@@ -75,6 +81,8 @@ pub struct LightDraws<'a> {
     pub class: LightClass,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
+    /// The engine's own resources that the shader reads.
+    pub resources: Vec<ShaderResource<'a>>,
 }
 
 impl Draws<'_> {
@@ -89,6 +97,17 @@ impl Draws<'_> {
     /// Whether it draws objects that write depth, and so hide what is behind them.
     pub fn hides(&self) -> bool {
         matches!(self, Self::Commands(commands) if commands.writes_depth)
+    }
+
+    /// The engine's own resources that the shader reads; none for a raw pass.
+    pub fn resources(&self) -> &[ShaderResource<'_>] {
+        match self {
+            Self::Commands(commands) => &commands.resources,
+            Self::FullScreen(full_screen) => &full_screen.resources,
+            Self::Lights(lights) => &lights.resources,
+            #[cfg(feature = "wgpu")]
+            Self::Raw(_) => &[],
+        }
     }
 
     /// The bytes of the uniform at `@group(2) @binding(0)`; empty if there is none.

@@ -35,6 +35,11 @@ impl Format {
         matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float)
     }
 
+    /// Whether a shader can sample it between pixels, with a filtering sampler, on every adapter.
+    pub fn is_filterable(self) -> bool {
+        !matches!(self, Self::R32Float | Self::Depth32Float)
+    }
+
     /// Whether it holds negative numbers.
     pub fn is_signed(self) -> bool {
         matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R32Float)

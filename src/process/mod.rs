@@ -20,6 +20,7 @@ mod prelude;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
+mod shader_resource;
 
 #[cfg(feature = "software")]
 pub use cpu_shader::{
@@ -41,6 +42,7 @@ pub use prelude::SHADER_PRELUDE;
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
+pub use shader_resource::ShaderResource;
 
 #[cfg(feature = "software")]
 pub(crate) use cpu_shader::TypedCpuShader;

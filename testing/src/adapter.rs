@@ -17,6 +17,13 @@ pub fn device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Qu
     open(&adapter, missing, adapter.limits())
 }
 
+/// Opens two devices of one instance on the machine's best adapter.
+pub fn two_devices() -> Result<[(wgpu::Device, wgpu::Queue); 2], Box<dyn Error>> {
+    let adapter = best_adapter()?;
+    let device = || open(&adapter, wgpu::Features::empty(), adapter.limits());
+    Ok([device()?, device()?])
+}
+
 /// Opens a device on the machine's best adapter, with these limits.
 pub fn device_with_limits(limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     open(&best_adapter()?, wgpu::Features::empty(), limits)

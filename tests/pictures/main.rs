@@ -24,6 +24,7 @@ mod processes;
 mod rays;
 mod references;
 mod requirements;
+mod resources;
 mod retained;
 mod shadow_bias;
 mod shadow_casters;
@@ -62,6 +63,7 @@ fn main() {
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (requirements::CASES, Needs::Adapter),
+        (resources::CASES, Needs::Adapter),
         (retained::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),

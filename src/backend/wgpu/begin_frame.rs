@@ -6,11 +6,12 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{BundleKey, WgpuFrame};
-use super::resources::{BindingResource, CachedBindGroup, LightMeshes, SubdividedMesh};
+use super::pass_bind_groups::update_bind_groups;
+use super::resources::{LightMeshes, SubdividedMesh};
 use super::strategy::RecordingStrategy;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{Access, Draws, Pass};
+use crate::process::{Draws, Pass};
 use crate::scene::Mesh;
 
 impl WgpuBackend {
@@ -40,7 +41,7 @@ impl WgpuBackend {
             let number = self.frames.fetch_add(1, Ordering::Relaxed);
             let background = scene.background.as_dvec3().to_array();
             let mut frame = WgpuFrame { number, pipelines, assets, light_meshes, targets, background, buffers };
-            self.begin_passes(&mut frame, request);
+            self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?
     }
@@ -62,32 +63,18 @@ impl WgpuBackend {
         catch_wgpu_panic("the device", finish).map(|_| ())
     }
 
-    /// Updates the bind group of each pass, and chooses its strategy.
-    fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) {
+    /// Updates the bind groups of each pass, and chooses its strategy.
+    ///
+    /// # Errors
+    /// If the device refuses a resource of the engine's.
+    fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) -> Result<(), BackendError> {
         let (strategies, mut may_try) = (self.strategies.strategies(), true);
         let WgpuFrame { number, pipelines, assets, targets, buffers, .. } = frame;
-        let (passes, parameters, objects) = buffers.passes_mut();
+        let (passes, resources) = buffers.passes_mut();
         for pass in passes {
             let Pass { process_index: process, view_index: view } = pass.pass;
             let pipelines = &pipelines[process];
-            let declaration = &request.plan.processes()[process].declaration;
-            let sampled = |(name, access): &(String, Access)| match access {
-                Access::Sample => targets.find(view, name).map(|target| &target.view),
-                Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
-                _ => None,
-            };
-            let parameters = pass.parameters.and_then(|(offset, length)| parameters.binding(offset, length));
-            let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
-            let sampled = (1..).zip(declaration.accesses.iter().filter_map(sampled).map(BindingResource::Texture));
-            let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
-            let resources = parameters.into_iter().chain(sampled);
-            pass.process_bind_group = CachedBindGroup::update(before, &self.device, "process", layout, resources);
-
-            let columns = declaration.columns.iter();
-            let columns = columns.filter_map(|column| objects.column(*column));
-            let (before, layout) = (pass.columns_bind_group.take(), pipelines.columns_layout.as_ref());
-            let resources = (0..).zip(columns.map(BindingResource::Buffer));
-            pass.columns_bind_group = CachedBindGroup::update(before, &self.device, "columns", layout, resources);
+            update_bind_groups(&self.device, request, pipelines, targets, &resources, pass)?;
 
             let (mut index, mut is_trial) = (0, false);
             if strategies.len() > 1 && pass.command_pass_index.is_some() {
@@ -102,12 +89,13 @@ impl WgpuBackend {
                 pass.bundle_cache.begin_frame(BundleKey {
                     frame_bind_group: frame_bind_group.clone(),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
-                    columns_bind_group: pass.columns_bind_group.as_ref().map(|columns| columns.group.clone()),
+                    engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
                     assets: Arc::clone(assets),
                     pipelines: Arc::clone(pipelines),
                 });
             }
         }
+        Ok(())
     }
 
     /// Creates or reuses the subdivided meshes that a list draws.

@@ -22,6 +22,7 @@ mod error_scope;
 mod frame;
 #[cfg(all(test, not(drawloom_loom)))]
 mod noop_device;
+mod pass_bind_groups;
 mod pipelines;
 mod recording;
 mod resources;

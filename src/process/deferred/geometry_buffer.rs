@@ -3,8 +3,6 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use std::borrow::Cow;
-
 use super::GeometryFormats;
 use crate::command::{Blending, MaterialShare, Selection};
 use crate::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -89,10 +87,9 @@ impl RenderProcess for GeometryBuffer {
     fn draws(&self) -> Draws<'_> {
         Draws::Commands(CommandDraws {
             shader: &self.shader,
-            fragment: Some("fragment"),
             selection: Selection { blending: Blending::Opaque, materials: self.share },
             writes_depth: !self.has_depth,
-            parameters: Cow::Borrowed(&[]),
+            ..CommandDraws::default()
         })
     }
 

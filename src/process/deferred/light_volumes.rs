@@ -80,7 +80,12 @@ impl RenderProcess for LightVolumes {
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::Lights(LightDraws { shader: &self.shader, class: self.class, parameters: Cow::Borrowed(&[]) })
+        Draws::Lights(LightDraws {
+            shader: &self.shader,
+            class: self.class,
+            parameters: Cow::Borrowed(&[]),
+            resources: Vec::new(),
+        })
     }
 
     #[cfg(feature = "software")]

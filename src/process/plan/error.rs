@@ -130,6 +130,16 @@ pub enum ProcessError {
         /// The size of an element of the scene, in bytes.
         found: usize,
     },
+    /// A [resource](crate::process::ShaderResource::Bytes) of a size that no storage buffer can have.
+    #[error("resource {resource} of process {process:?} has {bytes} bytes, instead of 4, 8, 12 ...")]
+    ResourceSize {
+        /// The process.
+        process: String,
+        /// The index of the resource.
+        resource: usize,
+        /// Its size.
+        bytes: usize,
+    },
     /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
     /// one by commands of its own.
     #[error(

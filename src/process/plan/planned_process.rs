@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
-use crate::process::{Access, Declaration, Declare, Draws, RenderProcess};
+use crate::process::{Access, Declaration, Declare, Draws, RenderProcess, ShaderResource};
 use crate::task::{JobPanic, catch};
 
 /// A process and what it declared.
@@ -37,8 +37,8 @@ impl PlannedProcess {
     /// What the process draws in this frame.
     ///
     /// # Errors
-    /// If the process panics, or its draws do not fit its declaration: only raw passes use targets by their own
-    /// commands.
+    /// If the process panics, its draws do not fit its declaration, as only raw passes use targets by their own commands, or it
+    /// has a resource of a size that no buffer can have.
     pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
         let process = || self.name.clone();
         let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
@@ -49,9 +49,23 @@ impl PlannedProcess {
             Draws::Raw(_) => true,
         };
         let fits = |access: &Access| access.is_raw() == is_raw;
-        match self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
-            Some((target, _)) => Err(ProcessError::Misdeclared { process: process(), target: target.clone() }),
-            None => Ok(draws),
+        if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
+            return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
         }
+        for (resource, bytes) in draws.resources().iter().enumerate().filter_map(bytes_of) {
+            if bytes == 0 || !bytes.is_multiple_of(4) {
+                return Err(ProcessError::ResourceSize { process: process(), resource, bytes });
+            }
+        }
+        Ok(draws)
+    }
+}
+
+/// The index and the size of a resource of bytes.
+fn bytes_of((index, resource): (usize, &ShaderResource<'_>)) -> Option<(usize, usize)> {
+    match resource {
+        ShaderResource::Bytes(bytes) => Some((index, bytes.len())),
+        #[cfg(feature = "wgpu")]
+        _ => None,
     }
 }

@@ -3,6 +3,7 @@
 //   @group(0)  the frame and the view: below
 //   @group(1)  materials and their textures: below
 //   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order
+//   @group(3)  the engine's own: the columns of objects that the process reads, then its resources, from binding 0
 //
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 
@@ -100,6 +101,8 @@ const ALPHA: u32 = 1u;
 @group(1) @binding(3) var textures_1024: texture_2d_array<f32>;
 @group(1) @binding(4) var textures_2048: texture_2d_array<f32>;
 @group(1) @binding(5) var texture_sampler: sampler;
+// Linear between pixels, and the nearest pixel outside: for targets.
+@group(1) @binding(6) var target_sampler: sampler;
 
 struct VertexInput {
     @location(0) position: vec3<f32>,

@@ -17,7 +17,7 @@ use crate::command::Batch;
 pub(crate) struct BundleKey {
     pub(crate) frame_bind_group: wgpu::BindGroup,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
-    pub(crate) columns_bind_group: Option<wgpu::BindGroup>,
+    pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
     pub(crate) assets: Arc<AssetSnapshot>,
     pub(crate) pipelines: Arc<ProcessPipelines>,
 }
@@ -26,7 +26,7 @@ impl PartialEq for BundleKey {
     fn eq(&self, other: &Self) -> bool {
         self.frame_bind_group == other.frame_bind_group
             && self.process_bind_group == other.process_bind_group
-            && self.columns_bind_group == other.columns_bind_group
+            && self.engine_bind_group == other.engine_bind_group
             && Arc::ptr_eq(&self.assets, &other.assets)
             && Arc::ptr_eq(&self.pipelines, &other.pipelines)
     }

@@ -8,6 +8,7 @@ use parking_lot::{Mutex, RwLock};
 
 use super::object_buffers::ObjectBuffers;
 use super::pass_state::WgpuPassState;
+use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::resources::{
     ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
@@ -54,7 +55,10 @@ impl BufferPool {
         let index_bytes =
             |buffers: &Buffers| buffers.passes.iter().map(|pass| pass.partial_indices.read().size()).sum::<u64>();
         let total = |buffers: &Buffers| {
-            buffers.all().map(GrowingBuffer::size).iter().sum::<u64>() + buffers.objects.size() + index_bytes(buffers)
+            buffers.all().map(GrowingBuffer::size).iter().sum::<u64>()
+                + buffers.objects.size()
+                + buffers.bytes.size()
+                + index_bytes(buffers)
         };
         self.free.lock().buffers.iter().map(total).sum()
     }
@@ -159,6 +163,7 @@ impl FrameBuffers {
         if reallocated {
             self.held_epoch = 0;
         }
+        buffers.bytes.update(device, uploads, request.draws)?;
         reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
             reallocated |= mirrored.upload(device, uploads)?;
@@ -218,10 +223,10 @@ impl FrameBuffers {
         &self.buffers.passes
     }
 
-    /// The passes, the buffer of their parameters, and those of the objects.
-    pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], &GrowingBuffer, &ObjectBuffers) {
-        let Buffers { passes, parameters, objects, .. } = &mut self.buffers;
-        (passes, &parameters.on_device, objects)
+    /// The passes, and what their bind groups bind.
+    pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], PassResources<'_>) {
+        let Buffers { passes, parameters, objects, bytes, .. } = &mut self.buffers;
+        (passes, PassResources { parameters: &parameters.on_device, objects, bytes })
     }
 
     /// The meshes that the frame draws subdivided.
@@ -261,6 +266,13 @@ impl FrameBuffers {
     }
 }
 
+/// What the bind groups of passes bind.
+pub(crate) struct PassResources<'a> {
+    pub(crate) parameters: &'a GrowingBuffer,
+    pub(crate) objects: &'a ObjectBuffers,
+    pub(crate) bytes: &'a ResourceBytes,
+}
+
 struct Buffers {
     objects: ObjectBuffers,
     /// One [`GpuView`] per view.
@@ -271,6 +283,8 @@ struct Buffers {
     object_indices: GrowingBuffer,
     /// Each pass's parameters.
     parameters: MirroredBuffer,
+    /// What processes read of the engine's own.
+    bytes: ResourceBytes,
     passes: Vec<WgpuPassState>,
     /// The key of the passes' bind groups, and the key of this frame.
     key: BindGroupKey,
@@ -302,6 +316,7 @@ impl Buffers {
             lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
             object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
             parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
+            bytes: ResourceBytes::default(),
             passes: Vec::new(),
             key: BindGroupKey::default(),
             next_key: BindGroupKey::default(),
@@ -312,7 +327,7 @@ impl Buffers {
         }
     }
 
-    /// All but those of objects.
+    /// All but those of objects, and the bytes of the engine's own.
     fn all(&self) -> [&GrowingBuffer; 4] {
         let Self { views, lights, object_indices, parameters, .. } = self;
         [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]

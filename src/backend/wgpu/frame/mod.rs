@@ -7,11 +7,12 @@ mod indirect_arguments;
 mod object_buffers;
 mod pass_state;
 mod pass_statistics;
+mod resource_bytes;
 mod wgpu_frame;
 
 pub(crate) use bundle_cache::BundleKey;
 pub(crate) use commands::{PassCommands, RecordedPart};
-pub(crate) use frame_buffers::BufferPool;
+pub(crate) use frame_buffers::{BufferPool, PassResources};
 pub(crate) use indirect_arguments::IndirectArguments;
 pub(crate) use pass_state::WgpuPassState;
 

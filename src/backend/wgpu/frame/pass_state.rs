@@ -30,8 +30,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) frame_bind_group: Option<wgpu::BindGroup>,
     /// `@group(2)`: the parameters, and the targets that the process samples.
     pub(crate) process_bind_group: Option<CachedBindGroup>,
-    /// `@group(3)`: the columns that the process reads.
-    pub(crate) columns_bind_group: Option<CachedBindGroup>,
+    /// `@group(3)`: the columns and the engine's own resources that the process reads.
+    pub(crate) engine_bind_group: Option<CachedBindGroup>,
     /// The version of the draw list whose objects the buffers hold.
     pub(crate) uploaded_list: RwLock<Version>,
     pub(crate) strategy: PassStrategy,
@@ -57,7 +57,7 @@ impl Default for WgpuPassState {
             parameters: None,
             frame_bind_group: None,
             process_bind_group: None,
-            columns_bind_group: None,
+            engine_bind_group: None,
             uploaded_list: RwLock::default(),
             strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
             strategy_index: 0,
@@ -97,7 +97,7 @@ impl WgpuPassState {
 
     /// Drops the caches that keep other resources alive.
     pub(crate) fn clear_caches(&mut self) {
-        (self.process_bind_group, self.columns_bind_group) = (None, None);
+        (self.process_bind_group, self.engine_bind_group) = (None, None);
         self.bundle_cache.clear();
     }
 

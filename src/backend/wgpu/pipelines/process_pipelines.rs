@@ -6,7 +6,8 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
 use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, SampledTarget, columns_layout, process_layout, texture_format, vertex_attributes, vertex_stride,
+    BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format, vertex_attributes,
+    vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
@@ -22,10 +23,13 @@ pub(crate) struct ProcessPipelines {
     attachments: AttachmentFormats,
     /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
     pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
-    /// Of `@group(3)`; `None` for a process that reads no columns.
-    pub(crate) columns_layout: Option<wgpu::BindGroupLayout>,
+    /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
+    pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
     /// How many columns it reads.
     columns: usize,
+    /// What it says about its resources.
+    resources: Vec<wgpu::BindingType>,
+    features: wgpu::Features,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
@@ -91,13 +95,15 @@ impl ProcessPipelines {
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
         let columns = planned.declaration.columns.len();
         let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
-        let columns_layout = columns_layout(device, columns);
+        let features = device.features();
+        let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
+        let engine_layout = engine_layout(device, columns, &resources);
         let shader = (key.vertices != VertexSource::None).then(|| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(key.source().into()),
             });
-            let own = [process_layout.as_ref(), columns_layout.as_ref()];
+            let own = [process_layout.as_ref(), engine_layout.as_ref()];
             let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
             let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -108,8 +114,19 @@ impl ProcessPipelines {
             CompiledShader { module, layout }
         });
         let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
-        let pipelines =
-            Self { name, key, attachments, process_layout, columns_layout, columns, shader, by_state, tuners };
+        let pipelines = Self {
+            name,
+            key,
+            attachments,
+            process_layout,
+            engine_layout,
+            columns,
+            resources,
+            features,
+            shader,
+            by_state,
+            tuners,
+        };
         if let Some(state) = pipelines.key.state {
             pipelines.insert(pipelines.create(device, state));
         }
@@ -132,7 +149,8 @@ impl ProcessPipelines {
 
     /// Whether these pipelines still fit what their process draws.
     pub(crate) fn fits_draws(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
-        self.key == PipelineKey::new(draws, quality)
+        let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
+        self.key == PipelineKey::new(draws, quality) && resources.eq(self.resources.iter().copied())
     }
 
     /// Creates the missing pipelines of these batches. [Insert](Self::insert) them only if the device reports no error.

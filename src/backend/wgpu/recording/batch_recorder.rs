@@ -124,7 +124,7 @@ impl<'a> BatchRecorder<'a> {
     pub(crate) fn set_bind_groups(&self, encoder: &mut impl RenderEncoder<'a>) {
         encoder.set_bind_group(0, self.pass.frame_bind_group.as_ref(), &[]);
         encoder.set_bind_group(1, Some(&self.frame.assets.group), &[]);
-        for (index, own) in [(2, &self.pass.process_bind_group), (3, &self.pass.columns_bind_group)] {
+        for (index, own) in [(2, &self.pass.process_bind_group), (3, &self.pass.engine_bind_group)] {
             if let Some(own) = own {
                 encoder.set_bind_group(index, Some(&own.group), &[]);
             }

@@ -189,20 +189,17 @@ impl AssetCache {
         let materials = filled_buffer(device, uploads, "materials", bytes, wgpu::BufferUsages::STORAGE)?;
 
         let views = self.textures.views(device);
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("textures"),
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            ..wgpu::SamplerDescriptor::default()
-        });
+        let samplers = [
+            linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
+            linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
+        ];
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: materials.as_entire_binding() }];
         for (binding, view) in (1..).zip(&views) {
             entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) });
         }
-        entries.push(wgpu::BindGroupEntry { binding: 5, resource: wgpu::BindingResource::Sampler(&sampler) });
+        for (binding, sampler) in (5..).zip(&samplers) {
+            entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Sampler(sampler) });
+        }
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("assets"),
             layout: &layouts.assets,
@@ -229,6 +226,18 @@ impl AssetCache {
         }
         self.textures.location(texture.index())
     }
+}
+
+fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some(label),
+        address_mode_u: outside,
+        address_mode_v: outside,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..wgpu::SamplerDescriptor::default()
+    })
 }
 
 fn new_vertex_arena() -> Arena {

@@ -2,7 +2,7 @@
 
 use wgpu::ShaderStages;
 
-use crate::process::Format;
+use crate::process::{Format, ShaderResource};
 use crate::view::GpuView;
 
 /// The bind group layouts that all processes share.
@@ -36,6 +36,7 @@ impl BindGroupLayouts {
             entry(3, ShaderStages::FRAGMENT, array),
             entry(4, ShaderStages::FRAGMENT, array),
             entry(5, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(6, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
         ];
         Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
     }
@@ -65,7 +66,7 @@ pub(crate) fn process_layout(
         let sample_type = if sampled.format.is_depth() {
             wgpu::TextureSampleType::Depth
         } else {
-            wgpu::TextureSampleType::Float { filterable: false }
+            wgpu::TextureSampleType::Float { filterable: sampled.format.is_filterable() }
         };
         let view_dimension =
             if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
@@ -76,12 +77,36 @@ pub(crate) fn process_layout(
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
 }
 
-/// The layout of a process's `@group(3)`: the columns of objects that it reads. `None` if it reads none.
-pub(crate) fn columns_layout(device: &wgpu::Device, columns: usize) -> Option<wgpu::BindGroupLayout> {
-    let entry = |binding| entry(binding, ShaderStages::VERTEX_FRAGMENT, storage());
-    let entries: Vec<_> = (0..columns as u32).map(entry).collect();
-    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("columns"), entries: &entries };
+/// The layout of a process's `@group(3)`: the columns of objects that it reads, then the resources of the engine's own. `None`
+/// if it has neither.
+pub(crate) fn engine_layout(
+    device: &wgpu::Device,
+    columns: usize,
+    resources: &[wgpu::BindingType],
+) -> Option<wgpu::BindGroupLayout> {
+    let types = std::iter::repeat_n(storage(), columns).chain(resources.iter().copied());
+    let entries: Vec<_> =
+        (0..).zip(types).map(|(binding, ty)| entry(binding, ShaderStages::VERTEX_FRAGMENT, ty)).collect();
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("engine"), entries: &entries };
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+}
+
+/// What the layout of a bind group says about a resource.
+pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderResource<'_>) -> wgpu::BindingType {
+    match resource {
+        ShaderResource::Bytes(_) | ShaderResource::Buffer(_) => storage(),
+        ShaderResource::Texture { view, dimension } => {
+            let texture = view.texture();
+            // A depth-stencil texture is sampled as depth.
+            let depth = wgpu::TextureSampleType::Depth;
+            wgpu::BindingType::Texture {
+                sample_type: texture.format().sample_type(None, Some(device_features)).unwrap_or(depth),
+                view_dimension: *dimension,
+                multisampled: texture.sample_count() > 1,
+            }
+        }
+        ShaderResource::Sampler { kind, .. } => wgpu::BindingType::Sampler(*kind),
+    }
 }
 
 /// A target's format as a wgpu format.

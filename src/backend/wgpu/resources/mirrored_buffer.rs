@@ -23,6 +23,24 @@ impl MirroredBuffer {
         &mut self.next
     }
 
+    /// Uploads `bytes` if the buffer does not hold them.
+    ///
+    /// # Errors
+    /// If the device allows no buffer of that size.
+    pub(crate) fn set(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        bytes: &[u8],
+    ) -> Result<(), BackendError> {
+        if self.on_device.reserve(device, bytes.len())? || bytes != self.written {
+            self.on_device.write(uploads, 0, bytes);
+            self.written.clear();
+            self.written.extend_from_slice(bytes);
+        }
+        Ok(())
+    }
+
     /// Uploads the rewritten bytes if they changed. Returns whether the buffer was reallocated.
     ///
     /// # Errors

@@ -17,7 +17,9 @@ mod vertex_layout;
 
 pub(crate) use arena::new_buffer;
 pub(crate) use asset_cache::{AssetCache, AssetSnapshot};
-pub(crate) use bind_group_layouts::{BindGroupLayouts, SampledTarget, columns_layout, process_layout, texture_format};
+pub(crate) use bind_group_layouts::{
+    BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
+};
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
 pub(crate) use growing_buffer::{
     ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,

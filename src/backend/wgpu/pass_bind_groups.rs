@@ -1,0 +1,49 @@
+//! The bind groups of a pass that its process determines.
+
+use super::frame::{PassResources, WgpuPassState};
+use super::pipelines::ProcessPipelines;
+use super::resources::{BindingResource, CachedBindGroup, WgpuTargets};
+use crate::backend::{BackendError, FrameRequest};
+use crate::process::{Access, Pass, ShaderResource};
+
+/// Updates `@group(2)` and `@group(3)` of a pass: makes them anew if something else is to be bound.
+///
+/// # Errors
+/// If the device refuses a resource of the engine's.
+pub(super) fn update_bind_groups(
+    device: &wgpu::Device,
+    request: &FrameRequest<'_>,
+    pipelines: &ProcessPipelines,
+    targets: &WgpuTargets,
+    resources: &PassResources<'_>,
+    pass: &mut WgpuPassState,
+) -> Result<(), BackendError> {
+    let Pass { process_index: process, view_index: view } = pass.pass;
+    let declaration = &request.plan.processes()[process].declaration;
+
+    let parameters = pass.parameters.and_then(|(offset, length)| resources.parameters.binding(offset, length));
+    let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
+    let sampled = |(name, access): &(String, Access)| match access {
+        Access::Sample => targets.find(view, name).map(|target| &target.view),
+        Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
+        _ => None,
+    };
+    let sampled = (1..).zip(declaration.accesses.iter().filter_map(sampled).map(BindingResource::Texture));
+    let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
+    let bound = parameters.into_iter().chain(sampled);
+    pass.process_bind_group = CachedBindGroup::update(before, device, &pass.label, layout, bound)?;
+
+    let columns = declaration.columns.iter().filter_map(|column| resources.objects.column(*column));
+    let draws = &request.draws[process];
+    let mut bytes = resources.bytes.of_process(process);
+    let own = draws.resources().iter().filter_map(move |resource| match resource {
+        ShaderResource::Bytes(_) => bytes.next().map(BindingResource::Buffer),
+        ShaderResource::Buffer(buffer) => Some(BindingResource::Buffer(buffer.as_entire_buffer_binding())),
+        ShaderResource::Texture { view, .. } => Some(BindingResource::Texture(view)),
+        ShaderResource::Sampler { sampler, .. } => Some(BindingResource::Sampler(sampler)),
+    });
+    let (before, layout) = (pass.engine_bind_group.take(), pipelines.engine_layout.as_ref());
+    let bound = (0..).zip(columns.map(BindingResource::Buffer).chain(own));
+    pass.engine_bind_group = CachedBindGroup::update(before, device, &pass.label, layout, bound)?;
+    Ok(())
+}

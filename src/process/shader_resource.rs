@@ -1,0 +1,44 @@
+//! Resources of the engine's own that shaders read.
+
+use std::borrow::Cow;
+
+/// Something of the engine's own that a process's shader reads, at `@group(3)`: after the
+/// [columns](super::Declare::reads_column) that the process reads, each has the next binding.
+///
+/// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another `wgpu::Instance`.
+///
+/// The bind group is made by the crate, and made anew only when a resource is another one. A CPU shader does not get these: it
+/// brings its own, since [`RenderProcess::cpu_shader`](super::RenderProcess) is called once a frame.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ShaderResource<'a> {
+    /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is recorded, and
+    /// uploaded if they changed. There are 4 or more, in multiples of 4.
+    Bytes(Cow<'a, [u8]>),
+    /// A buffer with the usage `STORAGE`: `var<storage, read>`.
+    #[cfg(feature = "wgpu")]
+    Buffer(wgpu::Buffer),
+    /// A texture with the usage `TEXTURE_BINDING`.
+    #[cfg(feature = "wgpu")]
+    Texture {
+        /// The view of it.
+        view: wgpu::TextureView,
+        /// The dimension that the view was made with: `D2` for `texture_2d`.
+        dimension: wgpu::TextureViewDimension,
+    },
+    /// A sampler.
+    #[cfg(feature = "wgpu")]
+    Sampler {
+        /// The sampler.
+        sampler: wgpu::Sampler,
+        /// How it samples: `Filtering` for `sampler`, `Comparison` for `sampler_comparison`.
+        kind: wgpu::SamplerBindingType,
+    },
+}
+
+impl<'a> ShaderResource<'a> {
+    /// The bytes of a slice, which the frame copies.
+    pub fn bytes_of<T: bytemuck::NoUninit>(values: &'a [T]) -> Self {
+        Self::Bytes(Cow::Borrowed(bytemuck::cast_slice(values)))
+    }
+}
