@@ -9,6 +9,7 @@ use super::stage_clock::StageClock;
 use super::tables::FrameTables;
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
+use crate::process::TargetSize;
 use crate::scene::Projection;
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
@@ -98,7 +99,10 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// Whether a pass culls triangles of meshes with triangle culling.
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
-        self.culls_triangles && self.request.views[self.view_index_of(pass)].can_cull_triangles()
+        // The test is of the pixels of the picture.
+        let draws_picture =
+            self.request.plan.drawn_size(self.request.passes[pass].process_index) == TargetSize::Picture;
+        self.culls_triangles && draws_picture && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 
     /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.

@@ -2,11 +2,11 @@
 
 use bytemuck::Pod;
 
-use super::Format;
+use super::{Format, TargetSize};
 use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
-/// of the size of its picture.
+/// of the size of its picture unless [`Declare::size`] says otherwise.
 #[derive(Debug, Default)]
 pub struct Declare {
     declaration: Declaration,
@@ -58,6 +58,23 @@ impl Declare {
     /// `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
     pub fn samples(&mut self, target: &str) {
         self.access(target, Access::Sample);
+    }
+
+    /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`] does: the history
+    /// of temporal filters. The process may write the target itself.
+    ///
+    /// That is the latest frame that was submitted with a view of this index and name whose target had this size and format. Before
+    /// there is one, all channels are 0, so a target whose alpha is written as 1 tells whether it has a history. The price is a copy
+    /// of the target at the end of each frame.
+    pub fn samples_previous(&mut self, target: &str) {
+        self.access(&previous_name(target), Access::SamplePrevious);
+    }
+
+    /// Sets the size of a target that the process creates: that it clears, or overwrites in a raw pass. Without this call it has
+    /// the size of the view's picture. All targets that a process draws into, and the depth that it tests, have the same size.
+    pub fn size(&mut self, target: &str, size: TargetSize) {
+        let size = if size == TargetSize::Divided(1) { TargetSize::Picture } else { size };
+        self.declaration.sizes.push((target.to_owned(), size));
     }
 
     /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
@@ -171,6 +188,8 @@ pub struct Declaration {
     pub views: ViewKind,
     /// The targets that it uses, and how, in the order declared.
     pub accesses: Vec<(String, Access)>,
+    /// The sizes of targets that it creates, if they are not those of the pictures.
+    pub sizes: Vec<(String, TargetSize)>,
     /// The data of objects that its shader reads, in the order of their bindings.
     pub columns: Vec<ColumnLayout>,
     /// The processes that it comes after.
@@ -206,11 +225,16 @@ impl Declaration {
     /// to.
     pub fn samples(&self) -> impl Iterator<Item = (ViewKind, &str)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
-            Access::Sample => Some((self.views, target.as_str())),
+            Access::Sample | Access::SamplePrevious => Some((self.views, target.as_str())),
             Access::SampleLayers(views) => Some((*views, target.as_str())),
             _ => None,
         })
     }
+}
+
+/// The name of what a target held at the end of the frame before, by which it can be read back.
+pub fn previous_name(target: &str) -> String {
+    format!("{target} of the frame before")
 }
 
 /// How a process uses a target.
@@ -233,6 +257,8 @@ pub enum Access {
     MatchDepth,
     /// Read by the shader.
     Sample,
+    /// Read by the shader: what another target held at the end of the frame before. The name is that of [`previous_name`].
+    SamplePrevious,
     /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
     /// Written by a raw pass.
@@ -244,14 +270,29 @@ pub enum Access {
 }
 
 impl Access {
-    /// Whether it depends on the target's earlier content.
+    /// Whether it depends on what other processes wrote in the same frame.
     pub fn reads(self) -> bool {
-        !matches!(self, Self::ClearColor(..) | Self::ClearDepth(_) | Self::ClearDepthLayer(_) | Self::Write(_))
+        !matches!(
+            self,
+            Self::SamplePrevious
+                | Self::ClearColor(..)
+                | Self::ClearDepth(_)
+                | Self::ClearDepthLayer(_)
+                | Self::Write(_)
+        )
     }
 
     /// Whether it changes the target.
     pub fn writes(self) -> bool {
-        !matches!(self, Self::TestDepth | Self::MatchDepth | Self::Sample | Self::SampleLayers(_) | Self::Read)
+        !matches!(
+            self,
+            Self::TestDepth
+                | Self::MatchDepth
+                | Self::Sample
+                | Self::SamplePrevious
+                | Self::SampleLayers(_)
+                | Self::Read
+        )
     }
 
     /// The target's format, if the access creates the target.

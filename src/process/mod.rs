@@ -21,6 +21,7 @@ mod prelude;
 mod raw_pass;
 mod render_process;
 mod shader_resource;
+mod target_size;
 
 #[cfg(feature = "software")]
 pub use cpu_shader::{
@@ -28,7 +29,7 @@ pub use cpu_shader::{
     PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS,
     VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
-pub use declaration::{Access, ClearColor, Declaration, Declare};
+pub use declaration::{Access, ClearColor, Declaration, Declare, previous_name};
 pub use deferred::{
     Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Requirements, ShadowCasters, Transparency,
 };
@@ -43,6 +44,7 @@ pub use prelude::SHADER_PRELUDE;
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
 pub use shader_resource::ShaderResource;
+pub use target_size::TargetSize;
 
 #[cfg(feature = "software")]
 pub(crate) use cpu_shader::TypedCpuShader;

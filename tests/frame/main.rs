@@ -11,6 +11,7 @@ mod occlusion;
 mod quality;
 mod retained;
 mod shadow_interval;
+mod targets;
 mod timeline;
 mod triangles;
 mod tuning;

@@ -14,6 +14,7 @@ mod extremes;
 mod fixture;
 mod formats;
 mod geometry;
+mod history;
 mod image_distance;
 mod light_cut_off;
 mod light_volumes;
@@ -52,6 +53,7 @@ fn main() {
         (extremes::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
+        (history::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),

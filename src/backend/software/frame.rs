@@ -66,6 +66,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
             };
             self.draw(known.ok_or_else(unknown)?, commands)?;
         }
+        self.targets.copy_histories();
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
     }
 }

@@ -171,7 +171,7 @@ fn attachments<R: Precision>(
         Ok(DepthAttachment { target: of_view(name)?, clears, is_writable, tests_equal })
     };
     let sampled = declaration.accesses.iter().filter_map(|(name, access)| match access {
-        Access::Sample => Some(of_view(name)),
+        Access::Sample | Access::SamplePrevious => Some(of_view(name)),
         Access::SampleLayers(kind) => Some(layered(*kind, name)),
         _ => None,
     });

@@ -7,7 +7,7 @@ use super::light_bounds::LightBounds;
 use super::pass_context::PassContext;
 use super::precision::Precision;
 use super::tiles::pixels_of;
-use crate::process::{FullScreenCpuShader, FullScreenPixel, LightCpuShader};
+use crate::process::{FullScreenCpuShader, FullScreenPixel, LightCpuShader, ShaderView};
 use crate::raster::{PixelBounds, Vector, Vector4};
 use crate::scene::Blend;
 use crate::task::JobPanic;
@@ -32,7 +32,7 @@ pub(super) fn draw_full_screen<R: Precision>(
                 &mut tile,
                 bounds,
                 blend,
-                context.view.shader_view.size,
+                open.tiling.size(),
                 |stored| stored == R::zero(),
                 |pixel, targets| shader.fragment(&inputs, pixel, targets),
             );
@@ -52,8 +52,9 @@ pub(super) fn draw_lights<R: Precision>(
 ) -> Result<(), JobPanic> {
     let view = context.view;
     let lights = &view.lights[lights];
-    let light_bounds: Vec<_> = lights.iter().map(|light| LightBounds::new(&view.shader_view, light)).collect();
     context.attachments.open(|open| {
+        let shader_view = ShaderView { size: open.tiling.size(), ..view.shader_view.clone() };
+        let light_bounds: Vec<_> = lights.iter().map(|light| LightBounds::new(&shader_view, light)).collect();
         let sampled = open.sampled();
         let inputs = context.inputs(&sampled);
         context.executor.for_each(open.tiles.len(), |tile| {
@@ -63,7 +64,7 @@ pub(super) fn draw_lights<R: Precision>(
                 let bounds = tile.bounds.intersection(light_bounds.pixels);
                 let [low, high] = light_bounds.depths.map(R::of);
                 let is_within = |stored| stored > R::zero() && low <= stored && stored <= high;
-                draw_pixels(&mut tile, bounds, Blend::Additive, view.shader_view.size, is_within, |pixel, targets| {
+                draw_pixels(&mut tile, bounds, Blend::Additive, shader_view.size, is_within, |pixel, targets| {
                     shader.fragment(&inputs, pixel, light, targets)
                 });
             }

@@ -41,8 +41,8 @@ impl<R> Clone for SoftwareTarget<R> {
 
 /// The targets of one frame.
 pub(super) struct SoftwareTargets<R> {
-    /// Of each view: its own targets, and its layers of shared ones.
-    views: Vec<Vec<SoftwareTarget<R>>>,
+    /// Of each view: its name, its own targets, and its layers of shared ones.
+    views: Vec<(String, Vec<SoftwareTarget<R>>)>,
     /// The targets that all views of a kind share.
     layered: Vec<Arc<TiledTexture<R>>>,
 }
@@ -56,7 +56,23 @@ impl<R> Default for SoftwareTargets<R> {
 impl<R> SoftwareTargets<R> {
     /// A view's target by its name.
     pub(super) fn find(&self, view: usize, name: &str) -> Option<&SoftwareTarget<R>> {
-        self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
+        self.views.get(view)?.1.iter().find(|target| target.texture.planned.name == name)
+    }
+
+    /// Copies what processes of later frames read of this one.
+    pub(super) fn copy_histories(&self)
+    where
+        R: Precision,
+    {
+        for (view, (_, targets)) in self.views.iter().enumerate() {
+            for copy in targets {
+                let source = copy.texture.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
+                if let Some(source) = source {
+                    let (mut copied, source) = (copy.texture.tiles.write(), source.texture.tiles.read());
+                    copied.iter_mut().zip(&*source).for_each(|(copy, tile)| copy.clone_from(tile));
+                }
+            }
+        }
     }
 
     /// A target that all views of a kind share, from its first layer on.
@@ -113,14 +129,18 @@ impl<R: Precision> TargetCache<R> {
                     );
                     continue;
                 }
+                let size = planned.size.in_view(view.camera.size);
+                // Another view has no part in this one's history.
+                let is_same_view = self.current.views.get(index).is_some_and(|(name, _)| name == view.name());
                 let kept = self.current.find(index, &planned.name);
-                let texture = match kept.filter(|kept| kept.texture.is_for(planned, view.camera.size)) {
+                let kept = kept.filter(|_| is_same_view || planned.copy_of.is_none());
+                let texture = match kept.filter(|kept| kept.texture.is_for(planned, size)) {
                     Some(kept) => Arc::clone(&kept.texture),
-                    None => Arc::new(TiledTexture::new(planned, view.camera.size, 1)?),
+                    None => Arc::new(TiledTexture::new(planned, size, 1)?),
                 };
                 targets.push(SoftwareTarget { texture, layer: 0 });
             }
-            next.views.push(targets);
+            next.views.push((view.name().to_owned(), targets));
         }
         self.current = Arc::new(next);
         Ok(Arc::clone(&self.current))

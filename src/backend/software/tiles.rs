@@ -60,6 +60,7 @@ pub(super) fn index_in_tile([x, y]: [usize; 2]) -> usize {
 }
 
 /// A tile's pixels; those outside of the picture are unused.
+#[derive(Clone)]
 pub(super) struct Tile<R>(Box<[R]>);
 
 impl<R: Precision> Tile<R> {

@@ -24,7 +24,7 @@ pub(super) fn update_bind_groups(
     let parameters = pass.parameters.and_then(|(offset, length)| resources.parameters.binding(offset, length));
     let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
     let sampled = |(name, access): &(String, Access)| match access {
-        Access::Sample => targets.find(view, name).map(|target| &target.view),
+        Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.view),
         Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
         _ => None,
     };

@@ -45,7 +45,13 @@ impl WgpuBackend {
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copy, readback) = readback.unzip();
             frame.buffers.objects().unmap();
-            let index = self.queue().submit(finished.into_iter().chain(copy));
+            let histories = frame.targets.have_histories().then(|| {
+                let descriptor = wgpu::CommandEncoderDescriptor { label: Some("histories") };
+                let mut encoder = self.device.create_command_encoder(&descriptor);
+                frame.targets.copy_histories(&mut encoder);
+                encoder.finish()
+            });
+            let index = self.queue().submit(finished.into_iter().chain(histories).chain(copy));
             frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), readback))

@@ -1,7 +1,7 @@
 //! Errors in a frame's processes and how they fit together.
 
 use crate::graph::GraphProblem;
-use crate::process::Format;
+use crate::process::{Format, TargetSize};
 
 /// Why no frame can be made of these processes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -27,6 +27,44 @@ pub enum PlanError {
         first: Format,
         /// The other.
         second: Format,
+    },
+    /// Two processes create a target in different sizes.
+    #[error("target {target:?} has the sizes {first:?} and {second:?}")]
+    ConflictingSizes {
+        /// The target.
+        target: String,
+        /// One size.
+        first: TargetSize,
+        /// The other.
+        second: TargetSize,
+    },
+    /// A process sets the size of a target that has none of its own.
+    #[error("process {process:?} sets the size of target {target:?}, {problem}")]
+    InvalidSize {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A process draws into targets of different sizes at once, or tests depth of another size.
+    #[error("process {process:?} uses targets {:?} and {:?}, which differ in size, in one pass", targets[0], targets[1])]
+    UnequalSizes {
+        /// The process.
+        process: String,
+        /// Two targets.
+        targets: [String; 2],
+    },
+    /// A process reads the history of a target that no process of its views writes, or that is drawn in layers.
+    #[error(
+        "process {process:?} reads {target:?}, but no process writes that target in the same views, as one for each view"
+    )]
+    NoHistory {
+        /// The process.
+        process: String,
+        /// What it reads.
+        target: String,
     },
     /// A target is used as depth with a format that holds colour, or the other way round.
     #[error("process {process:?} uses target {target:?} in a way that its format {format:?} does not allow")]

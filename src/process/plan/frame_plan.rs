@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::columns::{check_columns, columns_of};
 use super::order::{AddedProcess, order_constraints};
-use super::planned_target::targets_of;
+use super::planned_target::{drawn_size, targets_of};
 use super::view_group::view_groups;
 use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
-use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters};
+use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters, TargetSize, previous_name};
 use crate::scene::{ColumnLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
 
@@ -24,6 +24,8 @@ pub struct FramePlan {
     view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
+    /// Of each process.
+    drawn_sizes: Vec<TargetSize>,
     dropped: Vec<String>,
     dot: String,
 }
@@ -52,12 +54,16 @@ impl FramePlan {
             .collect::<Result<_, PlanError>>()?;
         planned.sort_by_key(|(_, planned)| planned.declaration.views);
         let mut graph = FrameGraph::new();
-        let mut added: Vec<AddedProcess> = Vec::new();
+        let (mut added, mut histories): (Vec<AddedProcess>, Vec<_>) = (Vec::new(), Vec::new());
         for (chain_slot, planned) in planned {
             let PlannedProcess { name, declaration, .. } = &planned;
             let (name, declaration) = (name.clone(), declaration.clone());
             let id = graph.add(name.clone(), planned);
             for (target, access) in &declaration.accesses {
+                if *access == Access::SamplePrevious {
+                    histories.push((declaration.views, target.clone()));
+                    continue;
+                }
                 let resource = graph.resource(resource_name(access.views(declaration.views), target));
                 if access.reads() {
                     graph.read(id, resource);
@@ -91,6 +97,16 @@ impl FramePlan {
             }
         }
 
+        // A target whose history is read is an output of its frame.
+        for added in &added {
+            let declaration = &added.declaration;
+            let is_read = |target: &str| histories.contains(&(declaration.views, previous_name(target)));
+            for target in declaration.written().filter(|target| is_read(target)) {
+                let resource = graph.resource(resource_name(declaration.views, target));
+                graph.output(resource);
+            }
+        }
+
         let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
         let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
         let dot =
@@ -106,9 +122,20 @@ impl FramePlan {
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
         let columns = columns_of(&processes)?;
+        let drawn_sizes = processes.iter().map(|planned| drawn_size(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { identity, alive: Arc::default(), processes, view_groups, targets, columns, dropped, dot })
+        Ok(Self {
+            identity,
+            alive: Arc::default(),
+            processes,
+            view_groups,
+            targets,
+            columns,
+            drawn_sizes,
+            dropped,
+            dot,
+        })
     }
 
     /// A number that no other plan of this program has.
@@ -157,6 +184,11 @@ impl FramePlan {
         &self.targets
     }
 
+    /// The size of the targets that a process, by index, draws into; that of the picture if it draws into none.
+    pub fn drawn_size(&self, process: usize) -> TargetSize {
+        self.drawn_sizes[process]
+    }
+
     /// The columns of objects that the processes read, each once.
     pub fn columns(&self) -> &[ColumnLayout] {
         &self.columns
@@ -202,6 +234,8 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Opti
         format: Format::Depth32Float,
         stored: false,
         layered: true,
+        size: TargetSize::Picture,
+        copy_of: None,
     })
 }
 

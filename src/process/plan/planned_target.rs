@@ -1,7 +1,7 @@
 //! The targets that a plan's processes use.
 
 use super::{PlanError, PlannedProcess};
-use crate::process::{Access, Format};
+use crate::process::{Access, Declaration, Format, TargetSize, previous_name};
 use crate::scene::ViewKind;
 
 /// A target that each view of one kind has.
@@ -17,33 +17,19 @@ pub struct PlannedTarget {
     pub stored: bool,
     /// Whether all views of the kind share it: one texture array, a layer for each view.
     pub layered: bool,
+    /// Its size.
+    pub size: TargetSize,
+    /// The target whose content is copied here at the end of each frame; `None` for one that processes write.
+    pub copy_of: Option<String>,
 }
 
-/// The targets of all processes, in the order in which they are first written.
+/// The targets of all processes, in the order in which they are first written, then the copies of those whose history is read.
 ///
 /// # Errors
-/// If processes disagree about a target's format or layers, or use depth as colour or colour as depth.
+/// If processes disagree about a target's format, layers or size, use depth as colour or colour as depth, draw into targets of
+/// different sizes, or read the history of a target that is not written or is drawn in layers.
 pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
-    let mut targets: Vec<PlannedTarget> = Vec::new();
-    for (planned, name, access) in accesses(processes) {
-        let Some(format) = access.format() else { continue };
-        let views = planned.declaration.views;
-        let layered = matches!(access, Access::ClearDepthLayer(_));
-        match targets.iter().find(|known| known.name == *name && known.views == views) {
-            Some(known) if known.format != format => {
-                return Err(PlanError::ConflictingFormats {
-                    target: name.clone(),
-                    first: known.format,
-                    second: format,
-                });
-            }
-            Some(known) if known.layered != layered => {
-                return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
-            }
-            Some(_) => {}
-            None => targets.push(PlannedTarget { name: name.clone(), views, format, stored: false, layered }),
-        }
-    }
+    let mut targets = written_targets(processes)?;
     for (planned, name, access) in accesses(processes) {
         let views = access.views(planned.declaration.views);
         let Some(known) = targets.iter_mut().find(|known| known.name == *name && known.views == views) else {
@@ -59,7 +45,117 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
             return Err(PlanError::LayeringMismatch { process: process(), target: name.clone() });
         }
     }
+    processes.iter().try_for_each(|planned| check_attachments(planned, &targets))?;
+    let copies = copied_targets(processes, &targets)?;
+    targets.extend(copies);
     Ok(targets)
+}
+
+fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
+    let mut targets: Vec<PlannedTarget> = Vec::new();
+    for planned in processes {
+        check_sizes(planned)?;
+    }
+    for (planned, name, access) in accesses(processes) {
+        let Some(format) = access.format() else { continue };
+        let views = planned.declaration.views;
+        let layered = matches!(access, Access::ClearDepthLayer(_));
+        let size = size_of(&planned.declaration, name);
+        match targets.iter().find(|known| known.name == *name && known.views == views) {
+            Some(known) if known.format != format => {
+                return Err(PlanError::ConflictingFormats {
+                    target: name.clone(),
+                    first: known.format,
+                    second: format,
+                });
+            }
+            Some(known) if known.layered != layered => {
+                return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
+            }
+            Some(known) if known.size != size => {
+                return Err(PlanError::ConflictingSizes { target: name.clone(), first: known.size, second: size });
+            }
+            Some(_) => {}
+            None => {
+                let (name, copy_of) = (name.clone(), None);
+                targets.push(PlannedTarget { name, views, format, stored: false, layered, size, copy_of });
+            }
+        }
+    }
+    Ok(targets)
+}
+
+fn size_of(declaration: &Declaration, target: &str) -> TargetSize {
+    declaration.sizes.iter().find(|(sized, _)| sized == target).map_or(TargetSize::Picture, |(_, size)| *size)
+}
+
+/// # Errors
+/// If a process sets the size of a target that it does not create, or that is drawn in layers, or sets one that no target can have.
+fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
+    for (target, size) in &planned.declaration.sizes {
+        let created =
+            planned.declaration.accesses.iter().find(|(name, access)| name == target && access.format().is_some());
+        let problem = match created {
+            None => "that it does not create",
+            Some((_, Access::ClearDepthLayer(_))) => "that it draws in layers, which have the size of the pictures",
+            Some(_) if !size.is_valid() => "to a size without pixels",
+            Some(_) => continue,
+        };
+        return Err(PlanError::InvalidSize { process: planned.name.clone(), target: target.clone(), problem });
+    }
+    Ok(())
+}
+
+/// # Errors
+/// If a process draws into targets of different sizes, or tests depth of another size.
+fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<(), PlanError> {
+    let mut attached = attached_targets(planned, targets);
+    let Some(first) = attached.next() else { return Ok(()) };
+    match attached.find(|other| other.size != first.size) {
+        None => Ok(()),
+        Some(other) => {
+            let (process, targets) = (planned.name.clone(), [first.name.clone(), other.name.clone()]);
+            Err(PlanError::UnequalSizes { process, targets })
+        }
+    }
+}
+
+/// The size of the targets that a process draws into; that of the picture if it draws into none.
+pub(super) fn drawn_size(planned: &PlannedProcess, targets: &[PlannedTarget]) -> TargetSize {
+    attached_targets(planned, targets).next().map_or(TargetSize::Picture, |target| target.size)
+}
+
+/// The targets that a process draws into, and the depth that it tests.
+fn attached_targets<'a>(
+    planned: &'a PlannedProcess,
+    targets: &'a [PlannedTarget],
+) -> impl Iterator<Item = &'a PlannedTarget> {
+    let Declaration { views, accesses, .. } = &planned.declaration;
+    let is_attached =
+        |access: &Access| access.is_depth() || matches!(access, Access::ClearColor(..) | Access::DrawOver);
+    let attached = accesses.iter().filter(move |(_, access)| is_attached(access));
+    attached.filter_map(|(name, _)| targets.iter().find(|known| known.name == *name && known.views == *views))
+}
+
+/// The copies of targets whose content of the frame before is read.
+fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Result<Vec<PlannedTarget>, PlanError> {
+    let mut copies: Vec<PlannedTarget> = Vec::new();
+    for (planned, name, access) in accesses(processes) {
+        let views = planned.declaration.views;
+        let is_known = copies.iter().any(|known| known.name == *name && known.views == views);
+        if access != Access::SamplePrevious || is_known {
+            continue;
+        }
+        let mut written = targets.iter().filter(|known| known.views == views && !known.layered);
+        match written.find(|known| previous_name(&known.name) == *name) {
+            None => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
+            Some(source) => {
+                let (name, copy_of) = (name.clone(), Some(source.name.clone()));
+                copies.push(PlannedTarget { name, copy_of, stored: false, ..source.clone() });
+            }
+        }
+    }
+    Ok(copies)
 }
 
 fn accesses(processes: &[PlannedProcess]) -> impl Iterator<Item = (&PlannedProcess, &String, Access)> {

@@ -68,7 +68,9 @@ impl AttachmentFormats {
             tests_equal: access == Access::MatchDepth,
         });
         let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
-            Access::Sample => Some(SampledTarget { format: format_of(declaration.views, target), layered: false }),
+            Access::Sample | Access::SamplePrevious => {
+                Some(SampledTarget { format: format_of(declaration.views, target), layered: false })
+            }
             Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
             _ => None,
         });

@@ -11,8 +11,8 @@ use crate::view::RenderView;
 /// The targets of one frame.
 #[derive(Default)]
 pub(crate) struct WgpuTargets {
-    /// For each view its own targets, and its layers of the shared ones.
-    views: Vec<Vec<ViewTarget>>,
+    /// For each view its name, its own targets, and its layers of the shared ones.
+    views: Vec<(String, Vec<ViewTarget>)>,
     /// The targets that all views of a kind share.
     layered: Vec<LayeredTarget>,
 }
@@ -44,7 +44,7 @@ impl ViewTarget {
 impl WgpuTargets {
     /// The target of one view by its name.
     pub(crate) fn find(&self, view: usize, name: &str) -> Option<&ViewTarget> {
-        self.views.get(view)?.iter().find(|target| target.planned.name == name)
+        self.views.get(view)?.1.iter().find(|target| target.planned.name == name)
     }
 
     /// The array that all views of a kind share.
@@ -53,9 +53,26 @@ impl WgpuTargets {
         found.map(|target| (&target.texture, &target.array))
     }
 
+    /// Copies what processes of later frames read of this one.
+    pub(crate) fn copy_histories(&self, encoder: &mut wgpu::CommandEncoder) {
+        for (view, (_, targets)) in self.views.iter().enumerate() {
+            for copy in targets {
+                let source = copy.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
+                let Some(source) = source else { continue };
+                let (from, to) = (source.texture.as_image_copy(), copy.texture.as_image_copy());
+                encoder.copy_texture_to_texture(from, to, copy.texture.size());
+            }
+        }
+    }
+
+    /// Whether processes of later frames read something of this one.
+    pub(crate) fn have_histories(&self) -> bool {
+        self.views.iter().any(|(_, targets)| targets.iter().any(|target| target.planned.copy_of.is_some()))
+    }
+
     /// The number of textures, and their size in bytes.
     pub(crate) fn sizes(&self) -> (usize, u64) {
-        let own = self.views.iter().flatten().filter(|target| !target.planned.layered);
+        let own = self.views.iter().flat_map(|(_, targets)| targets).filter(|target| !target.planned.layered);
         let textures = own.map(|target| (&target.planned, &target.texture));
         let textures = textures.chain(self.layered.iter().map(|target| (&target.planned, &target.texture)));
         textures.fold((0, 0), |(count, bytes), (planned, texture)| {
@@ -71,7 +88,7 @@ impl WgpuTargets {
 #[derive(Default)]
 pub(crate) struct TargetCache {
     current: Arc<WgpuTargets>,
-    /// The key of the current targets: the plan's identity, and kind, size and layer of each view.
+    /// The key of the current targets, beside the views' names: the plan's identity, and kind, size and layer of each view.
     plan: Option<u64>,
     views: Vec<(ViewKind, [u32; 2], u32)>,
 }
@@ -89,7 +106,9 @@ impl TargetCache {
         views: &[RenderView],
     ) -> Result<Arc<WgpuTargets>, BackendError> {
         let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
-        if self.plan == Some(plan.identity()) && self.views.iter().copied().eq(requested()) {
+        let names = self.current.views.iter().map(|(name, _)| name.as_str());
+        let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
+        if self.plan == Some(plan.identity()) && are_same_views {
             return Ok(Arc::clone(&self.current));
         }
         // If an error occurs below, no targets are current.
@@ -102,14 +121,14 @@ impl TargetCache {
             let planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
             let targets = planned.map(|planned| {
                 if !planned.layered {
-                    return self.own_target(device, planned, index, view.camera.size);
+                    return self.own_target(device, planned, index, view);
                 }
                 let shared = next.layered.iter().find(|shared| *shared.planned == *planned);
                 let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
                 Ok(self.layer_target(shared.ok_or_else(missing)?, index, view.layer))
             });
             let targets = targets.collect::<Result<_, _>>()?;
-            next.views.push(targets);
+            next.views.push((view.name().to_owned(), targets));
         }
         self.current = Arc::new(next);
         self.plan = Some(plan.identity());
@@ -127,11 +146,14 @@ impl TargetCache {
         &self,
         device: &wgpu::Device,
         planned: &PlannedTarget,
-        view: usize,
-        size: [u32; 2],
+        index: usize,
+        view: &RenderView,
     ) -> Result<ViewTarget, BackendError> {
-        let extent = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
-        let cached = self.current.find(view, &planned.name);
+        let [width, height] = planned.size.in_view(view.camera.size);
+        let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        // Another view has no part in this one's history.
+        let is_same_view = self.current.views.get(index).is_some_and(|(name, _)| name == view.name());
+        let cached = self.current.find(index, &planned.name).filter(|_| is_same_view || planned.copy_of.is_none());
         if let Some(cached) = cached.filter(|cached| *cached.planned == *planned && cached.texture.size() == extent) {
             return Ok(cached.clone());
         }

@@ -1,0 +1,151 @@
+//! Sizes and histories of targets that no plan can have.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, PlanError, RenderProcess, TargetSize};
+use drawloom::scene::ViewKind;
+use drawloom::task::Scheduler;
+use drawloom::{BuildError, Renderer};
+
+/// A process with a name, and a function that declares.
+struct Declaring(&'static str, Box<dyn Fn(&mut Declare) + Send + Sync>);
+
+impl Declaring {
+    fn new(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> Self {
+        Self(name, Box::new(declare))
+    }
+}
+
+impl RenderProcess for Declaring {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (self.1)(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen::default())
+    }
+}
+
+fn clears(declare: &mut Declare, target: &str) {
+    declare.clears_color(target, Format::Rgba8Unorm, ClearColor::Background);
+    declare.keep();
+}
+
+fn plan_error<const N: usize>(processes: [Declaring; N]) -> PlanError {
+    let builder = Renderer::builder(NullBackend);
+    let builder = processes.into_iter().fold(builder, |builder, process| builder.process(process));
+    match builder.build(Arc::new(Scheduler::new(1).unwrap())).err() {
+        Some(BuildError::Plan(error)) => error,
+        other => panic!("no error of a plan, but {other:?}"),
+    }
+}
+
+#[test]
+fn sizes_that_no_target_can_have_are_named() {
+    type Case = (fn(&mut Declare), &'static str);
+    let cases: [Case; 5] = [
+        (|declare| declare.size("other", TargetSize::Divided(2)), "does not create"),
+        (
+            |declare| {
+                declare.draws_over("other");
+                declare.size("other", TargetSize::Divided(2));
+            },
+            "does not create",
+        ),
+        (
+            |declare| {
+                clears(declare, "own");
+                declare.size("own", TargetSize::Divided(0));
+            },
+            "without pixels",
+        ),
+        (
+            |declare| {
+                clears(declare, "own");
+                declare.size("own", TargetSize::Fixed([3, 0]));
+            },
+            "without pixels",
+        ),
+        (
+            |declare| {
+                declare.clears_depth_layer("layers", Format::Depth32Float);
+                declare.size("layers", TargetSize::Divided(2));
+            },
+            "in layers",
+        ),
+    ];
+    for (declare, expected) in cases {
+        let sized = Declaring::new("sized", move |declaration| {
+            declare(declaration);
+            declaration.keep();
+        });
+        let other = Declaring::new("other", |declare| clears(declare, "other"));
+        let error = plan_error([other, sized]);
+        assert!(matches!(&error, PlanError::InvalidSize { process, .. } if process == "sized"), "{error}");
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn processes_that_disagree_about_a_size_are_refused() {
+    let whole = Declaring::new("whole", |declare| clears(declare, "picture"));
+    let half = Declaring::new("half", |declare| {
+        clears(declare, "picture");
+        declare.size("picture", TargetSize::Divided(2));
+        declare.after("whole");
+    });
+    let error = plan_error([whole, half]);
+    assert!(matches!(&error, PlanError::ConflictingSizes { target, .. } if target == "picture"), "{error}");
+}
+
+#[test]
+fn targets_of_one_pass_have_one_size() {
+    let error = plan_error([Declaring::new("mixed", |declare| {
+        clears(declare, "picture");
+        declare.clears_depth("depth", Format::Depth32Float);
+        declare.size("depth", TargetSize::Divided(2));
+    })]);
+    let PlanError::UnequalSizes { process, targets } = &error else { panic!("{error}") };
+    assert_eq!((process.as_str(), targets.each_ref().map(String::as_str)), ("mixed", ["picture", "depth"]));
+}
+
+#[test]
+fn a_history_needs_a_target_of_the_same_views() {
+    for target in ["unknown", "shadowed", "layers"] {
+        let shadowed = Declaring::new("shadowed", |declare| {
+            declare.views(ViewKind::Shadow);
+            clears(declare, "shadowed");
+        });
+        let layers = Declaring::new("layers", |declare| {
+            declare.clears_depth_layer("layers", Format::Depth32Float);
+            declare.keep();
+        });
+        let reader = Declaring::new("reader", move |declare| {
+            clears(declare, "picture");
+            declare.samples_previous(target);
+        });
+        let error = plan_error([shadowed, layers, reader]);
+        assert!(matches!(&error, PlanError::NoHistory { process, .. } if process == "reader"), "{error}");
+    }
+}
+
+#[test]
+fn a_process_whose_target_is_read_in_the_next_frame_is_not_dropped() {
+    let writer = Declaring::new("writer", |declare| {
+        declare.clears_color("written", Format::Rgba8Unorm, ClearColor::Background);
+    });
+    let reader = Declaring::new("reader", |declare| {
+        declare.samples_previous("written");
+        clears(declare, "picture");
+    });
+    let builder = Renderer::builder(NullBackend).process(writer).process(reader);
+    let (renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    assert!(renderer.plan().dropped().is_empty());
+    let targets: Vec<_> = renderer.plan().targets().iter().map(|target| target.name.as_str()).collect();
+    assert_eq!(targets, ["written", "picture", "written of the frame before"]);
+}
