@@ -135,6 +135,7 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            layers: &[],
             columns: &[],
             // Every cube moves in every frame.
             changes: Changes::Unknown,

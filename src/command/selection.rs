@@ -1,6 +1,6 @@
 //! Which objects a process draws.
 
-use crate::scene::Blend;
+use crate::scene::{Blend, Layers};
 
 /// Which objects a process draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -9,17 +9,24 @@ pub struct Selection {
     pub blending: Blending,
     /// By material.
     pub materials: MaterialShare,
+    /// By layer: objects that belong to one of these layers.
+    pub layers: Layers,
 }
 
 impl Selection {
     /// Every opaque object.
-    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL };
+    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL, layers: Layers::ALL };
     /// Every blended object.
-    pub const BLENDED: Self = Self { blending: Blending::Blended, materials: MaterialShare::ALL };
+    pub const BLENDED: Self = Self { blending: Blending::Blended, materials: MaterialShare::ALL, layers: Layers::ALL };
     /// Every object: opaque ones first, then blended ones.
-    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL };
+    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL, layers: Layers::ALL };
 
-    /// Whether it contains objects that blend like this and have the material in this slot.
+    /// Those of these objects that belong to one of some layers.
+    pub const fn in_layers(self, layers: Layers) -> Self {
+        Self { layers, ..self }
+    }
+
+    /// Whether it contains objects of any layer that blend like this and have the material in this slot.
     pub fn contains(self, blend: Blend, material: u32) -> bool {
         let blends = match self.blending {
             Blending::Opaque => blend == Blend::None,

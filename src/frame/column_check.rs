@@ -1,13 +1,16 @@
-//! Finds columns that changed although the engine did not report it.
+//! Finds columns and layers that changed although the engine did not report it.
 
-use crate::scene::{ColumnLayout, SceneError, SceneRef};
+use crate::scene::{ColumnLayout, Layers, ObjectColumn, SceneError, SceneRef};
 use crate::view::ObjectTable;
 
-/// Copies of the columns that the latest frame read. Only builds with debug assertions have any.
+/// Copies of the columns that the latest frame read, and of the objects' layers. Only builds with debug assertions have any.
 #[derive(Debug, Default)]
 pub(super) struct ColumnCheck {
     copies: Vec<(ColumnLayout, Vec<u8>)>,
 }
+
+/// The layers of objects are compared as a column is.
+const LAYERS: ObjectColumn<Layers> = ObjectColumn::new("layers of objects");
 
 impl ColumnCheck {
     /// Compares the columns that a frame read with those of the frame before, and copies them.
@@ -20,9 +23,11 @@ impl ColumnCheck {
         columns: &[ColumnLayout],
         objects: &ObjectTable,
     ) -> Result<(), SceneError> {
-        self.copies.retain(|(layout, _)| columns.contains(layout));
+        let layers = (!scene.layers.is_empty()).then(|| LAYERS.values(scene.layers));
+        let checked: Vec<_> = columns.iter().filter_map(|layout| scene.column(*layout)).chain(layers).collect();
+        self.copies.retain(|(layout, _)| checked.iter().any(|values| values.layout() == *layout));
         let mut outcome = Ok(());
-        for values in columns.iter().filter_map(|layout| scene.column(*layout)) {
+        for values in checked {
             let (layout, bytes) = (values.layout(), values.bytes());
             let Some((_, copy)) = self.copies.iter_mut().find(|(known, _)| *known == layout) else {
                 self.copies.push((layout, bytes.to_vec()));

@@ -11,6 +11,7 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::TargetSize;
 use crate::scene::Projection;
+use crate::view::LayerFilter;
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -55,9 +56,11 @@ impl<B: Backend> FrameContext<'_, B> {
     pub(super) fn list_inputs(&self, pass: usize) -> ListInputs {
         let view_index = self.view_index_of(pass);
         let objects = &self.tables.objects;
+        let selection = self.tables.passes[pass].selection.unwrap_or_default();
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
-            selection: self.tables.passes[pass].selection.unwrap_or_default(),
+            selection,
+            layers: (!LayerFilter::new(self.request.scene, selection).passes_all()).then(|| objects.epoch()),
             instancing: self.instancing,
             order: if self.orders_by_bin(pass) {
                 OrderInputs::Bins { draws_changed_in: objects.draws_changed_in() }

@@ -13,6 +13,8 @@ pub(super) struct ListInputs {
     /// The version of the view's visible set.
     pub(super) visible: Version,
     pub(super) selection: Selection,
+    /// The epoch of the object table, if the layers of objects decide which are drawn.
+    pub(super) layers: Option<u64>,
     pub(super) instancing: bool,
     pub(super) order: OrderInputs,
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use super::{Format, TargetSize};
+use super::{Format, Place, TargetSize};
 use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
@@ -164,6 +164,14 @@ impl Declare {
     /// Orders the process before another one, whatever they read and write.
     pub fn before(&mut self, process: &str) {
         self.declaration.before.push(process.to_owned());
+    }
+
+    /// Puts the process at a place of the [deferred pipeline](super::Deferred): after all of the pipeline's processes before it, and
+    /// before those behind it. Processes at the same place that write the same target still need an order.
+    pub fn at(&mut self, place: Place) {
+        let [begin, end] = place.slots();
+        self.after(begin);
+        self.before(end);
     }
 
     /// Keeps the process in the graph although no output depends on it, because it has side effects.

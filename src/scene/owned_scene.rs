@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Asset, Assets, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef};
+use super::{Asset, Assets, Bounds, Camera, Changes, Layers, Light, Material, Mesh, SceneError, SceneRef};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
@@ -42,6 +42,7 @@ pub struct Scene {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
+    layers: Vec<Layers>,
 }
 
 /// Refers to an object of a [`Scene`].
@@ -61,12 +62,14 @@ pub struct RenderObject {
     pub mesh: Handle<Mesh>,
     /// The material.
     pub material: Handle<Material>,
+    /// The layers that it belongs to.
+    pub layers: Layers,
 }
 
 impl RenderObject {
-    /// An object at `position`, without rotation and scale.
+    /// An object at `position`, without rotation and scale, in all layers.
     pub fn new(mesh: Handle<Mesh>, material: Handle<Material>, position: DVec3) -> Self {
-        Self { position, orientation: Quat::IDENTITY, scale: Vec3::ONE, mesh, material }
+        Self { position, orientation: Quat::IDENTITY, scale: Vec3::ONE, mesh, material, layers: Layers::ALL }
     }
 }
 
@@ -85,6 +88,7 @@ impl Scene {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            layers: &self.layers,
             columns: &[],
             changes: Changes::Unknown,
             assets: &self.assets,
@@ -110,6 +114,7 @@ impl Scene {
         self.bounds.push(bounds);
         self.meshes.push(object.mesh);
         self.materials.push(object.material);
+        self.layers.push(object.layers);
         Ok(ObjectHandle(handle))
     }
 
@@ -126,6 +131,7 @@ impl Scene {
         self.bounds[index] = bounds;
         self.meshes[index] = object.mesh;
         self.materials[index] = object.material;
+        self.layers[index] = object.layers;
         Ok(())
     }
 
@@ -143,6 +149,7 @@ impl Scene {
         self.bounds.swap_remove(index);
         self.meshes.swap_remove(index);
         self.materials.swap_remove(index);
+        self.layers.swap_remove(index);
         if let Some(&moved) = self.handles.get(index) {
             *self.indices.get_mut(moved).map_err(as_object)? = index;
         }
@@ -161,6 +168,7 @@ impl Scene {
             scale: self.scales[index],
             mesh: self.meshes[index],
             material: self.materials[index],
+            layers: self.layers[index],
         })
     }
 
@@ -178,6 +186,7 @@ impl Scene {
             self.bounds.extend_from_within(..originals);
             self.meshes.extend_from_within(..originals);
             self.materials.extend_from_within(..originals);
+            self.layers.extend_from_within(..originals);
         }
     }
 

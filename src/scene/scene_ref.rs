@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, Light, Material, Mesh, SceneError};
+use super::{Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, Layers, Light, Material, Mesh, SceneError};
 use crate::handle::Handle;
 
 /// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
@@ -27,6 +27,9 @@ pub struct SceneRef<'a> {
     pub meshes: &'a [Handle<Mesh>],
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
+    /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty if every
+    /// object belongs to all.
+    pub layers: &'a [Layers],
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.
     pub columns: &'a [ColumnValues<'a>],
@@ -69,6 +72,9 @@ impl SceneRef<'_> {
         ];
         match slices.into_iter().find(|&(_, count)| count != positions) {
             Some((slice, count)) => Err(SceneError::UnequalSlices { slice, count, positions }),
+            None if !self.layers.is_empty() && self.layers.len() != positions => {
+                Err(SceneError::UnequalSlices { slice: "layers", count: self.layers.len(), positions })
+            }
             None => self.check_columns(),
         }
     }

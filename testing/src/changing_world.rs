@@ -68,6 +68,7 @@ impl ChangingWorld {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            layers: &[],
             columns: &[],
             changes: match &self.changes {
                 Report::Unknown => Changes::Unknown,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Fxaa, PlanError, RenderProcess, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Fxaa, Place, PlanError, RenderProcess, ToneMapping,
 };
 use drawloom::scene::{Blend, Camera, Light, Material, Scene, ViewKind};
 use drawloom::task::Scheduler;
@@ -250,6 +250,47 @@ fn processes_may_be_ordered_relative_to_an_absent_one() {
     let expected = ["shadow casters", "geometry buffer", "shadowed spot lights", "fog", "rain", "tone mapping"];
     assert_eq!(processes(&mut renderer, &scene), expected);
     assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "fog", "rain", "tone mapping"]);
+}
+
+#[test]
+fn every_frame_has_every_place() {
+    let at = |name: &'static str, place, target: &'static str| {
+        own(name, move |declare| {
+            if target == "before" {
+                declare.clears_color(target, Format::Rgba8Unorm, ClearColor::Background);
+                declare.keep();
+            } else {
+                declare.draws_over(target);
+            }
+            declare.at(place);
+        })
+    };
+    let builder = builder(Deferred::to_picture())
+        .process(at("overlay", Place::AfterPostProcessing, "picture"))
+        .process(at("bloom", Place::AfterTransparency, "radiance"))
+        .process(at("fog", Place::AfterLighting, "radiance"))
+        .process(at("decals", Place::AfterGeometry, "radiance"))
+        .process(at("sky", Place::BeforeGeometry, "before"))
+        .process(own("haze", |declare| {
+            declare.draws_over("radiance");
+            declare.at(Place::AfterLighting);
+            declare.after("fog");
+        }));
+    let mut renderer = build(builder).unwrap();
+    let own_ones = ["sky", "decals", "fog", "haze", "bloom", "overlay"];
+    let pipeline = |name: &&String| !own_ones.contains(&name.as_str());
+    for scene in [everything(), empty()] {
+        let names = processes(&mut renderer, &scene);
+        let found: Vec<_> = names.iter().filter(|name| !pipeline(name)).map(String::as_str).collect();
+        assert_eq!(found, own_ones, "{names:?}");
+        let index = |name: &str| names.iter().position(|other| other == name).unwrap();
+        assert!(index("geometry buffer") < index("decals") && index("bloom") < index("tone mapping"), "{names:?}");
+        let lights = names.iter().filter(|name| name.ends_with("lights"));
+        assert!(lights.clone().all(|lights| (index("decals")..index("fog")).contains(&index(lights))), "{names:?}");
+        assert!(names.iter().all(|name| name != "transparency" || index("haze") < index(name)), "{names:?}");
+    }
+    let error = build_error(Renderer::builder(NullBackend).process(at("fog", Place::AfterLighting, "radiance")));
+    assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "after lighting".into() });
 }
 
 #[test]

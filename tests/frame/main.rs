@@ -5,6 +5,7 @@ mod changes;
 mod deferred;
 mod determinism;
 mod failing_process;
+mod layers;
 mod null_backend;
 mod object_table;
 mod occlusion;

@@ -108,6 +108,7 @@ mod tests {
             bounds: &[],
             meshes: &[],
             materials: &[],
+            layers: &[],
             columns: &[],
             changes: Changes::Unknown,
             assets: &assets,

@@ -8,7 +8,7 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::{DrawList, instance, sort};
-use crate::view;
+use crate::view::{self, LayerFilter};
 
 /// Makes a command for each visible object (M 10.3).
 pub(super) struct Fill {
@@ -37,11 +37,13 @@ impl<B: Backend> Stage<B> for Fill {
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let (table, view_index) = (&frame.tables.passes[self.pass], frame.view_index_of(self.pass));
+        let selection = table.selection.unwrap_or_default();
         let fill = view::Fill {
             table: &frame.tables.objects,
             view: &frame.request.views[view_index],
             visible: &frame.tables.visibility[view_index].set,
-            selection: table.selection.unwrap_or_default(),
+            selection,
+            layers: LayerFilter::new(frame.request.scene, selection),
             scene: frame.request.scene,
             quality: frame.request.quality,
         };
@@ -194,9 +196,10 @@ impl<B: Backend> Stage<B> for Bin {
         let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
         let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
         let selection = table.selection.unwrap_or_default();
+        let layers = LayerFilter::new(frame.request.scene, selection);
         for index in job.items {
             let part = (index, frame.segment_count(self.pass));
-            view::bin_visible(objects, visible, selection, part, &mut table.segments[index].write());
+            view::bin_visible(objects, visible, selection, layers, part, &mut table.segments[index].write());
         }
         Ok(())
     }

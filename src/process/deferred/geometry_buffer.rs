@@ -4,7 +4,7 @@
 mod cpu_shader;
 
 use super::GeometryFormats;
-use crate::command::{Blending, MaterialShare, Selection};
+use crate::command::{MaterialShare, Selection};
 use crate::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
@@ -87,7 +87,7 @@ impl RenderProcess for GeometryBuffer {
     fn draws(&self) -> Draws<'_> {
         Draws::Commands(CommandDraws {
             shader: &self.shader,
-            selection: Selection { blending: Blending::Opaque, materials: self.share },
+            selection: Selection { materials: self.share, ..Selection::OPAQUE },
             writes_depth: !self.has_depth,
             ..CommandDraws::default()
         })

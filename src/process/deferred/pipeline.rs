@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Requirements, ShadowCasters, Transparency};
+use super::{
+    DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters, Transparency,
+};
 use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
 use crate::quality::Quality;
@@ -130,7 +132,7 @@ impl Deferred {
 
     /// The names of all processes that a frame may have, whatever the scene, in order.
     pub fn names(&self) -> Vec<String> {
-        self.build(&Requirements::all()).iter().map(|process| process.name().to_owned()).collect()
+        self.build(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
     }
 
     /// How shadow maps are drawn, if they are drawn.
@@ -143,9 +145,9 @@ impl Deferred {
         self.post.iter().filter(|step| !self.left_out.iter().any(|name| name == step.process("", "").name()))
     }
 
-    /// The processes that draw a scene, each in its slot.
+    /// The processes that draw a scene, each in its slot. Empty slots mark the places for an engine's processes.
     pub(crate) fn chain(&self, requirements: &Requirements) -> Vec<ChainSlot> {
-        let mut built = self.build(requirements);
+        let mut built: Vec<_> = self.build(requirements).into_iter().flatten().collect();
         let slot = |name: String| {
             let shipped = built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
             let replacement =
@@ -153,7 +155,11 @@ impl Deferred {
             let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
             ChainSlot { process: process.filter(|_| !self.left_out.contains(&name)), name }
         };
-        self.names().into_iter().map(slot).collect()
+        let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, Place)| {
+            let names = processes.into_iter().map(|process| process.name().to_owned());
+            names.chain(place.slots().map(str::to_owned)).collect::<Vec<_>>()
+        };
+        self.build(&Requirements::all()).into_iter().zip(PLACES).flat_map(with_place).map(slot).collect()
     }
 
     /// # Errors
@@ -175,14 +181,30 @@ impl Deferred {
         }
     }
 
-    /// The shipped processes that a scene requires, in order.
-    fn build(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+    /// The shipped processes that a scene requires, in order: those before each of [`PLACES`].
+    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; PLACES.len()] {
+        [
+            self.shadows(requirements),
+            self.geometry(),
+            self.lighting(requirements),
+            self.transparency(requirements),
+            self.post_processing(),
+        ]
+    }
+
+    /// How shadow maps are drawn, if a scene requires them.
+    fn required_maps(&self, requirements: &Requirements) -> Option<&ShadowMaps> {
+        self.maps().filter(|_| requirements.shadows())
+    }
+
+    fn shadows(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+        let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
+        let casters = || Arc::new(ShadowCasters { hemispheres }) as Arc<dyn RenderProcess>;
+        self.required_maps(requirements).map(|_| casters()).into_iter().collect()
+    }
+
+    fn geometry(&self) -> Vec<Arc<dyn RenderProcess>> {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
-        let maps = self.maps().filter(|_| requirements.shadows());
-        if maps.is_some() {
-            let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
-            processes.push(Arc::new(ShadowCasters { hemispheres }));
-        }
         if self.depth_pre_pass {
             processes.push(Arc::new(DepthPrePass));
         }
@@ -195,6 +217,12 @@ impl Deferred {
                 Arc::new(geometry_buffer)
             });
         }
+        processes
+    }
+
+    fn lighting(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+        let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
+        let maps = self.required_maps(requirements);
         for class in LightClass::all().filter(|class| requirements.lights(*class)) {
             match maps {
                 None if class.shadowed => {}
@@ -204,9 +232,16 @@ impl Deferred {
                 _ => processes.push(Arc::new(LightVolumes::new(class.kind, self.formats))),
             }
         }
-        if requirements.transparency() {
-            processes.push(Arc::new(Transparency::new(maps)));
-        }
+        processes
+    }
+
+    fn transparency(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
+        let transparency = || Arc::new(Transparency::new(self.required_maps(requirements))) as Arc<dyn RenderProcess>;
+        requirements.transparency().then(transparency).into_iter().collect()
+    }
+
+    fn post_processing(&self) -> Vec<Arc<dyn RenderProcess>> {
+        let mut processes = Vec::new();
         let mut source = RADIANCE.to_owned();
         let steps: Vec<_> = self.steps().collect();
         for (index, step) in steps.iter().enumerate() {
@@ -224,6 +259,15 @@ impl Default for Deferred {
         Self::new()
     }
 }
+
+/// The places for an engine's processes, in order.
+const PLACES: [Place; 5] = [
+    Place::BeforeGeometry,
+    Place::AfterGeometry,
+    Place::AfterLighting,
+    Place::AfterTransparency,
+    Place::AfterPostProcessing,
+];
 
 const RADIANCE: &str = "radiance";
 const PICTURE: &str = "picture";

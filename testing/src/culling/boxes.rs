@@ -93,6 +93,7 @@ impl Objects {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
+            layers: &[],
             columns: &[],
             ..shapes.scene.as_scene_ref()
         }

@@ -162,6 +162,7 @@ impl GpuObjects {
             bounds: &scene.bounds[..count],
             meshes: &scene.meshes[..count],
             materials: &scene.materials[..count],
+            layers: &[],
             columns: &[],
             ..scene
         });

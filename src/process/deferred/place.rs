@@ -1,0 +1,38 @@
+//! Places for an engine's processes in a frame of the deferred pipeline.
+
+/// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all of them,
+/// whatever the scene requires: see [`Declare::at`](crate::process::Declare::at).
+///
+/// ```text
+///  geometry buffer │ lights │ transparency │ post-processing │
+///  ▲               ▲        ▲              ▲                 ▲
+///  BeforeGeometry  │        AfterLighting  │                 AfterPostProcessing
+///                  AfterGeometry           AfterTransparency
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Place {
+    /// Before the depth pre-pass and the geometry buffer. Shadow maps are drawn in views of their own, which come first.
+    BeforeGeometry,
+    /// When `radiance` holds ambient and emitted light.
+    AfterGeometry,
+    /// When `radiance` is that of all opaque objects.
+    AfterLighting,
+    /// When `radiance` is complete, before post-processing.
+    AfterTransparency,
+    /// When the picture is complete.
+    AfterPostProcessing,
+}
+
+impl Place {
+    /// The names of the empty slots at the beginning and at the end of the place: what is there comes between them.
+    pub(in crate::process) fn slots(self) -> [&'static str; 2] {
+        match self {
+            Self::BeforeGeometry => ["before geometry", "before geometry, at the latest"],
+            Self::AfterGeometry => ["after geometry", "after geometry, at the latest"],
+            Self::AfterLighting => ["after lighting", "after lighting, at the latest"],
+            Self::AfterTransparency => ["after transparency", "after transparency, at the latest"],
+            Self::AfterPostProcessing => ["after post-processing", "after post-processing, at the latest"],
+        }
+    }
+}

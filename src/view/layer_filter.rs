@@ -1,0 +1,39 @@
+//! Which objects a process draws by their layers.
+
+use super::set_bits;
+use crate::command::Selection;
+use crate::scene::{Layers, SceneRef};
+
+/// Which objects a process draws by their layers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LayerFilter<'a> {
+    /// Of each object; empty if the process draws all objects.
+    layers: &'a [Layers],
+    drawn: Layers,
+}
+
+impl<'a> LayerFilter<'a> {
+    pub(crate) fn new(scene: &SceneRef<'a>, selection: Selection) -> Self {
+        let drawn = selection.layers;
+        Self { layers: if drawn == Layers::ALL { &[] } else { scene.layers }, drawn }
+    }
+
+    /// Whether it lets all objects pass.
+    pub(crate) fn passes_all(&self) -> bool {
+        self.layers.is_empty()
+    }
+
+    #[inline]
+    pub(super) fn passes(&self, object: usize) -> bool {
+        self.layers.get(object).is_none_or(|layers| layers.intersect(self.drawn))
+    }
+
+    /// Those of up to 64 objects that pass: bit 0 is object `first`.
+    #[inline]
+    pub(super) fn pass(&self, first: usize, objects: u64) -> u64 {
+        if self.passes_all() {
+            return objects;
+        }
+        set_bits(objects).filter(|bit| self.passes(first + bit)).fold(0, |passed, bit| passed | 1 << bit)
+    }
+}
