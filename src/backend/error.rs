@@ -73,6 +73,26 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
+    /// A rectangle that cannot be read back: it is empty, not within its target, or a part of depth.
+    #[error(
+        "a rectangle of {}x{} pixels at {origin:?} cannot be read back of target {target:?} of view {view}, which has {}x{} pixels",
+        size[0], size[1], whole[0], whole[1]
+    )]
+    OutsideTarget {
+        /// The view's index.
+        view: usize,
+        /// The name of the target.
+        target: String,
+        /// The rectangle's upper left pixel.
+        origin: [u32; 2],
+        /// The rectangle's width and height.
+        size: [u32; 2],
+        /// The target's width and height.
+        whole: [u32; 2],
+    },
+    /// What is read back belongs to a frame that is not submitted, or was dropped.
+    #[error("the frame whose pixels are read back was not submitted")]
+    NotSubmitted,
     /// Pass times were requested from a backend that does not time passes.
     #[error("passes are not timed: see `WgpuBackend::time_passes`")]
     NotTimed,

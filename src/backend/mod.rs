@@ -18,7 +18,7 @@ mod wgpu;
 #[cfg(feature = "wgpu")]
 pub use self::wgpu::{
     DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuPassStatistics,
-    WgpuResources, WgpuSubmission,
+    WgpuReadBack, WgpuResources, WgpuSubmission,
 };
 pub use backend_trait::Backend;
 pub use error::BackendError;

@@ -43,6 +43,41 @@ impl<B: Backend> Recorded<B> {
     }
 }
 
+#[cfg(feature = "wgpu")]
+impl Recorded<crate::backend::WgpuBackend> {
+    /// Reads back a rectangle of a view's target as this frame leaves it, without waiting: ask the result when the frame is
+    /// submitted. `origin` is the rectangle's upper left pixel, `size` its width and height.
+    ///
+    /// To find the object under the cursor, draw the indices of objects into a target of [`Format::R32Uint`], and read one pixel:
+    ///
+    /// ```no_run
+    /// # use drawloom::{Recorded, Submitter, backend::{WgpuBackend, BackendError}};
+    /// # fn pick(mut recorded: Recorded<WgpuBackend>, submitter: &Submitter<WgpuBackend>, cursor: [u32; 2])
+    /// # -> Result<(), Box<dyn std::error::Error>> {
+    /// let under_cursor = recorded.read_back(0, "object index", cursor, [1, 1])?;
+    /// submitter.submit(recorded)?;
+    /// // In this frame or a later one:
+    /// if let Some(pixel) = under_cursor.try_read()? {
+    ///     let object = u32::from_le_bytes(pixel.bytes[..4].try_into()?);
+    /// }
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// [`Format::R32Uint`]: crate::process::Format::R32Uint
+    ///
+    /// # Errors
+    /// If there is no such target, the rectangle is empty or not in it, or is a part of a depth target, which is copied as a whole.
+    pub fn read_back(
+        &mut self,
+        view: usize,
+        target: &str,
+        origin: [u32; 2],
+        size: [u32; 2],
+    ) -> Result<crate::backend::WgpuReadBack, crate::backend::BackendError> {
+        self.frame.read_back(self.backend.device(), view, target, [origin, size])
+    }
+}
+
 /// Submits frames. It cannot leave the thread that built it, the device thread: the assert of M 10.3 as a type.
 ///
 /// ```compile_fail

@@ -2,7 +2,8 @@
 
 use crate::quality::{DiffuseFormat, NormalFormat};
 
-/// The format of a target. All of them can be drawn to and read on every adapter.
+/// The format of a target. All of them can be drawn to and read on every adapter; those that [cannot be
+/// blended](Format::can_be_blended) are drawn to as if nothing was blended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
@@ -20,6 +21,8 @@ pub enum Format {
     Rg16Float,
     /// A float.
     R32Float,
+    /// A whole number: shaders write and read `u32`.
+    R32Uint,
     /// Depth, a float.
     Depth32Float,
 }
@@ -32,12 +35,22 @@ impl Format {
 
     /// Whether a compute shader can write it as a storage texture on every adapter.
     pub fn can_be_stored(self) -> bool {
-        matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float)
+        matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float | Self::R32Uint)
+    }
+
+    /// Whether what is drawn can be blended with it on every adapter.
+    pub fn can_be_blended(self) -> bool {
+        !matches!(self, Self::R32Float | Self::R32Uint | Self::Depth32Float)
+    }
+
+    /// Whether it holds whole numbers.
+    pub fn is_integer(self) -> bool {
+        self == Self::R32Uint
     }
 
     /// Whether a shader can sample it between pixels, with a filtering sampler, on every adapter.
     pub fn is_filterable(self) -> bool {
-        !matches!(self, Self::R32Float | Self::Depth32Float)
+        !matches!(self, Self::R32Float | Self::R32Uint | Self::Depth32Float)
     }
 
     /// Whether it holds negative numbers.
@@ -50,7 +63,7 @@ impl Format {
         match self {
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
             Self::Rg8Unorm | Self::Rg16Float => 2,
-            Self::R32Float | Self::Depth32Float => 1,
+            Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
         }
     }
 
@@ -59,7 +72,7 @@ impl Format {
         match self {
             Self::Rg8Unorm => 2,
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm => 4,
-            Self::Rg16Float | Self::R32Float | Self::Depth32Float => 4,
+            Self::Rg16Float | Self::R32Float | Self::R32Uint | Self::Depth32Float => 4,
             Self::Rgba16Float => 8,
         }
     }

@@ -23,6 +23,7 @@ mod placement;
 mod post;
 mod processes;
 mod rays;
+mod read_back;
 mod references;
 mod requirements;
 mod resources;
@@ -62,6 +63,7 @@ fn main() {
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
+        (read_back::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (requirements::CASES, Needs::Adapter),

@@ -21,6 +21,7 @@ pub(super) fn blended<R: Precision>(format: Format, blend: Blend, color: Vector4
         from_fn(|channel| of(channel)(color[channel], destination[channel], color[3]))
     };
     let result = match blend {
+        _ if !format.can_be_blended() => color,
         Blend::None => color,
         Blend::Alpha => mix(
             |source, destination, alpha| source * alpha + destination * (R::one() - alpha),
@@ -60,6 +61,7 @@ pub(super) fn append_bytes<R: Precision>(format: Format, color: [R; 4], bytes: &
             ChannelEncoding::Srgb => bytes.push(srgb_byte_of(value)),
             ChannelEncoding::Half => bytes.extend(half_of(value).to_le_bytes()),
             ChannelEncoding::Float => bytes.extend((value as f32).to_le_bytes()),
+            ChannelEncoding::Integer => bytes.extend((value as u32).to_le_bytes()),
         }
     }
 }
@@ -73,6 +75,8 @@ enum ChannelEncoding {
     Srgb,
     Half,
     Float,
+    /// A whole number. In f32 it is exact up to 2²⁴.
+    Integer,
 }
 
 fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
@@ -83,6 +87,7 @@ fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
         Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm => ChannelEncoding::Steps(255.0),
         Format::Rgba16Float | Format::Rg16Float => ChannelEncoding::Half,
         Format::R32Float | Format::Depth32Float => ChannelEncoding::Float,
+        Format::R32Uint => ChannelEncoding::Integer,
     }
 }
 
@@ -91,8 +96,9 @@ fn clamped<R: Precision>(format: Format, value: R) -> R {
     if format.is_signed() {
         return if value.is_nan() { R::zero() } else { value };
     }
+    let most = if format.is_integer() { R::of(f64::from(u32::MAX)) } else { R::one() };
     // False for NaN.
-    if value > R::zero() { value.min(R::one()) } else { R::zero() }
+    if value > R::zero() { value.min(most) } else { R::zero() }
 }
 
 fn rounded(encoding: ChannelEncoding, value: f64) -> f64 {
@@ -101,6 +107,7 @@ fn rounded(encoding: ChannelEncoding, value: f64) -> f64 {
         ChannelEncoding::Srgb => f64::from(LINEAR_OF_BYTES[usize::from(srgb_byte_of(value))]),
         ChannelEncoding::Half => half_of(value).to_f64(),
         ChannelEncoding::Float => value,
+        ChannelEncoding::Integer => value.round(),
     }
 }
 

@@ -169,7 +169,7 @@ impl Backend for WgpuBackend {
         mut frame: WgpuFrame,
         queues: Vec<ViewQueue<WgpuCommands>>,
     ) -> Result<WgpuSubmission, BackendError> {
-        let submission = self.submit_frame(&frame, queues).inspect_err(|_| {
+        let submission = self.submit_frame(&mut frame, queues).inspect_err(|_| {
             self.buffers.clear();
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();

@@ -40,7 +40,9 @@ impl WgpuBackend {
             // Relaxed: a counter that orders nothing.
             let number = self.frames.fetch_add(1, Ordering::Relaxed);
             let background = scene.background.as_dvec3().to_array();
-            let mut frame = WgpuFrame { number, pipelines, assets, light_meshes, targets, background, buffers };
+            let read_backs = Vec::new();
+            let mut frame =
+                WgpuFrame { number, pipelines, assets, light_meshes, targets, background, read_backs, buffers };
             self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?

@@ -24,6 +24,7 @@ mod frame;
 mod noop_device;
 mod pass_bind_groups;
 mod pipelines;
+mod read_back;
 mod recording;
 mod resources;
 mod strategy;
@@ -33,6 +34,7 @@ mod timing;
 
 pub use backend::{WgpuBackend, WgpuResources};
 pub use frame::WgpuPassStatistics;
+pub use read_back::WgpuReadBack;
 pub use strategy::{EncodingStrategy, RecordingStrategy};
 pub use submission::WgpuSubmission;
 pub use timing::{DeviceClock, DevicePassTime, DevicePassTimes};

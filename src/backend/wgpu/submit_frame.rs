@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
+use super::read_back::ReadBackCopy;
 use super::submission::WgpuSubmission;
 use crate::backend::{BackendError, ViewQueue};
 use crate::tuning::Tuner;
@@ -17,7 +18,7 @@ impl WgpuBackend {
     /// If the device refuses.
     pub(super) fn submit_frame(
         &self,
-        frame: &WgpuFrame,
+        frame: &mut WgpuFrame,
         queues: Vec<ViewQueue<WgpuCommands>>,
     ) -> Result<WgpuSubmission, BackendError> {
         let mut finished = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
@@ -45,13 +46,15 @@ impl WgpuBackend {
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copy, readback) = readback.unzip();
             frame.buffers.objects().unmap();
-            let histories = frame.targets.have_histories().then(|| {
-                let descriptor = wgpu::CommandEncoderDescriptor { label: Some("histories") };
+            let copies = (frame.targets.have_histories() || !frame.read_backs.is_empty()).then(|| {
+                let descriptor = wgpu::CommandEncoderDescriptor { label: Some("copies of targets") };
                 let mut encoder = self.device.create_command_encoder(&descriptor);
+                frame.read_backs.iter().for_each(|copy| copy.encode(&mut encoder));
                 frame.targets.copy_histories(&mut encoder);
                 encoder.finish()
             });
-            let index = self.queue().submit(finished.into_iter().chain(histories).chain(copy));
+            let index = self.queue().submit(finished.into_iter().chain(copies).chain(copy));
+            frame.read_backs.drain(..).for_each(ReadBackCopy::submitted);
             frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), readback))

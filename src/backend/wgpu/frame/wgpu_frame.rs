@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::frame_buffers::FrameBuffers;
 use super::pass_state::WgpuPassState;
+use crate::backend::BackendError;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
+use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
 use crate::backend::wgpu::resources::{AssetSnapshot, LightMeshes, WgpuTargets};
 use crate::process::Pass;
 
@@ -18,11 +20,29 @@ pub struct WgpuFrame {
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) background: [f64; 3],
+    /// What is read back of it.
+    pub(crate) read_backs: Vec<ReadBackCopy>,
     /// Returned to the pool when the frame is dropped.
     pub(crate) buffers: FrameBuffers,
 }
 
 impl WgpuFrame {
+    /// Has a rectangle of a view's target read back when the frame is submitted: its upper left pixel, and its width and height.
+    ///
+    /// # Errors
+    /// See [`new_read_back`].
+    pub(crate) fn read_back(
+        &mut self,
+        device: &wgpu::Device,
+        view: usize,
+        target: &str,
+        rectangle: [[u32; 2]; 2],
+    ) -> Result<WgpuReadBack, BackendError> {
+        let (read_back, copy) = new_read_back(device, &self.targets, view, target, rectangle)?;
+        self.read_backs.push(copy);
+        Ok(read_back)
+    }
+
     /// The state of a pass, by index in the frame.
     pub(crate) fn pass(&self, index: usize) -> &WgpuPassState {
         &self.buffers.passes()[index]

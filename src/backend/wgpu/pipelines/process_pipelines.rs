@@ -41,6 +41,8 @@ pub(crate) struct ProcessPipelines {
 #[derive(Clone, Debug, PartialEq)]
 struct AttachmentFormats {
     colors: Vec<Option<wgpu::TextureFormat>>,
+    /// Whether each of the colours can be blended.
+    can_be_blended: Vec<bool>,
     depth: Option<DepthAttachmentFormat>,
     sampled: Vec<SampledTarget>,
 }
@@ -61,7 +63,9 @@ impl AttachmentFormats {
         };
         let format_of =
             |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
-        let colors = declaration.colors().map(|(target, _)| Some(texture_format(format_of(declaration.views, target))));
+        let colors = declaration.colors().map(|(target, _)| format_of(declaration.views, target));
+        let (colors, can_be_blended) =
+            colors.map(|format| (Some(texture_format(format)), format.can_be_blended())).unzip();
         let depth = declaration.depth().map(|(target, access)| DepthAttachmentFormat {
             format: texture_format(format_of(declaration.views, target)),
             writable: access.writes(),
@@ -74,7 +78,7 @@ impl AttachmentFormats {
             Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
             _ => None,
         });
-        Self { colors: colors.collect(), depth, sampled: sampled.collect() }
+        Self { colors, can_be_blended, depth, sampled: sampled.collect() }
     }
 }
 
@@ -219,11 +223,12 @@ impl ProcessPipelines {
     /// `None` for a raw pass, which has no pipelines.
     fn create(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
         let shader = self.shader.as_ref()?;
-        let target = |format: &Option<wgpu::TextureFormat>| {
-            let (blend, write_mask) = (blend_state(state.blend()), wgpu::ColorWrites::ALL);
-            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask })
+        let AttachmentFormats { colors, can_be_blended, .. } = &self.attachments;
+        let target = |(format, can_be_blended): (&Option<wgpu::TextureFormat>, &bool)| {
+            let blend = blend_state(state.blend()).filter(|_| *can_be_blended);
+            format.map(|format| wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
         };
-        let targets: Vec<_> = self.attachments.colors.iter().map(target).collect();
+        let targets: Vec<_> = colors.iter().zip(can_be_blended).map(target).collect();
         let layout = |array_stride, attributes| wgpu::VertexBufferLayout {
             array_stride,
             step_mode: wgpu::VertexStepMode::Vertex,

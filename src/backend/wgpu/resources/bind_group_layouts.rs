@@ -65,6 +65,8 @@ pub(crate) fn process_layout(
     for (binding, sampled) in (1..).zip(samples) {
         let sample_type = if sampled.format.is_depth() {
             wgpu::TextureSampleType::Depth
+        } else if sampled.format.is_integer() {
+            wgpu::TextureSampleType::Uint
         } else {
             wgpu::TextureSampleType::Float { filterable: sampled.format.is_filterable() }
         };
@@ -119,6 +121,7 @@ pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
         Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
         Format::R32Float => wgpu::TextureFormat::R32Float,
+        Format::R32Uint => wgpu::TextureFormat::R32Uint,
         Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
     }
 }

@@ -1,0 +1,145 @@
+//! Reading back parts of targets without waiting for the device.
+
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+
+use super::error_scope::with_error_scope;
+use super::resources::{ViewTarget, WgpuTargets};
+use crate::backend::{BackendError, Picture};
+use crate::process::Format;
+
+/// A rectangle of a target as one frame leaves it, on its way back to the CPU: see
+/// [`Recorded::read_back`](crate::Recorded::read_back).
+pub struct WgpuReadBack {
+    device: wgpu::Device,
+    buffer: wgpu::Buffer,
+    size: [u32; 2],
+    format: Format,
+    /// Shared with the copy while that is not submitted, and then with the callback of the mapping.
+    state: Arc<Mutex<State>>,
+}
+
+/// How far a read-back is.
+#[derive(Debug)]
+enum State {
+    /// Its frame is not submitted.
+    Recorded,
+    /// The device may not be done with it.
+    Submitted,
+    Done,
+    Failed(String),
+}
+
+impl WgpuReadBack {
+    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It does not wait.
+    ///
+    /// # Errors
+    /// If the frame was dropped, or the device is lost.
+    pub fn try_read(&self) -> Result<Option<Picture>, BackendError> {
+        self.poll(wgpu::PollType::Poll)?;
+        match &*self.state.lock() {
+            State::Recorded if Arc::strong_count(&self.state) == 1 => Err(BackendError::NotSubmitted),
+            State::Recorded | State::Submitted => Ok(None),
+            State::Done => self.picture().map(Some),
+            State::Failed(message) => Err(BackendError::DeviceLost { message: message.clone() }),
+        }
+    }
+
+    /// Waits until the device is done with the frame, which is submitted, and returns the pixels.
+    ///
+    /// # Errors
+    /// If the frame is not submitted, or the device is lost.
+    pub fn read(&self) -> Result<Picture, BackendError> {
+        if matches!(*self.state.lock(), State::Submitted) {
+            self.poll(wgpu::PollType::wait_indefinitely())?;
+        }
+        self.try_read()?.ok_or(BackendError::NotSubmitted)
+    }
+
+    fn poll(&self, poll: wgpu::PollType) -> Result<(), BackendError> {
+        self.device.poll(poll).map(|_| ()).map_err(|error| BackendError::DeviceLost { message: error.to_string() })
+    }
+
+    fn picture(&self) -> Result<Picture, BackendError> {
+        let lost = |error: wgpu::MapRangeError| BackendError::DeviceLost { message: error.to_string() };
+        let padded = self.buffer.get_mapped_range(..).map_err(lost)?;
+        let ([width, height], format) = (self.size, self.format);
+        let rows = padded.chunks_exact(padded_row(width, format));
+        let bytes = rows.flat_map(|row| &row[..width as usize * format.bytes()]).copied().collect();
+        Ok(Picture { width, height, format, bytes })
+    }
+}
+
+/// A copy of a rectangle to a buffer, made when its frame is submitted.
+pub(crate) struct ReadBackCopy {
+    target: ViewTarget,
+    origin: [u32; 2],
+    size: [u32; 2],
+    buffer: wgpu::Buffer,
+    state: Arc<Mutex<State>>,
+}
+
+impl ReadBackCopy {
+    /// Encodes it behind the frame's passes.
+    pub(crate) fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
+        let ([x, y], [width, height]) = (self.origin, self.size);
+        let source = wgpu::TexelCopyTextureInfo {
+            origin: wgpu::Origin3d { x, y, z: self.target.layer },
+            ..self.target.texture.as_image_copy()
+        };
+        let bytes_per_row = Some(padded_row(width, self.target.format()) as u32);
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: None };
+        let destination = wgpu::TexelCopyBufferInfo { buffer: &self.buffer, layout };
+        encoder.copy_texture_to_buffer(source, destination, wgpu::Extent3d { width, height, depth_or_array_layers: 1 });
+    }
+
+    /// Maps the buffer when the device is done with the frame, which was submitted.
+    pub(crate) fn submitted(self) {
+        let Self { buffer, state, .. } = self;
+        *state.lock() = State::Submitted;
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            *state.lock() = match result {
+                Ok(()) => State::Done,
+                Err(error) => State::Failed(error.to_string()),
+            };
+        });
+    }
+}
+
+/// A read-back of a rectangle of a view's target, and the copy that its frame makes for it.
+///
+/// # Errors
+/// If there is no such target, the rectangle is empty or not in it, or is a part of a depth target.
+pub(crate) fn new_read_back(
+    device: &wgpu::Device,
+    targets: &WgpuTargets,
+    view: usize,
+    target: &str,
+    [origin, size]: [[u32; 2]; 2],
+) -> Result<(WgpuReadBack, ReadBackCopy), BackendError> {
+    let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
+    let found = targets.find(view, target).ok_or_else(unknown)?.clone();
+    let (whole, format) = ([found.texture.width(), found.texture.height()], found.format());
+    let is_within = |axis: usize| origin[axis].checked_add(size[axis]).is_some_and(|end| end <= whole[axis]);
+    let fits = !size.contains(&0) && (0..2).all(is_within);
+    // No device copies a part of a depth texture.
+    if !fits || (format.is_depth() && size != whole) {
+        return Err(BackendError::OutsideTarget { view, target: target.to_owned(), origin, size, whole });
+    }
+    let descriptor = wgpu::BufferDescriptor {
+        label: Some("read back"),
+        size: padded_row(size[0], format) as u64 * u64::from(size[1]),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    };
+    let buffer = with_error_scope(device, target, || device.create_buffer(&descriptor))?;
+    let state = Arc::new(Mutex::new(State::Recorded));
+    let copy = ReadBackCopy { target: found, origin, size, buffer: buffer.clone(), state: Arc::clone(&state) };
+    Ok((WgpuReadBack { device: device.clone(), buffer, size, format, state }, copy))
+}
+
+/// The number of bytes of a row in a buffer.
+fn padded_row(width: u32, format: Format) -> usize {
+    (width as usize * format.bytes()).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize)
+}
