@@ -58,8 +58,8 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device lacks room for the frame's resources, or refuses them.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
-    /// The [epoch](ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none. If it is the
-    /// current one, nothing is uploaded.
+    /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none.
+    /// If it is the current one, nothing is uploaded.
     fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
         let _ = frame;
         0

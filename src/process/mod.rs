@@ -31,8 +31,8 @@ pub use cpu_shader::{
 };
 pub use declaration::{Access, ClearColor, Declaration, Declare, previous_name};
 pub use deferred::{
-    Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters,
-    Transparency,
+    Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place, Requirements,
+    SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use format::Format;

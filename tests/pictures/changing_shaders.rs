@@ -8,6 +8,7 @@ use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 use drawloom::task::Scheduler;
+use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -75,7 +76,9 @@ fn changing_shader() -> Result<(), Failed> {
     let scene = many_batches();
     let step = Arc::new(AtomicU32::new(0));
     let fixture = |recording| {
-        let (device, queue) = device()?;
+        // Whoever counts kept bundles has a device alone: see `fixture_alone`.
+        let is_counted = recording == RecordingStrategy::CachedBundles;
+        let (device, queue) = if is_counted { adapter::device()? } else { device()? };
         let builder = Renderer::builder(
             WgpuBackend::new(device, queue)?
                 .recording_strategy(recording)?

@@ -4,6 +4,7 @@
 mod cpu_shader;
 
 use super::GeometryFormats;
+use super::shading::SURFACE_SHADER;
 use crate::command::{MaterialShare, Selection};
 use crate::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 
@@ -42,11 +43,8 @@ impl GeometryBuffer {
         } else {
             format!("geometry buffer {} of {}", share.index + 1, share.of)
         };
-        let shader = [
-            include_str!("shading/surface.wgsl"),
-            &formats.normal_encoding_wgsl(),
-            include_str!("geometry_buffer/geometry_buffer.wgsl"),
-        ];
+        let shader =
+            [SURFACE_SHADER, &formats.normal_encoding_wgsl(), include_str!("geometry_buffer/geometry_buffer.wgsl")];
         Self { name, shader: shader.concat(), formats, share, has_depth: false }
     }
 

@@ -5,7 +5,7 @@ mod cpu_shader;
 
 use std::borrow::Cow;
 
-use super::shading::shadow_shader;
+use super::shading::{ILLUMINATION_SHADER, shadow_shader};
 use super::{GeometryFormats, ShadowCasters};
 use crate::process::{Declare, Draws, LightDraws, RenderProcess};
 use crate::scene::{LightKind, ViewKind};
@@ -47,7 +47,7 @@ impl LightVolumes {
         let class = LightClass { kind, shadowed: maps.is_some() };
         let shader = [
             &formats.normal_encoding_wgsl(),
-            include_str!("shading/illumination.wgsl"),
+            ILLUMINATION_SHADER,
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
             include_str!("light_volumes/light_volumes.wgsl"),
         ];

@@ -4,7 +4,7 @@
 mod cpu_shader;
 
 use super::ShadowCasters;
-use super::shading::shadow_shader;
+use super::shading::{ILLUMINATION_SHADER, SURFACE_SHADER, shadow_shader};
 use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
@@ -29,8 +29,8 @@ impl Transparency {
     /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
         let shader = [
-            include_str!("shading/surface.wgsl"),
-            include_str!("shading/illumination.wgsl"),
+            SURFACE_SHADER,
+            ILLUMINATION_SHADER,
             &shadow_shader(maps.map(|maps| (1, maps))),
             include_str!("transparency/transparency.wgsl"),
         ];

@@ -7,3 +7,16 @@ mod normal_encoding;
 mod shadow;
 
 pub(super) use shadow::shadow_shader;
+
+/// The WGSL with which the geometry buffer and transparency draw objects, for processes that replace them. It follows
+/// [`SHADER_PRELUDE`](crate::process::SHADER_PRELUDE), and has the entry point `vertex`.
+///
+/// Fragment shaders get a `Surface`: the position `relative` to the camera along the world's axes, the interpolated `normal`, `uv`,
+/// and the indices of the `material` and the `object`. `shading_normal(surface, material)` is the normal of the visible side;
+/// `surface_diffuse(surface, material)` is the diffuse colour with the material's texture, and the opacity. Both need uniform control
+/// flow.
+pub const SURFACE_SHADER: &str = include_str!("surface.wgsl");
+
+/// The WGSL by which lights illuminate: `illuminance_from(light, position, normal)` is the illuminance of a surface at a position
+/// relative to the camera, without shadows.
+pub const ILLUMINATION_SHADER: &str = include_str!("illumination.wgsl");

@@ -5,6 +5,8 @@ struct Surface {
     @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
     @location(3) @interpolate(flat) material: u32,
+    // The object's index in the scene.
+    @location(4) @interpolate(flat) object: u32,
 }
 
 @vertex
@@ -12,7 +14,7 @@ fn vertex(in: VertexInput) -> Surface {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, in.position);
     let uv = clamp(in.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
-    return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material);
+    return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material, object.index);
 }
 
 // From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,

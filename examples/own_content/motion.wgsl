@@ -1,0 +1,28 @@
+struct Before {
+    clip_from_relative: mat4x4<f32>,
+    camera_moved: vec4<f32>,
+}
+
+@group(2) @binding(0) var<uniform> before: Before;
+@group(3) @binding(0) var<storage, read> displacements: array<vec4<f32>>;
+
+struct Corner {
+    @invariant @builtin(position) position: vec4<f32>,
+    @location(0) now: vec3<f32>,
+    @location(1) then: vec3<f32>,
+}
+
+@vertex
+fn vertex(in: VertexInput) -> Corner {
+    let object = drawn_object(in.instance);
+    let relative = relative_position(object, in.position);
+    let relative_then = relative + before.camera_moved.xyz - displacements[object.index].xyz;
+    let now = clip_position(relative);
+    let then = before.clip_from_relative * vec4<f32>(relative_then, 1.0);
+    return Corner(now, now.xyw, then.xyw);
+}
+
+@fragment
+fn fragment(in: Corner) -> @location(0) vec2<f32> {
+    return (in.now.xy / in.now.z - in.then.xy / in.then.z) * vec2<f32>(0.5, -0.5);
+}

@@ -1,0 +1,94 @@
+//! Temporal anti-aliasing: motion vectors from the displacement of each object, and the filtered picture of the frame before.
+
+use drawloom::command::Selection;
+use drawloom::glam::Mat4;
+use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, Place, RenderProcess};
+use drawloom::scene::{Camera, ObjectColumn};
+use drawloom::view::RenderView;
+use parking_lot::Mutex;
+
+/// How far each object has moved since the last frame, in metres, and 0.
+pub const DISPLACEMENT: ObjectColumn<[f32; 4]> = ObjectColumn::new("displacement");
+
+const MOTION: &str = "motion";
+
+/// Draws how far each pixel's surface has moved since the last frame, in fractions of the picture.
+#[derive(Default)]
+pub struct Motion {
+    frame: Mutex<Frame>,
+}
+
+/// The camera of the frame before, as the shader reads it, and the camera of this frame.
+#[derive(Default)]
+struct Frame {
+    before: Before,
+    camera: Option<Camera>,
+}
+
+#[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Before {
+    clip_from_relative: Mat4,
+    /// From the camera before to this one.
+    camera_moved: [f32; 4],
+}
+
+impl Motion {
+    /// Takes note of the camera of the next frame.
+    pub fn begin_frame(&self, camera: &Camera) {
+        let mut frame = self.frame.lock();
+        let before = frame.camera.replace(camera.clone()).unwrap_or_else(|| camera.clone());
+        frame.before = Before {
+            clip_from_relative: RenderView::new(&before).clip_from_relative(),
+            camera_moved: (camera.position - before.position).as_vec3().extend(0.0).to_array(),
+        };
+    }
+}
+
+impl RenderProcess for Motion {
+    fn name(&self) -> &str {
+        MOTION
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(Place::AfterGeometry);
+        declare.clears_color(MOTION, Format::Rg16Float, ClearColor::Value([0.0; 4]));
+        declare.matches_depth("depth");
+        declare.reads_column(DISPLACEMENT);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let parameters = bytemuck::bytes_of(&self.frame.lock().before).to_vec().into();
+        let (shader, selection) = (include_str!("motion.wgsl"), Selection::OPAQUE);
+        Draws::Commands(CommandDraws { shader, selection, parameters, ..CommandDraws::default() })
+    }
+}
+
+/// A step of post-processing: mixes the picture with its own of the frame before, where that was the same surface.
+pub struct TemporalFilter {
+    source: String,
+    target: String,
+}
+
+impl TemporalFilter {
+    pub fn new(source: &str, target: &str) -> Self {
+        Self { source: source.to_owned(), target: target.to_owned() }
+    }
+}
+
+impl RenderProcess for TemporalFilter {
+    fn name(&self) -> &str {
+        "temporal filter"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples(&self.source);
+        declare.samples(MOTION);
+        declare.samples_previous(&self.target);
+        declare.clears_color(&self.target, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen { shader: include_str!("temporal.wgsl"), ..FullScreen::default() })
+    }
+}
