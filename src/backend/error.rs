@@ -20,6 +20,20 @@ pub enum BackendError {
         /// What Drawloom needs.
         needed: u64,
     },
+    /// A process's WGSL does not compile.
+    #[error("the shader of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
+    Shader {
+        /// The process.
+        process: String,
+        /// The line of the process's own text, from 1.
+        line: usize,
+        /// The column in that line, from 1.
+        column: usize,
+        /// What is wrong.
+        message: String,
+        /// The line.
+        text: String,
+    },
     /// The device refused a pass: an error in a render process's shader, targets or parameters.
     #[error("the device refused {label}: {message}")]
     Validation {

@@ -53,7 +53,7 @@ impl PipelineCache {
                 None => {
                     let label = format!("the shader of {:?}", planned.name.as_str());
                     let create = || ProcessPipelines::new(device, layouts, plan, planned, draws, quality);
-                    Arc::new(with_error_scope(device, &label, create)?)
+                    Arc::new(with_error_scope(device, &label, create)??)
                 }
             };
             // The loop visits processes in order, so this either replaces an entry or appends one.

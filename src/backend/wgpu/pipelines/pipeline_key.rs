@@ -56,10 +56,15 @@ impl<'a> PipelineKey<'a> {
         PipelineKey { shader: owned(self.shader), fragment: self.fragment.map(owned), ..self }
     }
 
-    /// The complete WGSL.
-    pub(crate) fn source(&self) -> String {
+    /// What goes before the process's own WGSL.
+    pub(crate) fn prelude(&self) -> String {
         let is_absolute = self.transforms == TransformPrecision::Absolute;
-        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{SHADER_PRELUDE}\n{}", self.shader)
+        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{SHADER_PRELUDE}\n")
+    }
+
+    /// The process's own WGSL.
+    pub(crate) fn own_shader(&self) -> &str {
+        &self.shader
     }
 }
 

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
+use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
+use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format, vertex_attributes,
     vertex_stride,
@@ -88,6 +90,10 @@ struct CompiledShader {
 }
 
 impl ProcessPipelines {
+    /// Compiles the shader of a process.
+    ///
+    /// # Errors
+    /// If it does not compile.
     pub(crate) fn new(
         device: &wgpu::Device,
         layouts: &BindGroupLayouts,
@@ -95,7 +101,7 @@ impl ProcessPipelines {
         planned: &PlannedProcess,
         draws: &Draws<'_>,
         quality: &Quality,
-    ) -> Self {
+    ) -> Result<Self, BackendError> {
         let name = planned.name.as_str();
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
@@ -104,11 +110,10 @@ impl ProcessPipelines {
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
         let engine_layout = engine_layout(device, columns, &resources);
-        let shader = (key.vertices != VertexSource::None).then(|| {
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(key.source().into()),
-            });
+        let shader = if key.vertices == VertexSource::None {
+            None
+        } else {
+            let module = compile_shader(device, name, &key.prelude(), key.own_shader())?;
             let own = [process_layout.as_ref(), engine_layout.as_ref()];
             let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
             let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
@@ -117,8 +122,8 @@ impl ProcessPipelines {
                 bind_group_layouts: &groups[..used],
                 immediate_size: 0,
             });
-            CompiledShader { module, layout }
-        });
+            Some(CompiledShader { module, layout })
+        };
         let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
         let pipelines = Self {
             name,
@@ -136,7 +141,7 @@ impl ProcessPipelines {
         if let Some(state) = pipelines.key.state {
             pipelines.insert(pipelines.create(device, state));
         }
-        pipelines
+        Ok(pipelines)
     }
 
     /// Whether a process of this plan can use these pipelines for these draws, in frames of this quality.
@@ -333,7 +338,8 @@ mod tests {
         let draws = plan.draws().unwrap();
         let quality = Quality::balanced();
         let layouts = BindGroupLayouts::new(&device);
-        let pipelines = ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality);
+        let pipelines =
+            ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
 
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {

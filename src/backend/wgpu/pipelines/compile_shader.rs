@@ -1,0 +1,82 @@
+//! Compiles WGSL, and reports errors at the lines of the process's own text.
+
+use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
+use crate::backend::wgpu::error_scope::with_error_scope;
+
+/// Compiles the shader of a process: its own WGSL, behind what the crate puts before it.
+///
+/// # Errors
+/// If it does not compile: [`BackendError::Shader`], with the line and column in the process's own text, if the error is there.
+pub(super) fn compile_shader(
+    device: &wgpu::Device,
+    process: &str,
+    before: &str,
+    own: &str,
+) -> Result<wgpu::ShaderModule, BackendError> {
+    let source = wgpu::ShaderSource::Wgsl([before, own].concat().into());
+    let mut created = None;
+    let outcome = with_error_scope(device, process, || {
+        created = Some(device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(process), source }));
+    });
+    let module = created.ok_or_else(|| broken_rule("a shader module is made, right or wrong"))?;
+    match outcome {
+        Ok(()) => Ok(module),
+        Err(error) => Err(located(process, before.len(), own, &module).unwrap_or(error)),
+    }
+}
+
+/// The first error of a shader at its line; `None` if it has no place in the process's own text, which begins at `offset`.
+fn located(process: &str, offset: usize, own: &str, module: &wgpu::ShaderModule) -> Option<BackendError> {
+    // The future is ready at once on every native backend.
+    let messages = pollster::block_on(module.get_compilation_info()).messages;
+    let (message, location) = messages.into_iter().find_map(|message| Some((message.message, message.location?)))?;
+    let at = (location.offset as usize).checked_sub(offset)?;
+    let (line, column, text) = place_in(own, at)?;
+    Some(BackendError::Shader { process: process.to_owned(), line, column, message, text: text.to_owned() })
+}
+
+/// The line and the column of a byte, both from 1, and the line's text; `None` past the end.
+fn place_in(text: &str, at: usize) -> Option<(usize, usize, &str)> {
+    let before = text.get(..at)?;
+    let line = before.matches('\n').count();
+    let column = before.rsplit('\n').next()?.chars().count();
+    Some((line + 1, column + 1, text.lines().nth(line).unwrap_or_default().trim_end()))
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+
+    #[test]
+    fn bytes_have_lines_and_columns() {
+        let text = "ab\nçd\n\nx";
+        assert_eq!(place_in(text, 0), Some((1, 1, "ab")));
+        assert_eq!(place_in(text, 2), Some((1, 3, "ab")));
+        assert_eq!(place_in(text, 5), Some((2, 2, "çd")));
+        assert_eq!(place_in(text, 7), Some((3, 1, "")));
+        assert_eq!(place_in(text, 8), Some((4, 1, "x")));
+        assert_eq!(place_in(text, 4), None, "amid a character");
+        assert_eq!(place_in(text, 99), None);
+    }
+
+    #[test]
+    fn errors_are_at_the_lines_of_the_process() {
+        let (device, _) = noop_device();
+        let before = "const A: u32 = 1u;\n// two lines\n";
+        let own = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return vec4<f32>(unknown);\n}\n";
+        let error = compile_shader(&device, "wrong", before, own).unwrap_err();
+        let BackendError::Shader { process, line, column, text, .. } = &error else { panic!("{error}") };
+        assert_eq!(
+            (process.as_str(), *line, *column, text.as_str()),
+            ("wrong", 3, 22, "    return vec4<f32>(unknown);")
+        );
+        assert!(error.to_string().contains("unknown"), "{error}");
+        let syntax = compile_shader(&device, "wrong", before, "\nfn fragment( {").unwrap_err();
+        assert!(matches!(syntax, BackendError::Shader { line: 2, .. }), "{syntax}");
+        let twice = compile_shader(&device, "twice", before, "const A: u32 = 2u;").unwrap_err();
+        assert!(twice.to_string().contains("twice"), "{twice}");
+        assert!(compile_shader(&device, "right", before, "").is_ok());
+    }
+}
