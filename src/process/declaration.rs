@@ -174,6 +174,12 @@ impl Declare {
         self.before(end);
     }
 
+    /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute pass
+    /// of particles. Its targets are those of that view, so no other process of these views may use them.
+    pub fn once_a_frame(&mut self) {
+        self.declaration.once_a_frame = true;
+    }
+
     /// Keeps the process in the graph although no output depends on it, because it has side effects.
     pub fn keep(&mut self) {
         self.declaration.keep = true;
@@ -204,6 +210,8 @@ pub struct Declaration {
     pub after: Vec<String>,
     /// The processes that it comes before.
     pub before: Vec<String>,
+    /// Whether it draws in the first of its views only.
+    pub once_a_frame: bool,
     /// Whether it stays in the graph although no output depends on it.
     pub keep: bool,
 }

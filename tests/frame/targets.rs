@@ -1,12 +1,13 @@
 //! Sizes and histories of targets that no plan can have.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, PlanError, RenderProcess, TargetSize};
 use drawloom::scene::ViewKind;
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, Renderer};
+use drawloom_testing::scenes::field;
 
 /// A process with a name, and a function that declares.
 struct Declaring(&'static str, Box<dyn Fn(&mut Declare) + Send + Sync>);
@@ -148,4 +149,74 @@ fn a_process_whose_target_is_read_in_the_next_frame_is_not_dropped() {
     assert!(renderer.plan().dropped().is_empty());
     let targets: Vec<_> = renderer.plan().targets().iter().map(|target| target.name.as_str()).collect();
     assert_eq!(targets, ["written", "picture", "written of the frame before"]);
+}
+
+#[test]
+fn a_process_that_draws_once_a_frame_draws_in_the_first_of_its_views() {
+    let once = Declaring::new("once", |declare| {
+        clears(declare, "shared");
+        declare.once_a_frame();
+    });
+    let each = Declaring::new("each", |declare| clears(declare, "picture"));
+    let builder = Renderer::builder(NullBackend).process(once).process(each);
+    let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let mut scene = field(5);
+    for views in [2, 1] {
+        scene.cameras.truncate(views);
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let submission = submitter.submit(recorded).unwrap().submission;
+        let mut passes: Vec<_> = submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
+        passes.sort_unstable();
+        let expected = [("each", 0), ("each", 1), ("once", 0)].into_iter().filter(|(_, view)| *view < views);
+        assert_eq!(passes, expected.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn targets_of_a_process_that_draws_once_a_frame_are_its_own() {
+    let once = Declaring::new("once", |declare| {
+        clears(declare, "shared");
+        declare.once_a_frame();
+    });
+    let reader = Declaring::new("reader", |declare| {
+        declare.samples("shared");
+        clears(declare, "picture");
+    });
+    let error = plan_error([once, reader]);
+    let PlanError::OnceAFrame { process, other, target } = &error else { panic!("{error}") };
+    assert_eq!([process, other, target], ["once", "reader", "shared"]);
+}
+
+#[test]
+fn a_process_that_nothing_needs_is_warned_of() {
+    let useless = Declaring::new("useless", |declare| {
+        declare.clears_color("unused", Format::Rgba8Unorm, ClearColor::Background);
+    });
+    let picture = Declaring::new("useful", |declare| clears(declare, "picture"));
+    let written = Arc::new(Mutex::new(Vec::new()));
+    let writer = {
+        let written = Arc::clone(&written);
+        move || Written(Arc::clone(&written))
+    };
+    let subscriber = tracing_subscriber::fmt().with_writer(writer).with_ansi(false).finish();
+    tracing::subscriber::with_default(subscriber, || {
+        let builder = Renderer::builder(NullBackend).process(useless).process(picture);
+        drop(builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap());
+    });
+    let text = String::from_utf8(written.lock().unwrap().clone()).unwrap();
+    assert!(text.contains("WARN") && text.contains("useless") && !text.contains("useful"), "{text}");
+}
+
+/// What a subscriber writes.
+struct Written(Arc<Mutex<Vec<u8>>>);
+
+impl std::io::Write for Written {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }

@@ -56,6 +56,16 @@ pub enum PlanError {
         /// Two targets.
         targets: [String; 2],
     },
+    /// A process uses a target of another that draws once a frame, and so in one of its views only.
+    #[error("process {process:?} draws target {target:?} once a frame, but process {other:?} uses that of each view")]
+    OnceAFrame {
+        /// The process that draws once a frame.
+        process: String,
+        /// The process that draws in each view.
+        other: String,
+        /// The target.
+        target: String,
+    },
     /// A process reads the history of a target that no process of its views writes, or that is drawn in layers.
     #[error(
         "process {process:?} reads {target:?}, but no process writes that target in the same views, as one for each view"

@@ -112,6 +112,9 @@ impl FramePlan {
         let dot =
             schedule.to_labelled_dot(|before, after| passed_on_targets(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
+        for process in dropped.iter().filter(|name| !slot_names.contains(name)) {
+            tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
+        }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
         let processes: Vec<_> = schedule.into_nodes().map(|(_, process)| process).collect();

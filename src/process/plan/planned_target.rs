@@ -46,6 +46,7 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
         }
     }
     processes.iter().try_for_each(|planned| check_attachments(planned, &targets))?;
+    check_once_a_frame(processes)?;
     let copies = copied_targets(processes, &targets)?;
     targets.extend(copies);
     Ok(targets)
@@ -135,6 +136,23 @@ fn attached_targets<'a>(
         |access: &Access| access.is_depth() || matches!(access, Access::ClearColor(..) | Access::DrawOver);
     let attached = accesses.iter().filter(move |(_, access)| is_attached(access));
     attached.filter_map(|(name, _)| targets.iter().find(|known| known.name == *name && known.views == *views))
+}
+
+/// # Errors
+/// If another process of the same views uses a target of a process that draws in one of them only.
+fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
+    for planned in processes.iter().filter(|planned| planned.declaration.once_a_frame) {
+        for target in planned.declaration.written() {
+            let uses = |(name, access): &(String, Access)| name == target && !matches!(access, Access::SampleLayers(_));
+            let same_views = |other: &&PlannedProcess| other.declaration.views == planned.declaration.views;
+            let others = processes.iter().filter(|other| other.name != planned.name).filter(same_views);
+            if let Some(other) = others.into_iter().find(|other| other.declaration.accesses.iter().any(uses)) {
+                let (process, other) = (planned.name.clone(), other.name.clone());
+                return Err(PlanError::OnceAFrame { process, other, target: target.to_owned() });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The copies of targets whose content of the frame before is read.

@@ -29,7 +29,10 @@ impl ViewGroup {
         let mut passes = Vec::new();
         let drawn = |(_, view): &(usize, &RenderView)| self.kinds.contains(&view.kind()) && !view.is_cached;
         for (view_index, kind) in views.iter().enumerate().filter(drawn).map(|(index, view)| (index, view.kind())) {
-            let of_kind = |(_, planned): &(usize, &PlannedProcess)| planned.declaration.views == kind;
+            let is_first = !passes.iter().any(|pass: &Pass| views[pass.view_index].kind() == kind);
+            let of_kind = |(_, planned): &(usize, &PlannedProcess)| {
+                planned.declaration.views == kind && (is_first || !planned.declaration.once_a_frame)
+            };
             passes.extend(
                 processes
                     .iter()
