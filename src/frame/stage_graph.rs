@@ -110,8 +110,8 @@ impl<B: Backend> StageGraph<B> {
         key: GraphKey,
     ) -> Result<Self, FrameError> {
         let passes = plan.passes(views);
-        for (index, view) in views.iter().enumerate() {
-            if !view.is_cached && !passes.iter().any(|pass| pass.view_index == index) {
+        for view in views {
+            if !view.is_cached && !plan.draws_views(view.kind()) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }

@@ -2,7 +2,10 @@
 
 use std::error::Error;
 
-use crate::scene::ViewKind;
+use bytemuck::Pod;
+use wgpu::util::DeviceExt;
+
+use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
@@ -27,11 +30,28 @@ pub struct RawPassResources<'a> {
     pub view: usize,
     /// Width and height of the view's picture, in pixels.
     pub size: [u32; 2],
+    /// The layouts of [`RawPassResources::bind_groups`], for pipelines of the pass's own.
+    pub bind_group_layouts: [&'a wgpu::BindGroupLayout; 2],
+    /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders: the view,
+    /// all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
+    pub bind_groups: [&'a wgpu::BindGroup; 2],
+    pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<&'a wgpu::Buffer>,
     pub(crate) textures: &'a dyn Fn(&str) -> Option<&'a wgpu::Texture>,
     pub(crate) layered: &'a dyn Fn(ViewKind, &str) -> Option<&'a wgpu::Texture>,
 }
 
 impl RawPassResources<'_> {
+    /// A new buffer with these bytes, for this frame. A write through the queue would be seen by every frame that is recorded and not
+    /// yet submitted.
+    pub fn buffer_of(&self, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
+        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents: bytes, usage })
+    }
+
+    /// The values of a column of objects; `None` if the process does not declare that it [reads](super::Declare::reads_column) it.
+    pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Option<&wgpu::Buffer> {
+        (self.columns)(column.layout())
+    }
+
     /// The view's target of this name; `None` if no process declares it.
     pub fn target(&self, name: &str) -> Option<&wgpu::Texture> {
         (self.textures)(name)

@@ -8,6 +8,7 @@ mod changes;
 mod changing_shaders;
 mod columns;
 mod determinism;
+mod compute;
 mod device_times;
 mod devices;
 mod extremes;
@@ -60,6 +61,7 @@ fn main() {
         (lighting::CASES, Needs::Adapter),
         (changing_shaders::CASES, Needs::Adapter),
         (columns::CASES, Needs::Adapter),
+        (compute::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),

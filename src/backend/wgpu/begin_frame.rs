@@ -40,9 +40,18 @@ impl WgpuBackend {
             // Relaxed: a counter that orders nothing.
             let number = self.frames.fetch_add(1, Ordering::Relaxed);
             let background = scene.background.as_dvec3().to_array();
-            let read_backs = Vec::new();
-            let mut frame =
-                WgpuFrame { number, pipelines, assets, light_meshes, targets, background, read_backs, buffers };
+            let (layouts, read_backs) = (self.layouts.clone(), Vec::new());
+            let mut frame = WgpuFrame {
+                number,
+                pipelines,
+                layouts,
+                assets,
+                light_meshes,
+                targets,
+                background,
+                read_backs,
+                buffers,
+            };
             self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?

@@ -109,7 +109,7 @@ pub(crate) fn record_without_commands(
 /// Has a raw pass encode itself.
 ///
 /// # Errors
-/// If the raw pass reports an error.
+/// If the raw pass reports an error, or a resource of the pass is missing. The latter is a bug in Drawloom.
 pub(crate) fn encode_raw(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
@@ -122,7 +122,21 @@ pub(crate) fn encode_raw(
     let textures = |name: &str| frame.targets.find(pass.view_index, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
     let size = request.views[pass.view_index].camera.size;
-    let resources = RawPassResources { device, view: pass.view_index, size, textures: &textures, layered: &layered };
+    let declared = &request.plan.processes()[pass.process_index].declaration.columns;
+    let columns = |column| frame.buffers.objects().column(column).filter(|_| declared.contains(&column));
+    let columns = |column| columns(column).map(|binding| binding.buffer);
+    let of_frame = frame.pass(index).frame_bind_group.as_ref();
+    let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
+    let resources = RawPassResources {
+        device,
+        view: pass.view_index,
+        size,
+        bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
+        bind_groups: [of_frame, &frame.assets.group],
+        columns: &columns,
+        textures: &textures,
+        layered: &layered,
+    };
     let queries = timed_pass_index.and_then(|timed_pass| frame.buffers.timestamps()?.queries(timed_pass));
     if let Some((set, [begin, _])) = queries {
         encoder.write_timestamp(set, begin);

@@ -6,6 +6,7 @@ use crate::process::{Format, ShaderResource};
 use crate::view::GpuView;
 
 /// The bind group layouts that all processes share.
+#[derive(Clone)]
 pub(crate) struct BindGroupLayouts {
     /// View, objects, the indices of drawn objects, lights.
     pub(crate) frame: wgpu::BindGroupLayout,
@@ -13,16 +14,20 @@ pub(crate) struct BindGroupLayouts {
     pub(crate) assets: wgpu::BindGroupLayout,
 }
 
+/// Shipped processes have no compute shaders, but raw passes of an engine may.
+const ALL_STAGES: ShaderStages = ShaderStages::VERTEX_FRAGMENT.union(ShaderStages::COMPUTE);
+const FRAGMENT_AND_COMPUTE: ShaderStages = ShaderStages::FRAGMENT.union(ShaderStages::COMPUTE);
+
 impl BindGroupLayouts {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
         let frame = [
-            entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(size_of::<GpuView>() as u64)),
-            entry(1, ShaderStages::VERTEX_FRAGMENT, storage()),
-            entry(2, ShaderStages::VERTEX_FRAGMENT, storage()),
-            entry(3, ShaderStages::VERTEX_FRAGMENT, storage()),
+            entry(0, ALL_STAGES, uniform(size_of::<GpuView>() as u64)),
+            entry(1, ALL_STAGES, storage()),
+            entry(2, ALL_STAGES, storage()),
+            entry(3, ALL_STAGES, storage()),
         ];
         let array = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Float { filterable: true },
@@ -30,13 +35,13 @@ impl BindGroupLayouts {
             multisampled: false,
         };
         let assets = [
-            entry(0, ShaderStages::VERTEX_FRAGMENT, storage()),
-            entry(1, ShaderStages::FRAGMENT, array),
-            entry(2, ShaderStages::FRAGMENT, array),
-            entry(3, ShaderStages::FRAGMENT, array),
-            entry(4, ShaderStages::FRAGMENT, array),
-            entry(5, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-            entry(6, ShaderStages::FRAGMENT, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(0, ALL_STAGES, storage()),
+            entry(1, FRAGMENT_AND_COMPUTE, array),
+            entry(2, FRAGMENT_AND_COMPUTE, array),
+            entry(3, FRAGMENT_AND_COMPUTE, array),
+            entry(4, FRAGMENT_AND_COMPUTE, array),
+            entry(5, FRAGMENT_AND_COMPUTE, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(6, FRAGMENT_AND_COMPUTE, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
         ];
         Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
     }
