@@ -3,7 +3,7 @@
 use bytemuck::Pod;
 
 use super::{Format, Place, TargetSize};
-use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
+use crate::scene::{AttributeLayout, AttributeValue, ColumnLayout, ObjectColumn, VertexAttribute, ViewKind};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
 /// of the size of its picture unless [`Declare::size`] says otherwise.
@@ -141,6 +141,26 @@ impl Declare {
         self.declaration.columns.push(column.layout());
     }
 
+    /// Reads an engine's own attribute of vertices as an input of the vertex shader: the first such attribute is `@location(3)`, the next
+    /// 4, and so on, behind those of the prelude's `VertexInput`. Meshes without it have the default for each vertex.
+    ///
+    /// ```
+    /// use drawloom::process::Declare;
+    /// use drawloom::scene::VertexAttribute;
+    ///
+    /// const TANGENT: VertexAttribute<[f32; 4]> = VertexAttribute::new("tangent");
+    ///
+    /// fn declare(declare: &mut Declare) {
+    ///     declare.clears_depth("depth", drawloom::process::Format::Depth32Float);
+    ///     // fn vertex(in: VertexInput, @location(3) tangent: vec4<f32>)
+    ///     declare.reads_attribute(TANGENT, [1.0, 0.0, 0.0, 1.0]);
+    /// }
+    /// ```
+    pub fn reads_attribute<T: AttributeValue>(&mut self, attribute: VertexAttribute<T>, default: T) {
+        let default = bytemuck::bytes_of(&default).to_vec();
+        self.declaration.attributes.push(DeclaredAttribute { layout: attribute.layout(), default });
+    }
+
     /// A raw pass overwrites a target with its own commands; as a storage texture too, if [`Format::can_be_stored`].
     pub fn writes(&mut self, target: &str, format: Format) {
         self.access(target, Access::Write(format));
@@ -206,6 +226,8 @@ pub struct Declaration {
     pub sizes: Vec<(String, TargetSize)>,
     /// The data of objects that its shader reads, in the order of their bindings.
     pub columns: Vec<ColumnLayout>,
+    /// The attributes of vertices that its shader reads, in the order of their locations.
+    pub attributes: Vec<DeclaredAttribute>,
     /// The processes that it comes after.
     pub after: Vec<String>,
     /// The processes that it comes before.
@@ -246,6 +268,15 @@ impl Declaration {
             _ => None,
         })
     }
+}
+
+/// An attribute of vertices that a process reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeclaredAttribute {
+    /// Its name and format.
+    pub layout: AttributeLayout,
+    /// The bytes of the value that vertices of meshes without it have.
+    pub default: Vec<u8>,
 }
 
 /// The name of what a target held at the end of the frame before, by which it can be read back.

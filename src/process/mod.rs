@@ -25,11 +25,11 @@ mod target_size;
 
 #[cfg(feature = "software")]
 pub use cpu_shader::{
-    CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, Materials, ObjectCpuShader, ObjectPixel,
-    PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS,
-    VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
+    CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
+    ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
+    VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
-pub use declaration::{Access, ClearColor, Declaration, Declare, previous_name};
+pub use declaration::{Access, ClearColor, Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
     Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place, Requirements,
     SURFACE_SHADER, ShadowCasters, Transparency,

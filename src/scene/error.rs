@@ -20,6 +20,16 @@ pub enum SceneError {
         /// The number of indices.
         indices: usize,
     },
+    /// Values of a [vertex attribute](super::VertexAttribute) that a mesh cannot have.
+    #[error("mesh `{mesh}`: its attribute {attribute:?} {problem}")]
+    InvalidAttribute {
+        /// The name of the mesh.
+        mesh: String,
+        /// The name of the attribute.
+        attribute: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// An index that points past the vertices.
     #[error("mesh `{mesh}`: index {index} points past its {vertices} vertices")]
     IndexOutOfRange {

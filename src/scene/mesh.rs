@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::SceneError;
+use super::vertex_attribute::MeshAttribute;
+use super::{AttributeFormat, AttributeLayout, AttributeValue, SceneError, VertexAttribute};
 
 /// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,7 @@ pub struct Mesh {
     topology: Topology,
     vertices: Vec<Vertex>,
     indices: Vec<u32>,
+    attributes: Vec<MeshAttribute>,
     bounds: Bounds,
     corners: [Vec3; 2],
     longest_edge: f32,
@@ -59,13 +61,55 @@ impl Mesh {
             let position = Vec3::from(vertex.position);
             [low.min(position), high.max(position)]
         });
+        let (attributes, longest_edge, culls_triangles) = (Vec::new(), 0.0, false);
         let mut mesh =
-            Self { name, topology, vertices, indices, bounds, corners, longest_edge: 0.0, culls_triangles: false };
+            Self { name, topology, vertices, indices, attributes, bounds, corners, longest_edge, culls_triangles };
         let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
         let edges = triangles.filter(has_distinct_corners).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
         mesh.longest_edge = root_rounded_up(longest_squared);
         mesh
+    }
+
+    /// Adds the values of an attribute, one for each vertex.
+    ///
+    /// # Errors
+    /// If there is not one value for each vertex, a value is not finite, or the mesh has the attribute already.
+    pub fn with_attribute<T: AttributeValue>(
+        mut self,
+        attribute: VertexAttribute<T>,
+        values: &[T],
+    ) -> Result<Self, SceneError> {
+        let (layout, vertices) = (attribute.layout(), self.vertices.len());
+        let refused =
+            |problem: String| SceneError::InvalidAttribute { mesh: self.name.clone(), attribute: layout.name, problem };
+        if values.len() != vertices {
+            return Err(refused(format!("has {} values for {vertices} vertices", values.len())));
+        }
+        if self.attributes.iter().any(|known| known.layout.name == layout.name) {
+            return Err(refused("is there already".to_owned()));
+        }
+        let bytes: Vec<u8> = bytemuck::cast_slice(values).to_vec();
+        if let AttributeFormat::Float32(components) = layout.format {
+            let is_finite = |value: &[u8]| bytemuck::pod_read_unaligned::<f32>(value).is_finite();
+            if let Some(number) = bytes.chunks_exact(4).position(|value| !is_finite(value)) {
+                return Err(refused(format!("is not finite at vertex {}", number / usize::from(components))));
+            }
+        }
+        self.attributes.push(MeshAttribute { layout, bytes });
+        Ok(self)
+    }
+
+    /// The values of an attribute, one for each vertex; `None` if the mesh does not have it in that format.
+    pub fn attribute(&self, layout: AttributeLayout) -> Option<&[u8]> {
+        let known = self.attributes.iter().find(|known| known.layout == layout);
+        known.map(|known| known.bytes.as_slice())
+    }
+
+    /// The attributes of another mesh with the same vertices, followed by ones that were added halfway between two others.
+    pub(super) fn with_attributes_of(self, other: &Self, added_between: &[[u32; 2]]) -> Self {
+        let attributes = other.attributes.iter().map(|attribute| attribute.subdivided(added_between)).collect();
+        Self { attributes, ..self }
     }
 
     /// Enables or disables triangle culling. If enabled, each frame tests every triangle in every view, and leaves out those
@@ -252,6 +296,26 @@ mod tests {
         let huge = vec![corner(f32::MAX, f32::MAX, 0.0), corner(f32::MIN, f32::MIN, 0.0), corners[2]];
         assert!(matches!(make(huge, vec![0, 1, 2]), Err(SceneError::MeshTooLarge { .. })));
         assert!(make(corners, vec![0, 1, 2]).is_ok());
+    }
+
+    #[test]
+    fn an_invalid_attribute_is_an_error_with_its_name() {
+        const WEIGHT: VertexAttribute<[f32; 2]> = VertexAttribute::new("weight");
+        let corners = vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0)];
+        let mesh = Mesh::new("leaf", Topology::TriangleList, corners, vec![0, 1, 2]).unwrap();
+        let problem_of = |mesh: Result<Mesh, SceneError>| match mesh {
+            Err(SceneError::InvalidAttribute { mesh, attribute: "weight", problem }) if mesh == "leaf" => problem,
+            other => panic!("{other:?}"),
+        };
+        let few = mesh.clone().with_attribute(WEIGHT, &[[0.0; 2]; 2]);
+        assert_eq!(problem_of(few), "has 2 values for 3 vertices");
+        let broken = mesh.clone().with_attribute(WEIGHT, &[[0.0; 2], [0.0, f32::INFINITY], [0.0; 2]]);
+        assert_eq!(problem_of(broken), "is not finite at vertex 1");
+        let mesh = mesh.with_attribute(WEIGHT, &[[0.5; 2]; 3]).unwrap();
+        assert_eq!(mesh.attribute(WEIGHT.layout()).map(<[u8]>::len), Some(24));
+        assert_eq!(mesh.attribute(VertexAttribute::<[f32; 3]>::new("weight").layout()), None);
+        let same_name = mesh.with_attribute(VertexAttribute::<u32>::new("weight"), &[1; 3]);
+        assert_eq!(problem_of(same_name), "is there already");
     }
 
     #[test]

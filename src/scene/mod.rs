@@ -19,6 +19,7 @@ mod packed_vertex;
 mod scene_ref;
 mod subdivision;
 mod transform;
+mod vertex_attribute;
 
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
@@ -33,3 +34,4 @@ pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;
 pub use scene_ref::SceneRef;
 pub(crate) use transform::is_unit;
+pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VertexAttribute};

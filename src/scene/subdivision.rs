@@ -15,8 +15,8 @@ impl Mesh {
     ///
     /// Longer edges are split at their midpoints until none is left. Whether and where an edge is split depends only on
     /// the positions of its ends, so surfaces that meet along an edge stay connected, even if normals or texture
-    /// coordinates differ there. A new vertex has the mean normal and texture coordinates of both ends, as
-    /// interpolation gives at the midpoint.
+    /// coordinates differ there. A new vertex has the mean normal, texture coordinates and attributes of
+    /// both ends, as interpolation gives at the midpoint; those of one end if they are whole numbers.
     ///
     /// Each step splits all long edges. Subdivision stops before a step that could exceed `triangle_limit` triangles or
     /// 2³² vertices, and does not split an edge whose midpoint f32 cannot distinguish from its ends.
@@ -40,7 +40,8 @@ impl Mesh {
     pub fn subdivided(&self, longest: f32, triangle_limit: usize) -> Self {
         // `max` returns the other operand if one is NaN.
         let longest = f64::from(longest.max(0.0));
-        let mut surface = Surface { vertices: self.vertices().to_vec(), triangles: Vec::new() };
+        let mut surface =
+            Surface { vertices: self.vertices().to_vec(), added_between: Vec::new(), triangles: Vec::new() };
         self.triangles().for_each(|corners| surface.add(corners));
         loop {
             let splits = surface.count_splits(longest * longest);
@@ -56,12 +57,15 @@ impl Mesh {
         }
         let indices = surface.triangles.into_flattened();
         Self::from_valid_parts(self.name().to_owned(), Topology::TriangleList, surface.vertices, indices)
+            .with_attributes_of(self, &surface.added_between)
     }
 }
 
 /// A mesh while it is subdivided.
 struct Surface {
     vertices: Vec<Vertex>,
+    /// For each vertex that was added, the two that it is halfway between.
+    added_between: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,
 }
 
@@ -82,6 +86,7 @@ impl Surface {
                 let [one, other] = edge;
                 Some(*midpoints.entry([one.min(other), one.max(other)]).or_insert_with(|| {
                     self.vertices.push(midpoint);
+                    self.added_between.push(edge);
                     self.vertices.len() as u32 - 1
                 }))
             });
@@ -167,6 +172,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::scene::VertexAttribute;
 
     const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
 
@@ -240,7 +246,12 @@ mod tests {
             limit in prop_oneof![Just(usize::MAX), 0..3000_usize],
         ) {
             let scale = 2_f32.powi(exponent);
+            const POSITION: VertexAttribute<[f32; 3]> = VertexAttribute::new("position, again");
+            const SIDE: VertexAttribute<u32> = VertexAttribute::new("side");
             let whole = distorted_box(Vec3::from(sizes) * scale, Vec3::from(origin) * scale, bends);
+            let again: Vec<_> = whole.vertices().iter().map(|vertex| vertex.position).collect();
+            let sides: Vec<_> = (0..again.len() as u32).map(|vertex| vertex / 4).collect();
+            let whole = whole.with_attribute(POSITION, &again).unwrap().with_attribute(SIDE, &sides).unwrap();
             prop_assert_eq!(border(&whole), 0);
             let longest = share * scale;
             let fine = whole.subdivided(longest, limit);
@@ -250,11 +261,18 @@ mod tests {
             if limit == usize::MAX {
                 prop_assert!(fine.longest_edge() <= longest);
             }
+            let again: &[[f32; 3]] = bytemuck::cast_slice(fine.attribute(POSITION.layout()).unwrap());
+            prop_assert!(fine.vertices().iter().map(|vertex| &vertex.position).eq(again));
             prop_assert!(longest_of(&fine) <= f64::from(fine.longest_edge()));
             prop_assert!((area(&fine) / area(&whole) - 1.0).abs() < 1e-4, "{} {}", area(&fine), area(&whole));
             for (triangle, corners) in fine.triangles().zip(positions(&fine)) {
                 let normals = triangle.map(|corner| Vec3::from(fine.vertices()[corner as usize].normal));
                 prop_assert!(SIDES.contains(&normals[0]) && normals == [normals[0]; 3]);
+                let side = |corner: u32| {
+                    let sides: &[u32] = bytemuck::cast_slice(fine.attribute(SIDE.layout()).unwrap());
+                    SIDES[sides[corner as usize] as usize]
+                };
+                prop_assert_eq!(triangle.map(side), normals);
                 prop_assert!(across(corners).dot((normals[0] / Vec3::from(sizes)).as_dvec3()) > 0.0);
             }
         }

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::{
-    Declare, Deferred, Draws, GeometryBuffer, GeometryFormats, LightVolumes, PlanError, ProcessError, RenderProcess,
-    ToneMapping,
+    CommandDraws, Declare, Deferred, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, PlanError,
+    ProcessError, RenderProcess, ToneMapping,
 };
 use drawloom::scene::{
     Bounds, Camera, Changes, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene, SceneError,
-    SceneRef, ViewKind,
+    SceneRef, VertexAttribute, ViewKind,
 };
 use drawloom::task::Scheduler;
 use drawloom::view::RejectionReason;
@@ -205,6 +205,39 @@ fn processes_that_disagree_about_a_column_are_refused() {
         BuildError::Plan(PlanError::ConflictingColumns { process, column: "tint", first: 16, second: 4 }) if process == "other"
     );
     assert!(is_named, "{error}");
+}
+
+#[test]
+fn processes_that_disagree_about_an_attribute_are_refused() {
+    const WEIGHT: VertexAttribute<f32> = VertexAttribute::new("weight");
+    struct Reading(&'static str, fn(&mut Declare));
+    impl RenderProcess for Reading {
+        fn name(&self) -> &str {
+            self.0
+        }
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_depth(self.0, Format::Depth32Float);
+            declare.keep();
+            (self.1)(declare);
+        }
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws::default())
+        }
+    }
+    let others: [fn(&mut Declare); 2] = [
+        |declare| declare.reads_attribute(WEIGHT, 0.5),
+        |declare| declare.reads_attribute(VertexAttribute::<u32>::new("weight"), 1),
+    ];
+    for other in others {
+        let first = Reading("first", |declare| declare.reads_attribute(WEIGHT, 1.0));
+        let builder = Renderer::builder(NullBackend).process(first).process(Reading("second", other));
+        let error = builder.build(Arc::new(Scheduler::new(1).unwrap())).err().expect("they disagree");
+        let is_named = matches!(
+            &error,
+            BuildError::Plan(PlanError::ConflictingAttributes { process, attribute: "weight" }) if process == "second"
+        );
+        assert!(is_named, "{error}");
+    }
 }
 
 #[cfg(debug_assertions)]

@@ -4,6 +4,7 @@
 //! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check
 //! each of them before you commit it.
 
+mod attributes;
 mod changes;
 mod changing_shaders;
 mod columns;
@@ -51,6 +52,7 @@ fn main() {
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let mut trials = Vec::new();
     let cases = [
+        (attributes::CASES, Needs::Adapter),
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),

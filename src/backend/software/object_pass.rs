@@ -4,7 +4,7 @@ use super::attachments::{MAX_COLOR_ATTACHMENTS, OpenAttachments, TileAttachments
 use super::pass_context::PassContext;
 use super::precision::Precision;
 use super::triangle_setup::{TriangleRange, TriangleSetup, TriangleState};
-use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS};
+use crate::process::{DeclaredAttribute, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS};
 use crate::raster::{Triangle, Vector4};
 use crate::scene::Blend;
 use crate::task::JobPanic;
@@ -13,6 +13,8 @@ use crate::task::JobPanic;
 pub(super) struct ObjectPass<'a, R: Precision> {
     pub(super) context: PassContext<'a, R>,
     pub(super) shader: &'a dyn ObjectCpuShader<R>,
+    /// The attributes of vertices that the process reads.
+    pub(super) attributes: &'a [DeclaredAttribute],
     /// Whether what is drawn occludes what is behind it.
     pub(super) writes_depth: bool,
     /// One job sets up the triangles of a chunk.
@@ -44,7 +46,7 @@ impl<R: Precision> ObjectPass<'_, R> {
         executor.for_each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
         for chunks in chunks.chunks(CHUNKS_IN_MEMORY) {
             let set_up = |chunk: usize| -> TriangleSetup<R, V> {
-                TriangleSetup::new(*shader, &inputs, &open.tiling, &chunks[chunk], object_of)
+                TriangleSetup::new(*shader, self.attributes, &inputs, &open.tiling, &chunks[chunk], object_of)
             };
             let setups = executor.map(chunks.len(), set_up)?;
             executor.for_each(open.tiles.len(), |index| {

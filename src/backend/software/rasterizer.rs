@@ -128,7 +128,8 @@ fn software_pass<R: Precision>(
     let process = planned.name.clone();
     let draws = match (&request.draws[pass.process_index], R::shader(shader)) {
         (Draws::Commands(draws), TypedCpuShader::Objects(shader)) => {
-            SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth }
+            let attributes = planned.declaration.attributes.clone();
+            SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth, attributes }
         }
         (Draws::FullScreen(draws), TypedCpuShader::FullScreen(shader)) => {
             SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }

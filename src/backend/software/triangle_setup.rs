@@ -7,9 +7,11 @@ use super::commands::SoftwareCommands;
 use super::precision::Precision;
 use super::tiles::Tiling;
 use crate::command::{Batch, Cull};
-use crate::process::{ObjectCpuShader, PassInputs, ShaderObject, VertexInput, VertexOutput};
+use crate::process::{
+    DeclaredAttribute, MAX_ATTRIBUTES, ObjectCpuShader, PassInputs, ShaderObject, VertexInput, VertexOutput,
+};
 use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
-use crate::scene::{Blend, Mesh, Vertex};
+use crate::scene::{Blend, Mesh};
 
 /// A range of one object's triangles.
 pub(super) struct TriangleRange {
@@ -99,6 +101,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
     /// Runs the vertex shader for a chunk, and sets up and bins its triangles.
     pub(super) fn new(
         shader: &dyn ObjectCpuShader<R>,
+        attributes: &[DeclaredAttribute],
         pass: &PassInputs<'_, R>,
         tiling: &Tiling,
         chunk: &[TriangleRange],
@@ -111,7 +114,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
             let state =
                 TriangleState { material: object.material, blend: range.batch.state.blend(), object: object.index };
             let culled = culled_winding(range.batch.state.cull());
-            let mut cache = PostTransformCache::new(shader, pass, &object, range.mesh.vertices());
+            let mut cache = PostTransformCache::new(shader, pass, &object, &range.mesh, attributes);
             range.each_triangle(|indices| {
                 let corners = indices.map(|index| cache.vertex(index));
                 Triangle::set_up(&corners, tiling.size(), culled, &mut setup.triangles);
@@ -165,7 +168,9 @@ struct PostTransformCache<'a, R: Precision, const V: usize> {
     shader: &'a dyn ObjectCpuShader<R>,
     pass: &'a PassInputs<'a, R>,
     object: &'a ShaderObject<R>,
-    vertices: &'a [Vertex],
+    mesh: &'a Mesh,
+    /// The attributes that the process reads.
+    attributes: &'a [DeclaredAttribute],
     /// Each with its index in the mesh.
     cached: [Option<(u32, ShadedVertex<R, V>)>; CACHE_SIZE],
 }
@@ -180,9 +185,10 @@ impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
         shader: &'a dyn ObjectCpuShader<R>,
         pass: &'a PassInputs<'a, R>,
         object: &'a ShaderObject<R>,
-        vertices: &'a [Vertex],
+        mesh: &'a Mesh,
+        attributes: &'a [DeclaredAttribute],
     ) -> Self {
-        Self { shader, pass, object, vertices, cached: [None; CACHE_SIZE] }
+        Self { shader, pass, object, mesh, attributes, cached: [None; CACHE_SIZE] }
     }
 
     fn vertex(&mut self, index: u32) -> ShadedVertex<R, V> {
@@ -190,7 +196,7 @@ impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
         match self.cached[entry] {
             Some((other, vertex)) if other == index => vertex,
             _ => {
-                let input = vertex_input(&self.vertices[index as usize]);
+                let input = vertex_input(self.mesh, index as usize, self.attributes);
                 let VertexOutput { clip, varyings } = self.shader.vertex(self.pass, self.object, &input);
                 let vertex = (clip, std::array::from_fn(|varying| varyings[varying]));
                 self.cached[entry] = Some((index, vertex));
@@ -200,11 +206,19 @@ impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
     }
 }
 
-fn vertex_input<R: Real>(vertex: &Vertex) -> VertexInput<R> {
+fn vertex_input<R: Real>(mesh: &Mesh, index: usize, attributes: &[DeclaredAttribute]) -> VertexInput<R> {
     let real = |value: f32| R::of(f64::from(value));
+    let vertex = mesh.vertices()[index];
+    let mut own = [Vector::zero(); MAX_ATTRIBUTES];
+    for (own, &DeclaredAttribute { layout, ref default }) in own.iter_mut().zip(attributes) {
+        let stride = layout.format.bytes();
+        let value = mesh.attribute(layout).map_or(default.as_slice(), |values| &values[index * stride..][..stride]);
+        *own = Vector(layout.format.numbers(value).map(R::of));
+    }
     VertexInput {
         position: Vector(vertex.position.map(real)),
         normal: Vector(vertex.normal.map(real)),
         uv: Vector(vertex.uv.map(real)),
+        attributes: own,
     }
 }

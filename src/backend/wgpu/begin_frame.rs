@@ -26,6 +26,9 @@ impl WgpuBackend {
         let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, request)?;
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin_frame(scene.assets);
+        if self.assets.lock().require_attributes(plan.attributes()) {
+            self.subdivisions.clear();
+        }
         let assets = with_error_scope(&self.device, "meshes, materials and textures", || {
             self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, vertices, rejections)
         })??;
@@ -120,7 +123,10 @@ impl WgpuBackend {
         list: &DrawList,
     ) -> Result<(), BackendError> {
         let vertices = request.quality.vertices;
-        let make = |mesh: Mesh| SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices);
+        let make = |mesh: Mesh| {
+            let attributes = self.assets.lock().attributes_of(&self.device, &self.uploads, &mesh)?;
+            SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices, attributes)
+        };
         self.subdivisions.collect(request, list, vertices, make, |key, mesh| {
             frame.buffers.subdivided().write().insert(key, mesh);
         })

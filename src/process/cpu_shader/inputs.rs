@@ -8,6 +8,9 @@ use crate::scene::{Blend, ColumnLayout, LightKind, ObjectColumn, Projection};
 /// How many numbers a vertex hands on to the pixels.
 pub const VARYINGS: usize = 9;
 
+/// How many attributes of the engine's own a CPU shader can read.
+pub const MAX_ATTRIBUTES: usize = 4;
+
 /// What a vertex shader returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexOutput<R> {
@@ -147,6 +150,9 @@ pub struct VertexInput<R> {
     pub normal: Vector3<R>,
     /// Texture coordinates.
     pub uv: Vector2<R>,
+    /// The first attributes of the engine's own that the process reads, in the order declared, each with 0 for the numbers that it
+    /// lacks.
+    pub attributes: [Vector4<R>; MAX_ATTRIBUTES],
 }
 
 /// A material: `Material` in `drawloom.wgsl`.

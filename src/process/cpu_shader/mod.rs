@@ -11,8 +11,8 @@ mod prelude;
 pub(super) mod test_inputs;
 
 pub use inputs::{
-    FullScreenPixel, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial,
-    ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+    FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight,
+    ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
 pub use interface::{CpuShader, FullScreenCpuShader, LightCpuShader, ObjectCpuShader};
 pub use prelude::{direction_from_octahedral, octahedral_from_direction};

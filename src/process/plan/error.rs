@@ -116,6 +116,14 @@ pub enum PlanError {
         /// The same of the second process's column.
         second: usize,
     },
+    /// Two processes read an attribute of one name in different formats, or with different defaults.
+    #[error("process {process:?} and another disagree about the format or the default of the attribute {attribute:?}")]
+    ConflictingAttributes {
+        /// The second process.
+        process: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {

@@ -5,13 +5,16 @@ use std::sync::Arc;
 use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::attributes::attributes_of;
 use super::columns::{check_columns, columns_of};
 use super::order::{AddedProcess, order_constraints};
 use super::planned_target::{drawn_size, targets_of};
 use super::view_group::view_groups;
 use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
-use crate::process::{Access, Declaration, Draws, Format, RenderProcess, ShadowCasters, TargetSize, previous_name};
+use crate::process::{
+    Access, Declaration, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize, previous_name,
+};
 use crate::scene::{ColumnLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
 
@@ -24,6 +27,7 @@ pub struct FramePlan {
     view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
+    attributes: Vec<DeclaredAttribute>,
     /// Of each process.
     drawn_sizes: Vec<TargetSize>,
     dropped: Vec<String>,
@@ -124,7 +128,7 @@ impl FramePlan {
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
-        let columns = columns_of(&processes)?;
+        let (columns, attributes) = (columns_of(&processes)?, attributes_of(&processes)?);
         let drawn_sizes = processes.iter().map(|planned| drawn_size(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
@@ -135,6 +139,7 @@ impl FramePlan {
             view_groups,
             targets,
             columns,
+            attributes,
             drawn_sizes,
             dropped,
             dot,
@@ -195,6 +200,11 @@ impl FramePlan {
     /// The columns of objects that the processes read, each once.
     pub fn columns(&self) -> &[ColumnLayout] {
         &self.columns
+    }
+
+    /// The attributes of vertices that the processes read, each once.
+    pub fn attributes(&self) -> &[DeclaredAttribute] {
+        &self.attributes
     }
 
     /// Checks that a scene has the columns that the processes read.

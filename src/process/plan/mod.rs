@@ -1,5 +1,6 @@
 //! The plan of a frame: its processes in order, and the targets that they use.
 
+mod attributes;
 mod chain;
 mod columns;
 mod error;

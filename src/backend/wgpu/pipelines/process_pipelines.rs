@@ -9,13 +9,13 @@ use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format, vertex_attributes,
-    vertex_stride,
+    vertex_format, vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess};
 use crate::quality::Quality;
-use crate::scene::{Blend, Topology, ViewKind};
+use crate::scene::{AttributeLayout, Blend, Topology, ViewKind};
 use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
@@ -27,6 +27,8 @@ pub(crate) struct ProcessPipelines {
     pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
     pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
+    /// The attributes of vertices that it reads.
+    attributes: Vec<AttributeLayout>,
     /// How many columns it reads.
     columns: usize,
     /// What it says about its resources.
@@ -106,6 +108,7 @@ impl ProcessPipelines {
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
         let columns = planned.declaration.columns.len();
+        let attributes = attributes_of(&planned.declaration).collect();
         let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
@@ -131,6 +134,7 @@ impl ProcessPipelines {
             attachments,
             process_layout,
             engine_layout,
+            attributes,
             columns,
             resources,
             features,
@@ -155,6 +159,7 @@ impl ProcessPipelines {
         self.name == planned.name.as_str()
             && self.fits_draws(draws, quality)
             && self.columns == planned.declaration.columns.len()
+            && attributes_of(&planned.declaration).eq(self.attributes.iter().copied())
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
     }
 
@@ -220,6 +225,11 @@ impl ProcessPipelines {
         work(tuners[view].get_or_insert_with(|| set.tuner()))
     }
 
+    /// The attributes of vertices that it reads, in the order of their buffers.
+    pub(crate) fn attributes(&self) -> &[AttributeLayout] {
+        &self.attributes
+    }
+
     /// The process's name.
     pub(crate) fn name(&self) -> &str {
         &self.name
@@ -234,19 +244,18 @@ impl ProcessPipelines {
             format.map(|format| wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
         };
         let targets: Vec<_> = colors.iter().zip(can_be_blended).map(target).collect();
-        let layout = |array_stride, attributes| wgpu::VertexBufferLayout {
-            array_stride,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes,
-        };
+        let own: Vec<_> = (FIRST_OWN_LOCATION..).zip(&self.attributes).map(own_attribute).collect();
+        let own = self.attributes.iter().zip(&own);
+        let own = own.map(|(layout, attribute)| buffer_layout(layout.format.bytes() as u64, attribute));
         let (entry_point, vertices) = match self.key.vertices {
             VertexSource::Meshes(format) => {
-                ("vertex", Some(Some(layout(vertex_stride(format), vertex_attributes(format)))))
+                let shipped = buffer_layout(vertex_stride(format), vertex_attributes(format));
+                ("vertex", std::iter::once(shipped).chain(own).collect())
             }
             VertexSource::LightVolumes => {
-                ("light_volume", Some(Some(layout(size_of::<[f32; 3]>() as u64, &POSITION_ONLY))))
+                ("light_volume", vec![buffer_layout(size_of::<[f32; 3]>() as u64, &POSITION_ONLY)])
             }
-            VertexSource::FullScreen | VertexSource::None => ("full_screen", None),
+            VertexSource::FullScreen | VertexSource::None => ("full_screen", Vec::new()),
         };
         let (topology, strip_index_format) = match state.topology() {
             Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
@@ -259,7 +268,7 @@ impl ProcessPipelines {
                 module: &shader.module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: vertices.as_slice(),
+                buffers: &vertices,
             },
             primitive: wgpu::PrimitiveState {
                 topology,
@@ -304,6 +313,22 @@ impl ProcessPipelines {
             VertexSource::Meshes(_) | VertexSource::None => wgpu::CompareFunction::Greater,
         }
     }
+}
+
+/// The location of the first attribute of the engine's own, behind those of `VertexInput` in `drawloom.wgsl`.
+const FIRST_OWN_LOCATION: u32 = 3;
+
+fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLayout> {
+    declaration.attributes.iter().map(|declared| declared.layout)
+}
+
+/// An attribute at a location, alone in its buffer.
+fn own_attribute((shader_location, layout): (u32, &AttributeLayout)) -> [wgpu::VertexAttribute; 1] {
+    [wgpu::VertexAttribute { format: vertex_format(layout.format), offset: 0, shader_location }]
+}
+
+fn buffer_layout(array_stride: u64, attributes: &[wgpu::VertexAttribute]) -> Option<wgpu::VertexBufferLayout<'_>> {
+    Some(wgpu::VertexBufferLayout { array_stride, step_mode: wgpu::VertexStepMode::Vertex, attributes })
 }
 
 /// Of light volumes.

@@ -10,7 +10,7 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
-use crate::backend::wgpu::resources::SubdividedMesh;
+use crate::backend::wgpu::resources::{SubdividedMesh, attribute_of};
 use crate::command::{Batch, DrawList, DrawState};
 
 /// Records the batches of a pass.
@@ -37,7 +37,7 @@ impl<'a> BatchRecorder<'a> {
         mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
         self.set_bind_groups(encoder);
-        self.set_arenas(encoder);
+        self.set_arenas(encoder)?;
         let mut start = batches.start;
         for run in self.list.batches[batches].chunk_by(|one, next| one.state == next.state) {
             let state = run[0].state;
@@ -46,7 +46,7 @@ impl<'a> BatchRecorder<'a> {
             let end = start + run.len();
             if state.subdivision_level() > 0 {
                 self.draw_subdivided(encoder, run)?;
-                self.set_arenas(encoder);
+                self.set_arenas(encoder)?;
             } else if self.list.is_whole() {
                 draw_run(encoder, start..end)?;
             } else {
@@ -115,6 +115,9 @@ impl<'a> BatchRecorder<'a> {
             let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
             let mesh = &mesh.geometry;
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
+            for (slot, layout) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+                encoder.set_vertex_buffer(slot, Some(attribute_of(&mesh.attributes, *layout)?.slice(..)));
+            }
             encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
         }
@@ -131,9 +134,14 @@ impl<'a> BatchRecorder<'a> {
         }
     }
 
-    fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) {
-        encoder.set_vertex_buffer(0, Some(self.frame.assets.vertices.slice(..)));
+    fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) -> Result<(), BackendError> {
+        let assets = &self.frame.assets;
+        encoder.set_vertex_buffer(0, Some(assets.vertices.slice(..)));
+        for (slot, layout) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+            encoder.set_vertex_buffer(slot, Some(assets.attribute(*layout)?.slice(..)));
+        }
         self.set_index_arena(encoder);
+        Ok(())
     }
 
     fn set_index_arena(&self, encoder: &mut impl RenderEncoder<'a>) {

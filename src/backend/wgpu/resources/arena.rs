@@ -45,6 +45,11 @@ impl Arena {
         start
     }
 
+    /// In bytes.
+    pub(crate) fn size(&self) -> u64 {
+        self.buffer.as_ref().map_or(0, wgpu::Buffer::size)
+    }
+
     pub(crate) fn buffer(&self) -> Option<&wgpu::Buffer> {
         self.buffer.as_ref()
     }

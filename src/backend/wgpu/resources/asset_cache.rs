@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::arena::{Arena, filled_buffer};
+use super::attribute_arenas::{AttributeArenas, AttributeBuffers};
 use super::bind_group_layouts::BindGroupLayouts;
 use super::gpu_material::GpuMaterial;
 use super::growing_buffer::check_storage_binding_size;
@@ -10,16 +11,19 @@ use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::{vertex_stride, with_vertex_bytes};
 use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::missing_mesh_error;
 use crate::command::Batch;
+use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
-use crate::scene::{Assets, Material, Mesh};
+use crate::scene::{Assets, AttributeLayout, Material, Mesh};
 use crate::view::{RejectionReason, Rejections};
 
 /// The meshes, materials and textures of a frame. It stays valid while assets change for later frames.
 pub(crate) struct AssetSnapshot {
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
+    attributes: AttributeBuffers,
     /// By mesh slot.
     meshes: Vec<Option<MeshRange>>,
     /// Materials and textures: `@group(1)`.
@@ -35,6 +39,26 @@ impl AssetSnapshot {
         let mesh = self.meshes.get(batch.mesh as usize).copied().flatten();
         mesh.ok_or_else(missing_mesh_error)
     }
+
+    /// The values of an attribute of all meshes.
+    ///
+    /// # Errors
+    /// If no plan has required it. This is a bug in Drawloom.
+    pub(crate) fn attribute(&self, layout: AttributeLayout) -> Result<&wgpu::Buffer, BackendError> {
+        attribute_of(&self.attributes, layout)
+    }
+}
+
+/// The buffer of an attribute.
+///
+/// # Errors
+/// If there is none. This is a bug in Drawloom.
+pub(crate) fn attribute_of(
+    attributes: &AttributeBuffers,
+    layout: AttributeLayout,
+) -> Result<&wgpu::Buffer, BackendError> {
+    let found = attributes.iter().find(|(known, _)| *known == layout);
+    found.map(|(_, buffer)| buffer).ok_or_else(|| broken_rule("attributes are uploaded before they are drawn"))
 }
 
 /// The range of a mesh in the arenas.
@@ -52,6 +76,7 @@ pub(crate) struct AssetCache {
     /// Of the vertices in the arena.
     format: VertexFormat,
     indices: Arena,
+    attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
     textures: TextureArrays,
     /// Identities and revisions of the snapshot's meshes, materials and textures.
@@ -67,6 +92,7 @@ impl Default for AssetCache {
             vertices: new_vertex_arena(),
             format: VertexFormat::default(),
             indices: Arena::new("indices", wgpu::BufferUsages::INDEX),
+            attributes: AttributeArenas::default(),
             meshes: Vec::new(),
             textures: TextureArrays::default(),
             current: None,
@@ -77,6 +103,31 @@ impl Default for AssetCache {
 }
 
 impl AssetCache {
+    /// Adds the attributes that a plan's processes read. Returns whether one of them is new.
+    pub(crate) fn require_attributes(&mut self, attributes: &[DeclaredAttribute]) -> bool {
+        let changed = self.attributes.require(attributes);
+        if changed {
+            // All meshes move to new arenas, with all attributes.
+            self.vertices = new_vertex_arena();
+            self.meshes.clear();
+            self.current = None;
+        }
+        changed
+    }
+
+    /// The attributes of a mesh in buffers of its own.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(crate) fn attributes_of(
+        &self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        mesh: &Mesh,
+    ) -> Result<AttributeBuffers, BackendError> {
+        self.attributes.of_mesh(device, uploads, mesh)
+    }
+
     /// The snapshot of these assets, with vertices of this format: the latest one if nothing changed.
     ///
     /// # Errors
@@ -153,6 +204,7 @@ impl AssetCache {
             let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
             self.vertices.reallocate(device, vertex_bytes)?;
             self.indices.reallocate(device, index_bytes)?;
+            self.attributes.reallocate(device, self.vertices.size() / vertex_stride(format))?;
             changed = assets
                 .meshes
                 .iter_with_revision()
@@ -162,6 +214,7 @@ impl AssetCache {
         for (slot, revision, mesh) in changed {
             let vertices = with_vertex_bytes(mesh, format, |bytes| self.vertices.append(uploads, bytes));
             let indices = self.indices.append(uploads, bytemuck::cast_slice(mesh.indices()));
+            self.attributes.write(uploads, mesh, vertices / vertex_stride(format));
             self.meshes[slot] = Some(MeshRange {
                 base_vertex: (vertices / vertex_stride(format)) as i32,
                 first_index: (indices / 4) as u32,
@@ -210,12 +263,14 @@ impl AssetCache {
         for arena in [&mut self.vertices, &mut self.indices] {
             if arena.buffer().is_none() {
                 arena.reallocate(device, 0)?;
+                self.attributes.reallocate(device, 0)?;
             }
         }
         let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
             return Err(BackendError::BrokenRule { rule: "arenas have buffers".to_owned() });
         };
-        Ok(AssetSnapshot { vertices: vertices.clone(), indices: indices.clone(), meshes: self.meshes.clone(), group })
+        let (vertices, indices, attributes) = (vertices.clone(), indices.clone(), self.attributes.buffers().clone());
+        Ok(AssetSnapshot { vertices, indices, attributes, meshes: self.meshes.clone(), group })
     }
 
     fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {

@@ -2,6 +2,7 @@
 
 mod arena;
 mod asset_cache;
+mod attribute_arenas;
 mod bind_group_layouts;
 mod cached_bind_group;
 mod gpu_material;
@@ -16,7 +17,8 @@ mod upload_queue;
 mod vertex_layout;
 
 pub(crate) use arena::new_buffer;
-pub(crate) use asset_cache::{AssetCache, AssetSnapshot};
+pub(crate) use asset_cache::{AssetCache, AssetSnapshot, attribute_of};
+pub(crate) use attribute_arenas::vertex_format;
 pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };

@@ -1,6 +1,7 @@
 //! Subdivided meshes on the device.
 
 use super::arena::filled_buffer;
+use super::attribute_arenas::AttributeBuffers;
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::with_vertex_bytes;
 use crate::backend::BackendError;
@@ -11,6 +12,7 @@ use crate::scene::Mesh;
 pub(crate) struct SubdividedMesh {
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
+    pub(crate) attributes: AttributeBuffers,
     pub(crate) index_count: u32,
 }
 
@@ -22,6 +24,7 @@ impl SubdividedMesh {
         uploads: &UploadQueue,
         mesh: &Mesh,
         format: VertexFormat,
+        attributes: AttributeBuffers,
     ) -> Result<Self, BackendError> {
         let upload = |label, bytes: &[u8], usage| filled_buffer(device, uploads, label, bytes, usage);
         let indices = bytemuck::cast_slice(mesh.indices());
@@ -30,6 +33,7 @@ impl SubdividedMesh {
                 upload("subdivided vertices", vertices, wgpu::BufferUsages::VERTEX)
             })?,
             indices: upload("subdivided indices", indices, wgpu::BufferUsages::INDEX)?,
+            attributes,
             index_count: mesh.indices().len() as u32,
         })
     }

@@ -30,6 +30,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::process::MAX_ATTRIBUTES;
     use crate::process::cpu_shader::test_inputs::{material, pass, view_values, views};
     use crate::process::{GeometryBuffer, GeometryFormats, RenderProcess, TypedCpuShader};
     use crate::raster::{Quaternion, Vector, Vector3};
@@ -54,7 +55,7 @@ mod tests {
                 index: 0,
             };
             let vertex =
-                VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero() };
+                VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero(), attributes: [Vector::zero(); MAX_ATTRIBUTES] };
             for view in views() {
                 let view = view_values(&view);
                 let material = material(Blend::None);

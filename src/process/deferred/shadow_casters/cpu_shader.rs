@@ -40,6 +40,7 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
+    use crate::process::MAX_ATTRIBUTES;
     use crate::process::ShaderView;
     use crate::process::cpu_shader::test_inputs::{material, paraboloid, pass, view_values, views};
     use crate::raster::{Quaternion, Vector, Vector3};
@@ -56,7 +57,12 @@ mod tests {
             material: 0,
             index: 0,
         };
-        let vertex = VertexInput { position: Vector::zero(), normal: Vector::zero(), uv: Vector::zero() };
+        let vertex = VertexInput {
+            position: Vector::zero(),
+            normal: Vector::zero(),
+            uv: Vector::zero(),
+            attributes: [Vector::zero(); MAX_ATTRIBUTES],
+        };
         let cpu_shader = ShadowCastersCpuShader { hemispheres: true };
         let material = material(Blend::None);
         let pass = pass(&view, &material, &[]);

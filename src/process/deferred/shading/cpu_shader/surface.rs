@@ -78,6 +78,7 @@ fn normalize_or<R: Real>(vector: Vector3<R>, other: Vector3<R>) -> Vector3<R> {
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
+    use crate::process::MAX_ATTRIBUTES;
     use crate::process::cpu_shader::test_inputs::{material, pass, view_values, views};
     use crate::raster::Quaternion;
     use crate::scene::Blend;
@@ -106,8 +107,12 @@ mod tests {
             material: 3,
             index: 0,
         };
-        let vertex =
-            VertexInput { position: Vector([1.0, 1.0, 1.0]), normal: Vector([0.0, 0.0, 1.0]), uv: Vector([0.75, 0.5]) };
+        let vertex = VertexInput {
+            position: Vector([1.0, 1.0, 1.0]),
+            normal: Vector([0.0, 0.0, 1.0]),
+            uv: Vector([0.75, 0.5]),
+            attributes: [Vector::zero(); MAX_ATTRIBUTES],
+        };
         let output = surface_vertex(&view, &object, &vertex);
         assert_eq!(output.clip, view.clip_position(Vector([2.0, 2.0, -4.0])));
         let pixel = ObjectPixel {

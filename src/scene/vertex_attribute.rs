@@ -1,0 +1,173 @@
+//! Data of an engine's own for each vertex.
+
+use std::marker::PhantomData;
+
+use bytemuck::Pod;
+
+/// A name for data that meshes have for each vertex beside [`Vertex`](super::Vertex), such as tangents, colours, or joints and
+/// weights. Make it once, as a constant: meshes bring values for it, and processes declare that their shaders read them.
+///
+/// ```
+/// use drawloom::scene::{Mesh, Topology, Vertex, VertexAttribute};
+///
+/// const COLOR: VertexAttribute<[f32; 4]> = VertexAttribute::new("colour");
+///
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let corners = corners.map(|position| Vertex { position, ..Vertex::default() }).to_vec();
+/// let mesh = Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?
+///     .with_attribute(COLOR, &[[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]])?;
+/// # Ok::<(), drawloom::scene::SceneError>(())
+/// ```
+///
+/// A shader has it as an input: see [`Declare::reads_attribute`](crate::process::Declare::reads_attribute).
+pub struct VertexAttribute<T> {
+    name: &'static str,
+    /// Neither owns nor borrows a `T`.
+    value: PhantomData<fn() -> T>,
+}
+
+impl<T: AttributeValue> VertexAttribute<T> {
+    /// An attribute of this name. Two attributes of one name are the same attribute.
+    pub const fn new(name: &'static str) -> Self {
+        Self { name, value: PhantomData }
+    }
+
+    /// Its name and format.
+    pub const fn layout(self) -> AttributeLayout {
+        AttributeLayout { name: self.name, format: T::FORMAT }
+    }
+}
+
+// Derived implementations would require them of `T`.
+impl<T> Clone for VertexAttribute<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for VertexAttribute<T> {}
+
+impl<T> std::fmt::Debug for VertexAttribute<T> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("VertexAttribute").field(&self.name).finish()
+    }
+}
+
+/// A [`VertexAttribute`] without the type of its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct AttributeLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// The format of its values.
+    pub format: AttributeFormat,
+}
+
+/// The format of an attribute's values: one to four numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum AttributeFormat {
+    /// This many `f32`.
+    Float32(u8),
+    /// This many `u32`, which are not interpolated.
+    Uint32(u8),
+    /// Four bytes that shaders read as `f32` from 0 to 1.
+    Unorm8x4,
+}
+
+impl AttributeFormat {
+    /// The number of bytes of a value.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Float32(components) | Self::Uint32(components) => 4 * components as usize,
+            Self::Unorm8x4 => 4,
+        }
+    }
+
+    /// The value halfway between two, as bytes; that of the first for whole numbers. It is appended.
+    pub(super) fn append_midpoint(self, one: &[u8], other: &[u8], bytes: &mut Vec<u8>) {
+        match self {
+            Self::Float32(_) => {
+                for (one, other) in one.chunks_exact(4).zip(other.chunks_exact(4)) {
+                    let [one, other]: [f32; 2] = [one, other].map(bytemuck::pod_read_unaligned);
+                    bytes.extend(one.midpoint(other).to_ne_bytes());
+                }
+            }
+            Self::Uint32(_) => bytes.extend_from_slice(one),
+            Self::Unorm8x4 => bytes.extend(one.iter().zip(other).map(|(one, other)| one.midpoint(*other))),
+        }
+    }
+
+    /// The numbers of a value that has these bytes, and 0 for those that it lacks.
+    #[cfg(feature = "software")]
+    pub(crate) fn numbers(self, value: &[u8]) -> [f64; 4] {
+        let mut numbers = [0.0; 4];
+        match self {
+            Self::Float32(_) => {
+                let read = |bytes: &[u8]| f64::from(bytemuck::pod_read_unaligned::<f32>(bytes));
+                numbers.iter_mut().zip(value.chunks_exact(4)).for_each(|(number, bytes)| *number = read(bytes));
+            }
+            Self::Uint32(_) => {
+                let read = |bytes: &[u8]| f64::from(bytemuck::pod_read_unaligned::<u32>(bytes));
+                numbers.iter_mut().zip(value.chunks_exact(4)).for_each(|(number, bytes)| *number = read(bytes));
+            }
+            Self::Unorm8x4 => {
+                numbers.iter_mut().zip(value).for_each(|(number, byte)| *number = f64::from(*byte) / 255.0);
+            }
+        }
+        numbers
+    }
+}
+
+/// A value of an attribute.
+pub trait AttributeValue: Pod + sealed::Sealed {
+    /// Its format.
+    const FORMAT: AttributeFormat;
+}
+
+mod sealed {
+    /// Only the crate knows formats.
+    pub trait Sealed {}
+}
+
+macro_rules! attribute_values {
+    ($($value:ty => $format:expr),* $(,)?) => {
+        $(
+            impl sealed::Sealed for $value {}
+
+            impl AttributeValue for $value {
+                const FORMAT: AttributeFormat = $format;
+            }
+        )*
+    };
+}
+
+attribute_values! {
+    f32 => AttributeFormat::Float32(1),
+    [f32; 2] => AttributeFormat::Float32(2),
+    [f32; 3] => AttributeFormat::Float32(3),
+    [f32; 4] => AttributeFormat::Float32(4),
+    u32 => AttributeFormat::Uint32(1),
+    [u32; 2] => AttributeFormat::Uint32(2),
+    [u32; 3] => AttributeFormat::Uint32(3),
+    [u32; 4] => AttributeFormat::Uint32(4),
+    [u8; 4] => AttributeFormat::Unorm8x4,
+}
+
+/// The values that a mesh has for an attribute.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct MeshAttribute {
+    pub(super) layout: AttributeLayout,
+    /// One value for each vertex.
+    pub(super) bytes: Vec<u8>,
+}
+
+impl MeshAttribute {
+    /// The same with a value for each vertex that was added halfway between two others.
+    pub(super) fn subdivided(&self, added_between: &[[u32; 2]]) -> Self {
+        let (mut bytes, stride) = (self.bytes.clone(), self.layout.format.bytes());
+        for ends in added_between {
+            let [one, other] = ends.map(|end| bytes[end as usize * stride..][..stride].to_vec());
+            self.layout.format.append_midpoint(&one, &other, &mut bytes);
+        }
+        Self { layout: self.layout, bytes }
+    }
+}
