@@ -23,8 +23,9 @@ impl<'a> LayerFilter<'a> {
         self.layers.is_empty()
     }
 
+    /// Whether it lets an object pass.
     #[inline]
-    pub(super) fn passes(&self, object: usize) -> bool {
+    pub(crate) fn passes(&self, object: usize) -> bool {
         self.layers.get(object).is_none_or(|layers| layers.intersect(self.drawn))
     }
 

@@ -35,7 +35,7 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     meshes.sync(scene.assets);
     let mut culler = OcclusionCuller::default();
     culler.reset(&view, tile_size);
-    culler.select_occluders(scene, &table, &visible, &meshes, |draw| draw.state.blend() == Blend::None);
+    culler.select_occluders(scene, &table, &visible, &meshes, |_, draw| draw.state.blend() == Blend::None);
     (0..culler.strip_count()).for_each(|strip| culler.draw_occluders(strip));
     let hidden = visible.remove_hidden(0..count, |first, mask| culler.hidden(scene, &table, first, mask));
     let visible_after: Vec<bool> = bits(&visible);

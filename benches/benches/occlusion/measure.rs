@@ -108,7 +108,7 @@ impl<'a> CameraCase<'a> {
             }
             occlusion.reset(view, side);
             let start = Instant::now();
-            occlusion.select_occluders(scene, table, &visible, meshes, |draw| draw.state.blend() == Blend::None);
+            occlusion.select_occluders(scene, table, &visible, meshes, |_, draw| draw.state.blend() == Blend::None);
             let chosen = Instant::now();
             (0..occlusion.strip_count()).for_each(|strip| occlusion.draw_occluders(strip));
             let drawn = Instant::now();

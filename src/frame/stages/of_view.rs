@@ -4,8 +4,9 @@ use super::super::context::FrameContext;
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
+use crate::command::Selection;
 use crate::scene::Blend;
-use crate::view::Frustum;
+use crate::view::{Frustum, LayerFilter};
 
 /// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
 pub(super) struct Visibility {
@@ -70,9 +71,12 @@ impl<B: Backend> Stage<B> for Occluders {
             &tables.objects,
             &tables.visibility[self.view].set,
             &tables.occluder_meshes,
-            |draw| {
+            |object, draw| {
                 let blend = draw.state.blend();
-                blend == Blend::None && selections.iter().any(|selection| selection.contains(blend, draw.material))
+                let is_drawn = |selection: &Selection| {
+                    selection.contains(blend, draw.material) && LayerFilter::new(scene, *selection).passes(object)
+                };
+                blend == Blend::None && selections.iter().any(is_drawn)
             },
         );
         Ok(())

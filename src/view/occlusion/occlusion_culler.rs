@@ -75,7 +75,7 @@ impl OcclusionCuller {
         table: &ObjectTable,
         visible: &VisibleSet,
         meshes: &OccluderMeshes,
-        may_occlude: impl Fn(&ObjectDraw) -> bool,
+        may_occlude: impl Fn(usize, &ObjectDraw) -> bool,
     ) {
         let Some(camera) = &self.camera else { return };
         let occluders = &mut *self.occluders.write();
@@ -89,7 +89,10 @@ impl OcclusionCuller {
                     let center = camera.camera_from_world(bounds.center);
                     let width = camera.apparent_width(center, f64::from(bounds.radius));
                     let draw = &objects.draws[entry];
-                    if width >= f64::from(self.tile_size) && may_occlude(draw) && !meshes.parts(draw.mesh).is_empty() {
+                    if width >= f64::from(self.tile_size)
+                        && may_occlude(object, draw)
+                        && !meshes.parts(draw.mesh).is_empty()
+                    {
                         let (width, depth, object) = (width as f32, center.z as f32, object as u32);
                         occluders.candidates.push(Candidate { width, depth, object });
                     }
