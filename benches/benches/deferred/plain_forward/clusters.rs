@@ -5,6 +5,7 @@ use std::array;
 use std::error::Error;
 use std::ops::Range;
 
+use drawloom::process::ILLUMINATION_SHADER;
 use drawloom::scene::SceneRef;
 use drawloom::view::GpuLight;
 use drawloom::wgpu;
@@ -57,8 +58,7 @@ impl Clusters {
         let grid = device.buffer(wgpu::BufferUsages::UNIFORM, size_of::<Grid>());
         let first_lights = device.buffer(wgpu::BufferUsages::STORAGE, (clusters + 1) * size_of::<u32>());
         let cluster_lights = device.buffer(wgpu::BufferUsages::STORAGE, capacity * size_of::<u32>());
-        let illumination = include_str!("../../../../src/process/deferred/shading/illumination.wgsl");
-        let shader = [device.surface_shader(), illumination, include_str!("clustered.wgsl")].concat();
+        let shader = [device.surface_shader(), ILLUMINATION_SHADER, include_str!("clustered.wgsl")].concat();
         Self {
             pipeline: device.surface_pipeline(&SurfacePipeline { shader: &shader, layout: Some(&layout), adds: false }),
             group: device.group(&layout, &[&grid, &first_lights, &cluster_lights]),

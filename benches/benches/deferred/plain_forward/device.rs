@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use bytemuck::{Pod, Zeroable};
 use drawloom::backend::WgpuBackend;
 use drawloom::glam::Vec3;
-use drawloom::process::SHADER_PRELUDE;
+use drawloom::process::{SHADER_PRELUDE, SURFACE_SHADER};
 use drawloom::scene::{Material, Mesh, SceneRef, Vertex};
 use drawloom::view::{GpuLight, GpuObject, GpuView};
 use drawloom::wgpu;
@@ -101,11 +101,10 @@ impl Device {
         let picture = new_target(&device, size, PICTURE, wgpu::TextureUsages::COPY_SRC);
         let parameters = initialized(wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&[1.0_f32, 0.0, 0.0, 0.0]));
         let (tone_mapping, tone_group) = tone_mapping(&device, &parameters, &radiance);
-        let surface = include_str!("../../../../src/process/deferred/shading/surface.wgsl");
         Ok(Self {
             size,
             index_count: mesh.indices().len() as u32,
-            surface_shader: [ABSOLUTE_TRANSFORMS, SHADER_PRELUDE, surface].concat(),
+            surface_shader: [ABSOLUTE_TRANSFORMS, SHADER_PRELUDE, SURFACE_SHADER].concat(),
             radiance,
             depth,
             picture_view: view_of(&picture),

@@ -3,6 +3,7 @@
 
 use std::error::Error;
 
+use drawloom::process::ILLUMINATION_SHADER;
 use drawloom::scene::SceneRef;
 use drawloom::view::GpuLight;
 use drawloom::wgpu;
@@ -32,10 +33,7 @@ struct LightDraw {
 
 impl DrawPerLight {
     pub fn new(device: &Device, scene: &SceneRef<'_>) -> Self {
-        let shading = |own| {
-            [device.surface_shader(), include_str!("../../../../src/process/deferred/shading/illumination.wgsl"), own]
-                .concat()
-        };
+        let shading = |own| [device.surface_shader(), ILLUMINATION_SHADER, own].concat();
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
         let layout = device.layout(&[storage]);
         // The largest number there can be.

@@ -29,7 +29,7 @@ fn fragment(in: LitSurface) -> @location(0) vec4<f32> {
     let gradient_x = dpdx(in.uv);
     let gradient_y = dpdy(in.uv);
     let material = materials[in.material];
-    let normal = shading_normal(Surface(in.clip, in.relative, in.normal, in.uv, in.material), material);
+    let normal = shading_normal(Surface(in.clip, in.relative, in.normal, in.uv, in.material, 0u), material);
 
     let illuminance = illuminance_from(lights[in.light], in.relative, normal);
     // As the deferred pipeline does.
