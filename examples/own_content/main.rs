@@ -1,10 +1,11 @@
-//! What an engine brings of its own: data of objects, post-processing with histories and smaller targets, and picking.
+//! What an engine brings of its own: data of objects and vertices, a material, post-processing with histories and smaller targets, and picking.
 //!
 //!     cargo run --release --example own_content -- --out pictures
 //!
-//! It draws 20,000 objects, and writes pictures:
+//! It draws 20,000 objects and three rings, and writes pictures:
 //!
-//! - `tints.png`: a colour of the engine's own for each object (`tints.rs`);
+//! - `tints.png`: a colour of the engine's own for each object (`tints.rs`), beside a material of its own on vertices of its own
+//!   (`metal.rs`);
 //! - `bloom.png`: the same with a glow around bright objects, at a half and a quarter of the picture's size (`bloom.rs`);
 //! - `smooth.png`: the same after frames of temporal anti-aliasing, while camera and objects move (`temporal.rs`).
 //!
@@ -12,6 +13,7 @@
 
 mod bloom;
 mod device;
+mod metal;
 mod picking;
 mod temporal;
 mod tints;
@@ -29,6 +31,7 @@ use drawloom::{Renderer, Submitter};
 use indicatif::ProgressBar;
 
 use crate::bloom::{BloomDown, BloomUp};
+use crate::metal::Metal;
 use crate::picking::ObjectIndex;
 use crate::temporal::{Motion, TemporalFilter};
 use crate::tints::TintedGeometryBuffer;
@@ -99,7 +102,7 @@ impl Engine {
         Ok(Self { device, queue, scheduler: Arc::new(Scheduler::with_available_parallelism()?) })
     }
 
-    /// A pipeline with picking, and perhaps with bloom.
+    /// A pipeline with the engine's own material and with picking, and perhaps with bloom.
     fn builder(
         &self,
         deferred: Deferred,
@@ -107,6 +110,7 @@ impl Engine {
     ) -> Result<drawloom::RendererBuilder<WgpuBackend>, Box<dyn Error>> {
         let backend = WgpuBackend::new(self.device.clone(), self.queue.clone())?;
         let mut builder = Renderer::builder(backend).deferred(deferred).process(ObjectIndex).output(picking::TARGET);
+        builder = builder.process(Metal::new(&self.device, &self.queue));
         if blooms {
             builder = builder.process(BloomDown::HALF).process(BloomDown::QUARTER).process(BloomUp);
         }

@@ -7,6 +7,8 @@ use drawloom::scene::{Camera, ObjectColumn};
 use drawloom::view::RenderView;
 use parking_lot::Mutex;
 
+use crate::metal;
+
 /// How far each object has moved since the last frame, in metres, and 0.
 pub const DISPLACEMENT: ObjectColumn<[f32; 4]> = ObjectColumn::new("displacement");
 
@@ -51,7 +53,9 @@ impl RenderProcess for Motion {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterGeometry);
+        // When all opaque objects are in the depth target.
+        declare.at(Place::AfterLighting);
+        declare.after(metal::NAME);
         declare.clears_color(MOTION, Format::Rg16Float, ClearColor::Value([0.0; 4]));
         declare.matches_depth("depth");
         declare.reads_column(DISPLACEMENT);

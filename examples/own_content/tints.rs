@@ -1,7 +1,10 @@
 //! A colour of the engine's own for each object, in the shipped geometry buffer's place.
 
+use drawloom::command::Selection;
 use drawloom::process::{CommandDraws, Declare, Draws, GeometryBuffer, GeometryFormats, RenderProcess, SURFACE_SHADER};
 use drawloom::scene::ObjectColumn;
+
+use crate::world::FIELD;
 
 /// The colour of each object, linear, and how much of it is emitted.
 pub const TINT: ObjectColumn<[f32; 4]> = ObjectColumn::new("tint");
@@ -31,6 +34,7 @@ impl RenderProcess for TintedGeometryBuffer {
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::Commands(CommandDraws { shader: &self.shader, ..CommandDraws::default() })
+        let selection = Selection::OPAQUE.in_layers(FIELD);
+        Draws::Commands(CommandDraws { shader: &self.shader, selection, ..CommandDraws::default() })
     }
 }

@@ -3,11 +3,19 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
-    Assets, Bounds, Camera, Changes, ColumnValues, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
+    Assets, Bounds, Camera, Changes, ColumnValues, Layers, Light, Material, Mesh, SceneError, SceneRef, Topology,
+    Vertex,
 };
 
+use crate::metal;
 use crate::temporal::DISPLACEMENT;
 use crate::tints::TINT;
+
+/// The layer of the spheres.
+pub const FIELD: Layers = Layers(1);
+
+/// The positions of the rings in metres, and how far each is turned towards the camera.
+const RINGS: [([f64; 3], f32); 3] = [([-9.0, 6.0, 16.0], 0.9), ([0.0, 6.5, 18.0], 1.57), ([9.0, 6.0, 16.0], 0.5)];
 
 pub struct World {
     pub camera: Camera,
@@ -20,6 +28,9 @@ pub struct World {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
+    layers: Vec<Layers>,
+    /// How many objects are in the field; rings follow.
+    field: usize,
     /// Red, green, blue, and how much of it is emitted.
     tints: Vec<[f32; 4]>,
     /// How far each object has moved since the last frame, in metres, and 0.
@@ -27,12 +38,16 @@ pub struct World {
 }
 
 impl World {
-    /// A hilly field of spheres in all colours of the rainbow.
-    pub fn new(count: usize) -> Result<Self, SceneError> {
+    /// A hilly field of spheres in all colours of the rainbow, and metal rings above it.
+    pub fn new(field: usize) -> Result<Self, SceneError> {
+        let count = field + RINGS.len();
         let mut assets = Assets::default();
         let sphere = sphere()?;
         let bounds = sphere.bounds();
         let sphere = assets.add(sphere)?;
+        let torus = metal::torus()?;
+        let torus_bounds = torus.bounds();
+        let torus = assets.add(torus)?;
         let white = assets.add(Material { name: "white".into(), diffuse: Vec3::ONE, ..Material::default() })?;
         let tint = |object: usize| {
             let [red, green, blue] = hue(object as f32 / count as f32 * 5.0);
@@ -54,9 +69,19 @@ impl World {
             bounds: vec![bounds; count],
             meshes: vec![sphere; count],
             materials: vec![white; count],
+            layers: vec![FIELD; count],
+            field,
             tints: (0..count).map(tint).collect(),
             displacements: vec![[0.0; 4]; count],
         };
+        for (object, (position, turn)) in (field..).zip(RINGS) {
+            world.positions[object] = position.into();
+            world.orientations[object] = Quat::from_rotation_x(turn);
+            world.scales[object] = Vec3::splat(3.0);
+            world.bounds[object] = torus_bounds;
+            world.meshes[object] = torus;
+            world.layers[object] = metal::LAYER;
+        }
         world.place();
         world.displacements.fill([0.0; 4]);
         Ok(world)
@@ -70,8 +95,8 @@ impl World {
     }
 
     fn place(&mut self) {
-        let side = (self.positions.len() as f64).sqrt().ceil();
-        let objects = self.positions.iter_mut().zip(&mut self.displacements).enumerate();
+        let side = (self.field as f64).sqrt().ceil();
+        let objects = self.positions[..self.field].iter_mut().zip(&mut self.displacements).enumerate();
         for (index, (position, displacement)) in objects {
             let (x, z) = (index as f64 % side - side / 2.0, (index as f64 / side).floor() - side / 2.0);
             let height = (x * 0.15 + self.time * 2.0).sin() + (z * 0.2).cos();
@@ -94,7 +119,7 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
-            layers: &[],
+            layers: &self.layers,
             columns,
             changes: Changes::Unknown,
             assets: &self.assets,
