@@ -16,7 +16,7 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{
-    CommandDraws, Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess, ToneMapping,
+    CommandDraws, Declare, Deferred, Draws, Format, RawPass, RawPassResources, RenderProcess, ToneMapping,
 };
 use drawloom::scene::{
     Assets, Blend, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
@@ -35,8 +35,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // One scheduler for the engine's own jobs and for Drawloom's.
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+    // The picture has the format of the surface, so presenting it is a copy.
+    let tone_mapping = ToneMapping { format: Format::Bgra8Srgb, ..ToneMapping::new(1.2) };
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue)?)
-        .deferred(Deferred::new().post(ToneMapping::new(1.2)).replace("transparency", Glow))
+        .deferred(Deferred::new().post(tone_mapping).replace("transparency", Glow))
         .process(Present { surface: Arc::clone(&surface) })
         .build(Arc::clone(&scheduler))?;
 
@@ -69,7 +71,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         lent_times[FRAMES - 1]
     );
     let submission = last.ok_or("no frame was drawn")?;
-    let picture = submission.read(0, "picture")?;
+    let mut picture = submission.read(0, "picture")?;
+    // Files have red first.
+    picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
     let path = "engine_loop.png";
     image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
     println!("{path} written, {}x{} after the resize", picture.width, picture.height);
@@ -266,7 +270,7 @@ fn surface_texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu::Te
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        format: wgpu::TextureFormat::Bgra8UnormSrgb,
         usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
     })

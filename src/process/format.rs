@@ -13,6 +13,10 @@ pub enum Format {
     Rgba8Unorm,
     /// Four bytes; red, green and blue are sRGB encoded.
     Rgba8Srgb,
+    /// As [`Format::Rgba8Unorm`], with blue first, as the surfaces of many windows are.
+    Bgra8Unorm,
+    /// As [`Format::Rgba8Srgb`], with blue first.
+    Bgra8Srgb,
     /// Three channels of 10 bits and one of 2, linear, 0 to 1.
     Rgb10a2Unorm,
     /// Four half floats.
@@ -61,7 +65,8 @@ impl Format {
     /// Channels per pixel.
     pub fn channels(self) -> usize {
         match self {
-            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => 4,
+            Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
             Self::Rg8Unorm | Self::Rg16Float => 2,
             Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
         }
@@ -71,7 +76,7 @@ impl Format {
     pub fn bytes(self) -> usize {
         match self {
             Self::Rg8Unorm => 2,
-            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Rgb10a2Unorm => 4,
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb | Self::Rgb10a2Unorm => 4,
             Self::Rg16Float | Self::R32Float | Self::R32Uint | Self::Depth32Float => 4,
             Self::Rgba16Float => 8,
         }

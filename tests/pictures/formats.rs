@@ -369,7 +369,7 @@ fn srgb(linear: f64) -> f64 {
 }
 
 fn clipped() -> Result<(), Failed> {
-    let tone_mapping = |exposure: f32| ToneMapping { exposure: exposure.into(), curve: ToneCurve::Clipped };
+    let tone_mapping = |exposure: f32| ToneMapping { curve: ToneCurve::Clipped, ..ToneMapping::new(exposure) };
     for (radiance, exposure) in [
         (Vec3::new(0.0, 0.25, 0.5), 1.0),
         (Vec3::new(0.9, 1.0, 1.1), 1.0),

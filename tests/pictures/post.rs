@@ -1,13 +1,17 @@
 //! Post-processing: tone mapping, anti-aliasing, and an engine's step between them.
 
-use drawloom::backend::Picture;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, Declare, Draws, Format, FullScreen, Fxaa, GeometryBuffer, GeometryFormats, PostStep, RenderProcess,
-    ToneMapping,
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, GeometryBuffer, GeometryFormats, PostStep,
+    RenderProcess, ToneMapping,
 };
 use drawloom::scene::{Camera, Scene};
-use drawloom_testing::scenes::sized;
+use drawloom::task::Scheduler;
+use drawloom_testing::scenes::{field, sized};
 use image::{Rgb, RgbImage};
 use libtest_mimic::Failed;
 
@@ -24,6 +28,7 @@ pub const CASES: &[Case] = &[
     ("a_picture_is_clamped_at_its_border", borders),
     ("settings_out_of_range_are_clamped", settings),
     ("an_engines_step_is_part_of_the_chain", own_step),
+    ("a_picture_may_have_the_channels_of_a_surface", channels_of_a_surface),
     ("negative_radiance_is_black_and_infinite_radiance_white", extreme_radiance),
 ];
 
@@ -179,7 +184,7 @@ fn straight_edges() -> Result<(), Failed> {
 
 fn no_contrast() -> Result<(), Failed> {
     // Without thresholds every pixel is processed.
-    let without_thresholds = Fxaa { contrast_threshold: 0.0, dark_threshold: 0.0, sub_pixel: 1.0 };
+    let without_thresholds = Fxaa { contrast_threshold: 0.0, dark_threshold: 0.0, sub_pixel: 1.0, ..Fxaa::default() };
     for value in 0..=255 {
         let decoded = f64::from(value) / 255.0;
         let linear = if decoded <= 0.040_45 { decoded / 12.92 } else { ((decoded + 0.055) / 1.055).powf(2.4) };
@@ -263,7 +268,7 @@ fn borders() -> Result<(), Failed> {
 
 fn settings() -> Result<(), Failed> {
     let draw = |contrast_threshold: f32, dark_threshold: f32, sub_pixel: f32| {
-        let fxaa = Fxaa { contrast_threshold, dark_threshold, sub_pixel };
+        let fxaa = Fxaa { contrast_threshold, dark_threshold, sub_pixel, ..Fxaa::default() };
         smoothed([32, 32], fxaa, BUSY, [0.0, 0.0, 32.0, 32.0])
     };
     let lowest = draw(0.0, 0.0, 0.0)?;
@@ -355,6 +360,35 @@ fn extreme_radiance() -> Result<(), Failed> {
             let found = [red, green, blue];
             return Err(format!("{radiance} at {exposure}: {found:?}, not {expected} and {ordinary}").into());
         }
+    }
+    Ok(())
+}
+
+fn channels_of_a_surface() -> Result<(), Failed> {
+    let scene = field(40);
+    let deferred = |format| {
+        let tone_mapping = ToneMapping { format, ..ToneMapping::default() };
+        Deferred::new().post(tone_mapping).post(Fxaa { format, ..Fxaa::default() })
+    };
+    let by_wgpu = |format| {
+        let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred(format)))?;
+        fixture.draw(&scene)
+    };
+    let by_software = |format| {
+        let scheduler = Arc::new(Scheduler::new(2)?);
+        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred(format));
+        let (mut renderer, submitter) = builder.build(scheduler)?;
+        Ok::<_, Failed>(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
+    };
+    let swapped = |mut picture: Picture| {
+        picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
+        picture.bytes
+    };
+    if by_wgpu(Format::Rgba8Srgb)?.bytes != swapped(by_wgpu(Format::Bgra8Srgb)?) {
+        return Err("on wgpu the pictures differ".into());
+    }
+    if by_software(Format::Rgba8Srgb)?.bytes != swapped(by_software(Format::Bgra8Srgb)?) {
+        return Err("on the software backend the pictures differ".into());
     }
     Ok(())
 }

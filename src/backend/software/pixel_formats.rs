@@ -55,6 +55,7 @@ pub(super) fn append_bytes<R: Precision>(format: Format, color: [R; 4], bytes: &
         bytes.extend((word | step_of(opacity, 3.0) << 30).to_le_bytes());
         return;
     }
+    let first = bytes.len();
     for (channel, value) in color.into_iter().enumerate().take(format.channels()) {
         match encoding_of(format, channel) {
             ChannelEncoding::Steps(steps) => bytes.push(step_of(value, steps) as u8),
@@ -63,6 +64,9 @@ pub(super) fn append_bytes<R: Precision>(format: Format, color: [R; 4], bytes: &
             ChannelEncoding::Float => bytes.extend((value as f32).to_le_bytes()),
             ChannelEncoding::Integer => bytes.extend((value as u32).to_le_bytes()),
         }
+    }
+    if matches!(format, Format::Bgra8Unorm | Format::Bgra8Srgb) {
+        bytes.swap(first, first + 2);
     }
 }
 
@@ -81,10 +85,11 @@ enum ChannelEncoding {
 
 fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
     match format {
-        Format::Rgba8Srgb if channel < 3 => ChannelEncoding::Srgb,
+        Format::Rgba8Srgb | Format::Bgra8Srgb if channel < 3 => ChannelEncoding::Srgb,
         Format::Rgb10a2Unorm if channel < 3 => ChannelEncoding::Steps(1023.0),
         Format::Rgb10a2Unorm => ChannelEncoding::Steps(3.0),
         Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm => ChannelEncoding::Steps(255.0),
+        Format::Bgra8Srgb | Format::Bgra8Unorm => ChannelEncoding::Steps(255.0),
         Format::Rgba16Float | Format::Rg16Float => ChannelEncoding::Half,
         Format::R32Float | Format::Depth32Float => ChannelEncoding::Float,
         Format::R32Uint => ChannelEncoding::Integer,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::PostStep;
 use super::shipped_step::{BoundStep, ShippedStep};
-use crate::process::{FullScreen, RenderProcess};
+use crate::process::{Format, FullScreen, RenderProcess};
 
 /// Smooths aliased edges, from the picture alone (Lottes, "FXAA", NVIDIA 2009, in its last version, 3.11).
 ///
@@ -15,8 +15,7 @@ use crate::process::{FullScreen, RenderProcess};
 /// step, and blends in as much of the other side as a straight edge would cover. Other pixels, and straight edges along
 /// rows or columns, stay the same, byte for byte.
 ///
-/// It belongs after [`ToneMapping`](super::ToneMapping): its source and its target are
-/// [`Format::Rgba8Srgb`](crate::process::Format).
+/// It belongs after [`ToneMapping`](super::ToneMapping): its source and its target are sRGB.
 ///
 /// Brightness is perceived brightness, the square root of luminance, from 0 to 1. Settings are clamped to 0 to 1; NaN
 /// counts as 0.
@@ -30,11 +29,13 @@ pub struct Fxaa {
     /// How much details smaller than a pixel are blended with their surroundings: 0 keeps thin lines and single pixels,
     /// 1 removes most of their flicker and some of their sharpness.
     pub sub_pixel: f32,
+    /// The format of its target.
+    pub format: Format,
 }
 
 impl Default for Fxaa {
     fn default() -> Self {
-        Self { contrast_threshold: 0.125, dark_threshold: 0.0625, sub_pixel: 0.5 }
+        Self { contrast_threshold: 0.125, dark_threshold: 0.0625, sub_pixel: 0.5, format: Format::Rgba8Srgb }
     }
 }
 
@@ -54,6 +55,10 @@ impl PostStep for Fxaa {
 
 impl ShippedStep for Fxaa {
     const NAME: &str = "fxaa";
+
+    fn format(&self) -> Format {
+        self.format
+    }
 
     fn full_screen(&self) -> FullScreen<'static> {
         let [contrast_threshold, dark_threshold, sub_pixel] = self.clamped_settings();

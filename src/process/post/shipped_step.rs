@@ -8,6 +8,9 @@ use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProce
 pub(super) trait ShippedStep: Send + Sync + 'static {
     const NAME: &str;
 
+    /// The format of its target.
+    fn format(&self) -> Format;
+
     fn full_screen(&self) -> FullScreen<'static>;
 
     #[cfg(feature = "software")]
@@ -33,7 +36,7 @@ impl<S: ShippedStep> RenderProcess for BoundStep<S> {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare_step(declare, &self.source, &self.target);
+        declare_step(declare, &self.source, &self.target, self.step.format());
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -46,7 +49,7 @@ impl<S: ShippedStep> RenderProcess for BoundStep<S> {
     }
 }
 
-pub(super) fn declare_step(declare: &mut Declare, source: &str, target: &str) {
+pub(super) fn declare_step(declare: &mut Declare, source: &str, target: &str, format: Format) {
     declare.samples(source);
-    declare.clears_color(target, Format::Rgba8Srgb, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
+    declare.clears_color(target, format, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::PostStep;
 use super::shipped_step::{BoundStep, ShippedStep, declare_step};
-use crate::process::{Declare, Draws, FullScreen, RenderProcess};
+use crate::process::{Declare, Draws, Format, FullScreen, RenderProcess};
 use crate::quality::{Quality, ToneCurve};
 
 /// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from
@@ -16,13 +16,15 @@ use crate::quality::{Quality, ToneCurve};
 ///
 /// As a process it reads the target `radiance` and draws the target `picture`; as a [`PostStep`], its source and target
 /// are given.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct ToneMapping {
     /// Multiplies radiance.
     pub exposure: Exposure,
     /// Maps radiance to 0 to 1. [`Deferred::quality`](crate::process::Deferred::quality) sets it to the quality's
     /// curve.
     pub curve: ToneCurve,
+    /// The format of the picture: sRGB, in the order of channels that the engine's surface has.
+    pub format: Format,
 }
 
 /// What radiance is multiplied by before it is mapped. An exposure that is NaN or not above 0 makes a black picture.
@@ -71,10 +73,17 @@ impl From<f32> for Exposure {
     }
 }
 
+impl Default for ToneMapping {
+    /// The filmic curve with an exposure of 1, into [`Format::Rgba8Srgb`].
+    fn default() -> Self {
+        Self { exposure: Exposure::default(), curve: ToneCurve::default(), format: Format::Rgba8Srgb }
+    }
+}
+
 impl ToneMapping {
     /// The filmic curve with an exposure: a constant number, or an [`Exposure`] that changes.
     pub fn new(exposure: impl Into<Exposure>) -> Self {
-        Self { exposure: exposure.into(), curve: ToneCurve::default() }
+        Self { exposure: exposure.into(), ..Self::default() }
     }
 
     /// The current exposure, clamped to finite numbers from 0: infinity times a radiance of 0 would be NaN.
@@ -90,7 +99,7 @@ impl RenderProcess for ToneMapping {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare_step(declare, "radiance", "picture");
+        declare_step(declare, "radiance", "picture", self.format);
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -115,6 +124,10 @@ impl PostStep for ToneMapping {
 
 impl ShippedStep for ToneMapping {
     const NAME: &str = "tone mapping";
+
+    fn format(&self) -> Format {
+        self.format
+    }
 
     fn full_screen(&self) -> FullScreen<'static> {
         let clips = if self.curve == ToneCurve::Clipped { 1.0 } else { 0.0 };

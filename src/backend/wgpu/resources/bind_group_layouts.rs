@@ -122,6 +122,8 @@ pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
         Format::Rg8Unorm => wgpu::TextureFormat::Rg8Unorm,
         Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
         Format::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Format::Bgra8Unorm => wgpu::TextureFormat::Bgra8Unorm,
+        Format::Bgra8Srgb => wgpu::TextureFormat::Bgra8UnormSrgb,
         Format::Rgb10a2Unorm => wgpu::TextureFormat::Rgb10a2Unorm,
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
         Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
