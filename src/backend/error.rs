@@ -87,12 +87,12 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
-    /// A rectangle that cannot be read back: it is empty, not within its target, or a part of depth.
+    /// A rectangle that cannot be read back: it is empty, not within its target, or a part of depth, which is read back as a whole.
     #[error(
-        "a rectangle of {}x{} pixels at {origin:?} cannot be read back of target {target:?} of view {view}, which has {}x{} pixels",
+        "a rectangle of {}x{} pixels at {origin:?} cannot be read back of target {target:?} of view {view}, which has {}x{} pixels: it is empty, outside, or a part of depth",
         size[0], size[1], whole[0], whole[1]
     )]
-    OutsideTarget {
+    InvalidReadBack {
         /// The view's index.
         view: usize,
         /// The name of the target.

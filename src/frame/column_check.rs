@@ -36,7 +36,10 @@ impl ColumnCheck {
             let elements = copy.chunks_exact(layout.stride).zip(bytes.chunks_exact(layout.stride));
             let changed = elements.enumerate().filter(|(_, (before, now))| before != now).map(|(object, _)| object);
             if let Some(object) = changed.into_iter().find(|object| !objects.is_reported(*object)) {
-                outcome = outcome.and(Err(SceneError::UnreportedColumnChange { column: layout.name, object }));
+                outcome = outcome.and(Err(match layout == LAYERS.layout() {
+                    true => SceneError::UnreportedChange { object },
+                    false => SceneError::UnreportedColumnChange { column: layout.name, object },
+                }));
             }
             copy.clear();
             copy.extend_from_slice(bytes);

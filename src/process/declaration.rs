@@ -63,15 +63,18 @@ impl Declare {
     /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`] does: the history
     /// of temporal filters. The process may write the target itself.
     ///
-    /// That is the latest frame that was submitted with a view of this index and name whose target had this size and format. Before
-    /// there is one, all channels are 0, so a target whose alpha is written as 1 tells whether it has a history. The price is a copy
-    /// of the target at the end of each frame.
+    /// That is the frame submitted before, if that had a view of this index and name, and its target this size and format. Otherwise
+    /// all channels of the format are 0: a target with an alpha that is written as 1 tells whether it has a history. The price is a
+    /// copy of the target at the end of each frame. A raw pass finds it as the target [`previous_name`].
     pub fn samples_previous(&mut self, target: &str) {
         self.access(&previous_name(target), Access::SamplePrevious);
     }
 
     /// Sets the size of a target that the process creates: that it clears, or overwrites in a raw pass. Without this call it has
     /// the size of the view's picture. All targets that a process draws into, and the depth that it tests, have the same size.
+    ///
+    /// The prelude's `view.width`, `view.height` and `clip_of_pixel` are those of the picture: shaders that draw into targets of other
+    /// sizes use `textureDimensions`, or the `clip` of `FullScreenPixel`.
     pub fn size(&mut self, target: &str, size: TargetSize) {
         let size = if size == TargetSize::Divided(1) { TargetSize::Picture } else { size };
         self.declaration.sizes.push((target.to_owned(), size));
@@ -84,7 +87,7 @@ impl Declare {
     }
 
     /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the next 1, and so
-    /// on. Each is an array with one element for each object of the scene, by [`Object::index`](super::SHADER_PRELUDE).
+    /// on. Each is an array with an element for each object of the scene, by `Object.index`. It may be longer than that.
     ///
     /// Frames whose scene has no such column fail. A device with the least number of storage buffers a shader,
     /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS), has none left for columns: request
@@ -279,7 +282,8 @@ pub struct DeclaredAttribute {
     pub default: Vec<u8>,
 }
 
-/// The name of what a target held at the end of the frame before, by which it can be read back.
+/// The name of the copy by which a target's history is read. It is made at the end of a frame: until then it is what the target held
+/// in the frame before, and once the frame is submitted, what the target holds.
 pub fn previous_name(target: &str) -> String {
     format!("{target} of the frame before")
 }

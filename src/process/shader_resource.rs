@@ -7,6 +7,9 @@ use std::borrow::Cow;
 ///
 /// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another `wgpu::Instance`.
 ///
+/// Bytes and buffers take a storage buffer each, and a device with only
+/// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS) has none left for them.
+///
 /// The bind group is made by the crate, and made anew only when a resource is another one. A CPU shader does not get these: it
 /// brings its own, since [`RenderProcess::cpu_shader`](super::RenderProcess) is called once a frame.
 #[derive(Clone, Debug, PartialEq)]

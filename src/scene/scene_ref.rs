@@ -28,7 +28,7 @@ pub struct SceneRef<'a> {
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
     /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty if every
-    /// object belongs to all.
+    /// object belongs to all. A process that does not draw all layers makes its list anew in each frame in which an object changes.
     pub layers: &'a [Layers],
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.

@@ -7,7 +7,7 @@ use crate::scene::{Layers, SceneRef};
 /// Which objects a process draws by their layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerFilter<'a> {
-    /// Of each object; empty if the process draws all objects.
+    /// Of each object; empty if all have the same answer.
     layers: &'a [Layers],
     drawn: Layers,
 }
@@ -20,13 +20,16 @@ impl<'a> LayerFilter<'a> {
 
     /// Whether it lets all objects pass.
     pub(crate) fn passes_all(&self) -> bool {
-        self.layers.is_empty()
+        self.layers.is_empty() && self.drawn != Layers(0)
     }
 
     /// Whether it lets an object pass.
     #[inline]
     pub(crate) fn passes(&self, object: usize) -> bool {
-        self.layers.get(object).is_none_or(|layers| layers.intersect(self.drawn))
+        match self.layers.get(object) {
+            Some(layers) => layers.intersect(self.drawn),
+            None => self.drawn != Layers(0),
+        }
     }
 
     /// Those of up to 64 objects that pass: bit 0 is object `first`.

@@ -290,7 +290,7 @@ fn every_frame_has_every_place() {
         assert!(names.iter().all(|name| name != "transparency" || index("haze") < index(name)), "{names:?}");
     }
     let error = build_error(Renderer::builder(NullBackend).process(at("fog", Place::AfterLighting, "radiance")));
-    assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "after lighting".into() });
+    assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "the place after lighting".into() });
 }
 
 #[test]

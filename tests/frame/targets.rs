@@ -3,10 +3,12 @@
 use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
-use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, PlanError, RenderProcess, TargetSize};
-use drawloom::scene::ViewKind;
+use drawloom::process::{
+    ClearColor, Declare, Draws, Format, FullScreen, PlanError, ProcessError, RenderProcess, TargetSize,
+};
+use drawloom::scene::{Blend, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::{BuildError, Renderer};
+use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
 
 /// A process with a name, and a function that declares.
@@ -49,7 +51,15 @@ fn plan_error<const N: usize>(processes: [Declaring; N]) -> PlanError {
 #[test]
 fn sizes_that_no_target_can_have_are_named() {
     type Case = (fn(&mut Declare), &'static str);
-    let cases: [Case; 5] = [
+    let cases: [Case; 6] = [
+        (
+            |declare| {
+                clears(declare, "own");
+                declare.size("own", TargetSize::Divided(2));
+                declare.size("own", TargetSize::Divided(4));
+            },
+            "again",
+        ),
         (|declare| declare.size("other", TargetSize::Divided(2)), "does not create"),
         (
             |declare| {
@@ -219,4 +229,30 @@ impl std::io::Write for Written {
     fn flush(&mut self) -> std::io::Result<()> {
         Ok(())
     }
+}
+
+#[test]
+fn what_cannot_be_blended_is_named() {
+    struct Sum;
+    impl RenderProcess for Sum {
+        fn name(&self) -> &str {
+            "sum"
+        }
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_color("sum", Format::R32Float, ClearColor::Value([0.0; 4]));
+            declare.keep();
+        }
+        fn draws(&self) -> Draws<'_> {
+            Draws::FullScreen(FullScreen { blend: Blend::Additive, ..FullScreen::default() })
+        }
+    }
+    let builder = Renderer::builder(NullBackend).process(Sum);
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let error = renderer.record(field(3).as_scene_ref()).map(drop).unwrap_err();
+    let is_named = matches!(
+        &error,
+        FrameError::Process(ProcessError::CannotBlend { process, target, format: Format::R32Float })
+            if process == "sum" && target == "sum"
+    );
+    assert!(is_named, "{error}");
 }

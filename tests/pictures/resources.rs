@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use drawloom::backend::{Picture, WgpuBackend};
+use drawloom::backend::{BackendError, Picture, WgpuBackend};
 use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, ShaderResource};
 use drawloom::scene::Scene;
 use drawloom::{RendererBuilder, wgpu};
@@ -19,6 +19,8 @@ pub const CASES: &[Case] = &[
     ("a_frame_in_flight_keeps_its_bytes", bytes_in_flight),
     ("a_shader_reads_a_buffer_a_texture_and_a_sampler", handles),
     ("a_process_may_change_the_kinds_of_its_resources", other_kinds),
+    ("a_shader_reads_a_multisampled_texture", multisampled),
+    ("a_submission_that_is_refused_reads_nothing_back", refused_submission),
     ("targets_are_sampled_between_pixels", filtered_target),
     ("resources_that_the_device_refuses_are_named_and_the_next_frame_is_right", refused),
 ];
@@ -285,4 +287,53 @@ fn refused() -> Result<(), Failed> {
         assert_color(pixel(&picture, 3, 3), [128, 128, 64])?;
     }
     Ok(())
+}
+
+/// A texture of four samples a pixel, whose content is 0.
+fn multisampled() -> Result<(), Failed> {
+    let mut own = Own::new()?;
+    let (device, _) = device().ok_or("no adapter")?;
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("samples"),
+        size: wgpu::Extent3d { width: 2, height: 2, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 4,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8Unorm,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let shader = "
+        @group(3) @binding(0) var samples: texture_multisampled_2d<f32>;
+
+        @fragment
+        fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+            return vec4<f32>(textureLoad(samples, vec2<i32>(1, 1), 3).rg, f32(textureNumSamples(samples)) / 255.0, 1.0);
+        }
+    ";
+    let picture =
+        own.draw(shader, vec![ShaderResource::Texture { view, dimension: wgpu::TextureViewDimension::D2 }])?;
+    assert_color(pixel(&picture, 3, 3), [0, 0, 4])
+}
+
+fn refused_submission() -> Result<(), Failed> {
+    let mut own = Own::new()?;
+    let (device, queue) = device().ok_or("no adapter")?;
+    let tint = buffer(&device, &queue, 0.25, wgpu::BufferUsages::STORAGE);
+    let resources =
+        vec![ShaderResource::Buffer(tint.clone()), image(&device, &queue), sampler(&device, wgpu::FilterMode::Linear)];
+    own.process.set(FROM_HANDLES, resources);
+    let mut recorded = own.fixture.record(&own.scene)?;
+    let read_back = recorded.read_back(0, "own", [0, 0], [1, 1])?;
+    tint.destroy();
+    if own.fixture.submit(recorded).is_ok() {
+        return Err("a buffer was destroyed, and nobody noticed".into());
+    }
+    match read_back.try_read() {
+        Err(BackendError::NotSubmitted) => {}
+        other => return Err(format!("read back of a refused submission: {other:?}").into()),
+    }
+    let picture = own.draw(FROM_BYTES, vec![floats(&[1.0]), floats(&[0.5])])?;
+    assert_color(pixel(&picture, 3, 3), [255, 128, 1])
 }

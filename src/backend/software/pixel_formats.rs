@@ -112,7 +112,7 @@ fn rounded(encoding: ChannelEncoding, value: f64) -> f64 {
         ChannelEncoding::Srgb => f64::from(LINEAR_OF_BYTES[usize::from(srgb_byte_of(value))]),
         ChannelEncoding::Half => half_of(value).to_f64(),
         ChannelEncoding::Float => value,
-        ChannelEncoding::Integer => value.round(),
+        ChannelEncoding::Integer => value.trunc(),
     }
 }
 

@@ -26,7 +26,7 @@ enum State {
     /// Its frame is not submitted.
     Recorded,
     /// The device may not be done with it.
-    Submitted,
+    Submitted(wgpu::SubmissionIndex),
     Done,
     Failed(String),
 }
@@ -40,7 +40,7 @@ impl WgpuReadBack {
         self.poll(wgpu::PollType::Poll)?;
         match &*self.state.lock() {
             State::Recorded if Arc::strong_count(&self.state) == 1 => Err(BackendError::NotSubmitted),
-            State::Recorded | State::Submitted => Ok(None),
+            State::Recorded | State::Submitted(_) => Ok(None),
             State::Done => self.picture().map(Some),
             State::Failed(message) => Err(BackendError::DeviceLost { message: message.clone() }),
         }
@@ -51,8 +51,12 @@ impl WgpuReadBack {
     /// # Errors
     /// If the frame is not submitted, or the device is lost.
     pub fn read(&self) -> Result<Picture, BackendError> {
-        if matches!(*self.state.lock(), State::Submitted) {
-            self.poll(wgpu::PollType::wait_indefinitely())?;
+        loop {
+            let index = match &*self.state.lock() {
+                State::Submitted(index) => index.clone(),
+                _ => break,
+            };
+            self.poll(wgpu::PollType::Wait { submission_index: Some(index), timeout: None })?;
         }
         self.try_read()?.ok_or(BackendError::NotSubmitted)
     }
@@ -95,9 +99,9 @@ impl ReadBackCopy {
     }
 
     /// Maps the buffer when the device is done with the frame, which was submitted.
-    pub(crate) fn submitted(self) {
+    pub(crate) fn submitted(self, index: &wgpu::SubmissionIndex) {
         let Self { buffer, state, .. } = self;
-        *state.lock() = State::Submitted;
+        *state.lock() = State::Submitted(index.clone());
         buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             *state.lock() = match result {
                 Ok(()) => State::Done,
@@ -125,7 +129,7 @@ pub(crate) fn new_read_back(
     let fits = !size.contains(&0) && (0..2).all(is_within);
     // No device copies a part of a depth texture.
     if !fits || (format.is_depth() && size != whole) {
-        return Err(BackendError::OutsideTarget { view, target: target.to_owned(), origin, size, whole });
+        return Err(BackendError::InvalidReadBack { view, target: target.to_owned(), origin, size, whole });
     }
     let descriptor = wgpu::BufferDescriptor {
         label: Some("read back"),

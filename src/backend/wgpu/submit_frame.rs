@@ -6,7 +6,6 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
-use super::read_back::ReadBackCopy;
 use super::submission::WgpuSubmission;
 use crate::backend::{BackendError, ViewQueue};
 use crate::tuning::Tuner;
@@ -40,7 +39,7 @@ impl WgpuBackend {
                 }
             }
         }
-        let submission = with_error_scope(&self.device, "the frame", || {
+        let (submission, index) = with_error_scope(&self.device, "the frame", || {
             let timestamps = frame.buffers.timestamps().zip(self.device_timing.as_ref());
             let readback =
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
@@ -54,12 +53,13 @@ impl WgpuBackend {
                 encoder.finish()
             });
             let index = self.queue().submit(finished.into_iter().chain(copies).chain(copy));
-            frame.read_backs.drain(..).for_each(ReadBackCopy::submitted);
             frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
-            Ok(WgpuSubmission::new(device, queue, index, Arc::clone(&frame.targets), readback))
+            Ok((WgpuSubmission::new(device, queue, index.clone(), Arc::clone(&frame.targets), readback), index))
         })
         .flatten()?;
+        // Only now, because a submission that is refused copies nothing.
+        frame.read_backs.drain(..).for_each(|copy| copy.submitted(&index));
         self.report_costs(frame);
         Ok(submission)
     }

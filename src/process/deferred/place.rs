@@ -28,11 +28,13 @@ impl Place {
     /// The names of the empty slots at the beginning and at the end of the place: what is there comes between them.
     pub(in crate::process) fn slots(self) -> [&'static str; 2] {
         match self {
-            Self::BeforeGeometry => ["before geometry", "before geometry, at the latest"],
-            Self::AfterGeometry => ["after geometry", "after geometry, at the latest"],
-            Self::AfterLighting => ["after lighting", "after lighting, at the latest"],
-            Self::AfterTransparency => ["after transparency", "after transparency, at the latest"],
-            Self::AfterPostProcessing => ["after post-processing", "after post-processing, at the latest"],
+            Self::BeforeGeometry => ["the place before geometry", "the end of the place before geometry"],
+            Self::AfterGeometry => ["the place after geometry", "the end of the place after geometry"],
+            Self::AfterLighting => ["the place after lighting", "the end of the place after lighting"],
+            Self::AfterTransparency => ["the place after transparency", "the end of the place after transparency"],
+            Self::AfterPostProcessing => {
+                ["the place after post-processing", "the end of the place after post-processing"]
+            }
         }
     }
 }

@@ -186,6 +186,16 @@ pub enum ProcessError {
         /// The size of an element of the scene, in bytes.
         found: usize,
     },
+    /// Lights or a full-screen triangle are to be blended with a target whose format cannot be blended.
+    #[error("process {process:?} blends with target {target:?}, whose format {format:?} cannot be blended")]
+    CannotBlend {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+        /// Its format.
+        format: Format,
+    },
     /// A [resource](crate::process::ShaderResource::Bytes) of a size that no storage buffer can have.
     #[error("resource {resource} of process {process:?} has {bytes} bytes, instead of 4, 8, 12 ...")]
     ResourceSize {

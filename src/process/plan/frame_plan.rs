@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::attributes::attributes_of;
 use super::columns::{check_columns, columns_of};
 use super::order::{AddedProcess, order_constraints};
-use super::planned_target::{drawn_size, targets_of};
+use super::planned_target::{check_blending, drawn_size, targets_of};
 use super::view_group::view_groups;
 use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
@@ -177,9 +177,14 @@ impl FramePlan {
     /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
     ///
     /// # Errors
-    /// If a process panics, or its draws do not fit its declaration.
+    /// If a process panics, or its draws do not fit its declaration or its targets.
     pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
-        self.processes.iter().map(PlannedProcess::draws).collect()
+        let checked = |planned: &'a PlannedProcess| {
+            let draws = planned.draws()?;
+            check_blending(planned, &draws, &self.targets)?;
+            Ok(draws)
+        };
+        self.processes.iter().map(checked).collect()
     }
 
     /// Whether any process draws in views of this kind.

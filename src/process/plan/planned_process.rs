@@ -48,7 +48,8 @@ impl PlannedProcess {
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };
-        let fits = |access: &Access| access.is_raw() == is_raw;
+        // Both kinds read histories: raw passes by the name of the copy.
+        let fits = |access: &Access| access.is_raw() == is_raw || *access == Access::SamplePrevious;
         if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
             return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
         }

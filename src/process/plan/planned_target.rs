@@ -1,8 +1,8 @@
 //! The targets that a plan's processes use.
 
-use super::{PlanError, PlannedProcess};
-use crate::process::{Access, Declaration, Format, TargetSize, previous_name};
-use crate::scene::ViewKind;
+use super::{PlanError, PlannedProcess, ProcessError};
+use crate::process::{Access, Declaration, Draws, Format, TargetSize, previous_name};
+use crate::scene::{Blend, ViewKind};
 
 /// A target that each view of one kind has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,7 +96,9 @@ fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
     for (target, size) in &planned.declaration.sizes {
         let created =
             planned.declaration.accesses.iter().find(|(name, access)| name == target && access.format().is_some());
+        let sizes = planned.declaration.sizes.iter().filter(|(sized, _)| sized == target);
         let problem = match created {
+            _ if sizes.count() > 1 => "and sets it again",
             None => "that it does not create",
             Some((_, Access::ClearDepthLayer(_))) => "that it draws in layers, which have the size of the pictures",
             Some(_) if !size.is_valid() => "to a size without pixels",
@@ -124,6 +126,28 @@ fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Res
 /// The size of the targets that a process draws into; that of the picture if it draws into none.
 pub(super) fn drawn_size(planned: &PlannedProcess, targets: &[PlannedTarget]) -> TargetSize {
     attached_targets(planned, targets).next().map_or(TargetSize::Picture, |target| target.size)
+}
+
+/// # Errors
+/// If lights or a full-screen triangle are blended with a target that cannot be blended. Objects have materials of all kinds, and
+/// those that blend are drawn there as if they did not.
+pub(super) fn check_blending(
+    planned: &PlannedProcess,
+    draws: &Draws<'_>,
+    targets: &[PlannedTarget],
+) -> Result<(), ProcessError> {
+    let blends = match draws {
+        Draws::FullScreen(full_screen) => full_screen.blend != Blend::None,
+        Draws::Lights(_) => true,
+        _ => false,
+    };
+    let refuses = |target: &&PlannedTarget| !target.format.is_depth() && !target.format.can_be_blended();
+    match attached_targets(planned, targets).find(refuses) {
+        Some(PlannedTarget { name, format, .. }) if blends => {
+            Err(ProcessError::CannotBlend { process: planned.name.clone(), target: name.clone(), format: *format })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The targets that a process draws into, and the depth that it tests.

@@ -78,7 +78,7 @@ impl ObjectBuffers {
         self.all().for_each(|buffer| buffer.await_submission(queue));
     }
 
-    /// The GPU layouts of the objects. `None` before [`ObjectBuffers::reserve`], as the next one.
+    /// The GPU layouts of the objects; `None` before [`ObjectBuffers::reserve`].
     pub(crate) fn gpu_objects(&self) -> Option<wgpu::BufferBinding<'_>> {
         self.binding(&self.gpu_objects)
     }
@@ -168,8 +168,9 @@ impl Changed<'_> {
         }
         // One write for each run of objects, because each write has a fixed cost.
         objects.for_each_change(blocks.clone(), held_epoch, MIN_UNCHANGED, |run| {
-            for start in run.clone().step_by(MAX_STAGED_BYTES / stride) {
-                let run = start..run.end.min(start + MAX_STAGED_BYTES / stride);
+            let most = (MAX_STAGED_BYTES / stride).max(1);
+            for start in run.clone().step_by(most) {
+                let run = start..run.end.min(start + most);
                 let size = NonZeroU64::new((run.len() * stride) as u64);
                 let Some((buffer, size)) = buffer.on_device().buffer().zip(size) else { continue };
                 let offset = (run.start * stride) as u64;

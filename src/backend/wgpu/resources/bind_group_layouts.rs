@@ -106,11 +106,15 @@ pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderRes
             let texture = view.texture();
             // A depth-stencil texture is sampled as depth.
             let depth = wgpu::TextureSampleType::Depth;
-            wgpu::BindingType::Texture {
-                sample_type: texture.format().sample_type(None, Some(device_features)).unwrap_or(depth),
-                view_dimension: *dimension,
-                multisampled: texture.sample_count() > 1,
-            }
+            let multisampled = texture.sample_count() > 1;
+            let sample_type = match texture.format().sample_type(None, Some(device_features)).unwrap_or(depth) {
+                // Samplers do not take multisampled textures.
+                wgpu::TextureSampleType::Float { filterable } => {
+                    wgpu::TextureSampleType::Float { filterable: filterable && !multisampled }
+                }
+                other => other,
+            };
+            wgpu::BindingType::Texture { sample_type, view_dimension: *dimension, multisampled }
         }
         ShaderResource::Sampler { kind, .. } => wgpu::BindingType::Sampler(*kind),
     }
