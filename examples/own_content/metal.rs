@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 use drawloom::command::Selection;
 use drawloom::glam::{Vec2, Vec3};
 use drawloom::process::{CommandDraws, Declare, Draws, ILLUMINATION_SHADER, Place, RenderProcess, ShaderResource};
-use drawloom::scene::{Layers, Mesh, SceneError, Topology, Vertex, VertexAttribute};
+use drawloom::scene::{LayerMask, Mesh, SceneError, Topology, Vertex, VertexAttribute};
 use drawloom::wgpu;
 use wgpu::util::DeviceExt;
 
@@ -17,7 +17,7 @@ pub const TANGENT: VertexAttribute<[f32; 4]> = VertexAttribute::new("tangent");
 pub const COLOR: VertexAttribute<[u8; 4]> = VertexAttribute::new("colour");
 
 /// The layer of objects with this material.
-pub const LAYER: Layers = Layers(2);
+pub const LAYER: LayerMask = LayerMask::layer(1);
 
 /// The name of the process.
 pub const NAME: &str = "metal";

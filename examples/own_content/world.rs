@@ -3,7 +3,7 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
-    Assets, Bounds, Camera, Changes, ColumnValues, Layers, Light, Material, Mesh, SceneError, SceneRef, Topology,
+    Assets, Bounds, Camera, Changes, ColumnValues, LayerMask, Light, Material, Mesh, SceneError, SceneRef, Topology,
     Vertex,
 };
 
@@ -12,7 +12,7 @@ use crate::temporal::DISPLACEMENT;
 use crate::tints::TINT;
 
 /// The layer of the spheres.
-pub const FIELD: Layers = Layers(1);
+pub const FIELD: LayerMask = LayerMask::layer(0);
 
 /// The positions of the rings in metres, and how far each is turned towards the camera.
 const RINGS: [([f64; 3], f32); 3] = [([-9.0, 6.0, 16.0], 0.9), ([0.0, 6.5, 18.0], 1.57), ([9.0, 6.0, 16.0], 0.5)];
@@ -28,7 +28,7 @@ pub struct World {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
-    layers: Vec<Layers>,
+    layers: Vec<LayerMask>,
     /// How many objects are in the field; rings follow.
     field: usize,
     /// Red, green, blue, and how much of it is emitted.

@@ -1,6 +1,6 @@
 //! Which objects a process draws.
 
-use crate::scene::{Blend, Layers};
+use crate::scene::{Blend, LayerMask};
 
 /// Which objects a process draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -10,19 +10,20 @@ pub struct Selection {
     /// By material.
     pub materials: MaterialShare,
     /// By layer: objects that belong to one of these layers.
-    pub layers: Layers,
+    pub layers: LayerMask,
 }
 
 impl Selection {
     /// Every opaque object.
-    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL, layers: Layers::ALL };
+    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL, layers: LayerMask::ALL };
     /// Every blended object.
-    pub const BLENDED: Self = Self { blending: Blending::Blended, materials: MaterialShare::ALL, layers: Layers::ALL };
+    pub const BLENDED: Self =
+        Self { blending: Blending::Blended, materials: MaterialShare::ALL, layers: LayerMask::ALL };
     /// Every object: opaque ones first, then blended ones.
-    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL, layers: Layers::ALL };
+    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL, layers: LayerMask::ALL };
 
     /// Those of these objects that belong to one of some layers.
-    pub const fn in_layers(self, layers: Layers) -> Self {
+    pub const fn in_layers(self, layers: LayerMask) -> Self {
         Self { layers, ..self }
     }
 

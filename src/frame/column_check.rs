@@ -1,6 +1,6 @@
 //! Finds columns and layers that changed although the engine did not report it.
 
-use crate::scene::{ColumnLayout, Layers, ObjectColumn, SceneError, SceneRef};
+use crate::scene::{ColumnLayout, LayerMask, ObjectColumn, SceneError, SceneRef};
 use crate::view::ObjectTable;
 
 /// Copies of the columns that the latest frame read, and of the objects' layers. Only builds with debug assertions have any.
@@ -10,7 +10,7 @@ pub(super) struct ColumnCheck {
 }
 
 /// The layers of objects are compared as a column is.
-const LAYERS: ObjectColumn<Layers> = ObjectColumn::new("layers of objects");
+const LAYERS: ObjectColumn<LayerMask> = ObjectColumn::new("layers of objects");
 
 impl ColumnCheck {
     /// Compares the columns that a frame read with those of the frame before, and copies them.

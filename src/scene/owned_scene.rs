@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Asset, Assets, Bounds, Camera, Changes, Layers, Light, Material, Mesh, SceneError, SceneRef};
+use super::{Asset, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, SceneError, SceneRef};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
@@ -42,7 +42,7 @@ pub struct Scene {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
-    layers: Vec<Layers>,
+    layers: Vec<LayerMask>,
 }
 
 /// Refers to an object of a [`Scene`].
@@ -63,13 +63,13 @@ pub struct RenderObject {
     /// The material.
     pub material: Handle<Material>,
     /// The layers that it belongs to.
-    pub layers: Layers,
+    pub layers: LayerMask,
 }
 
 impl RenderObject {
     /// An object at `position`, without rotation and scale, in all layers.
     pub fn new(mesh: Handle<Mesh>, material: Handle<Material>, position: DVec3) -> Self {
-        Self { position, orientation: Quat::IDENTITY, scale: Vec3::ONE, mesh, material, layers: Layers::ALL }
+        Self { position, orientation: Quat::IDENTITY, scale: Vec3::ONE, mesh, material, layers: LayerMask::ALL }
     }
 }
 

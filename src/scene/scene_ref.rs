@@ -3,7 +3,9 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, Layers, Light, Material, Mesh, SceneError};
+use super::{
+    Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, SceneError,
+};
 use crate::handle::Handle;
 
 /// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
@@ -29,7 +31,7 @@ pub struct SceneRef<'a> {
     pub materials: &'a [Handle<Material>],
     /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty if every
     /// object belongs to all. A process that does not draw all layers makes its list anew in each frame in which an object changes.
-    pub layers: &'a [Layers],
+    pub layers: &'a [LayerMask],
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.
     pub columns: &'a [ColumnValues<'a>],

@@ -2,33 +2,33 @@
 
 use super::set_bits;
 use crate::command::Selection;
-use crate::scene::{Layers, SceneRef};
+use crate::scene::{LayerMask, SceneRef};
 
 /// Which objects a process draws by their layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerFilter<'a> {
     /// Of each object; empty if all have the same answer.
-    layers: &'a [Layers],
-    drawn: Layers,
+    layers: &'a [LayerMask],
+    drawn: LayerMask,
 }
 
 impl<'a> LayerFilter<'a> {
     pub(crate) fn new(scene: &SceneRef<'a>, selection: Selection) -> Self {
         let drawn = selection.layers;
-        Self { layers: if drawn == Layers::ALL { &[] } else { scene.layers }, drawn }
+        Self { layers: if drawn == LayerMask::ALL { &[] } else { scene.layers }, drawn }
     }
 
     /// Whether it lets all objects pass.
     pub(crate) fn passes_all(&self) -> bool {
-        self.layers.is_empty() && self.drawn != Layers(0)
+        self.layers.is_empty() && self.drawn != LayerMask::NONE
     }
 
     /// Whether it lets an object pass.
     #[inline]
     pub(crate) fn passes(&self, object: usize) -> bool {
         match self.layers.get(object) {
-            Some(layers) => layers.intersect(self.drawn),
-            None => self.drawn != Layers(0),
+            Some(layers) => layers.intersects(self.drawn),
+            None => self.drawn != LayerMask::NONE,
         }
     }
 

@@ -6,7 +6,7 @@ use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
 use drawloom::quality::{DepthCurve, DepthKey, Quality};
-use drawloom::scene::{Changes, Layers, SceneError, SceneRef};
+use drawloom::scene::{Changes, LayerMask, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer, Submitter};
 use drawloom_testing::changing_world::ChangingWorld;
@@ -38,7 +38,7 @@ impl RenderProcess for Depth {
 const SELECTIONS: [Selection; 3] = [Selection::OPAQUE, Selection::BLENDED, Selection::ALL];
 
 /// A renderer with each selection twice: of all layers, and of these.
-fn renderer(layers: Layers, quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+fn renderer(layers: LayerMask, quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let mut builder = Renderer::builder(NullBackend).quality(quality);
     for (index, selection) in SELECTIONS.into_iter().enumerate() {
         builder = builder.process(Depth { name: format!("all {index}"), selection });
@@ -48,7 +48,7 @@ fn renderer(layers: Layers, quality: Quality, workers: usize) -> (Renderer<NullB
 }
 
 /// Whether the processes of some layers drew what those of all layers did, without the objects of other layers.
-fn check(renderer: &Renderer<NullBackend>, drawn: Layers, layers: &[Layers]) -> Result<(), TestCaseError> {
+fn check(renderer: &Renderer<NullBackend>, drawn: LayerMask, layers: &[LayerMask]) -> Result<(), TestCaseError> {
     for view in 0..2 {
         for index in 0..SELECTIONS.len() {
             let objects = |of: &str| renderer.draw_list(&format!("{of} {index}"), view).unwrap().objects.clone();
@@ -73,26 +73,26 @@ proptest! {
     fn a_process_draws_the_objects_of_its_layers(
         seed in any::<u64>(), count in 0_usize..700, drawn in 0_u32..16, bits in 0_u32..2, workers in 1_usize..3,
     ) {
-        let drawn = Layers(drawn);
+        let drawn = LayerMask(drawn);
         let quality = Quality {
             opaque_order: DepthKey { bits: bits * 8, curve: DepthCurve::Logarithmic },
             ..Quality::balanced()
         };
         let (mut renderer, submitter) = renderer(drawn, quality, workers);
         let (mut world, mut random) = (ChangingWorld::new(seed, count), Random::stream(seed));
-        let mut layers: Vec<_> = (0..count).map(|_| Layers(random.below(16) as u32)).collect();
+        let mut layers: Vec<_> = (0..count).map(|_| LayerMask(random.below(16) as u32)).collect();
         for frame in 0..8 {
             let scene = world.as_scene_ref();
-            layers.resize(scene.object_count(), Layers(3));
+            layers.resize(scene.object_count(), LayerMask(3));
             // Without layers every object belongs to all.
-            let lent: &[Layers] = if frame == 3 { &[] } else { &layers };
+            let lent: &[LayerMask] = if frame == 3 { &[] } else { &layers };
             // The world does not know of layers, which all count as changed if some do.
             let changes = if frame % 2 == 0 || frame == 3 { Changes::Unknown } else { scene.changes };
             let recorded = renderer.record(SceneRef { layers: lent, changes, ..scene });
             submitter.submit(recorded.unwrap()).unwrap();
             check(&renderer, drawn, lent)?;
             if frame % 2 == 1 {
-                layers.iter_mut().step_by(3).for_each(|layers| *layers = Layers(random.below(16) as u32));
+                layers.iter_mut().step_by(3).for_each(|layers| *layers = LayerMask(random.below(16) as u32));
             } else if frame != 2 {
                 world.step().unwrap();
             }
@@ -102,10 +102,10 @@ proptest! {
 
 #[test]
 fn a_list_is_kept_until_layers_change() {
-    let (mut renderer, _) = renderer(Layers(1), Quality::balanced(), 1);
+    let (mut renderer, _) = renderer(LayerMask(1), Quality::balanced(), 1);
     let scene = field(500);
-    let mut layers = vec![Layers(1); 500];
-    let mut frame = |layers: &[Layers], changes| {
+    let mut layers = vec![LayerMask(1); 500];
+    let mut frame = |layers: &[LayerMask], changes| {
         let recorded = renderer.record(SceneRef { layers, changes, ..scene.as_scene_ref() });
         drop(recorded.unwrap());
         let list = renderer.draw_list("some 0", 0).unwrap();
@@ -114,16 +114,16 @@ fn a_list_is_kept_until_layers_change() {
     let first = frame(&layers, Changes::Unknown);
     assert_eq!(first.0, frame(&layers, Changes::NONE).0, "nothing changed");
     let hidden = first.1[0];
-    layers[hidden as usize] = Layers(2);
+    layers[hidden as usize] = LayerMask(2);
     let changed = frame(&layers, Changes::Objects(&[hidden]));
     assert!(!changed.1.contains(&hidden) && changed.1.len() + 1 == first.1.len());
 }
 
 #[test]
 fn layers_that_do_not_fit_are_refused() {
-    let (mut renderer, _) = renderer(Layers(1), Quality::balanced(), 1);
+    let (mut renderer, _) = renderer(LayerMask(1), Quality::balanced(), 1);
     let scene = field(5);
-    let error = renderer.record(SceneRef { layers: &[Layers(1); 4], ..scene.as_scene_ref() }).map(drop).unwrap_err();
+    let error = renderer.record(SceneRef { layers: &[LayerMask(1); 4], ..scene.as_scene_ref() }).map(drop).unwrap_err();
     let expected = SceneError::UnequalSlices { slice: "layers", count: 4, positions: 5 };
     assert!(matches!(&error, FrameError::Scene(found) if *found == expected), "{error}");
 }
@@ -131,10 +131,10 @@ fn layers_that_do_not_fit_are_refused() {
 #[cfg(debug_assertions)]
 #[test]
 fn layers_that_change_without_a_report_are_named() {
-    let (mut renderer, _) = renderer(Layers(1), Quality::balanced(), 1);
+    let (mut renderer, _) = renderer(LayerMask(1), Quality::balanced(), 1);
     let scene = field(5);
-    drop(renderer.record(SceneRef { layers: &[Layers(1); 5], ..scene.as_scene_ref() }).unwrap());
-    let changed = [1, 1, 2, 1, 1].map(Layers);
+    drop(renderer.record(SceneRef { layers: &[LayerMask(1); 5], ..scene.as_scene_ref() }).unwrap());
+    let changed = [1, 1, 2, 1, 1].map(LayerMask);
     let lent = SceneRef { layers: &changed, changes: Changes::Objects(&[1]), ..scene.as_scene_ref() };
     let error = renderer.record(lent).map(drop).unwrap_err();
     assert!(matches!(&error, FrameError::Scene(SceneError::UnreportedChange { object: 2 })), "{error}");

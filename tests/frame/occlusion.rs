@@ -8,7 +8,7 @@ use drawloom::command::{Blending, Selection};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Blend, Camera, Layers, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
+use drawloom::scene::{Blend, Camera, LayerMask, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
 use drawloom_testing::scenes::{cube, field, sized};
@@ -198,7 +198,7 @@ impl RenderProcess for FirstLayer {
     }
 
     fn draws(&self) -> Draws<'_> {
-        let selection = Selection::OPAQUE.in_layers(Layers(1));
+        let selection = Selection::OPAQUE.in_layers(LayerMask(1));
         Draws::Commands(CommandDraws { selection, ..CommandDraws::default() })
     }
 }
@@ -207,16 +207,16 @@ impl RenderProcess for FirstLayer {
 fn objects_of_other_layers_occlude_nothing() {
     let quality = Quality { occlusion: Some(4), culling: CullingVolume::Sphere, ..Quality::balanced() };
     let scene = wall_and_cubes();
-    let occluded = |wall: Layers| {
+    let occluded = |wall: LayerMask| {
         let builder = Renderer::builder(NullBackend).process(FirstLayer).output("picture").quality(quality);
         let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
-        let mut layers = vec![Layers(1); scene.object_count()];
+        let mut layers = vec![LayerMask(1); scene.object_count()];
         layers[0] = wall;
         let recorded = renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() });
         recorded.unwrap().statistics().views[0].occluded
     };
-    assert!(occluded(Layers(1)) > 100);
-    assert_eq!(occluded(Layers(2)), 0, "nothing draws the wall");
+    assert!(occluded(LayerMask(1)) > 100);
+    assert_eq!(occluded(LayerMask(2)), 0, "nothing draws the wall");
 }
 
 /// Draws only glass, which occludes nothing.
