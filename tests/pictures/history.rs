@@ -129,11 +129,17 @@ fn another_history() -> Result<(), Failed> {
 }
 
 fn history_in_software() -> Result<(), Failed> {
-    let (mut by_wgpu, scene) = (Fixture::with(2, accumulates)?, scene());
+    let (mut by_wgpu, mut scene) = (Fixture::with(2, accumulates)?, scene());
     let scheduler = Arc::new(Scheduler::new(2)?);
     let builder = accumulates(Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))));
     let (mut renderer, submitter) = builder.build(scheduler)?;
-    for frame in 0..4 {
+    for frame in 0..8 {
+        // Another view, and another size.
+        match frame {
+            3 => scene.cameras[0].name.push_str(", turned"),
+            5 => scene.cameras[0].size = [64, 70],
+            _ => {}
+        }
         let recorded = by_wgpu.record(&scene)?;
         let expected = by_wgpu.submit(recorded)?.read(0, "sum")?;
         let found = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "sum")?;

@@ -51,14 +51,15 @@ impl WgpuReadBack {
     /// # Errors
     /// If the frame is not submitted, or the device is lost.
     pub fn read(&self) -> Result<Picture, BackendError> {
-        loop {
-            let index = match &*self.state.lock() {
-                State::Submitted(index) => index.clone(),
-                _ => break,
-            };
-            self.poll(wgpu::PollType::Wait { submission_index: Some(index), timeout: None })?;
-        }
-        self.try_read()?.ok_or(BackendError::NotSubmitted)
+        let index = match &*self.state.lock() {
+            State::Submitted(index) => Some(index.clone()),
+            _ => None,
+        };
+        let Some(index) = index else { return self.try_read()?.ok_or(BackendError::NotSubmitted) };
+        self.poll(wgpu::PollType::Wait { submission_index: Some(index), timeout: None })?;
+        // The device is done with the frame, so it has mapped the buffer, or is lost.
+        let lost = || BackendError::DeviceLost { message: "pixels that were read back never came".to_owned() };
+        self.try_read()?.ok_or_else(lost)
     }
 
     fn poll(&self, poll: wgpu::PollType) -> Result<(), BackendError> {
@@ -101,13 +102,18 @@ impl ReadBackCopy {
     /// Maps the buffer when the device is done with the frame, which was submitted.
     pub(crate) fn submitted(self, index: &wgpu::SubmissionIndex) {
         let Self { buffer, state, .. } = self;
-        *state.lock() = State::Submitted(index.clone());
+        let in_callback = Arc::clone(&state);
         buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            *state.lock() = match result {
+            *in_callback.lock() = match result {
                 Ok(()) => State::Done,
                 Err(error) => State::Failed(error.to_string()),
             };
         });
+        // Behind the request: whoever waits for the submission finds it mapped. Another thread may have polled already.
+        let mut state = state.lock();
+        if matches!(*state, State::Recorded) {
+            *state = State::Submitted(index.clone());
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::error_scope::with_error_scope;
-use super::resources::{ViewTarget, WgpuTargets};
+use super::read_back::new_read_back;
+use super::resources::WgpuTargets;
 use super::timing::{DevicePassTimes, TimestampReadback};
 use crate::backend::{BackendError, Picture};
 
@@ -62,47 +63,14 @@ impl WgpuSubmission {
         self.wait()?;
         let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
         let found = self.targets.find(view, target).ok_or_else(unknown)?;
-        let (size, format) = (found.texture.size(), found.format());
-        let row = size.width as usize * format.bytes();
-        let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        let buffer = with_error_scope(&self.device, target, || {
-            let buffer = self.copy_to_buffer(found, padded_row);
-            buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-                // Fails only if the device refused the mapping; then the receiver below is gone.
-                let _ = sender.send(result);
-            });
-            buffer
+        let whole = [found.texture.width(), found.texture.height()];
+        let (read_back, copy) = new_read_back(&self.device, &self.targets, view, target, [[0, 0], whole])?;
+        let index = with_error_scope(&self.device, target, || {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            copy.encode(&mut encoder);
+            self.queue.submit([encoder.finish()])
         })?;
-        let lost = |message: String| BackendError::DeviceLost { message };
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
-        let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;
-        mapped.map_err(|error| lost(error.to_string()))?;
-        let padded = buffer.get_mapped_range(..).map_err(|error| lost(error.to_string()))?;
-        let bytes = padded.chunks_exact(padded_row).flat_map(|padded| &padded[..row]).copied().collect();
-        Ok(Picture { width: size.width, height: size.height, format, bytes })
-    }
-
-    fn copy_to_buffer(&self, target: &ViewTarget, padded_row: usize) -> wgpu::Buffer {
-        let size = wgpu::Extent3d { depth_or_array_layers: 1, ..target.texture.size() };
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size: padded_row as u64 * u64::from(size.height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout =
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row as u32), rows_per_image: None };
-        encoder.copy_texture_to_buffer(
-            wgpu::TexelCopyTextureInfo {
-                origin: wgpu::Origin3d { z: target.layer, ..wgpu::Origin3d::ZERO },
-                ..target.texture.as_image_copy()
-            },
-            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-            size,
-        );
-        self.queue.submit([encoder.finish()]);
-        buffer
+        copy.submitted(&index);
+        read_back.read()
     }
 }
