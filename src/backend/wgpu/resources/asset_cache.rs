@@ -107,9 +107,8 @@ impl AssetCache {
     pub(crate) fn require_attributes(&mut self, attributes: &[DeclaredAttribute]) -> bool {
         let changed = self.attributes.require(attributes);
         if changed {
-            // All meshes move to new arenas, with all attributes.
+            // Nothing fits into an arena without room, so all meshes move to a new one, with all attributes.
             self.vertices = new_vertex_arena();
-            self.meshes.clear();
             self.current = None;
         }
         changed
