@@ -13,12 +13,12 @@ struct Corner {
 }
 
 @vertex
-fn vertex(in: VertexInput, @location(3) tangent: vec4<f32>, @location(4) color: vec4<f32>) -> Corner {
+fn vertex(in: VertexInput) -> Corner {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, in.position);
-    let turned = rotate(object.orientation, object.scale * tangent.xyz);
+    let turned = rotate(object.orientation, object.scale * in.tangent.xyz);
     let normal = world_normal(object, in.normal);
-    return Corner(clip_position(relative), relative, normal, vec4<f32>(turned, tangent.w), in.uv, color.rgb);
+    return Corner(clip_position(relative), relative, normal, vec4<f32>(turned, in.tangent.w), in.uv, in.colour.rgb);
 }
 
 @fragment

@@ -3,7 +3,7 @@
 use crate::scene::{Blend, LayerMask};
 
 /// Which objects a process draws.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Selection {
     /// By blending.
     pub blending: Blending,
@@ -11,20 +11,30 @@ pub struct Selection {
     pub materials: MaterialShare,
     /// By layer: objects that belong to one of these layers.
     pub layers: LayerMask,
+    /// Objects that belong to one of these layers are left out.
+    pub excluded_layers: LayerMask,
 }
 
 impl Selection {
     /// Every opaque object.
-    pub const OPAQUE: Self = Self { blending: Blending::Opaque, materials: MaterialShare::ALL, layers: LayerMask::ALL };
+    pub const OPAQUE: Self = Self::of(Blending::Opaque);
     /// Every blended object.
-    pub const BLENDED: Self =
-        Self { blending: Blending::Blended, materials: MaterialShare::ALL, layers: LayerMask::ALL };
+    pub const BLENDED: Self = Self::of(Blending::Blended);
     /// Every object: opaque ones first, then blended ones.
-    pub const ALL: Self = Self { blending: Blending::Both, materials: MaterialShare::ALL, layers: LayerMask::ALL };
+    pub const ALL: Self = Self::of(Blending::Both);
+
+    const fn of(blending: Blending) -> Self {
+        Self { blending, materials: MaterialShare::ALL, layers: LayerMask::ALL, excluded_layers: LayerMask::NONE }
+    }
 
     /// Those of these objects that belong to one of some layers.
     pub const fn in_layers(self, layers: LayerMask) -> Self {
         Self { layers, ..self }
+    }
+
+    /// Those of these objects that belong to none of some layers.
+    pub const fn not_in_layers(self, excluded_layers: LayerMask) -> Self {
+        Self { excluded_layers, ..self }
     }
 
     /// Whether it contains objects of any layer that blend like this and have the material in this slot.
@@ -36,6 +46,12 @@ impl Selection {
         };
         // The comparison comes first: the division costs as much as the rest of a command.
         blends && (self.materials == MaterialShare::ALL || material % self.materials.of.max(1) == self.materials.index)
+    }
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self::OPAQUE
     }
 }
 

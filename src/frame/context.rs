@@ -102,10 +102,11 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// Whether a pass culls triangles of meshes with triangle culling.
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
-        // The test is of the pixels of the picture.
-        let draws_picture =
-            self.request.plan.drawn_size(self.request.passes[pass].process_index) == TargetSize::Picture;
-        self.culls_triangles && draws_picture && self.request.views[self.view_index_of(pass)].can_cull_triangles()
+        let process = self.request.passes[pass].process_index;
+        // The test is of the triangles of the mesh, and of the pixels of the picture.
+        let is_exact = !self.request.draws[process].deforms()
+            && self.request.plan.drawn_size(process) == TargetSize::Picture;
+        self.culls_triangles && is_exact && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 
     /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.

@@ -144,8 +144,8 @@ impl Declare {
         self.declaration.columns.push(column.layout());
     }
 
-    /// Reads an engine's own attribute of vertices as an input of the vertex shader: the first such attribute is `@location(3)`, the next
-    /// 4, and so on, behind those of the prelude's `VertexInput`. Meshes without it have the default for each vertex.
+    /// Reads an engine's own attribute of vertices: a field of the prelude's `VertexInput`, by its name. Meshes without it have the
+    /// default for each vertex.
     ///
     /// ```
     /// use drawloom::process::Declare;
@@ -155,7 +155,7 @@ impl Declare {
     ///
     /// fn declare(declare: &mut Declare) {
     ///     declare.clears_depth("depth", drawloom::process::Format::Depth32Float);
-    ///     // fn vertex(in: VertexInput, @location(3) tangent: vec4<f32>)
+    ///     // In the shader: in.tangent
     ///     declare.reads_attribute(TANGENT, [1.0, 0.0, 0.0, 1.0]);
     /// }
     /// ```
@@ -211,6 +211,13 @@ impl Declare {
     /// The declaration.
     pub fn finish(self) -> Declaration {
         self.declaration
+    }
+
+    /// Changes how the process uses its targets.
+    pub(in crate::process) fn replace_accesses(&mut self, replace: impl Fn(Access) -> Access) {
+        for (_, access) in &mut self.declaration.accesses {
+            *access = replace(*access);
+        }
     }
 
     fn access(&mut self, target: &str, access: Access) {

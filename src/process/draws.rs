@@ -31,6 +31,14 @@ pub struct CommandDraws<'a> {
     pub shader: &'a str,
     /// The fragment entry point; `None` draws only depth.
     pub fragment: Option<&'a str>,
+    /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
+    /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped
+    /// processes and [`SURFACE_SHADER`](super::SURFACE_SHADER) call. [`Deferred::deformation`](super::Deferred::deformation) sets it for
+    /// all processes of the pipeline.
+    ///
+    /// The objects' bounds contain what it returns. Deformed objects hide nothing behind them from culling, and their triangles are not
+    /// culled on the CPU.
+    pub deformation: Option<&'a str>,
     /// Which objects are drawn.
     pub selection: Selection,
     /// Whether depth is written.
@@ -46,6 +54,7 @@ impl Default for CommandDraws<'_> {
         Self {
             shader: "",
             fragment: Some("fragment"),
+            deformation: None,
             selection: Selection::OPAQUE,
             writes_depth: true,
             parameters: Cow::Borrowed(&[]),
@@ -94,9 +103,14 @@ impl Draws<'_> {
         }
     }
 
-    /// Whether it draws objects that write depth, and so hide what is behind them.
+    /// Whether it draws objects that write depth in the shape of their meshes, and so hide what is behind them.
     pub fn hides(&self) -> bool {
-        matches!(self, Self::Commands(commands) if commands.writes_depth)
+        matches!(self, Self::Commands(CommandDraws { writes_depth: true, deformation: None, .. }))
+    }
+
+    /// Whether it draws objects whose vertices its shader moves.
+    pub fn deforms(&self) -> bool {
+        matches!(self, Self::Commands(CommandDraws { deformation: Some(_), .. }))
     }
 
     /// The engine's own resources that the shader reads; none for a raw pass.

@@ -25,13 +25,13 @@ mod target_size;
 
 #[cfg(feature = "software")]
 pub use cpu_shader::{
-    CpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
+    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
     ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
     VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
 pub use declaration::{Access, ClearColor, Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
-    Deferred, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place, Requirements,
+    Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place, Requirements,
     SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
@@ -50,4 +50,4 @@ pub use target_size::TargetSize;
 #[cfg(feature = "software")]
 pub(crate) use cpu_shader::TypedCpuShader;
 #[cfg(feature = "wgpu")]
-pub(crate) use prelude::LightVolume;
+pub(crate) use prelude::{FIRST_OWN_LOCATION, LightVolume, prelude_with};

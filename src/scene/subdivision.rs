@@ -246,7 +246,7 @@ mod tests {
             limit in prop_oneof![Just(usize::MAX), 0..3000_usize],
         ) {
             let scale = 2_f32.powi(exponent);
-            const POSITION: VertexAttribute<[f32; 3]> = VertexAttribute::new("position, again");
+            const POSITION: VertexAttribute<[f32; 3]> = VertexAttribute::new("position_again");
             const SIDE: VertexAttribute<u32> = VertexAttribute::new("side");
             let whole = distorted_box(Vec3::from(sizes) * scale, Vec3::from(origin) * scale, bends);
             let again: Vec<_> = whole.vertices().iter().map(|vertex| vertex.position).collect();

@@ -19,7 +19,7 @@ use bytemuck::Pod;
 /// # Ok::<(), drawloom::scene::SceneError>(())
 /// ```
 ///
-/// A shader has it as an input: see [`Declare::reads_attribute`](crate::process::Declare::reads_attribute).
+/// A shader has it as a field of `VertexInput`: see [`Declare::reads_attribute`](crate::process::Declare::reads_attribute).
 pub struct VertexAttribute<T> {
     name: &'static str,
     /// Neither owns nor borrows a `T`.
@@ -27,8 +27,14 @@ pub struct VertexAttribute<T> {
 }
 
 impl<T: AttributeValue> VertexAttribute<T> {
-    /// An attribute of this name. Two attributes of one name are the same attribute.
+    /// An attribute of this name, which is that of a field of `VertexInput` in shaders. Two attributes of one name are the same
+    /// attribute.
+    ///
+    /// # Panics
+    /// If the name is not made of ASCII letters, digits and underscores, begins with a digit or an underscore, or is that of a field
+    /// that every vertex has. For a constant, that is an error of the compiler.
     pub const fn new(name: &'static str) -> Self {
+        assert!(is_field_name(name), "the name of an attribute is that of a field in WGSL");
         Self { name, value: PhantomData }
     }
 
@@ -36,6 +42,19 @@ impl<T: AttributeValue> VertexAttribute<T> {
     pub const fn layout(self) -> AttributeLayout {
         AttributeLayout { name: self.name, format: T::FORMAT }
     }
+}
+
+const fn is_field_name(name: &str) -> bool {
+    let bytes = name.as_bytes();
+    let mut index = 0;
+    while index < bytes.len() {
+        let is_inner = index > 0 && (bytes[index].is_ascii_digit() || bytes[index] == b'_');
+        if !bytes[index].is_ascii_alphabetic() && !is_inner {
+            return false;
+        }
+        index += 1;
+    }
+    !(bytes.is_empty() || matches!(bytes, b"position" | b"normal" | b"uv" | b"instance"))
 }
 
 // Derived implementations would require them of `T`.
@@ -74,6 +93,18 @@ pub enum AttributeFormat {
 }
 
 impl AttributeFormat {
+    /// The type that shaders read.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn wgsl_type(self) -> String {
+        match self {
+            Self::Float32(1) => "f32".into(),
+            Self::Uint32(1) => "u32".into(),
+            Self::Float32(components) => format!("vec{components}<f32>"),
+            Self::Uint32(components) => format!("vec{components}<u32>"),
+            Self::Unorm8x4 => "vec4<f32>".into(),
+        }
+    }
+
     /// The number of bytes of a value.
     pub const fn bytes(self) -> usize {
         match self {

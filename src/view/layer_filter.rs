@@ -10,26 +10,36 @@ pub(crate) struct LayerFilter<'a> {
     /// Of each object; empty if all have the same answer.
     layers: &'a [LayerMask],
     drawn: LayerMask,
+    excluded: LayerMask,
 }
 
 impl<'a> LayerFilter<'a> {
     pub(crate) fn new(scene: &SceneRef<'a>, selection: Selection) -> Self {
-        let drawn = selection.layers;
-        Self { layers: if drawn == LayerMask::ALL { &[] } else { scene.layers }, drawn }
+        let (drawn, excluded) = (selection.layers, selection.excluded_layers);
+        let is_of_all = drawn == LayerMask::ALL && excluded == LayerMask::NONE;
+        Self { layers: if is_of_all { &[] } else { scene.layers }, drawn, excluded }
     }
 
     /// Whether it lets all objects pass.
     pub(crate) fn passes_all(&self) -> bool {
-        self.layers.is_empty() && self.drawn != LayerMask::NONE
+        self.layers.is_empty() && self.passes_every_layer()
     }
 
     /// Whether it lets an object pass.
     #[inline]
     pub(crate) fn passes(&self, object: usize) -> bool {
         match self.layers.get(object) {
-            Some(layers) => layers.intersects(self.drawn),
-            None => self.drawn != LayerMask::NONE,
+            Some(layers) => {
+                let is_drawn = self.drawn == LayerMask::ALL || layers.intersects(self.drawn);
+                is_drawn && !layers.intersects(self.excluded)
+            }
+            None => self.passes_every_layer(),
         }
+    }
+
+    /// Whether it lets objects that belong to all layers pass.
+    fn passes_every_layer(&self) -> bool {
+        self.drawn != LayerMask::NONE && self.excluded == LayerMask::NONE
     }
 
     /// Those of up to 64 objects that pass: bit 0 is object `first`.

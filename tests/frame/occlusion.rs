@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::command::{Blending, Selection};
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
+use drawloom::process::{CommandDraws, Declare, Deferred, Deformation, Draws, Format, RenderProcess};
 use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::{Blend, Camera, LayerMask, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
@@ -126,6 +126,42 @@ fn quality_changes_between_frames() {
     let fine = occluded(Some(1));
     assert!(0 < coarse && coarse < fine, "{coarse} {fine}");
     assert_eq!(occluded(None), 0);
+}
+
+/// Objects of layer 2 have another shape than their meshes.
+struct Deformed;
+
+impl Deformation for Deformed {
+    fn name(&self) -> &str {
+        "deformed"
+    }
+
+    fn layers(&self) -> LayerMask {
+        LayerMask::layer(2)
+    }
+
+    fn declare(&self, _: &mut Declare) {}
+
+    fn shader(&self) -> &str {
+        ""
+    }
+}
+
+#[test]
+fn deformed_objects_hide_no_others() {
+    let scene = wall_and_cubes();
+    let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
+    let mut occluded = |layer_of_wall| {
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().deformation(Deformed));
+        let scheduler = Arc::new(Scheduler::new(2).unwrap());
+        let mut renderer = builder.quality(quality).build(scheduler).unwrap().0;
+        let mut layers = vec![LayerMask::layer(1); scene.as_scene_ref().positions.len()];
+        layers[0] = LayerMask::layer(layer_of_wall);
+        let scene = SceneRef { layers: &layers, ..scene.as_scene_ref() };
+        renderer.record(scene).unwrap().statistics().views[0].occluded
+    };
+    assert_eq!(occluded(2), 0);
+    assert!(occluded(1) > 0);
 }
 
 #[test]

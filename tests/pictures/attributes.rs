@@ -40,15 +40,10 @@ const SHADER: &str = "
     }
 
     @vertex
-    fn vertex(
-        in: VertexInput,
-        @location(3) color: vec3<f32>,
-        @location(4) strength: u32,
-        @location(5) shade: vec4<f32>,
-    ) -> Corner {
+    fn vertex(in: VertexInput) -> Corner {
         let object = drawn_object(in.instance);
         let position = clip_position(relative_position(object, in.position));
-        return Corner(position, color * f32(strength) / 100.0 * shade.g);
+        return Corner(position, in.colour * f32(in.strength) / 100.0 * in.shade.g);
     }
 
     @fragment

@@ -8,6 +8,7 @@ mod attributes;
 mod changes;
 mod changing_shaders;
 mod columns;
+mod deformation;
 mod determinism;
 mod compute;
 mod device_times;
@@ -64,6 +65,7 @@ fn main() {
         (changing_shaders::CASES, Needs::Adapter),
         (columns::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
+        (deformation::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),

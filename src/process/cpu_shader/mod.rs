@@ -1,15 +1,18 @@
 //! CPU shaders: Rust versions of the WGSL shaders, which the software backend runs in their place.
 //!
 //! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`,
-//! and `built_in` those of WGSL itself.
+//! `built_in` those of WGSL itself, and
+//! `deformation` what moves vertices before a shader gets them.
 
 pub(super) mod built_in;
+mod deformation;
 mod inputs;
 mod interface;
 mod prelude;
 #[cfg(all(test, not(drawloom_loom)))]
 pub(super) mod test_inputs;
 
+pub use deformation::DeformationCpuShader;
 pub use inputs::{
     FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight,
     ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,

@@ -3,6 +3,7 @@
 //! `pipeline` puts the processes together that a scene requires. Each process has a file, and a folder with its WGSL
 //! and its CPU shader. `shading` is what several of their shaders share.
 
+mod deformation;
 mod depth_pre_pass;
 mod geometry_buffer;
 mod geometry_formats;
@@ -14,6 +15,7 @@ mod shading;
 mod shadow_casters;
 mod transparency;
 
+pub use deformation::Deformation;
 pub use depth_pre_pass::DepthPrePass;
 pub use geometry_buffer::GeometryBuffer;
 pub use geometry_formats::GeometryFormats;

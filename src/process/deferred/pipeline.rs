@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::deformation::{Deformation, split_by_deformation};
 use super::{
     DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters, Transparency,
 };
@@ -41,6 +42,7 @@ pub struct Deferred {
     post: Vec<Arc<dyn PostStep>>,
     replaced: Vec<(String, Arc<dyn RenderProcess>)>,
     left_out: Vec<String>,
+    deformations: Vec<Arc<dyn Deformation>>,
 }
 
 impl Deferred {
@@ -54,6 +56,7 @@ impl Deferred {
             post: Vec::new(),
             replaced: Vec::new(),
             left_out: Vec::new(),
+            deformations: Vec::new(),
         }
     }
 
@@ -122,6 +125,12 @@ impl Deferred {
     /// shadows.
     pub fn leave_out(mut self, name: impl Into<String>) -> Self {
         self.left_out.push(name.into());
+        self
+    }
+
+    /// Adds vertex code of the engine's own for the objects of some layers.
+    pub fn deformation(mut self, deformation: impl Deformation + 'static) -> Self {
+        self.deformations.push(Arc::new(deformation));
         self
     }
 
@@ -200,24 +209,24 @@ impl Deferred {
     fn shadows(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
         let casters = || Arc::new(ShadowCasters { hemispheres }) as Arc<dyn RenderProcess>;
-        self.required_maps(requirements).map(|_| casters()).into_iter().collect()
+        self.with_deformed(self.required_maps(requirements).map(|_| casters()).into_iter().collect())
     }
 
     fn geometry(&self) -> Vec<Arc<dyn RenderProcess>> {
-        let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
+        let (mut pre_pass, mut processes): (Vec<Arc<dyn RenderProcess>>, Vec<_>) = (Vec::new(), Vec::new());
         if self.depth_pre_pass {
-            processes.push(Arc::new(DepthPrePass));
+            pre_pass.push(Arc::new(DepthPrePass));
         }
         let of = self.geometry_shares.clamp(1, 64);
         for index in 0..of {
             let geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
-            processes.push(if self.depth_pre_pass {
-                Arc::new(geometry_buffer.after_depth_pre_pass())
+            processes.push(Arc::new(if self.depth_pre_pass {
+                geometry_buffer.after_depth_pre_pass()
             } else {
-                Arc::new(geometry_buffer)
-            });
+                geometry_buffer
+            }) as _);
         }
-        processes
+        [self.with_deformed(pre_pass), self.with_deformed(processes)].concat()
     }
 
     fn lighting(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
@@ -237,7 +246,14 @@ impl Deferred {
 
     fn transparency(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let transparency = || Arc::new(Transparency::new(self.required_maps(requirements))) as Arc<dyn RenderProcess>;
-        requirements.transparency().then(transparency).into_iter().collect()
+        self.with_deformed(requirements.transparency().then(transparency).into_iter().collect())
+    }
+
+    /// These processes, which draw objects, and those that draw deformed objects, except in place of processes that are left out.
+    fn with_deformed(&self, processes: Vec<Arc<dyn RenderProcess>>) -> Vec<Arc<dyn RenderProcess>> {
+        let is_left_out = |process: &Arc<dyn RenderProcess>| self.left_out.iter().any(|name| name == process.name());
+        let (left_out, drawn): (Vec<_>, Vec<_>) = processes.into_iter().partition(is_left_out);
+        [left_out, split_by_deformation(drawn, &self.deformations)].concat()
     }
 
     fn post_processing(&self) -> Vec<Arc<dyn RenderProcess>> {

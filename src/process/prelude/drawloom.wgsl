@@ -104,13 +104,6 @@ const ALPHA: u32 = 1u;
 // Linear between pixels, and the nearest pixel outside: for targets.
 @group(1) @binding(6) var target_sampler: sampler;
 
-struct VertexInput {
-    @location(0) position: vec3<f32>,
-    @location(1) normal: vec3<f32>,
-    @location(2) uv: vec2<f32>,
-    @builtin(instance_index) instance: u32,
-}
-
 struct FullScreenPixel {
     @builtin(position) position: vec4<f32>,
     // From (-1, -1) at the picture's lower left to (1, 1) at its upper right.

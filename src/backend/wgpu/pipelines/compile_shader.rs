@@ -4,17 +4,18 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::wgpu::error_scope::with_error_scope;
 
-/// Compiles the shader of a process: its own WGSL, behind what the crate puts before it.
+/// Compiles the shader of a process: its own texts of WGSL, behind what the crate puts before them.
 ///
 /// # Errors
-/// If it does not compile: [`BackendError::Shader`], with the line and column in the process's own text, if the error is there.
+/// If it does not compile: [`BackendError::Shader`], with the line and column in that of the process's own texts which has the error.
 pub(super) fn compile_shader(
     device: &wgpu::Device,
     process: &str,
     before: &str,
-    own: &str,
+    own: &[&str],
 ) -> Result<wgpu::ShaderModule, BackendError> {
-    let source = wgpu::ShaderSource::Wgsl([before, own].concat().into());
+    let source = [&[before], own].concat().join("\n");
+    let source = wgpu::ShaderSource::Wgsl(source.into());
     let mut created = None;
     let outcome = with_error_scope(device, process, || {
         created = Some(device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(process), source }));
@@ -22,16 +23,23 @@ pub(super) fn compile_shader(
     let module = created.ok_or_else(|| broken_rule("a shader module is made, right or wrong"))?;
     match outcome {
         Ok(()) => Ok(module),
-        Err(error) => Err(located(process, before.len(), own, &module).unwrap_or(error)),
+        Err(error) => Err(located(process, before, own, &module).unwrap_or(error)),
     }
 }
 
-/// The first error of a shader at its line; `None` if it has no place in the process's own text, which begins at `offset`.
-fn located(process: &str, offset: usize, own: &str, module: &wgpu::ShaderModule) -> Option<BackendError> {
+/// The first error of a shader at its line; `None` if it is not in one of the process's own texts, which follow after `before`.
+fn located(process: &str, before: &str, own: &[&str], module: &wgpu::ShaderModule) -> Option<BackendError> {
     // The future is ready at once on every native backend.
     let messages = pollster::block_on(module.get_compilation_info()).messages;
     let (message, location) = messages.into_iter().find_map(|message| Some((message.message, message.location?)))?;
-    let at = (location.offset as usize).checked_sub(offset)?;
+    let mut at = (location.offset as usize).checked_sub(before.len() + 1)?;
+    let own = own.iter().find(|own| match at.checked_sub(own.len() + 1) {
+        None => true,
+        Some(later) => {
+            at = later;
+            false
+        }
+    })?;
     let (line, column, text) = place_in(own, at)?;
     Some(BackendError::Shader { process: process.to_owned(), line, column, message, text: text.to_owned() })
 }
@@ -66,17 +74,17 @@ mod tests {
         let (device, _) = noop_device();
         let before = "const A: u32 = 1u;\n// two lines\n";
         let own = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return vec4<f32>(unknown);\n}\n";
-        let error = compile_shader(&device, "wrong", before, own).unwrap_err();
+        let error = compile_shader(&device, "wrong", before, &["const B: u32 = A;", own]).unwrap_err();
         let BackendError::Shader { process, line, column, text, .. } = &error else { panic!("{error}") };
         assert_eq!(
             (process.as_str(), *line, *column, text.as_str()),
             ("wrong", 3, 22, "    return vec4<f32>(unknown);")
         );
         assert!(error.to_string().contains("unknown"), "{error}");
-        let syntax = compile_shader(&device, "wrong", before, "\nfn fragment( {").unwrap_err();
+        let syntax = compile_shader(&device, "wrong", before, &["\nfn fragment( {", own]).unwrap_err();
         assert!(matches!(syntax, BackendError::Shader { line: 2, .. }), "{syntax}");
-        let twice = compile_shader(&device, "twice", before, "const A: u32 = 2u;").unwrap_err();
+        let twice = compile_shader(&device, "twice", before, &["const A: u32 = 2u;"]).unwrap_err();
         assert!(twice.to_string().contains("twice"), "{twice}");
-        assert!(compile_shader(&device, "right", before, "").is_ok());
+        assert!(compile_shader(&device, "right", before, &["", "const B: u32 = A;"]).is_ok());
     }
 }

@@ -3,14 +3,15 @@
 use std::borrow::Cow;
 
 use crate::command::{Cull, DrawState};
-use crate::process::{Draws, SHADER_PRELUDE};
+use crate::process::{Draws, prelude_with};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
-use crate::scene::{Blend, LightKind, Topology};
+use crate::scene::{AttributeLayout, Blend, LightKind, Topology};
 
 /// The inputs of pipelines that a process, or the quality, may change from frame to frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PipelineKey<'a> {
     shader: Cow<'a, str>,
+    deformation: Option<Cow<'a, str>>,
     pub(crate) vertices: VertexSource,
     pub(crate) fragment: Option<Cow<'a, str>>,
     pub(crate) parameter_bytes: usize,
@@ -39,11 +40,13 @@ impl<'a> PipelineKey<'a> {
         let state = fixed_state(draws);
         let with = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
-            Self { shader, vertices, fragment, parameter_bytes, writes_depth, state, transforms }
+            let deformation = None;
+            Self { shader, deformation, vertices, fragment, parameter_bytes, writes_depth, state, transforms }
         };
         match draws {
             Draws::Commands(draws) => {
-                with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth)
+                let key = with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth);
+                Self { deformation: draws.deformation.map(Cow::Borrowed), ..key }
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
@@ -53,18 +56,20 @@ impl<'a> PipelineKey<'a> {
 
     pub(crate) fn into_owned(self) -> PipelineKey<'static> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
-        PipelineKey { shader: owned(self.shader), fragment: self.fragment.map(owned), ..self }
+        let [deformation, fragment] = [self.deformation, self.fragment].map(|text| text.map(owned));
+        PipelineKey { shader: owned(self.shader), deformation, fragment, ..self }
     }
 
-    /// What goes before the process's own WGSL.
-    pub(crate) fn prelude(&self) -> String {
+    /// What goes before the process's own WGSL, which reads these attributes.
+    pub(crate) fn prelude(&self, attributes: &[AttributeLayout]) -> String {
         let is_absolute = self.transforms == TransformPrecision::Absolute;
-        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{SHADER_PRELUDE}\n")
+        let prelude = prelude_with(attributes, self.deformation.is_some());
+        format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{prelude}\n")
     }
 
-    /// The process's own WGSL.
-    pub(crate) fn own_shader(&self) -> &str {
-        &self.shader
+    /// The process's own WGSL: its deformation, and its shader.
+    pub(crate) fn own_shaders(&self) -> [&str; 2] {
+        [self.deformation.as_deref().unwrap_or_default(), &self.shader]
     }
 }
 

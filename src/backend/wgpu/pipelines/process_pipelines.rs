@@ -13,7 +13,7 @@ use crate::backend::wgpu::resources::{
 };
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
-use crate::process::{Access, Declaration, Draws, Format, FramePlan, PlannedProcess};
+use crate::process::{Access, Declaration, Draws, FIRST_OWN_LOCATION, Format, FramePlan, PlannedProcess};
 use crate::quality::Quality;
 use crate::scene::{AttributeLayout, Blend, Topology, ViewKind};
 use crate::tuning::Tuner;
@@ -108,7 +108,7 @@ impl ProcessPipelines {
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
         let columns = planned.declaration.columns.len();
-        let attributes = attributes_of(&planned.declaration).collect();
+        let attributes: Vec<_> = attributes_of(&planned.declaration).collect();
         let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
@@ -116,7 +116,7 @@ impl ProcessPipelines {
         let shader = if key.vertices == VertexSource::None {
             None
         } else {
-            let module = compile_shader(device, name, &key.prelude(), key.own_shader())?;
+            let module = compile_shader(device, name, &key.prelude(&attributes), &key.own_shaders())?;
             let own = [process_layout.as_ref(), engine_layout.as_ref()];
             let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
             let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
@@ -314,9 +314,6 @@ impl ProcessPipelines {
         }
     }
 }
-
-/// The location of the first attribute of the engine's own, behind those of `VertexInput` in `drawloom.wgsl`.
-const FIRST_OWN_LOCATION: u32 = 3;
 
 fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLayout> {
     declaration.attributes.iter().map(|declared| declared.layout)

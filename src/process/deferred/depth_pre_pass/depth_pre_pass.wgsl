@@ -1,4 +1,5 @@
 @vertex
 fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
-    return clip_position(relative_position(drawn_object(in.instance), in.position));
+    let object = drawn_object(in.instance);
+    return clip_position(relative_position(object, deform(in, object).position));
 }

@@ -12,9 +12,10 @@ struct Surface {
 @vertex
 fn vertex(in: VertexInput) -> Surface {
     let object = drawn_object(in.instance);
-    let relative = relative_position(object, in.position);
-    let uv = clamp(in.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
-    return Surface(clip_position(relative), relative, world_normal(object, in.normal), uv, object.material, object.index);
+    let deformed = deform(in, object);
+    let relative = relative_position(object, deformed.position);
+    let uv = clamp(deformed.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
+    return Surface(clip_position(relative), relative, world_normal(object, deformed.normal), uv, object.material, object.index);
 }
 
 // From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,

@@ -6,7 +6,8 @@ struct Caster {
 
 @vertex
 fn vertex(in: VertexInput) -> Caster {
-    let relative = relative_position(drawn_object(in.instance), in.position);
+    let object = drawn_object(in.instance);
+    let relative = relative_position(object, deform(in, object).position);
     var forward = 1.0;
     if view.projection == PARABOLOID {
         forward = dot(view.forward, relative) / max(length(relative), 1e-30);
