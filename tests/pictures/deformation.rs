@@ -120,7 +120,7 @@ fn scene(is_in_shape: bool) -> Result<(Scene, Vec<LayerMask>), Failed> {
             casts_shadow: true,
         },
     ];
-    let stone = scene.add(Material { double_sided: true, ..Material::default() })?;
+    let stone = scene.add(Material::default())?;
     let glass = scene.add(Material { blend: Blend::Alpha, opacity: 0.5, ..Material::default() })?;
     let mut layers = Vec::new();
     for (index, push) in PUSHES.into_iter().enumerate() {
