@@ -34,7 +34,7 @@ pub(super) fn occluders(
         if *depth.get_or_insert(target) != target {
             return None;
         }
-        if access.writes() && draws[pass.process_index].hides() && selection.blending != Blending::Blended {
+        if access.writes_depth() && draws[pass.process_index].hides() && selection.blending != Blending::Blended {
             let own = colors_of(pass);
             if tests_only || !(colors.is_empty() || own.is_empty() || own == colors) {
                 return None;

@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use super::{Format, Place, TargetSize};
+use super::{BufferAccess, BufferLayout, Format, Place, StorageBuffer, TargetSize};
 use crate::scene::{AttributeLayout, AttributeValue, ColumnLayout, ObjectColumn, VertexAttribute, ViewKind};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
@@ -28,7 +28,8 @@ impl Declare {
         self.access(target, Access::DrawOver);
     }
 
-    /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed.
+    /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed. If it has a
+    /// [stencil](super::Stencil), that is written and cleared to 0 too.
     pub fn clears_depth(&mut self, target: &str, format: Format) {
         self.access(target, Access::ClearDepth(format));
     }
@@ -42,6 +43,17 @@ impl Declare {
     /// first cleared to 0, infinitely far away. The pictures of those views have the same size.
     pub fn clears_depth_layer(&mut self, target: &str, format: Format) {
         self.access(target, Access::ClearDepthLayer(format));
+    }
+
+    /// Tests against the depth that another process wrote, without writing it, and writes the [stencil](super::Stencil) beside it. What
+    /// has the stored depth passes the test, so that objects which are drawn already can be marked.
+    pub fn marks_stencil(&mut self, target: &str) {
+        self.access(target, Access::MarkStencil);
+    }
+
+    /// Tests against the [stencil](super::Stencil) beside a depth, whatever the depth, and writes neither.
+    pub fn tests_stencil(&mut self, target: &str) {
+        self.access(target, Access::TestStencil);
     }
 
     /// Tests against the depth that another process wrote, without writing it.
@@ -164,6 +176,26 @@ impl Declare {
         self.declaration.attributes.push(DeclaredAttribute { layout: attribute.layout(), default });
     }
 
+    /// Reads a buffer in the shader, at `@group(2)` after the sampled targets: the first of the process's buffers has the next binding,
+    /// the next the one after that, and so on. It comes after the processes that change the buffer.
+    ///
+    /// A device with only [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS) has no storage buffers left for
+    /// these: see [`Declare::reads_column`].
+    pub fn reads_buffer<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
+        self.declaration.buffers.push((buffer.layout(), BufferAccess::Read));
+    }
+
+    /// Reads and writes a buffer in the shader, with a binding as [`Declare::reads_buffer`] has. Compute and fragment shaders have it, and
+    /// vertex shaders have not. Processes that change the same buffer need an order.
+    pub fn changes_buffer<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
+        self.declaration.buffers.push((buffer.layout(), BufferAccess::Change));
+    }
+
+    /// Takes the arguments of its indirect draw or dispatch from a buffer, which has no binding.
+    pub fn reads_arguments<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
+        self.declaration.buffers.push((buffer.layout(), BufferAccess::Arguments));
+    }
+
     /// A raw pass overwrites a target with its own commands; as a storage texture too, if [`Format::can_be_stored`].
     pub fn writes(&mut self, target: &str, format: Format) {
         self.access(target, Access::Write(format));
@@ -238,6 +270,8 @@ pub struct Declaration {
     pub columns: Vec<ColumnLayout>,
     /// The attributes of vertices that its shader reads, in the order of their locations.
     pub attributes: Vec<DeclaredAttribute>,
+    /// The buffers that it uses, and how, in the order declared.
+    pub buffers: Vec<(BufferLayout, BufferAccess)>,
     /// The processes that it comes after.
     pub after: Vec<String>,
     /// The processes that it comes before.
@@ -261,6 +295,12 @@ impl Declaration {
     /// The targets that it writes.
     pub fn written(&self) -> impl Iterator<Item = &str> {
         self.accesses.iter().filter(|(_, access)| access.writes()).map(|(target, _)| target.as_str())
+    }
+
+    /// The buffers that the shader has, in the order of their bindings, each with whether it writes them.
+    pub fn bound_buffers(&self) -> impl Iterator<Item = (BufferLayout, bool)> + Clone {
+        let bound = self.buffers.iter().filter(|(_, access)| *access != BufferAccess::Arguments);
+        bound.map(|(buffer, access)| (*buffer, *access == BufferAccess::Change))
     }
 
     /// The depth target, and how it is used.
@@ -309,6 +349,10 @@ pub enum Access {
     ClearDepthLayer(Format),
     /// Tested and written, over its content.
     DrawDepth,
+    /// Tested; its stencil is written.
+    MarkStencil,
+    /// Only its stencil is tested.
+    TestStencil,
     /// Tested.
     TestDepth,
     /// Tested for equality.
@@ -344,7 +388,8 @@ impl Access {
     pub fn writes(self) -> bool {
         !matches!(
             self,
-            Self::TestDepth
+            Self::TestStencil
+                | Self::TestDepth
                 | Self::MatchDepth
                 | Self::Sample
                 | Self::SamplePrevious
@@ -376,8 +421,29 @@ impl Access {
     pub fn is_depth(self) -> bool {
         matches!(
             self,
-            Self::ClearDepth(_) | Self::ClearDepthLayer(_) | Self::DrawDepth | Self::TestDepth | Self::MatchDepth
+            Self::ClearDepth(_)
+                | Self::ClearDepthLayer(_)
+                | Self::DrawDepth
+                | Self::MarkStencil
+                | Self::TestStencil
+                | Self::TestDepth
+                | Self::MatchDepth
         )
+    }
+
+    /// Whether it may write the depth of a depth target.
+    pub fn writes_depth(self) -> bool {
+        self.is_depth() && self.writes() && self != Self::MarkStencil
+    }
+
+    /// Whether it keeps what a depth target holds.
+    pub fn keeps_depth(self) -> bool {
+        self.is_depth() && self.reads()
+    }
+
+    /// Whether the target is drawn into as colour.
+    pub fn is_color(self) -> bool {
+        matches!(self, Self::ClearColor(..) | Self::DrawOver)
     }
 
     /// Whether a raw pass makes the access.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 #[cfg(feature = "wgpu")]
 use super::RawPass;
-use super::ShaderResource;
+use super::{BufferOffset, ComputeDispatch, DrawCount, ProceduralDraws, ShaderResource, Stencil, Workgroups};
 use crate::command::Selection;
 use crate::scene::Blend;
 use crate::view::LightClass;
@@ -19,6 +19,10 @@ pub enum Draws<'a> {
     FullScreen(FullScreen<'a>),
     /// The pixels that the lights of a class reach.
     Lights(LightDraws<'a>),
+    /// Vertices that the shader makes itself.
+    Procedural(ProceduralDraws<'a>),
+    /// Nothing: a compute shader runs.
+    Compute(ComputeDispatch<'a>),
     /// Commands that the process encodes itself: compute, copies, render passes.
     #[cfg(feature = "wgpu")]
     Raw(&'a dyn RawPass),
@@ -43,6 +47,8 @@ pub struct CommandDraws<'a> {
     pub selection: Selection,
     /// Whether depth is written.
     pub writes_depth: bool,
+    /// The stencil test; `None` for none.
+    pub stencil: Option<Stencil>,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
     /// The engine's own resources that the shader reads.
@@ -57,6 +63,7 @@ impl Default for CommandDraws<'_> {
             deformation: None,
             selection: Selection::OPAQUE,
             writes_depth: true,
+            stencil: None,
             parameters: Cow::Borrowed(&[]),
             resources: Vec::new(),
         }
@@ -72,6 +79,8 @@ pub struct FullScreen<'a> {
     pub shader: &'a str,
     /// How it blends with the targets' content.
     pub blend: Blend,
+    /// The stencil test; `None` for none.
+    pub stencil: Option<Stencil>,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
     pub parameters: Cow<'a, [u8]>,
     /// The engine's own resources that the shader reads.
@@ -119,8 +128,33 @@ impl Draws<'_> {
             Self::Commands(commands) => &commands.resources,
             Self::FullScreen(full_screen) => &full_screen.resources,
             Self::Lights(lights) => &lights.resources,
+            Self::Procedural(procedural) => &procedural.resources,
+            Self::Compute(dispatch) => &dispatch.resources,
             #[cfg(feature = "wgpu")]
             Self::Raw(_) => &[],
+        }
+    }
+
+    /// The stencil test, if there is one.
+    pub fn stencil(&self) -> Option<Stencil> {
+        match self {
+            Self::Commands(commands) => commands.stencil,
+            Self::FullScreen(full_screen) => full_screen.stencil,
+            Self::Procedural(procedural) => procedural.stencil,
+            _ => None,
+        }
+    }
+
+    /// Where the arguments of an indirect draw or dispatch are, and their size in bytes; `None` if it has none.
+    pub fn arguments(&self) -> Option<(BufferOffset, u64)> {
+        match self {
+            Self::Procedural(ProceduralDraws { count: DrawCount::Indirect(offset), .. }) => {
+                Some((*offset, DrawCount::ARGUMENT_BYTES))
+            }
+            Self::Compute(ComputeDispatch { workgroups: Workgroups::Indirect(offset), .. }) => {
+                Some((*offset, Workgroups::ARGUMENT_BYTES))
+            }
+            _ => None,
         }
     }
 
@@ -130,6 +164,8 @@ impl Draws<'_> {
             Self::Commands(commands) => &commands.parameters,
             Self::FullScreen(full_screen) => &full_screen.parameters,
             Self::Lights(lights) => &lights.parameters,
+            Self::Procedural(procedural) => &procedural.parameters,
+            Self::Compute(dispatch) => &dispatch.parameters,
             #[cfg(feature = "wgpu")]
             Self::Raw(_) => &[],
         }

@@ -2,8 +2,8 @@
 
 use crate::quality::{DiffuseFormat, NormalFormat};
 
-/// The format of a target. All of them can be drawn to and read on every adapter; those that [cannot be
-/// blended](Format::can_be_blended) are drawn to as if nothing was blended.
+/// The format of a target. Unless it says otherwise, it can be drawn to and read on every adapter. Objects with blended materials are
+/// drawn to those that [cannot be blended](Format::can_be_blended) as if they did not blend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
@@ -29,12 +29,28 @@ pub enum Format {
     R32Uint,
     /// Depth, a float.
     Depth32Float,
+    /// Depth, a float, and a [stencil](super::Stencil). Devices need the feature `DEPTH32FLOAT_STENCIL8`, which
+    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) requests where there is it. It is not read
+    /// back, and shaders sample its depth.
+    Depth32FloatStencil8,
+    /// A [stencil](super::Stencil) without depth, which shaders sample as a whole number.
+    Stencil8,
 }
 
 impl Format {
-    /// Whether it holds depth rather than colour.
-    pub fn is_depth(self) -> bool {
-        self == Self::Depth32Float
+    /// Whether it holds depth, a stencil or both, rather than colour.
+    pub fn is_depth_stencil(self) -> bool {
+        self.has_depth() || self.has_stencil()
+    }
+
+    /// Whether it holds depth.
+    pub fn has_depth(self) -> bool {
+        matches!(self, Self::Depth32Float | Self::Depth32FloatStencil8)
+    }
+
+    /// Whether it holds a stencil.
+    pub fn has_stencil(self) -> bool {
+        matches!(self, Self::Depth32FloatStencil8 | Self::Stencil8)
     }
 
     /// Whether a compute shader can write it as a storage texture on every adapter.
@@ -44,17 +60,17 @@ impl Format {
 
     /// Whether what is drawn can be blended with it on every adapter.
     pub fn can_be_blended(self) -> bool {
-        !matches!(self, Self::R32Float | Self::R32Uint | Self::Depth32Float)
+        !self.is_depth_stencil() && !matches!(self, Self::R32Float | Self::R32Uint)
     }
 
     /// Whether it holds whole numbers.
     pub fn is_integer(self) -> bool {
-        self == Self::R32Uint
+        matches!(self, Self::R32Uint | Self::Stencil8)
     }
 
     /// Whether a shader can sample it between pixels, with a filtering sampler, on every adapter.
     pub fn is_filterable(self) -> bool {
-        !matches!(self, Self::R32Float | Self::R32Uint | Self::Depth32Float)
+        self.can_be_blended()
     }
 
     /// Whether it holds negative numbers.
@@ -62,22 +78,25 @@ impl Format {
         matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R32Float)
     }
 
-    /// Channels per pixel.
+    /// Channels per pixel, as shaders sample them.
     pub fn channels(self) -> usize {
         match self {
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => 4,
             Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
             Self::Rg8Unorm | Self::Rg16Float => 2,
             Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
+            Self::Depth32FloatStencil8 | Self::Stencil8 => 1,
         }
     }
 
-    /// Bytes per pixel.
+    /// Bytes per pixel, without the stencil beside depth.
     pub fn bytes(self) -> usize {
         match self {
+            Self::Stencil8 => 1,
             Self::Rg8Unorm => 2,
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb | Self::Rgb10a2Unorm => 4,
-            Self::Rg16Float | Self::R32Float | Self::R32Uint | Self::Depth32Float => 4,
+            Self::Rg16Float | Self::R32Float | Self::R32Uint => 4,
+            Self::Depth32Float | Self::Depth32FloatStencil8 => 4,
             Self::Rgba16Float => 8,
         }
     }

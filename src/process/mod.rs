@@ -8,6 +8,7 @@
 //! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
 //!   post-processing.
 
+mod compute_dispatch;
 #[cfg(feature = "software")]
 mod cpu_shader;
 mod declaration;
@@ -17,22 +18,26 @@ mod format;
 mod plan;
 mod post;
 mod prelude;
+mod procedural_draws;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
 mod shader_resource;
+mod stencil;
+mod storage_buffer;
 mod target_size;
 
+pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
 pub use cpu_shader::{
-    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
-    ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
-    VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
+    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials,
+    ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject,
+    ShaderView, VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
 pub use declaration::{Access, ClearColor, Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
-    Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place, Requirements,
-    SURFACE_SHADER, ShadowCasters, Transparency,
+    Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place,
+    Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use format::Format;
@@ -41,10 +46,13 @@ pub use plan::{
 };
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
+pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
 pub use shader_resource::ShaderResource;
+pub use stencil::{Comparison, Stencil, StencilOperation};
+pub use storage_buffer::{BufferAccess, BufferLayout, BufferOffset, StorageBuffer};
 pub use target_size::TargetSize;
 
 #[cfg(feature = "software")]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::{
-    CommandDraws, Declare, Deferred, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, PlanError,
-    ProcessError, RenderProcess, ToneMapping,
+    CommandDraws, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Format, GeometryBuffer, GeometryFormats,
+    LightVolumes, PlanError, ProceduralDraws, ProcessError, RenderProcess, StorageBuffer, ToneMapping, Workgroups,
 };
 use drawloom::scene::{
     Bounds, Camera, Changes, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene, SceneError,
@@ -396,4 +396,102 @@ fn a_frame_of_another_renderer_is_refused() {
     let (_, other) = renderer(1, Granularity::default());
     let recorded = one.record(scene.as_scene_ref()).unwrap();
     assert!(matches!(other.submit(recorded), Err(SubmitError::ForeignFrame)));
+}
+
+/// A process whose use of buffers and arguments is wrong in one way or another.
+struct Buffering {
+    name: &'static str,
+    declare: fn(&mut Declare),
+    draws: fn() -> Draws<'static>,
+}
+
+impl RenderProcess for Buffering {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.keep();
+        (self.declare)(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        (self.draws)()
+    }
+}
+
+const COUNTS: StorageBuffer<u32> = StorageBuffer::new("counts", 8);
+
+fn dispatch() -> Draws<'static> {
+    Draws::Compute(ComputeDispatch::default())
+}
+
+#[test]
+fn buffers_that_nothing_writes_or_that_differ_are_refused() {
+    let build = |processes: Vec<Buffering>| {
+        let builder = processes.into_iter().fold(Renderer::builder(NullBackend), |builder, one| builder.process(one));
+        builder.build(Arc::new(Scheduler::new(1).unwrap())).map(drop)
+    };
+    let reads = || Buffering { name: "reads", declare: |declare| declare.reads_buffer(COUNTS), draws: dispatch };
+    let error = build(vec![reads()]).unwrap_err().to_string();
+    assert!(error.contains("nothing writes \"buffer counts\"") && error.contains("\"reads\""), "{error}");
+
+    let changes = Buffering { name: "changes", declare: |declare| declare.changes_buffer(COUNTS), draws: dispatch };
+    build(vec![reads(), changes]).unwrap();
+
+    let other = |declare: &mut Declare| declare.changes_buffer(StorageBuffer::<[u32; 4]>::new("counts", 8));
+    let other = Buffering { name: "other", declare: other, draws: dispatch };
+    let error = build(vec![reads(), other]).unwrap_err();
+    let is_named = matches!(
+        &error,
+        BuildError::Plan(PlanError::ConflictingBuffers { buffer: "counts", first, second, .. })
+            if [*first, *second] == [128, 32]
+    );
+    assert!(is_named, "{error}");
+}
+
+#[test]
+fn arguments_are_in_a_buffer_that_the_process_declares() {
+    fn both(declare: &mut Declare) {
+        declare.changes_buffer(COUNTS);
+        declare.reads_arguments(COUNTS);
+    }
+    let cases: [(fn(&mut Declare), fn() -> Draws<'static>, &str); 4] = [
+        (
+            |declare| declare.changes_buffer(COUNTS),
+            || {
+                let workgroups = Workgroups::Indirect(COUNTS.at(0));
+                Draws::Compute(ComputeDispatch { workgroups, ..ComputeDispatch::default() })
+            },
+            "which it does not declare",
+        ),
+        (
+            both,
+            || {
+                let workgroups = Workgroups::Indirect(COUNTS.at(6));
+                Draws::Compute(ComputeDispatch { workgroups, ..ComputeDispatch::default() })
+            },
+            "past its end",
+        ),
+        (
+            both,
+            || {
+                let count = DrawCount::Indirect(COUNTS.at(5));
+                Draws::Procedural(ProceduralDraws { count, ..ProceduralDraws::default() })
+            },
+            "past its end",
+        ),
+        (
+            |declare| declare.clears_depth("depth", Format::Depth32Float),
+            dispatch,
+            "a compute shader, which cannot draw into target \"depth\"",
+        ),
+    ];
+    for (declare, draws, problem) in cases {
+        let process = Buffering { name: "wrong", declare, draws };
+        let builder = Renderer::builder(NullBackend).process(process);
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        let error = renderer.record(field(3).as_scene_ref()).map(drop).unwrap_err().to_string();
+        assert!(error.contains(problem) && error.contains("\"wrong\""), "{error}");
+    }
 }

@@ -151,7 +151,7 @@ impl Deformation for Deformed {
 fn deformed_objects_hide_no_others() {
     let scene = wall_and_cubes();
     let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
-    let mut occluded = |layer_of_wall| {
+    let occluded = |layer_of_wall| {
         let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().deformation(Deformed));
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
         let mut renderer = builder.quality(quality).build(scheduler).unwrap().0;

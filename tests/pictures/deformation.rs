@@ -11,8 +11,8 @@ use drawloom::process::{
 };
 use drawloom::raster::Real;
 use drawloom::scene::{
-    Blend, Bounds, Camera, LayerMask, Light, Material, Mesh, ObjectColumn, RenderObject, Scene, SceneRef, Topology, Vertex,
-    VertexAttribute,
+    Blend, Bounds, Camera, LayerMask, Light, Material, Mesh, ObjectColumn, RenderObject, Scene, SceneRef, Topology,
+    Vertex, VertexAttribute,
 };
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::{cube, sized};
@@ -155,12 +155,7 @@ fn pushes() -> Vec<f32> {
     PUSHES.into_iter().chain([100.0, 100.0]).collect()
 }
 
-fn picture_of(
-    deferred: Deferred,
-    scene: &Scene,
-    layers: &[LayerMask],
-    pushes: &[f32],
-) -> Result<Picture, Failed> {
+fn picture_of(deferred: Deferred, scene: &Scene, layers: &[LayerMask], pushes: &[f32]) -> Result<Picture, Failed> {
     let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
     // What is pushed stays within this.
     let [low, high] = [-10.0, 10.0].map(Vec3::splat);

@@ -5,6 +5,7 @@
 //! each of them before you commit it.
 
 mod attributes;
+mod buffers;
 mod changes;
 mod changing_shaders;
 mod columns;
@@ -36,6 +37,7 @@ mod shadow_casters;
 mod shadow_interval;
 mod shadows;
 mod software;
+mod stencil;
 mod strategies;
 mod transforms;
 mod transparency;
@@ -54,6 +56,7 @@ fn main() {
     let mut trials = Vec::new();
     let cases = [
         (attributes::CASES, Needs::Adapter),
+        (buffers::CASES, Needs::Adapter),
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),
@@ -77,6 +80,7 @@ fn main() {
         (retained::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (stencil::CASES, Needs::Adapter),
         (strategies::CASES, Needs::Adapter),
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),

@@ -91,8 +91,9 @@ fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
         Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm => ChannelEncoding::Steps(255.0),
         Format::Bgra8Srgb | Format::Bgra8Unorm => ChannelEncoding::Steps(255.0),
         Format::Rgba16Float | Format::Rg16Float => ChannelEncoding::Half,
-        Format::R32Float | Format::Depth32Float => ChannelEncoding::Float,
+        Format::R32Float | Format::Depth32Float | Format::Depth32FloatStencil8 => ChannelEncoding::Float,
         Format::R32Uint => ChannelEncoding::Integer,
+        Format::Stencil8 => ChannelEncoding::Steps(255.0),
     }
 }
 

@@ -143,6 +143,10 @@ fn software_pass<R: Precision>(
             return Err(BackendError::Validation { label: process, message });
         }
     };
+    if request.draws[pass.process_index].stencil().is_some() {
+        let message = String::from("the software backend has no stencil");
+        return Err(BackendError::Validation { label: process, message });
+    }
     let attachments = attachments(request, pass, targets)?;
     attachments.check(&process)?;
     Ok(SoftwarePass { pass, process, draws, attachments })
@@ -166,7 +170,7 @@ fn attachments<R: Precision>(
         Ok(ColorAttachment { target: of_view(name)?, clear })
     };
     let depth = |(name, access): (&str, Access)| {
-        let is_writable = access.writes();
+        let is_writable = access.writes_depth();
         let clears = is_writable && access != Access::DrawDepth;
         let tests_equal = access == Access::MatchDepth;
         Ok(DepthAttachment { target: of_view(name)?, clears, is_writable, tests_equal })

@@ -9,7 +9,8 @@ use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::PipelineCache;
 use super::resources::{
-    AssetCache, BindGroupLayouts, LightMeshes, SubdividedMesh, TargetCache, UploadQueue, new_buffer, shares_memory,
+    AssetCache, BindGroupLayouts, LightMeshes, StorageBuffers, SubdividedMesh, TargetCache, UploadQueue, new_buffer,
+    shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::timing::{DeviceClock, DeviceTiming};
@@ -36,6 +37,7 @@ pub struct WgpuBackend {
     pub(super) assets: Mutex<AssetCache>,
     pub(super) subdivisions: SubdivisionCache<SubdividedMesh>,
     pub(super) targets: Mutex<TargetCache>,
+    pub(super) storage_buffers: Mutex<Arc<StorageBuffers>>,
     pub(super) buffers: Arc<BufferPool>,
     pub(super) strategies: StrategySet,
     /// The number of frames begun.
@@ -55,6 +57,9 @@ impl WgpuBackend {
     /// Optional features, used by [`RecordingStrategy::Indirect`].
     pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
 
+    /// The feature that targets of [`Format::Depth32FloatStencil8`](crate::process::Format::Depth32FloatStencil8) need.
+    pub const STENCIL_FEATURES: wgpu::Features = wgpu::Features::DEPTH32FLOAT_STENCIL8;
+
     /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it only for such
     /// devices: see [`WgpuBackend::optional_features`].
     pub const MAPPING_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -63,7 +68,7 @@ impl WgpuBackend {
     /// [`WgpuBackend::REQUIRED_FEATURES`].
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         let mapping = if shares_memory(&adapter.get_info()) { Self::MAPPING_FEATURES } else { wgpu::Features::empty() };
-        adapter.features() & (Self::OPTIONAL_FEATURES | Self::TIMING_FEATURES | mapping)
+        adapter.features() & (Self::OPTIONAL_FEATURES | Self::STENCIL_FEATURES | Self::TIMING_FEATURES | mapping)
     }
 
     /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times
@@ -107,6 +112,7 @@ impl WgpuBackend {
             assets: Mutex::default(),
             subdivisions: SubdivisionCache::default(),
             targets: Mutex::default(),
+            storage_buffers: Mutex::default(),
             buffers: Arc::new(BufferPool::new(maps_memory)),
             strategies: StrategySet::new(supports_indirect, tunes_indirect),
             frames: AtomicU64::new(0),
@@ -166,7 +172,8 @@ impl WgpuBackend {
     pub fn resources(&self) -> WgpuResources {
         let pipelines = self.pipelines.lock().pipeline_count();
         let (targets, target_bytes) = self.targets.lock().current().sizes();
-        WgpuResources { pipelines, targets, target_bytes, buffer_bytes: self.buffers.bytes() }
+        let buffer_bytes = self.buffers.bytes() + self.storage_buffers.lock().size();
+        WgpuResources { pipelines, targets, target_bytes, buffer_bytes }
     }
 
     /// Reads the device's clock. It waits for all earlier submissions, so do not call it amid a frame; and it takes
@@ -185,6 +192,7 @@ impl WgpuBackend {
         *self.light_meshes.lock() = None;
         self.subdivisions.clear();
         *self.targets.lock() = TargetCache::default();
+        *self.storage_buffers.lock() = Arc::default();
         self.buffers.clear();
     }
 }
@@ -204,7 +212,7 @@ pub struct WgpuResources {
     pub targets: usize,
     /// The size of these textures in bytes.
     pub target_bytes: u64,
-    /// The size in bytes of all buffers for objects, views, lights, parameters and triangles that no frame in flight
-    /// uses.
+    /// The size in bytes of all buffers that processes share, and of those for objects, views, lights, parameters and triangles that no
+    /// frame in flight uses.
     pub buffer_bytes: u64,
 }

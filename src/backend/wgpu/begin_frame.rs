@@ -34,6 +34,9 @@ impl WgpuBackend {
         })??;
         let targets =
             with_error_scope(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
+        let storage_buffers = with_error_scope(&self.device, "the buffers of processes", || {
+            self.storage_buffers.lock().update(&self.device, plan)
+        })??;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
             buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
@@ -51,6 +54,7 @@ impl WgpuBackend {
                 assets,
                 light_meshes,
                 targets,
+                storage_buffers,
                 background,
                 read_backs,
                 buffers,
@@ -83,12 +87,12 @@ impl WgpuBackend {
     /// If the device refuses a resource of the engine's.
     fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) -> Result<(), BackendError> {
         let (strategies, mut may_try) = (self.strategies.strategies(), true);
-        let WgpuFrame { number, pipelines, assets, targets, buffers, .. } = frame;
+        let WgpuFrame { number, pipelines, assets, targets, storage_buffers, buffers, .. } = frame;
         let (passes, resources) = buffers.passes_mut();
         for pass in passes {
             let Pass { process_index: process, view_index: view } = pass.pass;
             let pipelines = &pipelines[process];
-            update_bind_groups(&self.device, request, pipelines, targets, &resources, pass)?;
+            update_bind_groups(&self.device, request, pipelines, (targets, storage_buffers), &resources, pass)?;
 
             let (mut index, mut is_trial) = (0, false);
             if strategies.len() > 1 && pass.command_pass_index.is_some() {

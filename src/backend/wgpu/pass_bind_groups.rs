@@ -2,7 +2,7 @@
 
 use super::frame::{PassResources, WgpuPassState};
 use super::pipelines::ProcessPipelines;
-use super::resources::{BindingResource, CachedBindGroup, WgpuTargets};
+use super::resources::{BindingResource, CachedBindGroup, StorageBuffers, WgpuTargets};
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, Pass, ShaderResource};
 
@@ -14,7 +14,7 @@ pub(super) fn update_bind_groups(
     device: &wgpu::Device,
     request: &FrameRequest<'_>,
     pipelines: &ProcessPipelines,
-    targets: &WgpuTargets,
+    (targets, buffers): (&WgpuTargets, &StorageBuffers),
     resources: &PassResources<'_>,
     pass: &mut WgpuPassState,
 ) -> Result<(), BackendError> {
@@ -24,13 +24,16 @@ pub(super) fn update_bind_groups(
     let parameters = pass.parameters.and_then(|(offset, length)| resources.parameters.binding(offset, length));
     let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
     let sampled = |(name, access): &(String, Access)| match access {
-        Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.view),
+        Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.sampled),
         Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
         _ => None,
     };
     let sampled = (1..).zip(declaration.accesses.iter().filter_map(sampled).map(BindingResource::Texture));
     let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
-    let bound = parameters.into_iter().chain(sampled);
+    let samples = declaration.samples().count() as u32;
+    let shared = declaration.bound_buffers().filter_map(|(buffer, _)| buffers.find(buffer));
+    let shared = shared.map(|buffer| BindingResource::Buffer(buffer.as_entire_buffer_binding()));
+    let bound = parameters.into_iter().chain(sampled).chain((1 + samples..).zip(shared));
     pass.process_bind_group = CachedBindGroup::update(before, device, &pass.label, layout, bound)?;
 
     let columns = declaration.columns.iter().filter_map(|column| resources.objects.column(*column));

@@ -134,7 +134,7 @@ pub(crate) fn new_read_back(
     let is_within = |axis: usize| origin[axis].checked_add(size[axis]).is_some_and(|end| end <= whole[axis]);
     let fits = !size.contains(&0) && (0..2).all(is_within);
     // No device copies a part of a depth texture.
-    if !fits || (format.is_depth() && size != whole) {
+    if !fits || (format.is_depth_stencil() && size != whole) || (format.has_depth() && format.has_stencil()) {
         return Err(BackendError::InvalidReadBack { view, target: target.to_owned(), origin, size, whole });
     }
     let descriptor = wgpu::BufferDescriptor {

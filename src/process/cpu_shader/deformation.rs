@@ -19,10 +19,7 @@ impl CpuShader {
         D: DeformationCpuShader<f32> + DeformationCpuShader<f64> + 'static,
     {
         let deformation = Arc::new(deformation);
-        Self {
-            single: self.single.deformed(Arc::clone(&deformation) as _),
-            double: self.double.deformed(deformation),
-        }
+        Self { single: self.single.deformed(Arc::clone(&deformation) as _), double: self.double.deformed(deformation) }
     }
 }
 

@@ -10,8 +10,17 @@ use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
 /// than vertices.
 ///
 /// Of two surfaces at exactly the same depth, the one drawn last is visible, and not the one drawn first.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct DepthPrePass;
+#[derive(Clone, Copy, Debug)]
+pub struct DepthPrePass {
+    format: Format,
+}
+
+impl DepthPrePass {
+    /// Draws into `depth` of this format: that of [`GeometryFormats::depth`](super::GeometryFormats::depth).
+    pub fn new(format: Format) -> Self {
+        Self { format }
+    }
+}
 
 impl RenderProcess for DepthPrePass {
     fn name(&self) -> &str {
@@ -19,7 +28,7 @@ impl RenderProcess for DepthPrePass {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.clears_depth("depth", Format::Depth32Float);
+        declare.clears_depth("depth", self.format);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -6,17 +6,17 @@ mod cpu_shader;
 use super::GeometryFormats;
 use super::shading::SURFACE_SHADER;
 use crate::command::{MaterialShare, Selection};
-use crate::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use crate::process::{ClearColor, CommandDraws, Declare, Draws, RenderProcess};
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
 /// radiance:
 ///
 /// | target | content | default format |
 /// | --- | --- | --- |
-/// | `depth` | reversed depth, 0 where nothing was drawn | [`Format::Depth32Float`] |
-/// | `normal` | world-space normal, octahedral (Cigolle et al. 2014): see [`GeometryFormats::normal_encoding_wgsl`] | [`Format::Rg16Float`] |
-/// | `diffuse` | the fraction of light reflected, 0 to 1 | [`Format::Rgba8Srgb`] |
-/// | `radiance` | emitted light and reflected ambient light; elsewhere the scene's background | [`Format::Rgba16Float`] |
+/// | `depth` | reversed depth, 0 where nothing was drawn | [`Depth32Float`](crate::process::Format::Depth32Float) |
+/// | `normal` | world-space normal, octahedral (Cigolle et al. 2014): see [`GeometryFormats::normal_encoding_wgsl`] | [`Rg16Float`](crate::process::Format::Rg16Float) |
+/// | `diffuse` | the fraction of light reflected, 0 to 1 | [`Rgba8Srgb`](crate::process::Format::Rgba8Srgb) |
+/// | `radiance` | emitted light and reflected ambient light; elsewhere the scene's background | [`Rgba16Float`](crate::process::Format::Rgba16Float) |
 ///
 /// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the
 /// depth; draw each object; finish. The viewport is the picture's, and the states are the pipelines'.
@@ -61,7 +61,7 @@ impl RenderProcess for GeometryBuffer {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        let GeometryFormats { normal, diffuse, radiance } = self.formats;
+        let GeometryFormats { normal, diffuse, radiance, depth } = self.formats;
         let zero = ClearColor::Value([0.0; 4]);
         let targets =
             [("normal", normal, zero), ("diffuse", diffuse, zero), ("radiance", radiance, ClearColor::Background)];
@@ -76,7 +76,7 @@ impl RenderProcess for GeometryBuffer {
         if self.has_depth {
             declare.matches_depth("depth");
         } else if first {
-            declare.clears_depth("depth", Format::Depth32Float);
+            declare.clears_depth("depth", depth);
         } else {
             declare.draws_depth("depth");
         }

@@ -12,19 +12,28 @@ pub struct GeometryFormats {
     pub diffuse: Format,
     /// Of `radiance`: three channels or more. A format whose values end at 1 clips bright light before tone mapping.
     pub radiance: Format,
+    /// Of `depth`: one with depth, and with a [stencil](crate::process::Stencil) if processes of the engine use one.
+    pub depth: Format,
 }
 
 impl Default for GeometryFormats {
     fn default() -> Self {
-        Self { normal: Format::Rg16Float, diffuse: Format::Rgba8Srgb, radiance: Format::Rgba16Float }
+        Self {
+            normal: Format::Rg16Float,
+            diffuse: Format::Rgba8Srgb,
+            radiance: Format::Rgba16Float,
+            depth: Format::Depth32Float,
+        }
     }
 }
 
 impl GeometryFormats {
-    /// The first target whose format lacks a channel that it needs.
+    /// The first target whose format lacks what it needs.
     pub(super) fn first_unsuitable(&self) -> Option<(&'static str, Format)> {
         let targets = [("normal", self.normal, 2), ("diffuse", self.diffuse, 3), ("radiance", self.radiance, 3)];
-        let unsuitable = targets.into_iter().find(|(_, format, channels)| format.channels() < *channels);
-        unsuitable.map(|(target, format, _)| (target, format))
+        let lacks =
+            |(_, format, channels): &(_, Format, usize)| format.is_depth_stencil() || format.channels() < *channels;
+        let unsuitable = targets.into_iter().find(lacks).map(|(target, format, _)| (target, format));
+        unsuitable.or_else(|| (!self.depth.has_depth()).then_some(("depth", self.depth)))
     }
 }

@@ -215,7 +215,7 @@ impl Deferred {
     fn geometry(&self) -> Vec<Arc<dyn RenderProcess>> {
         let (mut pre_pass, mut processes): (Vec<Arc<dyn RenderProcess>>, Vec<_>) = (Vec::new(), Vec::new());
         if self.depth_pre_pass {
-            pre_pass.push(Arc::new(DepthPrePass));
+            pre_pass.push(Arc::new(DepthPrePass::new(self.formats.depth)));
         }
         let of = self.geometry_shares.clamp(1, 64);
         for index in 0..of {

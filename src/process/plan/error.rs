@@ -124,6 +124,18 @@ pub enum PlanError {
         /// The attribute.
         attribute: &'static str,
     },
+    /// Two processes use buffers of one name with different sizes.
+    #[error("process {process:?} uses the buffer {buffer:?} with {second} bytes, another process with {first}")]
+    ConflictingBuffers {
+        /// The second process.
+        process: String,
+        /// The buffer.
+        buffer: &'static str,
+        /// The size of the first process's buffer, in bytes.
+        first: u64,
+        /// The same of the second process's buffer.
+        second: u64,
+    },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {
@@ -205,6 +217,30 @@ pub enum ProcessError {
         resource: usize,
         /// Its size.
         bytes: usize,
+    },
+    /// The arguments of an indirect draw or dispatch are not where the process may read them.
+    #[error("process {process:?} takes its arguments from a buffer, {problem}")]
+    Arguments {
+        /// The process.
+        process: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A process uses a stencil that it does not have.
+    #[error("process {process:?} uses a stencil, {problem}")]
+    Stencil {
+        /// The process.
+        process: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A compute shader is declared to draw into targets, or to test depth.
+    #[error("process {process:?} runs a compute shader, which cannot draw into target {target:?} or test its depth")]
+    ComputeDraws {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
     },
     /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
     /// one by commands of its own.

@@ -6,14 +6,16 @@ use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::attributes::attributes_of;
+use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::order::{AddedProcess, order_constraints};
-use super::planned_target::{check_blending, drawn_size, targets_of};
+use super::planned_target::{check_blending, check_stencil, drawn_size, targets_of};
 use super::view_group::view_groups;
 use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
 use crate::process::{
-    Access, Declaration, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize, previous_name,
+    Access, BufferAccess, BufferLayout, Declaration, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters,
+    TargetSize, previous_name,
 };
 use crate::scene::{ColumnLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
@@ -28,6 +30,7 @@ pub struct FramePlan {
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
     attributes: Vec<DeclaredAttribute>,
+    buffers: Vec<BufferLayout>,
     /// Of each process.
     drawn_sizes: Vec<TargetSize>,
     dropped: Vec<String>,
@@ -76,6 +79,15 @@ impl FramePlan {
                     graph.write(id, resource);
                 }
             }
+            for (buffer, access) in &declaration.buffers {
+                let resource = graph.resource(buffer_name(buffer.name));
+                graph.read(id, resource);
+                if *access == BufferAccess::Change {
+                    // The first to change it finds what the frame before left.
+                    graph.import(resource);
+                    graph.write(id, resource);
+                }
+            }
             if declaration.keep {
                 graph.keep(id);
             }
@@ -114,7 +126,7 @@ impl FramePlan {
         let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
         let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
         let dot =
-            schedule.to_labelled_dot(|before, after| passed_on_targets(declarations[before], declarations[after]));
+            schedule.to_labelled_dot(|before, after| passed_on_resources(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
         for process in dropped.iter().filter(|name| !slot_names.contains(name)) {
             tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
@@ -129,6 +141,7 @@ impl FramePlan {
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
         let (columns, attributes) = (columns_of(&processes)?, attributes_of(&processes)?);
+        let buffers = buffers_of(&processes)?;
         let drawn_sizes = processes.iter().map(|planned| drawn_size(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
@@ -140,6 +153,7 @@ impl FramePlan {
             targets,
             columns,
             attributes,
+            buffers,
             drawn_sizes,
             dropped,
             dot,
@@ -182,6 +196,7 @@ impl FramePlan {
         let checked = |planned: &'a PlannedProcess| {
             let draws = planned.draws()?;
             check_blending(planned, &draws, &self.targets)?;
+            check_stencil(planned, &draws, &self.targets)?;
             Ok(draws)
         };
         self.processes.iter().map(checked).collect()
@@ -210,6 +225,11 @@ impl FramePlan {
     /// The attributes of vertices that the processes read, each once.
     pub fn attributes(&self) -> &[DeclaredAttribute] {
         &self.attributes
+    }
+
+    /// The buffers that the processes share, each once.
+    pub fn buffers(&self) -> &[BufferLayout] {
+        &self.buffers
     }
 
     /// Checks that a scene has the columns that the processes read.
@@ -257,8 +277,13 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Opti
     })
 }
 
-/// The names of the targets that one process writes and another then uses, for an edge's label.
-fn passed_on_targets(before: &Declaration, after: &Declaration) -> String {
+/// A buffer's name in the graph.
+fn buffer_name(buffer: &str) -> String {
+    format!("buffer {buffer}")
+}
+
+/// The names of the targets and buffers that one process writes and another then uses, for an edge's label.
+fn passed_on_resources(before: &Declaration, after: &Declaration) -> String {
     let mut names: Vec<_> = after
         .accesses
         .iter()
@@ -267,6 +292,9 @@ fn passed_on_targets(before: &Declaration, after: &Declaration) -> String {
             (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
         })
         .collect();
+    let changed = before.buffers.iter().filter(|(_, access)| *access == BufferAccess::Change).map(|(buffer, _)| buffer);
+    let used = changed.filter(|changed| after.buffers.iter().any(|(buffer, _)| buffer == *changed));
+    names.extend(used.map(|buffer| buffer.name));
     // A process may test and sample the same target.
     names.sort_unstable();
     names.dedup();

@@ -1,6 +1,7 @@
 //! The plan of a frame: its processes in order, and the targets that they use.
 
 mod attributes;
+mod buffers;
 mod chain;
 mod columns;
 mod error;

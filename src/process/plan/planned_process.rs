@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
-use crate::process::{Access, Declaration, Declare, Draws, RenderProcess, ShaderResource};
+use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess, ShaderResource};
 use crate::task::{JobPanic, catch};
 
 /// A process and what it declared.
@@ -45,6 +45,7 @@ impl PlannedProcess {
         let draws = catch(|| self.process.draws()).map_err(panicked)?;
         let is_raw = match draws {
             Draws::Commands(_) | Draws::FullScreen(_) | Draws::Lights(_) => false,
+            Draws::Procedural(_) | Draws::Compute(_) => false,
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };
@@ -53,12 +54,32 @@ impl PlannedProcess {
         if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
             return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
         }
+        let attached = |(_, access): &&(String, Access)| access.is_depth() || access.is_color();
+        if let (Draws::Compute(_), Some((target, _))) = (&draws, self.declaration.accesses.iter().find(attached)) {
+            return Err(ProcessError::ComputeDraws { process: process(), target: target.clone() });
+        }
+        if let Some(problem) = draws.arguments().and_then(|arguments| self.problem_of_arguments(arguments)) {
+            return Err(ProcessError::Arguments { process: process(), problem });
+        }
         for (resource, bytes) in draws.resources().iter().enumerate().filter_map(bytes_of) {
             if bytes == 0 || !bytes.is_multiple_of(4) {
                 return Err(ProcessError::ResourceSize { process: process(), resource, bytes });
             }
         }
         Ok(draws)
+    }
+
+    /// What is wrong with arguments of this many bytes; `None` if nothing is.
+    fn problem_of_arguments(&self, (offset, bytes): (BufferOffset, u64)) -> Option<&'static str> {
+        if !self.declaration.buffers.contains(&(offset.buffer, BufferAccess::Arguments)) {
+            Some("which it does not declare")
+        } else if !offset.bytes.is_multiple_of(4) {
+            Some("at an offset that is not a multiple of 4")
+        } else if offset.bytes.saturating_add(bytes) > offset.buffer.bytes {
+            Some("past its end")
+        } else {
+            None
+        }
     }
 }
 

@@ -37,8 +37,8 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
         };
         let process = || planned.name.clone();
         known.stored |= matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored();
-        let draws_color = matches!(access, Access::ClearColor(..) | Access::DrawOver);
-        if (access.is_depth() && !known.format.is_depth()) || (draws_color && known.format.is_depth()) {
+        if access.is_depth() && !known.format.is_depth_stencil() || access.is_color() && known.format.is_depth_stencil()
+        {
             return Err(PlanError::WrongFormat { process: process(), target: name.clone(), format: known.format });
         }
         if matches!(access, Access::SampleLayers(_)) && !known.layered {
@@ -138,10 +138,11 @@ pub(super) fn check_blending(
 ) -> Result<(), ProcessError> {
     let blends = match draws {
         Draws::FullScreen(full_screen) => full_screen.blend != Blend::None,
+        Draws::Procedural(procedural) => procedural.blend != Blend::None,
         Draws::Lights(_) => true,
         _ => false,
     };
-    let refuses = |target: &&PlannedTarget| !target.format.is_depth() && !target.format.can_be_blended();
+    let refuses = |target: &&PlannedTarget| !target.format.is_depth_stencil() && !target.format.can_be_blended();
     match attached_targets(planned, targets).find(refuses) {
         Some(PlannedTarget { name, format, .. }) if blends => {
             Err(ProcessError::CannotBlend { process: planned.name.clone(), target: name.clone(), format: *format })
@@ -150,15 +151,31 @@ pub(super) fn check_blending(
     }
 }
 
+/// # Errors
+/// If a process tests or writes a stencil that it does not have.
+pub(super) fn check_stencil(
+    planned: &PlannedProcess,
+    draws: &Draws<'_>,
+    targets: &[PlannedTarget],
+) -> Result<(), ProcessError> {
+    let Some(stencil) = draws.stencil() else { return Ok(()) };
+    let has_stencil = attached_targets(planned, targets).any(|target| target.format.has_stencil());
+    let can_write = planned.declaration.depth().is_some_and(|(_, access)| access.writes());
+    let problem = match stencil.writes() && !can_write {
+        _ if !has_stencil => "but its depth target has none",
+        true => "and writes it, but declares only that it tests depth",
+        false => return Ok(()),
+    };
+    Err(ProcessError::Stencil { process: planned.name.clone(), problem })
+}
+
 /// The targets that a process draws into, and the depth that it tests.
 fn attached_targets<'a>(
     planned: &'a PlannedProcess,
     targets: &'a [PlannedTarget],
 ) -> impl Iterator<Item = &'a PlannedTarget> {
     let Declaration { views, accesses, .. } = &planned.declaration;
-    let is_attached =
-        |access: &Access| access.is_depth() || matches!(access, Access::ClearColor(..) | Access::DrawOver);
-    let attached = accesses.iter().filter(move |(_, access)| is_attached(access));
+    let attached = accesses.iter().filter(|(_, access)| access.is_depth() || access.is_color());
     attached.filter_map(|(name, _)| targets.iter().find(|known| known.name == *name && known.views == *views))
 }
 

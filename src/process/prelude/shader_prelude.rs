@@ -28,7 +28,8 @@ pub(crate) fn prelude_with(attributes: &[AttributeLayout], has_deformation: bool
     let fields = (FIRST_OWN_LOCATION..).zip(attributes).map(|(location, AttributeLayout { name, format })| {
         format!("    @location({location}) {name}: {},\n", format.wgsl_type())
     });
-    let vertex_input = vertex_input.replace(END_OF_FIELDS, &fields.chain([END_OF_FIELDS.to_owned()]).collect::<String>());
+    let vertex_input =
+        vertex_input.replace(END_OF_FIELDS, &fields.chain([END_OF_FIELDS.to_owned()]).collect::<String>());
     let deformation = if has_deformation { "" } else { include_str!("no_deformation.wgsl") };
     [include_str!("drawloom.wgsl"), "\n", include_str!("light_volume.wgsl"), "\n", &vertex_input, deformation].concat()
 }

@@ -7,7 +7,7 @@ use super::pass_state::WgpuPassState;
 use crate::backend::BackendError;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
-use crate::backend::wgpu::resources::{AssetSnapshot, BindGroupLayouts, LightMeshes, WgpuTargets};
+use crate::backend::wgpu::resources::{AssetSnapshot, BindGroupLayouts, LightMeshes, StorageBuffers, WgpuTargets};
 use crate::process::Pass;
 
 /// A frame in flight through the wgpu backend.
@@ -20,6 +20,7 @@ pub struct WgpuFrame {
     pub(crate) assets: Arc<AssetSnapshot>,
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
+    pub(crate) storage_buffers: Arc<StorageBuffers>,
     pub(crate) background: [f64; 3],
     /// What is read back of it.
     pub(crate) read_backs: Vec<ReadBackCopy>,

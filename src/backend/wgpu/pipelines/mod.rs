@@ -1,5 +1,6 @@
 //! The pipelines and bind groups of render processes.
 
+mod attachment_formats;
 mod compile_shader;
 mod pipeline_cache;
 mod pipeline_key;

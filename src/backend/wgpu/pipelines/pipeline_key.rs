@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::command::{Cull, DrawState};
-use crate::process::{Draws, prelude_with};
+use crate::process::{Draws, Primitive, Stencil, prelude_with};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
 use crate::scene::{AttributeLayout, Blend, LightKind, Topology};
 
@@ -16,6 +16,7 @@ pub(crate) struct PipelineKey<'a> {
     pub(crate) fragment: Option<Cow<'a, str>>,
     pub(crate) parameter_bytes: usize,
     pub(crate) writes_depth: bool,
+    pub(crate) stencil: Option<Stencil>,
     /// The only draw state of a process without commands.
     pub(crate) state: Option<DrawState>,
     transforms: TransformPrecision,
@@ -28,6 +29,10 @@ pub(crate) enum VertexSource {
     /// One triangle at infinite distance.
     FullScreen,
     LightVolumes,
+    /// The shader makes them, and they form these.
+    Procedural(Primitive),
+    /// There are none: a compute shader runs.
+    Compute,
     /// A raw pass encodes itself.
     None,
 }
@@ -40,8 +45,8 @@ impl<'a> PipelineKey<'a> {
         let state = fixed_state(draws);
         let with = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
-            let deformation = None;
-            Self { shader, deformation, vertices, fragment, parameter_bytes, writes_depth, state, transforms }
+            let (deformation, stencil) = (None, draws.stencil());
+            Self { shader, deformation, vertices, fragment, parameter_bytes, writes_depth, stencil, state, transforms }
         };
         match draws {
             Draws::Commands(draws) => {
@@ -50,6 +55,10 @@ impl<'a> PipelineKey<'a> {
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
+            Draws::Procedural(draws) => {
+                with(draws.shader, VertexSource::Procedural(draws.primitive), draws.fragment, draws.writes_depth)
+            }
+            Draws::Compute(dispatch) => with(dispatch.shader, VertexSource::Compute, None, false),
             Draws::Raw(_) => with("", VertexSource::None, None, false),
         }
     }
@@ -73,11 +82,15 @@ impl<'a> PipelineKey<'a> {
     }
 }
 
-/// The draw state of a process that draws no commands; `None` for commands, which have one each, and for raw passes.
+/// The draw state of a process that draws no commands; `None` for commands, which have one each, for compute shaders and for raw
+/// passes.
 pub(crate) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
     match draws {
         Draws::FullScreen(full_screen) => {
             Some(DrawState::new(Topology::TriangleList, Cull::Nothing, full_screen.blend))
+        }
+        Draws::Procedural(procedural) => {
+            Some(DrawState::new(Topology::TriangleList, procedural.cull, procedural.blend))
         }
         Draws::Lights(lights) => {
             // Only far sides, which the camera also sees from inside a volume.

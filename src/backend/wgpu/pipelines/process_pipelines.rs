@@ -4,18 +4,18 @@ use std::collections::HashMap;
 
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
+use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat};
 use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format, vertex_attributes,
-    vertex_format, vertex_stride,
+    BindGroupLayouts, binding_type, engine_layout, process_layout, vertex_attributes, vertex_format, vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Batch, Cull, DrawState};
-use crate::process::{Access, Declaration, Draws, FIRST_OWN_LOCATION, Format, FramePlan, PlannedProcess};
+use crate::process::{Access, Declaration, Draws, FIRST_OWN_LOCATION, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
-use crate::scene::{AttributeLayout, Blend, Topology, ViewKind};
+use crate::scene::{AttributeLayout, Blend, Topology};
 use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
@@ -36,54 +36,11 @@ pub(crate) struct ProcessPipelines {
     features: wgpu::Features,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
+    /// Of a compute shader.
+    compute: Option<wgpu::ComputePipeline>,
     by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
     /// The tuner of each view's pass.
     tuners: Mutex<Vec<Option<Tuner>>>,
-}
-
-/// The formats of the targets that a process draws into and samples.
-#[derive(Clone, Debug, PartialEq)]
-struct AttachmentFormats {
-    colors: Vec<Option<wgpu::TextureFormat>>,
-    /// Whether each of the colours can be blended.
-    can_be_blended: Vec<bool>,
-    depth: Option<DepthAttachmentFormat>,
-    sampled: Vec<SampledTarget>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct DepthAttachmentFormat {
-    format: wgpu::TextureFormat,
-    /// Whether the pass may write it; a draw state may still switch that off.
-    writable: bool,
-    /// Whether only fragments of exactly the stored depth are drawn.
-    tests_equal: bool,
-}
-
-impl AttachmentFormats {
-    fn new(plan: &FramePlan, declaration: &Declaration) -> Self {
-        let planned = |views: ViewKind, target: &str| {
-            plan.targets().iter().find(|planned| planned.views == views && planned.name == target)
-        };
-        let format_of =
-            |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
-        let colors = declaration.colors().map(|(target, _)| format_of(declaration.views, target));
-        let (colors, can_be_blended) =
-            colors.map(|format| (Some(texture_format(format)), format.can_be_blended())).unzip();
-        let depth = declaration.depth().map(|(target, access)| DepthAttachmentFormat {
-            format: texture_format(format_of(declaration.views, target)),
-            writable: access.writes(),
-            tests_equal: access == Access::MatchDepth,
-        });
-        let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
-            Access::Sample | Access::SamplePrevious => {
-                Some(SampledTarget { format: format_of(declaration.views, target), layered: false })
-            }
-            Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
-            _ => None,
-        });
-        Self { colors, can_be_blended, depth, sampled: sampled.collect() }
-    }
 }
 
 struct CompiledShader {
@@ -109,10 +66,12 @@ impl ProcessPipelines {
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
         let columns = planned.declaration.columns.len();
         let attributes: Vec<_> = attributes_of(&planned.declaration).collect();
-        let process_layout = process_layout(device, key.parameter_bytes, &attachments.sampled);
+        let is_compute = key.vertices == VertexSource::Compute;
+        let AttachmentFormats { sampled, writes_buffers, .. } = &attachments;
+        let process_layout = process_layout(device, key.parameter_bytes, sampled, writes_buffers, is_compute);
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
-        let engine_layout = engine_layout(device, columns, &resources);
+        let engine_layout = engine_layout(device, columns, &resources, is_compute);
         let shader = if key.vertices == VertexSource::None {
             None
         } else {
@@ -127,6 +86,7 @@ impl ProcessPipelines {
             });
             Some(CompiledShader { module, layout })
         };
+        let compute = shader.as_ref().filter(|_| is_compute).map(|shader| compute_pipeline(device, shader));
         let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
         let pipelines = Self {
             name,
@@ -139,6 +99,7 @@ impl ProcessPipelines {
             resources,
             features,
             shader,
+            compute,
             by_state,
             tuners,
         };
@@ -201,16 +162,17 @@ impl ProcessPipelines {
         self.by_state.read()
     }
 
+    /// The pipeline of a compute shader; `None` for a process that draws.
+    pub(crate) fn compute(&self) -> Option<&wgpu::ComputePipeline> {
+        self.compute.as_ref()
+    }
+
     /// Describes bundles for passes of this process.
     pub(crate) fn bundle_descriptor<'a>(&'a self, label: &'a str) -> wgpu::RenderBundleEncoderDescriptor<'a> {
         wgpu::RenderBundleEncoderDescriptor {
             label: Some(label),
             color_formats: &self.attachments.colors,
-            depth_stencil: self.attachments.depth.map(|depth| wgpu::RenderBundleDepthStencil {
-                format: depth.format,
-                depth_read_only: !depth.writable,
-                stencil_read_only: true,
-            }),
+            depth_stencil: self.attachments.depth.map(DepthAttachmentFormat::of_bundles),
             sample_count: 1,
             multiview: None,
         }
@@ -235,7 +197,7 @@ impl ProcessPipelines {
         &self.name
     }
 
-    /// `None` for a raw pass, which has no pipelines.
+    /// `None` for a raw pass, which has no pipeline.
     fn create(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
         let shader = self.shader.as_ref()?;
         let AttachmentFormats { colors, can_be_blended, .. } = &self.attachments;
@@ -255,11 +217,13 @@ impl ProcessPipelines {
             VertexSource::LightVolumes => {
                 ("light_volume", vec![buffer_layout(size_of::<[f32; 3]>() as u64, &POSITION_ONLY)])
             }
-            VertexSource::FullScreen | VertexSource::None => ("full_screen", Vec::new()),
+            VertexSource::Procedural(_) => ("vertex", Vec::new()),
+            VertexSource::FullScreen | VertexSource::Compute | VertexSource::None => ("full_screen", Vec::new()),
         };
-        let (topology, strip_index_format) = match state.topology() {
-            Topology::TriangleList => (wgpu::PrimitiveTopology::TriangleList, None),
-            Topology::TriangleStrip => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
+        let (topology, strip_index_format) = match (self.key.vertices, state.topology()) {
+            (VertexSource::Procedural(primitive), _) => (primitive_topology(primitive), None),
+            (_, Topology::TriangleList) => (wgpu::PrimitiveTopology::TriangleList, None),
+            (_, Topology::TriangleStrip) => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
         };
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: None,
@@ -281,13 +245,10 @@ impl ProcessPipelines {
                 },
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: self.attachments.depth.map(|depth| wgpu::DepthStencilState {
-                format: depth.format,
+            depth_stencil: self.attachments.depth.map(|depth| {
                 // A blended surface must not hide what is drawn after it.
-                depth_write_enabled: Some(depth.writable && self.key.writes_depth && state.blend() == Blend::None),
-                depth_compare: Some(self.depth_compare(depth)),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
+                let writes_depth = self.key.writes_depth && state.blend() == Blend::None;
+                depth.of_pipeline(writes_depth, self.depth_compare(depth), self.key.stencil)
             }),
             multisample: wgpu::MultisampleState::default(),
             fragment: self.key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
@@ -305,14 +266,29 @@ impl ProcessPipelines {
     /// Depth is reversed: nearer is greater.
     fn depth_compare(&self, depth: DepthAttachmentFormat) -> wgpu::CompareFunction {
         match self.key.vertices {
-            _ if depth.tests_equal => wgpu::CompareFunction::Equal,
+            _ if depth.access == Access::MatchDepth => wgpu::CompareFunction::Equal,
+            _ if depth.access == Access::TestStencil => wgpu::CompareFunction::Always,
+            _ if depth.access == Access::MarkStencil => wgpu::CompareFunction::GreaterEqual,
             // At infinite distance (depth 0), so it covers the pixels without geometry.
             VertexSource::FullScreen => wgpu::CompareFunction::GreaterEqual,
             // The far side of a light volume, where it is behind a surface; never where there is no surface.
             VertexSource::LightVolumes => wgpu::CompareFunction::Less,
-            VertexSource::Meshes(_) | VertexSource::None => wgpu::CompareFunction::Greater,
+            VertexSource::Meshes(_) | VertexSource::Procedural(_) | VertexSource::Compute | VertexSource::None => {
+                wgpu::CompareFunction::Greater
+            }
         }
     }
+}
+
+fn compute_pipeline(device: &wgpu::Device, shader: &CompiledShader) -> wgpu::ComputePipeline {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: Some(&shader.layout),
+        module: &shader.module,
+        entry_point: Some("compute"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
 }
 
 fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLayout> {
@@ -330,6 +306,16 @@ fn buffer_layout(array_stride: u64, attributes: &[wgpu::VertexAttribute]) -> Opt
 
 /// Of light volumes.
 const POSITION_ONLY: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
+
+fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
+    match primitive {
+        Primitive::Triangles => wgpu::PrimitiveTopology::TriangleList,
+        Primitive::TriangleStrip => wgpu::PrimitiveTopology::TriangleStrip,
+        Primitive::Lines => wgpu::PrimitiveTopology::LineList,
+        Primitive::LineStrip => wgpu::PrimitiveTopology::LineStrip,
+        Primitive::Points => wgpu::PrimitiveTopology::PointList,
+    }
+}
 
 fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
     use wgpu::{BlendComponent, BlendFactor, BlendOperation};

@@ -3,7 +3,7 @@
 use crate::backend::FrameRequest;
 use crate::backend::wgpu::frame::WgpuFrame;
 use crate::backend::wgpu::strategy::PassSegment;
-use crate::process::{Access, ClearColor, Pass};
+use crate::process::{ClearColor, Pass};
 
 /// No device supports more colour attachments.
 const MAX_COLOR_ATTACHMENTS: usize = 8;
@@ -33,16 +33,19 @@ pub(crate) fn begin_pass<'a>(
     }
     let depth = declaration.depth().and_then(|(name, access)| {
         let target = frame.targets.find(view, name)?;
-        let is_loaded = access == Access::DrawDepth || !segment.is_first;
+        let (is_loaded, store) = (access.keeps_depth() || !segment.is_first, wgpu::StoreOp::Store);
         // Depth is reversed: 0 is infinitely far away.
-        let load = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
+        let depth = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) };
+        let stencil = if is_loaded { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0) };
+        let writes_depth = target.format().has_depth() && access.writes_depth();
+        let writes_stencil = target.format().has_stencil() && access.writes();
         Some(wgpu::RenderPassDepthStencilAttachment {
             view: &target.view,
-            depth_ops: access.writes().then_some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
+            depth_ops: writes_depth.then_some(wgpu::Operations { load: depth, store }),
+            stencil_ops: writes_stencil.then_some(wgpu::Operations { load: stencil, store }),
         })
     });
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+    let mut render_pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(&pass.label),
         color_attachments: &colors[..count],
         depth_stencil_attachment: depth,
@@ -50,7 +53,11 @@ pub(crate) fn begin_pass<'a>(
             .timed_pass_index
             .and_then(|timed_pass| frame.buffers.timestamps()?.writes_of_segment(timed_pass, segment)),
         ..wgpu::RenderPassDescriptor::default()
-    })
+    });
+    if let Some(stencil) = request.draws[process].stencil() {
+        render_pass.set_stencil_reference(u32::from(stencil.reference));
+    }
+    render_pass
 }
 
 fn load_op(clear: Option<ClearColor>, background: [f64; 3]) -> wgpu::LoadOp<wgpu::Color> {

@@ -1,6 +1,7 @@
 //! Encoding of passes: from batches and recorded parts to command encoders.
 
 use super::bundles::record_bundle;
+use super::compute::encode_compute;
 use super::record_pass::{encode_raw, record_batches, record_without_commands, replay_bundles};
 use crate::backend::wgpu::frame::{RecordedPart, WgpuFrame, WgpuPart, WgpuPassState};
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
@@ -24,6 +25,7 @@ pub(crate) fn encode_pass(
     let WgpuPassState { pass, strategy, .. } = *frame.pass(index);
     encode(device, frame, index, |encoder| match (&request.draws[pass.process_index], strategy.recording) {
         (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
+        (Draws::Compute(dispatch), _) => encode_compute(encoder, frame, index, dispatch),
         (Draws::Commands(_), Direct | Indirect) => {
             record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())
         }

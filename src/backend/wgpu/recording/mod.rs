@@ -3,6 +3,7 @@
 mod batch_recorder;
 mod begin_pass;
 mod bundles;
+mod compute;
 mod encode_pass;
 mod record_pass;
 

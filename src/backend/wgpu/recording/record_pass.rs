@@ -11,7 +11,7 @@ use crate::backend::wgpu::pipelines::fixed_state;
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{Draws, Pass, RawPass, RawPassResources};
+use crate::process::{DrawCount, Draws, Pass, ProceduralDraws, RawPass, RawPassResources};
 
 /// Records the batches of a segment directly into the pass.
 ///
@@ -66,10 +66,17 @@ pub(crate) fn replay_bundles<'a>(
     segment: PassSegment,
     bundles: impl IntoIterator<Item = &'a wgpu::RenderBundle>,
 ) {
-    begin_pass(encoder, frame, request, index, segment).execute_bundles(bundles);
+    let pass = frame.pass(index).pass;
+    let by_state = frame.pipelines(pass).by_state();
+    let mut render_pass = begin_pass(encoder, frame, request, index, segment);
+    // wgpu gives the device the reference only with a pipeline that tests it, and does not look for one in bundles.
+    if let Some(pipeline) = by_state.values().next().filter(|_| request.draws[pass.process_index].stencil().is_some()) {
+        render_pass.set_pipeline(pipeline);
+    }
+    render_pass.execute_bundles(bundles);
 }
 
-/// Records a pass that draws lights, or a full-screen triangle.
+/// Records a pass that draws lights, a full-screen triangle, or vertices that the shader makes.
 ///
 /// # Errors
 /// If a resource of the pass is missing. This is a bug in Drawloom.
@@ -100,6 +107,14 @@ pub(crate) fn record_without_commands(
                 render_pass.set_vertex_buffer(0, meshes.vertices.slice(..));
                 render_pass.draw(meshes.range(draws.class.kind), lights);
             }
+        }
+        Draws::Procedural(ProceduralDraws { count: DrawCount::Count { vertices, instances }, .. }) => {
+            render_pass.draw(0..*vertices, 0..*instances);
+        }
+        Draws::Procedural(ProceduralDraws { count: DrawCount::Indirect(offset), .. }) => {
+            let buffer = frame.storage_buffers.find(offset.buffer);
+            let buffer = buffer.ok_or_else(|| broken_rule("a buffer is made before it is used"))?;
+            render_pass.draw_indirect(buffer, offset.bytes);
         }
         _ => render_pass.draw(0..3, 0..1),
     }

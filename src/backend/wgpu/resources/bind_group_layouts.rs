@@ -25,9 +25,9 @@ impl BindGroupLayouts {
         };
         let frame = [
             entry(0, ALL_STAGES, uniform(size_of::<GpuView>() as u64)),
-            entry(1, ALL_STAGES, storage()),
-            entry(2, ALL_STAGES, storage()),
-            entry(3, ALL_STAGES, storage()),
+            entry(1, ALL_STAGES, storage(false)),
+            entry(2, ALL_STAGES, storage(false)),
+            entry(3, ALL_STAGES, storage(false)),
         ];
         let array = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Float { filterable: true },
@@ -35,7 +35,7 @@ impl BindGroupLayouts {
             multisampled: false,
         };
         let assets = [
-            entry(0, ALL_STAGES, storage()),
+            entry(0, ALL_STAGES, storage(false)),
             entry(1, FRAGMENT_AND_COMPUTE, array),
             entry(2, FRAGMENT_AND_COMPUTE, array),
             entry(3, FRAGMENT_AND_COMPUTE, array),
@@ -55,20 +55,23 @@ pub(crate) struct SampledTarget {
     pub(crate) layered: bool,
 }
 
-/// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples. `None` if it has
-/// neither.
+/// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples, then its buffers, each with
+/// whether its shader writes it. `None` if it has none of them.
 pub(crate) fn process_layout(
     device: &wgpu::Device,
     parameter_bytes: usize,
     samples: &[SampledTarget],
+    writes_buffers: &[bool],
+    is_compute: bool,
 ) -> Option<wgpu::BindGroupLayout> {
+    let [stages, fragment] = stages(is_compute);
     let mut entries = Vec::new();
     if parameter_bytes > 0 {
         // With the size, wgpu refuses a shader that reads more when its pipeline is created.
-        entries.push(entry(0, ShaderStages::VERTEX_FRAGMENT, uniform(parameter_bytes as u64)));
+        entries.push(entry(0, stages, uniform(parameter_bytes as u64)));
     }
     for (binding, sampled) in (1..).zip(samples) {
-        let sample_type = if sampled.format.is_depth() {
+        let sample_type = if sampled.format.has_depth() {
             wgpu::TextureSampleType::Depth
         } else if sampled.format.is_integer() {
             wgpu::TextureSampleType::Uint
@@ -78,7 +81,11 @@ pub(crate) fn process_layout(
         let view_dimension =
             if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
         let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
-        entries.push(entry(binding, ShaderStages::FRAGMENT, texture));
+        entries.push(entry(binding, fragment, texture));
+    }
+    for (binding, writes) in (1 + samples.len() as u32..).zip(writes_buffers) {
+        // Not every device lets vertex shaders write.
+        entries.push(entry(binding, if *writes { fragment } else { stages }, storage(*writes)));
     }
     let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("process"), entries: &entries };
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
@@ -90,18 +97,24 @@ pub(crate) fn engine_layout(
     device: &wgpu::Device,
     columns: usize,
     resources: &[wgpu::BindingType],
+    is_compute: bool,
 ) -> Option<wgpu::BindGroupLayout> {
-    let types = std::iter::repeat_n(storage(), columns).chain(resources.iter().copied());
-    let entries: Vec<_> =
-        (0..).zip(types).map(|(binding, ty)| entry(binding, ShaderStages::VERTEX_FRAGMENT, ty)).collect();
+    let [stages, _] = stages(is_compute);
+    let types = std::iter::repeat_n(storage(false), columns).chain(resources.iter().copied());
+    let entries: Vec<_> = (0..).zip(types).map(|(binding, ty)| entry(binding, stages, ty)).collect();
     let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("engine"), entries: &entries };
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+}
+
+/// The stages of a process's shaders, and those that sample targets and write buffers.
+fn stages(is_compute: bool) -> [ShaderStages; 2] {
+    if is_compute { [ShaderStages::COMPUTE; 2] } else { [ShaderStages::VERTEX_FRAGMENT, ShaderStages::FRAGMENT] }
 }
 
 /// What the layout of a bind group says about a resource.
 pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderResource<'_>) -> wgpu::BindingType {
     match resource {
-        ShaderResource::Bytes(_) | ShaderResource::Buffer(_) => storage(),
+        ShaderResource::Bytes(_) | ShaderResource::Buffer(_) => storage(false),
         ShaderResource::Texture { view, dimension } => {
             let texture = view.texture();
             // A depth-stencil texture is sampled as depth.
@@ -134,6 +147,8 @@ pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
         Format::R32Float => wgpu::TextureFormat::R32Float,
         Format::R32Uint => wgpu::TextureFormat::R32Uint,
         Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
+        Format::Depth32FloatStencil8 => wgpu::TextureFormat::Depth32FloatStencil8,
+        Format::Stencil8 => wgpu::TextureFormat::Stencil8,
     }
 }
 
@@ -149,9 +164,9 @@ fn uniform(size: u64) -> wgpu::BindingType {
     }
 }
 
-fn storage() -> wgpu::BindingType {
+fn storage(writes: bool) -> wgpu::BindingType {
     wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        ty: wgpu::BufferBindingType::Storage { read_only: !writes },
         has_dynamic_offset: false,
         min_binding_size: None,
     }

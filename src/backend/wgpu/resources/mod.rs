@@ -10,6 +10,7 @@ mod growing_buffer;
 mod light_meshes;
 mod mirrored_buffer;
 mod object_buffer;
+mod storage_buffers;
 mod subdivided_mesh;
 mod target_cache;
 mod texture_arrays;
@@ -29,6 +30,7 @@ pub(crate) use growing_buffer::{
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use mirrored_buffer::MirroredBuffer;
 pub(crate) use object_buffer::{ObjectBuffer, poll, shares_memory};
+pub(crate) use storage_buffers::StorageBuffers;
 pub(crate) use subdivided_mesh::SubdividedMesh;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
 pub(crate) use upload_queue::UploadQueue;

@@ -24,6 +24,8 @@ pub(crate) struct ViewTarget {
     pub(crate) texture: wgpu::Texture,
     /// Of the view's layer only.
     pub(crate) view: wgpu::TextureView,
+    /// The same as shaders sample it: depth without the stencil.
+    pub(crate) sampled: wgpu::TextureView,
     pub(crate) layer: u32,
 }
 
@@ -158,8 +160,8 @@ impl TargetCache {
             return Ok(cached.clone());
         }
         let texture = new_texture(device, planned, extent)?;
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, layer: 0 })
+        let (view, sampled) = new_views(&texture, planned.format, &wgpu::TextureViewDescriptor::default());
+        Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 })
     }
 
     fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {
@@ -167,13 +169,14 @@ impl TargetCache {
         if let Some(cached) = cached.filter(|cached| cached.texture == shared.texture && cached.layer == layer) {
             return cached.clone();
         }
-        let view = shared.texture.create_view(&wgpu::TextureViewDescriptor {
+        let descriptor = wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2),
             base_array_layer: layer,
             array_layer_count: Some(1),
             ..wgpu::TextureViewDescriptor::default()
-        });
-        ViewTarget { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, layer }
+        };
+        let (view, sampled) = new_views(&shared.texture, shared.planned.format, &descriptor);
+        ViewTarget { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, sampled, layer }
     }
 
     fn layered_target(
@@ -199,9 +202,26 @@ impl TargetCache {
         }
         let texture = new_texture(device, planned, extent)?;
         let dimension = Some(wgpu::TextureViewDimension::D2Array);
-        let array = texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
+        let descriptor = wgpu::TextureViewDescriptor { dimension, ..Default::default() };
+        let (_, array) = new_views(&texture, planned.format, &descriptor);
         Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
     }
+}
+
+/// A view to draw into, and one that shaders sample.
+fn new_views(
+    texture: &wgpu::Texture,
+    format: Format,
+    descriptor: &wgpu::TextureViewDescriptor<'_>,
+) -> (wgpu::TextureView, wgpu::TextureView) {
+    let view = texture.create_view(descriptor);
+    let sampled = if format.has_depth() && format.has_stencil() {
+        let aspect = wgpu::TextureAspect::DepthOnly;
+        texture.create_view(&wgpu::TextureViewDescriptor { aspect, ..descriptor.clone() })
+    } else {
+        view.clone()
+    };
+    (view, sampled)
 }
 
 fn new_texture(
@@ -209,6 +229,10 @@ fn new_texture(
     planned: &PlannedTarget,
     size: wgpu::Extent3d,
 ) -> Result<wgpu::Texture, BackendError> {
+    let missing = texture_format(planned.format).required_features() - device.features();
+    if !missing.is_empty() {
+        return Err(BackendError::MissingFeature { missing: missing.to_string() });
+    }
     let limits = device.limits();
     for (limit, allowed, needed) in [
         ("max_texture_dimension_2d", limits.max_texture_dimension_2d, size.width.max(size.height)),

@@ -1,0 +1,121 @@
+//! The attachments of a process's passes, as its pipelines and bundles see them.
+
+use crate::backend::wgpu::resources::{SampledTarget, texture_format};
+use crate::process::{Access, Comparison, Declaration, Format, FramePlan, Stencil, StencilOperation};
+use crate::scene::ViewKind;
+
+/// The formats of the targets that a process draws into and samples, and how it uses buffers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct AttachmentFormats {
+    pub(super) colors: Vec<Option<wgpu::TextureFormat>>,
+    /// Whether each of the colours can be blended.
+    pub(super) can_be_blended: Vec<bool>,
+    pub(super) depth: Option<DepthAttachmentFormat>,
+    pub(super) sampled: Vec<SampledTarget>,
+    /// Whether the shader writes each of the process's buffers.
+    pub(super) writes_buffers: Vec<bool>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DepthAttachmentFormat {
+    pub(super) format: Format,
+    /// Whether the pass may write depth; a draw state may still switch that off.
+    pub(super) writes_depth: bool,
+    /// Whether it may write the stencil.
+    pub(super) writes_stencil: bool,
+    /// How it is tested.
+    pub(super) access: Access,
+}
+
+impl AttachmentFormats {
+    pub(super) fn new(plan: &FramePlan, declaration: &Declaration) -> Self {
+        let planned = |views: ViewKind, target: &str| {
+            plan.targets().iter().find(|planned| planned.views == views && planned.name == target)
+        };
+        let format_of =
+            |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
+        let colors = declaration.colors().map(|(target, _)| format_of(declaration.views, target));
+        let (colors, can_be_blended) =
+            colors.map(|format| (Some(texture_format(format)), format.can_be_blended())).unzip();
+        let depth = declaration.depth().map(|(target, access)| DepthAttachmentFormat {
+            format: format_of(declaration.views, target),
+            writes_depth: access.writes_depth(),
+            writes_stencil: access.writes(),
+            access,
+        });
+        let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
+            Access::Sample | Access::SamplePrevious => {
+                Some(SampledTarget { format: format_of(declaration.views, target), layered: false })
+            }
+            Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
+            _ => None,
+        });
+        let writes_buffers = declaration.bound_buffers().map(|(_, writes)| writes);
+        let (sampled, writes_buffers) = (sampled.collect(), writes_buffers.collect());
+        Self { colors, can_be_blended, depth, sampled, writes_buffers }
+    }
+}
+
+impl DepthAttachmentFormat {
+    /// The same for bundles.
+    pub(super) fn of_bundles(self) -> wgpu::RenderBundleDepthStencil {
+        wgpu::RenderBundleDepthStencil {
+            format: texture_format(self.format),
+            depth_read_only: !(self.format.has_depth() && self.writes_depth),
+            stencil_read_only: !(self.format.has_stencil() && self.writes_stencil),
+        }
+    }
+
+    /// The same for a pipeline.
+    pub(super) fn of_pipeline(
+        self,
+        writes_depth: bool,
+        depth_compare: wgpu::CompareFunction,
+        stencil: Option<Stencil>,
+    ) -> wgpu::DepthStencilState {
+        wgpu::DepthStencilState {
+            format: texture_format(self.format),
+            depth_write_enabled: self.format.has_depth().then_some(self.writes_depth && writes_depth),
+            depth_compare: self.format.has_depth().then_some(depth_compare),
+            stencil: stencil.map_or_else(wgpu::StencilState::default, stencil_state),
+            bias: wgpu::DepthBiasState::default(),
+        }
+    }
+}
+
+fn stencil_state(stencil: Stencil) -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState {
+        compare: compare_function(stencil.comparison),
+        fail_op: stencil_operation(stencil.on_fail),
+        depth_fail_op: stencil_operation(stencil.on_depth_fail),
+        pass_op: stencil_operation(stencil.on_pass),
+    };
+    let [read_mask, write_mask] = [stencil.read_mask, stencil.write_mask].map(u32::from);
+    wgpu::StencilState { front: face, back: face, read_mask, write_mask }
+}
+
+fn compare_function(comparison: Comparison) -> wgpu::CompareFunction {
+    match comparison {
+        Comparison::Never => wgpu::CompareFunction::Never,
+        Comparison::Less => wgpu::CompareFunction::Less,
+        Comparison::Equal => wgpu::CompareFunction::Equal,
+        Comparison::LessEqual => wgpu::CompareFunction::LessEqual,
+        Comparison::Greater => wgpu::CompareFunction::Greater,
+        Comparison::NotEqual => wgpu::CompareFunction::NotEqual,
+        Comparison::GreaterEqual => wgpu::CompareFunction::GreaterEqual,
+        Comparison::Always => wgpu::CompareFunction::Always,
+    }
+}
+
+fn stencil_operation(operation: StencilOperation) -> wgpu::StencilOperation {
+    match operation {
+        StencilOperation::Keep => wgpu::StencilOperation::Keep,
+        StencilOperation::Zero => wgpu::StencilOperation::Zero,
+        StencilOperation::Replace => wgpu::StencilOperation::Replace,
+        StencilOperation::Invert => wgpu::StencilOperation::Invert,
+        StencilOperation::IncrementClamp => wgpu::StencilOperation::IncrementClamp,
+        StencilOperation::DecrementClamp => wgpu::StencilOperation::DecrementClamp,
+        StencilOperation::IncrementWrap => wgpu::StencilOperation::IncrementWrap,
+        StencilOperation::DecrementWrap => wgpu::StencilOperation::DecrementWrap,
+    }
+}

@@ -1,0 +1,86 @@
+//! Buffers on the device that processes share.
+
+use std::marker::PhantomData;
+
+use bytemuck::Pod;
+
+/// A buffer on the device that processes of a renderer share: particles, palettes, arguments of indirect draws. Make it once, as a
+/// constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that orders them.
+///
+/// There is one for all views. It is all zeros until a shader writes it, and keeps its content from frame to frame, in the order in
+/// which frames are submitted. If the device reports an error, it begins anew with zeros.
+///
+/// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
+pub struct StorageBuffer<T> {
+    layout: BufferLayout,
+    /// Neither owns nor borrows a `T`.
+    element: PhantomData<fn() -> T>,
+}
+
+impl<T: Pod> StorageBuffer<T> {
+    /// A buffer of this name with this many elements. Two buffers of one name are the same buffer.
+    ///
+    /// # Panics
+    /// If its size is 0, or that of `T` not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
+    /// the compiler.
+    pub const fn new(name: &'static str, count: u32) -> Self {
+        assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
+        assert!(count > 0, "a buffer has elements");
+        let layout = BufferLayout { name, bytes: size_of::<T>() as u64 * count as u64 };
+        Self { layout, element: PhantomData }
+    }
+
+    /// Its name and size.
+    pub const fn layout(self) -> BufferLayout {
+        self.layout
+    }
+
+    /// The place of an element: of the arguments of an indirect draw or dispatch.
+    pub const fn at(self, index: u32) -> BufferOffset {
+        BufferOffset { buffer: self.layout, bytes: size_of::<T>() as u64 * index as u64 }
+    }
+}
+
+// Derived implementations would require them of `T`.
+impl<T> Clone for StorageBuffer<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for StorageBuffer<T> {}
+
+impl<T> std::fmt::Debug for StorageBuffer<T> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("StorageBuffer").field(&self.layout.name).field(&self.layout.bytes).finish()
+    }
+}
+
+/// A [`StorageBuffer`] without the type of its elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BufferLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// Its size in bytes.
+    pub bytes: u64,
+}
+
+/// A place in a [`StorageBuffer`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BufferOffset {
+    /// The buffer.
+    pub buffer: BufferLayout,
+    /// The offset from its beginning, in bytes.
+    pub bytes: u64,
+}
+
+/// How a process uses a [`StorageBuffer`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BufferAccess {
+    /// Its shader reads it.
+    Read,
+    /// Its shader reads and writes it.
+    Change,
+    /// It holds the arguments of its indirect draw or dispatch.
+    Arguments,
+}

@@ -1,0 +1,267 @@
+//! Stencils: what one process marks, another leaves out.
+
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::{Picture, WgpuBackend};
+use drawloom::command::Selection;
+use drawloom::process::{
+    ClearColor, CommandDraws, Comparison, Declare, Deferred, Draws, Format, FullScreen, GeometryFormats, RenderProcess,
+    SURFACE_SHADER, Stencil, StencilOperation,
+};
+use drawloom::scene::{LayerMask, Scene, SceneRef};
+use drawloom::task::Scheduler;
+use drawloom_testing::scenes::field;
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::fixture::Fixture;
+use crate::strategies::{device, strategies};
+
+pub const CASES: &[Case] = &[
+    ("a_stencil_alone_marks_all_pixels_of_objects", alone),
+    ("a_stencil_beside_depth_marks_visible_pixels", beside_depth),
+    ("every_strategy_tests_the_same_stencil", every_strategy),
+    ("operations_and_masks_are_those_of_the_device", operations),
+    ("a_process_that_has_no_stencil_is_named", without),
+];
+
+const MARKED: LayerMask = LayerMask::layer(4);
+
+/// Which target has the stencil, and how the objects are marked.
+#[derive(Clone, Copy)]
+struct Mark {
+    target: &'static str,
+    format: Format,
+    stencil: Stencil,
+}
+
+impl Mark {
+    const ALONE: Self = Self { target: "marked", format: Format::Stencil8, stencil: Stencil::mark(3) };
+    const BESIDE_DEPTH: Self =
+        Self { target: "depth", format: Format::Depth32FloatStencil8, stencil: Stencil::mark(3) };
+}
+
+impl RenderProcess for Mark {
+    fn name(&self) -> &str {
+        "mark"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        if self.format == Format::Stencil8 {
+            declare.clears_depth(self.target, self.format);
+        } else {
+            declare.marks_stencil(self.target);
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: SURFACE_SHADER,
+            fragment: None,
+            selection: Selection::OPAQUE.in_layers(MARKED),
+            stencil: Some(self.stencil),
+            ..CommandDraws::default()
+        })
+    }
+}
+
+/// Draws white where a stencil compares like this.
+struct White {
+    target: &'static str,
+    stencil: Stencil,
+}
+
+impl RenderProcess for White {
+    fn name(&self) -> &str {
+        "white"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("white", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.tests_stencil(self.target);
+        declare.after("mark");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                return vec4<f32>(1.0);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, stencil: Some(self.stencil), ..FullScreen::default() })
+    }
+}
+
+/// Draws the same objects in white, without a stencil.
+struct Covered {
+    depth: Option<&'static str>,
+}
+
+impl RenderProcess for Covered {
+    fn name(&self) -> &str {
+        "covered"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("covered", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        if let Some(depth) = self.depth {
+            declare.matches_depth(depth);
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let selection = Selection::OPAQUE.in_layers(MARKED);
+        Draws::Commands(CommandDraws { shader: COVERED, selection, writes_depth: false, ..CommandDraws::default() })
+    }
+}
+
+const COVERED: &str = "
+    struct Corner {
+        @invariant @builtin(position) clip: vec4<f32>,
+    }
+
+    @vertex
+    fn vertex(in: VertexInput) -> Corner {
+        return Corner(clip_position(relative_position(drawn_object(in.instance), in.position)));
+    }
+
+    @fragment
+    fn fragment(in: Corner) -> @location(0) vec4<f32> {
+        return vec4<f32>(1.0);
+    }
+";
+
+/// A field of which every third object is to be marked.
+fn scene() -> (Scene, Vec<LayerMask>) {
+    let mut scene = field(200);
+    scene.cameras.truncate(1);
+    let layers = (0..200).map(|object| if object % 3 == 0 { MARKED } else { LayerMask::layer(0) }).collect();
+    (scene, layers)
+}
+
+fn pipeline() -> Deferred {
+    Deferred::to_picture()
+        .formats(GeometryFormats { depth: Format::Depth32FloatStencil8, ..GeometryFormats::default() })
+}
+
+fn draw(fixture: &mut Fixture, target: &str) -> Result<Picture, Failed> {
+    let (scene, layers) = scene();
+    let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
+    Ok(fixture.submit(recorded)?.read(0, target)?)
+}
+
+/// What is white where a stencil that was marked compares like this.
+fn white(mark: Mark, stencil: Stencil) -> Result<Picture, Failed> {
+    let white = White { target: mark.target, stencil };
+    let mut fixture =
+        Fixture::with(2, |builder| builder.deferred(pipeline()).process(mark).process(white).output("white"))?;
+    draw(&mut fixture, "white")
+}
+
+/// The objects that are to be marked, in white: all of them, or where they are visible.
+fn covered(depth: Option<&'static str>) -> Result<Picture, Failed> {
+    let mut fixture =
+        Fixture::with(2, |builder| builder.deferred(pipeline()).process(Covered { depth }).output("covered"))?;
+    draw(&mut fixture, "covered")
+}
+
+fn inverted(picture: &Picture) -> Vec<u8> {
+    picture.bytes.iter().map(|byte| 255 - byte).collect()
+}
+
+/// Fails unless a stencil of 3 is where the picture is white, and 0 elsewhere.
+fn check(mark: Mark, covered: &Picture) -> Result<(), Failed> {
+    if !covered.bytes.contains(&0) || !covered.bytes.contains(&255) {
+        return Err("the objects cover all or nothing".into());
+    }
+    if white(mark, Stencil::test(Comparison::Equal, 3))?.bytes != covered.bytes {
+        return Err("what is marked is not what the objects cover".into());
+    }
+    if white(mark, Stencil::test(Comparison::NotEqual, 3))?.bytes != inverted(covered) {
+        return Err("what is not marked is not what the objects leave".into());
+    }
+    if white(mark, Stencil::test(Comparison::Equal, 0))?.bytes != inverted(covered) {
+        return Err("the stencil is not cleared to 0".into());
+    }
+    Ok(())
+}
+
+fn alone() -> Result<(), Failed> {
+    check(Mark::ALONE, &covered(None)?)
+}
+
+fn beside_depth() -> Result<(), Failed> {
+    let (all, visible) = (covered(None)?, covered(Some("depth"))?);
+    if all == visible {
+        return Err("all marked objects are visible".into());
+    }
+    check(Mark::BESIDE_DEPTH, &visible)
+}
+
+fn every_strategy() -> Result<(), Failed> {
+    let expected = covered(Some("depth"))?;
+    for (recording, encoding) in strategies()? {
+        let (device, queue) = device()?;
+        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let white = White { target: "depth", stencil: Stencil::test(Comparison::Equal, 3) };
+        let builder = Renderer::builder(backend).deferred(pipeline()).process(Mark::BESIDE_DEPTH);
+        let (renderer, submitter) = builder.process(white).output("white").build(Arc::new(Scheduler::new(2)?))?;
+        let mut fixture = Fixture { renderer, submitter };
+        for frame in 0..2 {
+            if draw(&mut fixture, "white")?.bytes != expected.bytes {
+                return Err(format!("frame {frame} of {recording:?} and {encoding:?} differs").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn operations() -> Result<(), Failed> {
+    let covered = covered(None)?;
+    let with = |stencil| Mark { stencil, ..Mark::ALONE };
+    let equal = |value| Stencil::test(Comparison::Equal, value);
+    let masked = with(Stencil { write_mask: 2, ..Stencil::mark(3) });
+    let failing = with(Stencil {
+        comparison: Comparison::Never,
+        on_fail: StencilOperation::Replace,
+        on_pass: StencilOperation::Zero,
+        ..Stencil::mark(5)
+    });
+    let inverting = with(Stencil { write_mask: 1, on_pass: StencilOperation::Keep, ..Stencil::mark(1) });
+    for (mark, stencil, is_covered) in [
+        (masked, equal(2), true),
+        (masked, Stencil { read_mask: 1, ..equal(3) }, false),
+        (masked, Stencil { read_mask: 2, ..equal(3) }, true),
+        (failing, equal(5), true),
+        (inverting, equal(1), false),
+    ] {
+        let found = white(mark, stencil)?;
+        let is_white = found.bytes == covered.bytes;
+        if is_white != is_covered || (!is_covered && found.bytes.contains(&255)) {
+            return Err(format!("{stencil:?} after {:?}", mark.stencil).into());
+        }
+    }
+    Ok(())
+}
+
+fn without() -> Result<(), Failed> {
+    let problem = |mark: Mark, white: White| -> Result<String, Failed> {
+        let usual = Deferred::to_picture();
+        let mut fixture =
+            Fixture::with(2, |builder| builder.deferred(usual).process(mark).process(white).output("white"))?;
+        let (scene, _) = scene();
+        let recorded = fixture.renderer.record(scene.as_scene_ref());
+        Ok(recorded.err().ok_or("it is recorded")?.to_string())
+    };
+    let test = Stencil::test(Comparison::Equal, 3);
+    let no_stencil = problem(Mark::ALONE, White { target: "depth", stencil: test })?;
+    let read_only = problem(Mark::ALONE, White { target: "marked", stencil: Stencil::mark(1) })?;
+    for (found, part) in [(no_stencil, "has none"), (read_only, "declares only")] {
+        if !found.contains(part) || !found.contains("\"white\"") {
+            return Err(found.into());
+        }
+    }
+    Ok(())
+}
