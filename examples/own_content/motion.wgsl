@@ -1,9 +1,9 @@
-struct Before {
+struct PreviousCamera {
     clip_from_relative: mat4x4<f32>,
     camera_moved: vec4<f32>,
 }
 
-@group(2) @binding(0) var<uniform> before: Before;
+@group(2) @binding(0) var<uniform> previous: PreviousCamera;
 @group(3) @binding(0) var<storage, read> displacements: array<vec4<f32>>;
 
 struct Corner {
@@ -16,9 +16,9 @@ struct Corner {
 fn vertex(in: VertexInput) -> Corner {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, in.position);
-    let relative_then = relative + before.camera_moved.xyz - displacements[object.index].xyz;
+    let relative_then = relative + previous.camera_moved.xyz - displacements[object.index].xyz;
     let now = clip_position(relative);
-    let then = before.clip_from_relative * vec4<f32>(relative_then, 1.0);
+    let then = previous.clip_from_relative * vec4<f32>(relative_then, 1.0);
     return Corner(now, now.xyw, then.xyw);
 }
 

@@ -23,15 +23,15 @@ pub struct Motion {
 /// The camera of the frame before, as the shader reads it, and the camera of this frame.
 #[derive(Default)]
 struct Frame {
-    before: Before,
+    previous: PreviousCamera,
     camera: Option<Camera>,
 }
 
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct Before {
+struct PreviousCamera {
     clip_from_relative: Mat4,
-    /// From the camera before to this one.
+    /// From the previous camera to this one.
     camera_moved: [f32; 4],
 }
 
@@ -39,10 +39,10 @@ impl Motion {
     /// Takes note of the camera of the next frame.
     pub fn begin_frame(&self, camera: &Camera) {
         let mut frame = self.frame.lock();
-        let before = frame.camera.replace(camera.clone()).unwrap_or_else(|| camera.clone());
-        frame.before = Before {
-            clip_from_relative: RenderView::new(&before).clip_from_relative(),
-            camera_moved: (camera.position - before.position).as_vec3().extend(0.0).to_array(),
+        let previous = frame.camera.replace(camera.clone()).unwrap_or_else(|| camera.clone());
+        frame.previous = PreviousCamera {
+            clip_from_relative: RenderView::new(&previous).clip_from_relative(),
+            camera_moved: (camera.position - previous.position).as_vec3().extend(0.0).to_array(),
         };
     }
 }
@@ -62,7 +62,7 @@ impl RenderProcess for Motion {
     }
 
     fn draws(&self) -> Draws<'_> {
-        let parameters = bytemuck::bytes_of(&self.frame.lock().before).to_vec().into();
+        let parameters = bytemuck::bytes_of(&self.frame.lock().previous).to_vec().into();
         let (shader, selection) = (include_str!("motion.wgsl"), Selection::OPAQUE);
         Draws::Commands(CommandDraws { shader, selection, parameters, ..CommandDraws::default() })
     }

@@ -87,9 +87,9 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
-    /// A rectangle that cannot be read back: it is empty, not within its target, or a part of depth, which is read back as a whole.
+    /// A rectangle that cannot be read back.
     #[error(
-        "a rectangle of {}x{} pixels at {origin:?} cannot be read back of target {target:?} of view {view}, which has {}x{} pixels: it is empty, outside, or a part of depth",
+        "a rectangle of {}x{} pixels at {origin:?} cannot be read back from target {target:?} of view {view}, which has {}x{} pixels: {problem}",
         size[0], size[1], whole[0], whole[1]
     )]
     InvalidReadBack {
@@ -103,6 +103,8 @@ pub enum BackendError {
         size: [u32; 2],
         /// The target's width and height.
         whole: [u32; 2],
+        /// What is wrong.
+        problem: &'static str,
     },
     /// What is read back belongs to a frame that is not submitted, or was dropped.
     #[error("the frame whose pixels are read back was not submitted")]

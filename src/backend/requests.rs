@@ -23,7 +23,7 @@ pub struct FrameRequest<'a> {
     pub passes: &'a [Pass],
     /// The scene.
     pub scene: &'a SceneRef<'a>,
-    /// What all views need to know about the scene's objects. Of blocks that are uploaded it is complete.
+    /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
     /// The frame's accuracy.
     pub quality: &'a Quality,

@@ -229,8 +229,9 @@ impl Declare {
         self.before(end);
     }
 
-    /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute pass
-    /// of particles. Its targets are those of that view, so no other process of these views may use them.
+    /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute shader
+    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. Of shadow maps, the first
+    /// is the first that is drawn anew; in frames that keep all of them, the process does not draw.
     pub fn once_a_frame(&mut self) {
         self.declaration.once_a_frame = true;
     }
@@ -329,8 +330,8 @@ pub struct DeclaredAttribute {
     pub default: Vec<u8>,
 }
 
-/// The name of the copy by which a target's history is read. It is made at the end of a frame: until then it is what the target held
-/// in the frame before, and once the frame is submitted, what the target holds.
+/// The name of the copy that holds a target's history. The copy is made at the end of each frame: passes read what the target held in
+/// the frame before, and once the frame is submitted, the copy is that of the frame itself.
 pub fn previous_name(target: &str) -> String {
     format!("{target} of the frame before")
 }

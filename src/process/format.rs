@@ -13,9 +13,10 @@ pub enum Format {
     Rgba8Unorm,
     /// Four bytes; red, green and blue are sRGB encoded.
     Rgba8Srgb,
-    /// As [`Format::Rgba8Unorm`], with blue first, as the surfaces of many windows are.
+    /// As [`Format::Rgba8Unorm`], with blue first.
     Bgra8Unorm,
-    /// As [`Format::Rgba8Srgb`], with blue first.
+    /// As [`Format::Rgba8Srgb`], with blue first, as the surfaces of many windows are. It can be copied to a surface whose format is not
+    /// said to be sRGB too, whose bytes mean the same.
     Bgra8Srgb,
     /// Three channels of 10 bits and one of 2, linear, 0 to 1.
     Rgb10a2Unorm,

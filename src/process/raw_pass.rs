@@ -9,7 +9,8 @@ use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
-/// It is called on a worker, once per frame and view of its process's kind.
+/// It is called on a worker, once per frame and view of its process's kind, or
+/// [once a frame](super::Declare::once_a_frame).
 pub trait RawPass: Send + Sync {
     /// Encodes the pass.
     ///
@@ -35,7 +36,7 @@ pub struct RawPassResources<'a> {
     /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders: the view,
     /// all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
     pub bind_groups: [&'a wgpu::BindGroup; 2],
-    pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<&'a wgpu::Buffer>,
+    pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<wgpu::BufferBinding<'a>>,
     pub(crate) textures: &'a dyn Fn(&str) -> Option<&'a wgpu::Texture>,
     pub(crate) layered: &'a dyn Fn(ViewKind, &str) -> Option<&'a wgpu::Texture>,
 }
@@ -48,7 +49,7 @@ impl RawPassResources<'_> {
     }
 
     /// The values of a column of objects; `None` if the process does not declare that it [reads](super::Declare::reads_column) it.
-    pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Option<&wgpu::Buffer> {
+    pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Option<wgpu::BufferBinding<'_>> {
         (self.columns)(column.layout())
     }
 

@@ -6,7 +6,7 @@ use super::{Declare, Draws};
 
 /// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
-/// A process draws once in each view of its kind. All workers share it while a frame is recorded, so it keeps what
+/// A process draws once in each view of its kind, or [once a frame](Declare::once_a_frame). All workers share it while a frame is recorded, so it keeps what
 /// changes over frames behind a lock or in an atomic.
 ///
 /// ```

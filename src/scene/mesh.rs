@@ -107,8 +107,8 @@ impl Mesh {
     }
 
     /// The attributes of another mesh with the same vertices, followed by ones that were added halfway between two others.
-    pub(super) fn with_attributes_of(self, other: &Self, added_between: &[[u32; 2]]) -> Self {
-        let attributes = other.attributes.iter().map(|attribute| attribute.subdivided(added_between)).collect();
+    pub(super) fn with_attributes_of(self, other: &Self, midpoint_ends: &[[u32; 2]]) -> Self {
+        let attributes = other.attributes.iter().map(|attribute| attribute.subdivided(midpoint_ends)).collect();
         Self { attributes, ..self }
     }
 

@@ -41,7 +41,7 @@ impl Mesh {
         // `max` returns the other operand if one is NaN.
         let longest = f64::from(longest.max(0.0));
         let mut surface =
-            Surface { vertices: self.vertices().to_vec(), added_between: Vec::new(), triangles: Vec::new() };
+            Surface { vertices: self.vertices().to_vec(), midpoint_ends: Vec::new(), triangles: Vec::new() };
         self.triangles().for_each(|corners| surface.add(corners));
         loop {
             let splits = surface.count_splits(longest * longest);
@@ -57,7 +57,7 @@ impl Mesh {
         }
         let indices = surface.triangles.into_flattened();
         Self::from_valid_parts(self.name().to_owned(), Topology::TriangleList, surface.vertices, indices)
-            .with_attributes_of(self, &surface.added_between)
+            .with_attributes_of(self, &surface.midpoint_ends)
     }
 }
 
@@ -65,7 +65,7 @@ impl Mesh {
 struct Surface {
     vertices: Vec<Vertex>,
     /// For each vertex that was added, the two that it is halfway between.
-    added_between: Vec<[u32; 2]>,
+    midpoint_ends: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,
 }
 
@@ -86,7 +86,7 @@ impl Surface {
                 let [one, other] = edge;
                 Some(*midpoints.entry([one.min(other), one.max(other)]).or_insert_with(|| {
                     self.vertices.push(midpoint);
-                    self.added_between.push(edge);
+                    self.midpoint_ends.push(edge);
                     self.vertices.len() as u32 - 1
                 }))
             });

@@ -193,9 +193,9 @@ pub(super) struct MeshAttribute {
 
 impl MeshAttribute {
     /// The same with a value for each vertex that was added halfway between two others.
-    pub(super) fn subdivided(&self, added_between: &[[u32; 2]]) -> Self {
+    pub(super) fn subdivided(&self, midpoint_ends: &[[u32; 2]]) -> Self {
         let (mut bytes, stride) = (self.bytes.clone(), self.layout.format.bytes());
-        for ends in added_between {
+        for ends in midpoint_ends {
             let [one, other] = ends.map(|end| bytes[end as usize * stride..][..stride].to_vec());
             self.layout.format.append_midpoint(&one, &other, &mut bytes);
         }

@@ -184,17 +184,30 @@ fn a_process_that_draws_once_a_frame_draws_in_the_first_of_its_views() {
 
 #[test]
 fn targets_of_a_process_that_draws_once_a_frame_are_its_own() {
-    let once = Declaring::new("once", |declare| {
-        clears(declare, "shared");
-        declare.once_a_frame();
-    });
-    let reader = Declaring::new("reader", |declare| {
+    let once = || {
+        Declaring::new("once", |declare| {
+            clears(declare, "shared");
+            declare.once_a_frame();
+        })
+    };
+    let reads: [fn(&mut Declare); 2] =
+        [|declare| declare.samples("shared"), |declare| declare.samples_previous("shared")];
+    for reads in reads {
+        let reader = Declaring::new("reader", move |declare| {
+            reads(declare);
+            clears(declare, "picture");
+        });
+        let error = plan_error([once(), reader]);
+        let PlanError::OnceAFrame { process, other, target } = &error else { panic!("{error}") };
+        assert_eq!([process, other, target], ["once", "reader", "shared"]);
+    }
+    let second = Declaring::new("second", |declare| {
         declare.samples("shared");
         clears(declare, "picture");
+        declare.once_a_frame();
     });
-    let error = plan_error([once, reader]);
-    let PlanError::OnceAFrame { process, other, target } = &error else { panic!("{error}") };
-    assert_eq!([process, other, target], ["once", "reader", "shared"]);
+    let builder = Renderer::builder(NullBackend).process(once()).process(second);
+    assert!(builder.build(Arc::new(Scheduler::new(1).unwrap())).is_ok(), "both draw in the same view");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drawloom::Renderer;
-use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, SoftwareBackend, WgpuBackend};
+use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
@@ -19,8 +19,9 @@ use drawloom_testing::scenes::{cube, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, device, pixel};
+use crate::fixture::{Fixture, pixel};
 use crate::image_distance::assert_color;
+use crate::strategies::{device, strategies};
 
 pub const CASES: &[Case] = &[
     ("attributes_are_interpolated_and_meshes_without_them_have_the_default", interpolated),
@@ -149,7 +150,13 @@ fn changing_meshes() -> Result<(), Failed> {
     let mut scene = scene_of(vec![two_colored()?, square(Topology::TriangleList)])?;
     let material = scene.as_scene_ref().materials[0];
     for step in 0..10 {
-        let mesh = with_colors(if step % 2 == 0 { cube() } else { square(Topology::TriangleList) }, step as f32 * 0.1)?;
+        let mesh = match step {
+            // The arenas grow, and what they hold moves.
+            4 => cube().subdivided(0.02, 100_000),
+            _ if step % 2 == 0 => cube(),
+            _ => square(Topology::TriangleList),
+        };
+        let mesh = with_colors(mesh, step as f32 * 0.1)?;
         if step == 5 {
             let replaced = scene.as_scene_ref().meshes[0];
             scene.replace(replaced, mesh)?;
@@ -222,13 +229,8 @@ fn same_everywhere() -> Result<(), Failed> {
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let by_software = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "coloured")?;
     let mut first = None;
-    for (recording, encoding) in [
-        (RecordingStrategy::Direct, EncodingStrategy::PerPass),
-        (RecordingStrategy::Direct, EncodingStrategy::Split),
-        (RecordingStrategy::Bundles, EncodingStrategy::OnSubmit),
-        (RecordingStrategy::CachedBundles, EncodingStrategy::PerPass),
-    ] {
-        let (device, queue) = device().ok_or("there is no graphics adapter")?;
+    for (recording, encoding) in strategies()? {
+        let (device, queue) = device()?;
         let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
         let builder = Renderer::builder(backend).process(Colored).output("coloured");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;

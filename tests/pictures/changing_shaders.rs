@@ -76,7 +76,7 @@ fn changing_shader() -> Result<(), Failed> {
     let scene = many_batches();
     let step = Arc::new(AtomicU32::new(0));
     let fixture = |recording| {
-        // Whoever counts kept bundles has a device alone: see `fixture_alone`.
+        // Cases that count cached bundles use a device of their own: see `fixture_alone`.
         let is_counted = recording == RecordingStrategy::CachedBundles;
         let (device, queue) = if is_counted { adapter::device()? } else { device()? };
         let builder = Renderer::builder(

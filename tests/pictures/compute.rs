@@ -53,7 +53,7 @@ impl RawPass for Palette {
         let tints = resources.column(TINT).ok_or("no tints")?;
         let entries = [
             wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&palette) },
-            wgpu::BindGroupEntry { binding: 1, resource: tints.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(tints) },
             wgpu::BindGroupEntry { binding: 2, resource: factor.as_entire_binding() },
         ];
         let own = device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries });

@@ -1,5 +1,7 @@
 //! Parts of targets, read back without waiting.
 
+use std::time::{Duration, Instant};
+
 use drawloom::backend::BackendError;
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
@@ -81,9 +83,12 @@ fn picking() -> Result<(), Failed> {
         }
         fixture.submit(recorded)?;
         // As an engine does, which asks once a frame.
+        let deadline = Instant::now() + Duration::from_secs(20);
         let pixel = loop {
-            if let Some(pixel) = under_cursor.try_read()? {
-                break pixel;
+            match under_cursor.try_read()? {
+                Some(pixel) => break pixel,
+                None if Instant::now() > deadline => return Err("the pixel never came".into()),
+                None => std::thread::yield_now(),
             }
         };
         let found = u32::from_le_bytes(pixel.bytes[..4].try_into()?);

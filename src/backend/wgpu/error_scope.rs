@@ -36,6 +36,15 @@ pub(crate) fn catch_wgpu_panic<R>(label: &str, work: impl FnOnce() -> R) -> Resu
     catch(work).map_err(|panic| refused(label, panic.message))
 }
 
+/// Polls the device. wgpu panics if the device is lost.
+///
+/// # Errors
+/// If the device is lost, or is not done in time.
+pub(crate) fn poll(device: &wgpu::Device, poll: wgpu::PollType) -> Result<(), BackendError> {
+    let lost = |error: wgpu::PollError| BackendError::DeviceLost { message: error.to_string() };
+    catch_wgpu_panic("the device", || device.poll(poll).map(|_| ()))?.map_err(lost)
+}
+
 fn refused(label: &str, message: String) -> BackendError {
     // wgpu has no error type for a lost device, but all its messages about one contain these words.
     if message.contains("device is lost") {

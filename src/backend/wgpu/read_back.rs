@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::error_scope::with_error_scope;
+use super::error_scope::{poll, with_error_scope};
 use super::resources::{ViewTarget, WgpuTargets};
 use crate::backend::{BackendError, Picture};
 use crate::process::Format;
@@ -37,7 +37,7 @@ impl WgpuReadBack {
     /// # Errors
     /// If the frame was dropped, or the device is lost.
     pub fn try_read(&self) -> Result<Option<Picture>, BackendError> {
-        self.poll(wgpu::PollType::Poll)?;
+        poll(&self.device, wgpu::PollType::Poll)?;
         match &*self.state.lock() {
             State::Recorded if Arc::strong_count(&self.state) == 1 => Err(BackendError::NotSubmitted),
             State::Recorded | State::Submitted(_) => Ok(None),
@@ -51,19 +51,25 @@ impl WgpuReadBack {
     /// # Errors
     /// If the frame is not submitted, or the device is lost.
     pub fn read(&self) -> Result<Picture, BackendError> {
-        let index = match &*self.state.lock() {
+        let submitted = |state: &State| match state {
             State::Submitted(index) => Some(index.clone()),
             _ => None,
         };
-        let Some(index) = index else { return self.try_read()?.ok_or(BackendError::NotSubmitted) };
-        self.poll(wgpu::PollType::Wait { submission_index: Some(index), timeout: None })?;
+        let mut index = submitted(&self.state.lock());
+        if index.is_none() {
+            if let Some(picture) = self.try_read()? {
+                return Ok(picture);
+            }
+            // Another thread may have submitted it meanwhile.
+            index = submitted(&self.state.lock());
+        }
+        if index.is_none() && matches!(*self.state.lock(), State::Recorded) {
+            return Err(BackendError::NotSubmitted);
+        }
+        poll(&self.device, wgpu::PollType::Wait { submission_index: index, timeout: None })?;
         // The device is done with the frame, so it has mapped the buffer, or is lost.
         let lost = || BackendError::DeviceLost { message: "pixels that were read back never came".to_owned() };
         self.try_read()?.ok_or_else(lost)
-    }
-
-    fn poll(&self, poll: wgpu::PollType) -> Result<(), BackendError> {
-        self.device.poll(poll).map(|_| ()).map_err(|error| BackendError::DeviceLost { message: error.to_string() })
     }
 
     fn picture(&self) -> Result<Picture, BackendError> {
@@ -109,7 +115,8 @@ impl ReadBackCopy {
                 Err(error) => State::Failed(error.to_string()),
             };
         });
-        // Behind the request: whoever waits for the submission finds it mapped. Another thread may have polled already.
+        // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped. Another thread may
+        // have polled already.
         let mut state = state.lock();
         if matches!(*state, State::Recorded) {
             *state = State::Submitted(index.clone());
@@ -132,10 +139,19 @@ pub(crate) fn new_read_back(
     let found = targets.find(view, target).ok_or_else(unknown)?.clone();
     let (whole, format) = ([found.texture.width(), found.texture.height()], found.format());
     let is_within = |axis: usize| origin[axis].checked_add(size[axis]).is_some_and(|end| end <= whole[axis]);
-    let fits = !size.contains(&0) && (0..2).all(is_within);
-    // No device copies a part of a depth texture.
-    if !fits || (format.is_depth_stencil() && size != whole) || (format.has_depth() && format.has_stencil()) {
-        return Err(BackendError::InvalidReadBack { view, target: target.to_owned(), origin, size, whole });
+    let problem = if size.contains(&0) {
+        Some("it is empty")
+    } else if !(0..2).all(is_within) {
+        Some("it is not within the target")
+    } else if format.has_depth() && format.has_stencil() {
+        Some("depth with a stencil is not read back")
+    } else if format.is_depth_stencil() && size != whole {
+        Some("no device copies a part of depth or of a stencil")
+    } else {
+        None
+    };
+    if let Some(problem) = problem {
+        return Err(BackendError::InvalidReadBack { view, target: target.to_owned(), origin, size, whole, problem });
     }
     let descriptor = wgpu::BufferDescriptor {
         label: Some("read back"),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::error_scope::with_error_scope;
+use super::error_scope::{poll, with_error_scope};
 use super::read_back::new_read_back;
 use super::resources::WgpuTargets;
 use super::timing::{DevicePassTimes, TimestampReadback};
@@ -50,8 +50,7 @@ impl WgpuSubmission {
     /// # Errors
     /// If the device is lost.
     pub fn wait(&self) -> Result<(), BackendError> {
-        let poll = wgpu::PollType::Wait { submission_index: Some(self.index.clone()), timeout: None };
-        self.device.poll(poll).map(|_| ()).map_err(|error| BackendError::DeviceLost { message: error.to_string() })
+        poll(&self.device, wgpu::PollType::Wait { submission_index: Some(self.index.clone()), timeout: None })
     }
 
     /// Waits until the device has drawn the frame, and reads back a view's target.

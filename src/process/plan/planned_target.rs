@@ -180,14 +180,19 @@ fn attached_targets<'a>(
 }
 
 /// # Errors
-/// If another process of the same views uses a target of a process that draws in one of them only.
+/// If a process that draws in each view uses a target, or its history, of a process that draws in one of them only.
 fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
     for planned in processes.iter().filter(|planned| planned.declaration.once_a_frame) {
         for target in planned.declaration.written() {
-            let uses = |(name, access): &(String, Access)| name == target && !matches!(access, Access::SampleLayers(_));
-            let same_views = |other: &&PlannedProcess| other.declaration.views == planned.declaration.views;
-            let others = processes.iter().filter(|other| other.name != planned.name).filter(same_views);
-            if let Some(other) = others.into_iter().find(|other| other.declaration.accesses.iter().any(uses)) {
+            let history = previous_name(target);
+            let uses = |(name, access): &(String, Access)| {
+                (name == target || *name == history) && !matches!(access, Access::SampleLayers(_))
+            };
+            let draws_in_each = |other: &&PlannedProcess| {
+                other.declaration.views == planned.declaration.views && !other.declaration.once_a_frame
+            };
+            let mut others = processes.iter().filter(draws_in_each);
+            if let Some(other) = others.find(|other| other.declaration.accesses.iter().any(uses)) {
                 let (process, other) = (planned.name.clone(), other.name.clone());
                 return Err(PlanError::OnceAFrame { process, other, target: target.to_owned() });
             }

@@ -10,9 +10,10 @@ use super::object_buffers::ObjectBuffers;
 use super::pass_state::WgpuPassState;
 use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;
+use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
     ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
-    check_storage_binding_size, poll, size_with_headroom,
+    check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
@@ -76,7 +77,8 @@ impl BufferPool {
     /// If the device is lost.
     pub(crate) fn take(self: &Arc<Self>, device: &wgpu::Device) -> Result<FrameBuffers, BackendError> {
         if self.maps_memory {
-            poll(device)?;
+            // Runs callbacks, which may be the engine's own, so no lock is held meanwhile.
+            poll(device, wgpu::PollType::Poll)?;
         }
         let (mut buffers, generation) = self.take_free();
         buffers.objects.map(device)?;

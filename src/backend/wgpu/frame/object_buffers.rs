@@ -168,9 +168,9 @@ impl Changed<'_> {
         }
         // One write for each run of objects, because each write has a fixed cost.
         objects.for_each_change(blocks.clone(), held_epoch, MIN_UNCHANGED, |run| {
-            let most = (MAX_STAGED_BYTES / stride).max(1);
-            for start in run.clone().step_by(most) {
-                let run = start..run.end.min(start + most);
+            let objects_per_write = (MAX_STAGED_BYTES / stride).max(1);
+            for start in run.clone().step_by(objects_per_write) {
+                let run = start..run.end.min(start + objects_per_write);
                 let size = NonZeroU64::new((run.len() * stride) as u64);
                 let Some((buffer, size)) = buffer.on_device().buffer().zip(size) else { continue };
                 let offset = (run.start * stride) as u64;

@@ -32,21 +32,32 @@ fn located(process: &str, before: &str, own: &[&str], module: &wgpu::ShaderModul
     // The future is ready at once on every native backend.
     let messages = pollster::block_on(module.get_compilation_info()).messages;
     let (message, location) = messages.into_iter().find_map(|message| Some((message.message, message.location?)))?;
-    let mut at = (location.offset as usize).checked_sub(before.len() + 1)?;
-    let own = own.iter().find(|own| match at.checked_sub(own.len() + 1) {
+    let mut offset = (location.offset as usize).checked_sub(before.len() + 1)?;
+    let own = own.iter().find(|own| match offset.checked_sub(own.len() + 1) {
         None => true,
-        Some(later) => {
-            at = later;
+        Some(in_later) => {
+            offset = in_later;
             false
         }
     })?;
-    let (line, column, text) = place_in(own, at)?;
-    Some(BackendError::Shader { process: process.to_owned(), line, column, message, text: text.to_owned() })
+    let (line, column, text) = line_and_column(own, offset)?;
+    let (process, message, text) = (process.to_owned(), without_excerpts(&message), text.to_owned());
+    Some(BackendError::Shader { process, line, column, message, text })
+}
+
+/// What a diagnostic of wgpu says, without its excerpts, whose lines are counted from the beginning of the prelude: its first line, and
+/// the notes on the cause.
+fn without_excerpts(diagnostic: &str) -> String {
+    let mut lines = diagnostic.lines().map(str::trim).filter(|line| !line.is_empty());
+    let first = lines.next().unwrap_or_default();
+    let first = first.split_once("error: ").map_or(first, |(_, what)| what);
+    let notes = lines.filter_map(|line| line.strip_prefix("= ")).map(|note| format!("; {note}"));
+    [first.to_owned()].into_iter().chain(notes).collect()
 }
 
 /// The line and the column of a byte, both from 1, and the line's text; `None` past the end.
-fn place_in(text: &str, at: usize) -> Option<(usize, usize, &str)> {
-    let before = text.get(..at)?;
+fn line_and_column(text: &str, offset: usize) -> Option<(usize, usize, &str)> {
+    let before = text.get(..offset)?;
     let line = before.matches('\n').count();
     let column = before.rsplit('\n').next()?.chars().count();
     Some((line + 1, column + 1, text.lines().nth(line).unwrap_or_default().trim_end()))
@@ -60,13 +71,13 @@ mod tests {
     #[test]
     fn bytes_have_lines_and_columns() {
         let text = "ab\nçd\n\nx";
-        assert_eq!(place_in(text, 0), Some((1, 1, "ab")));
-        assert_eq!(place_in(text, 2), Some((1, 3, "ab")));
-        assert_eq!(place_in(text, 5), Some((2, 2, "çd")));
-        assert_eq!(place_in(text, 7), Some((3, 1, "")));
-        assert_eq!(place_in(text, 8), Some((4, 1, "x")));
-        assert_eq!(place_in(text, 4), None, "amid a character");
-        assert_eq!(place_in(text, 99), None);
+        assert_eq!(line_and_column(text, 0), Some((1, 1, "ab")));
+        assert_eq!(line_and_column(text, 2), Some((1, 3, "ab")));
+        assert_eq!(line_and_column(text, 5), Some((2, 2, "çd")));
+        assert_eq!(line_and_column(text, 7), Some((3, 1, "")));
+        assert_eq!(line_and_column(text, 8), Some((4, 1, "x")));
+        assert_eq!(line_and_column(text, 4), None, "amid a character");
+        assert_eq!(line_and_column(text, 99), None);
     }
 
     #[test]
@@ -80,11 +91,16 @@ mod tests {
             (process.as_str(), *line, *column, text.as_str()),
             ("wrong", 3, 22, "    return vec4<f32>(unknown);")
         );
-        assert!(error.to_string().contains("unknown"), "{error}");
+        let message = error.to_string();
+        assert!(message.contains("`unknown`") && !message.contains("wgsl:"), "{error}");
+        let invalid = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return 1u;\n}\n";
+        let invalid = compile_shader(&device, "invalid", before, &[invalid]).unwrap_err();
+        let is_told = matches!(&invalid, BackendError::Shader { message, .. } if !message.contains("wgsl:"));
+        assert!(is_told && invalid.to_string().contains("return"), "{invalid}");
         let syntax = compile_shader(&device, "wrong", before, &["\nfn fragment( {", own]).unwrap_err();
         assert!(matches!(syntax, BackendError::Shader { line: 2, .. }), "{syntax}");
         let twice = compile_shader(&device, "twice", before, &["const A: u32 = 2u;"]).unwrap_err();
-        assert!(twice.to_string().contains("twice"), "{twice}");
+        assert!(matches!(&twice, BackendError::Shader { line: 1, .. }), "{twice}");
         assert!(compile_shader(&device, "right", before, &["", "const B: u32 = A;"]).is_ok());
     }
 }

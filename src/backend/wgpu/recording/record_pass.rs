@@ -139,7 +139,6 @@ pub(crate) fn encode_raw(
     let size = request.views[pass.view_index].camera.size;
     let declared = &request.plan.processes()[pass.process_index].declaration.columns;
     let columns = |column| frame.buffers.objects().column(column).filter(|_| declared.contains(&column));
-    let columns = |column| columns(column).map(|binding| binding.buffer);
     let of_frame = frame.pass(index).frame_bind_group.as_ref();
     let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
     let resources = RawPassResources {

@@ -258,13 +258,6 @@ impl AssetCache {
             entries: &entries,
         });
 
-        // Bundles bind the arenas even if the scene has no mesh.
-        for arena in [&mut self.vertices, &mut self.indices] {
-            if arena.buffer().is_none() {
-                arena.reallocate(device, 0)?;
-                self.attributes.reallocate(device, 0)?;
-            }
-        }
         let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
             return Err(BackendError::BrokenRule { rule: "arenas have buffers".to_owned() });
         };

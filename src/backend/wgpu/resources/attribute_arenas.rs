@@ -1,4 +1,4 @@
-//! The attributes of an engine's own that meshes have on the device.
+//! Vertex attributes on the device: a buffer for each attribute that processes read.
 
 use super::arena::{filled_buffer, new_buffer};
 use super::upload_queue::UploadQueue;

@@ -29,7 +29,7 @@ pub(crate) use growing_buffer::{
 };
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use mirrored_buffer::MirroredBuffer;
-pub(crate) use object_buffer::{ObjectBuffer, poll, shares_memory};
+pub(crate) use object_buffer::{ObjectBuffer, shares_memory};
 pub(crate) use storage_buffers::StorageBuffers;
 pub(crate) use subdivided_mesh::SubdividedMesh;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};

@@ -7,7 +7,7 @@ use parking_lot::Mutex;
 
 use super::growing_buffer::GrowingBuffer;
 use crate::backend::BackendError;
-use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
+use crate::backend::wgpu::error_scope::{poll, with_error_scope};
 
 /// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write straight into it while it is mapped, so
 /// nothing is staged, and nothing copied when the frame is submitted.
@@ -87,7 +87,7 @@ impl ObjectBuffer {
             (usage.is_mapped, usage.is_refused) = (result.is_ok(), result.is_err());
         };
         with_error_scope(device, self.label, || buffer.map_async(wgpu::MapMode::Write, .., mapped))?;
-        poll(device)?;
+        poll(device, wgpu::PollType::Poll)?;
         let maps_memory = !usage.lock().is_refused;
         if !self.is_mapped() {
             // A new buffer, without the request. It is pending if a frame was dropped whose staged writes the device still executes.
@@ -135,15 +135,6 @@ impl ObjectBuffer {
     }
 }
 
-/// Runs the callbacks of all that the device has done. These may be the engine's own, so no lock is held meanwhile.
-///
-/// # Errors
-/// If the device is lost.
-pub(crate) fn poll(device: &wgpu::Device) -> Result<(), BackendError> {
-    // Without a wait there is no timeout, and whether all submissions are done is not of interest.
-    catch_wgpu_panic("the device", || device.poll(wgpu::PollType::Poll)).map(|_| ())
-}
-
 /// Whether a device reads the CPU's own memory as fast as any other. Devices with memory of their own read the CPU's through a bus.
 pub(crate) fn shares_memory(adapter: &wgpu::AdapterInfo) -> bool {
     use wgpu::{Backend, DeviceType};
@@ -178,7 +169,7 @@ mod tests {
                 assert!(!buffer.is_ready());
                 buffer.map(&device).unwrap();
                 assert!(!can_write(&buffer, 0..64), "nobody has polled");
-                poll(&device).unwrap();
+                poll(&device, wgpu::PollType::Poll).unwrap();
                 assert!(buffer.is_ready());
                 buffer.map(&device).unwrap();
                 let views = [0..64, 64..bytes].map(|bytes| buffer.mapped(bytes).unwrap());
@@ -195,15 +186,15 @@ mod tests {
         buffer.reserve(&device, 64).unwrap();
         submit(&buffer, &queue);
         buffer.unmap();
-        poll(&device).unwrap();
+        poll(&device, wgpu::PollType::Poll).unwrap();
         assert!(!buffer.is_ready());
         queue.submit([]);
         buffer.await_submission(&queue);
-        poll(&device).unwrap();
+        poll(&device, wgpu::PollType::Poll).unwrap();
         assert!(buffer.is_ready());
         submit(&buffer, &queue);
         buffer.reserve(&device, 1 << 20).unwrap();
-        poll(&device).unwrap();
+        poll(&device, wgpu::PollType::Poll).unwrap();
         assert!(!buffer.is_ready(), "the submission read another buffer");
     }
 

@@ -7,7 +7,7 @@ use super::queries::{new_query_set, timestamp_bytes};
 use super::readback::{ReadbackPool, read_timestamps};
 use super::timestamps::DeviceTiming;
 use crate::backend::BackendError;
-use crate::backend::wgpu::error_scope::with_error_scope;
+use crate::backend::wgpu::error_scope::{poll, with_error_scope};
 use crate::backend::wgpu::resources::GrowingBuffer;
 use crate::timeline::{DeviceLog, DevicePass, Timeline};
 
@@ -207,8 +207,7 @@ impl<'a> ClockProbe<'a> {
         })?;
         let before = timeline.now();
         let index = with_error_scope(device, "the device's clock", || queue.submit([commands]))?;
-        let poll = wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
-        device.poll(poll).map_err(|error| BackendError::DeviceLost { message: error.to_string() })?;
+        poll(device, wgpu::PollType::Wait { submission_index: Some(index), timeout: None })?;
         let after = timeline.now();
         let ended = read_timestamps(device, mappable, 1)?.first().map_or(0, |[_, ended]| *ended);
         Ok((before, after, ended))

@@ -10,7 +10,7 @@ use super::device_pass_times::{DevicePassTime, DevicePassTimes};
 use super::queries::{PassName, timestamp_bytes};
 use super::tick_period::TickPeriod;
 use crate::backend::BackendError;
-use crate::backend::wgpu::error_scope::with_error_scope;
+use crate::backend::wgpu::error_scope::{poll, with_error_scope};
 use crate::backend::wgpu::resources::GrowingBuffer;
 
 /// A frame's timestamps in flight to the CPU.
@@ -108,7 +108,7 @@ pub(crate) fn read_timestamps(
         });
     })?;
     // The copy is finished, so polling suffices; waiting would also wait for later submissions.
-    device.poll(wgpu::PollType::Poll).map_err(|error| lost(error.to_string()))?;
+    poll(device, wgpu::PollType::Poll)?;
     let result = receiver.recv().map_err(|error| lost(error.to_string()))?;
     result.map_err(|error| lost(error.to_string()))?;
     let stamps = {
