@@ -1,6 +1,7 @@
 //! Resources of the engine's own that shaders read.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Something of the engine's own that a process's shader reads, at `@group(3)`: after the
 /// [columns](super::Declare::reads_column) that the process reads, each has the next binding.
@@ -18,6 +19,8 @@ pub enum ShaderResource<'a> {
     /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is recorded, and
     /// uploaded if they changed. There are 4 or more, in multiples of 4.
     Bytes(Cow<'a, [u8]>),
+    /// The same for several processes: uploaded once for all that have this `Arc`.
+    SharedBytes(Arc<[u8]>),
     /// A buffer with the usage `STORAGE`: `var<storage, read>`.
     #[cfg(feature = "wgpu")]
     Buffer(wgpu::Buffer),
@@ -43,5 +46,15 @@ impl<'a> ShaderResource<'a> {
     /// The bytes of a slice, which the frame copies.
     pub fn bytes_of<T: bytemuck::NoUninit>(values: &'a [T]) -> Self {
         Self::Bytes(Cow::Borrowed(bytemuck::cast_slice(values)))
+    }
+
+    /// The bytes that the CPU writes; `None` for resources of the device.
+    pub(crate) fn bytes(&self) -> Option<&[u8]> {
+        match self {
+            Self::Bytes(bytes) => Some(bytes),
+            Self::SharedBytes(bytes) => Some(bytes),
+            #[cfg(feature = "wgpu")]
+            _ => None,
+        }
     }
 }

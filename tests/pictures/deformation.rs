@@ -40,11 +40,17 @@ const ASIDE: f32 = 0.25;
 struct Push {
     name: &'static str,
     layers: LayerMask,
-    aside: f32,
+    aside: Arc<[u8]>,
 }
 
 impl Push {
-    const USUAL: Self = Self { name: "push", layers: PUSHED, aside: ASIDE };
+    fn new(name: &'static str, layers: LayerMask, aside: f32) -> Self {
+        Self { name, layers, aside: aside.to_ne_bytes().into() }
+    }
+
+    fn usual() -> Self {
+        Self::new("push", PUSHED, ASIDE)
+    }
 }
 
 impl Deformation for Push {
@@ -77,7 +83,7 @@ impl Deformation for Push {
     }
 
     fn resources(&self) -> Vec<ShaderResource<'_>> {
-        vec![ShaderResource::bytes_of(std::slice::from_ref(&self.aside))]
+        vec![ShaderResource::SharedBytes(Arc::clone(&self.aside))]
     }
 
     fn cpu_shader(&self, process: CpuShader) -> Option<CpuShader> {
@@ -179,7 +185,7 @@ fn shape() -> Result<(), Failed> {
         if expected == picture_of(pipeline.clone(), &scene, &layers, &pushes())? {
             return Err("the deformation changes nothing".into());
         }
-        let found = picture_of(pipeline.deformation(Push::USUAL), &scene, &layers, &pushes())?;
+        let found = picture_of(pipeline.deformation(Push::usual()), &scene, &layers, &pushes())?;
         if found != expected {
             let differing = found.bytes.iter().zip(&expected.bytes).filter(|(one, other)| one != other).count();
             return Err(format!("{differing} bytes differ").into());
@@ -192,9 +198,9 @@ fn first_deformation() -> Result<(), Failed> {
     let (scene, mut layers) = scene(false)?;
     layers[1] = PUSHED | OTHER;
     let pushes: Vec<_> = PUSHES.into_iter().chain([0.0, 0.0]).collect();
-    let once = picture_of(Deferred::to_picture().deformation(Push::USUAL), &scene, &layers, &pushes)?;
-    let second = Push { name: "second", layers: OTHER | PUSHED, aside: 7.0 };
-    let both = Deferred::to_picture().deformation(Push::USUAL).deformation(second);
+    let once = picture_of(Deferred::to_picture().deformation(Push::usual()), &scene, &layers, &pushes)?;
+    let second = Push::new("second", OTHER | PUSHED, 7.0);
+    let both = Deferred::to_picture().deformation(Push::usual()).deformation(second);
     if picture_of(both, &scene, &layers, &pushes)? != once {
         return Err("the second deformation draws objects of the first".into());
     }
@@ -214,7 +220,7 @@ fn on_software() -> Result<(), Failed> {
         Ok(submitter.submit(renderer.record(scene)?)?.submission.read(0, "picture")?)
     };
     let expected = draw(Deferred::to_picture(), &moved)?;
-    if draw(Deferred::to_picture().deformation(Push::USUAL), &scene)? == expected {
+    if draw(Deferred::to_picture().deformation(Push::usual()), &scene)? == expected {
         Ok(())
     } else {
         Err("the software backend draws another shape".into())

@@ -40,7 +40,7 @@ pub(super) fn update_bind_groups(
     let draws = &request.draws[process];
     let mut bytes = resources.bytes.of_process(process);
     let own = draws.resources().iter().filter_map(move |resource| match resource {
-        ShaderResource::Bytes(_) => bytes.next().map(BindingResource::Buffer),
+        ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) => bytes.next().map(BindingResource::Buffer),
         ShaderResource::Buffer(buffer) => Some(BindingResource::Buffer(buffer.as_entire_buffer_binding())),
         ShaderResource::Texture { view, .. } => Some(BindingResource::Texture(view)),
         ShaderResource::Sampler { sampler, .. } => Some(BindingResource::Sampler(sampler)),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
-use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess, ShaderResource};
+use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
 use crate::task::{JobPanic, catch};
 
 /// A process and what it declared.
@@ -61,7 +61,8 @@ impl PlannedProcess {
         if let Some(problem) = draws.arguments().and_then(|arguments| self.problem_of_arguments(arguments)) {
             return Err(ProcessError::Arguments { process: process(), problem });
         }
-        for (resource, bytes) in draws.resources().iter().enumerate().filter_map(bytes_of) {
+        for (resource, own) in draws.resources().iter().enumerate() {
+            let Some(bytes) = own.bytes().map(<[u8]>::len) else { continue };
             if bytes == 0 || !bytes.is_multiple_of(4) {
                 return Err(ProcessError::ResourceSize { process: process(), resource, bytes });
             }
@@ -80,14 +81,5 @@ impl PlannedProcess {
         } else {
             None
         }
-    }
-}
-
-/// The index and the size of a resource of bytes.
-fn bytes_of((index, resource): (usize, &ShaderResource<'_>)) -> Option<(usize, usize)> {
-    match resource {
-        ShaderResource::Bytes(bytes) => Some((index, bytes.len())),
-        #[cfg(feature = "wgpu")]
-        _ => None,
     }
 }

@@ -4,19 +4,22 @@ use std::ops::Range;
 
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{MirroredBuffer, UploadQueue, check_storage_binding_size};
-use crate::process::{Draws, ShaderResource};
+use crate::process::Draws;
 
-/// The buffers of [`ShaderResource::Bytes`], which all views of a process share.
+/// The buffers of [`ShaderResource::Bytes`](crate::process::ShaderResource::Bytes) and
+/// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), which all views of a process share.
 #[derive(Default)]
 pub(crate) struct ResourceBytes {
     /// Each with the number of its bytes.
     buffers: Vec<(MirroredBuffer, usize)>,
-    /// Those of each process.
+    /// The index of the buffer of each such resource of each process.
+    bound: Vec<usize>,
+    /// The part of `bound` of each process.
     of_processes: Vec<Range<usize>>,
 }
 
 impl ResourceBytes {
-    /// Uploads the bytes that changed.
+    /// Uploads the bytes that changed; those at the same place in the CPU's memory once.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
@@ -26,31 +29,37 @@ impl ResourceBytes {
         uploads: &UploadQueue,
         draws: &[Draws<'_>],
     ) -> Result<(), BackendError> {
+        self.bound.clear();
         self.of_processes.clear();
-        let mut count = 0;
+        let mut uploaded: Vec<&[u8]> = Vec::new();
         for draws in draws {
-            let first = count;
-            for resource in draws.resources() {
-                let ShaderResource::Bytes(bytes) = resource else { continue };
+            let first = self.bound.len();
+            for bytes in draws.resources().iter().filter_map(|resource| resource.bytes()) {
+                // All draws of the frame are alive, so bytes at the same place are the same.
+                let index = uploaded.iter().position(|other| std::ptr::eq(*other, bytes)).unwrap_or(uploaded.len());
+                self.bound.push(index);
+                if index < uploaded.len() {
+                    continue;
+                }
+                uploaded.push(bytes);
                 check_storage_binding_size(device, bytes.len())?;
-                if count == self.buffers.len() {
+                if index == self.buffers.len() {
                     self.buffers.push((MirroredBuffer::new("engine's bytes", wgpu::BufferUsages::STORAGE), 0));
                 }
-                let (buffer, length) = &mut self.buffers[count];
+                let (buffer, length) = &mut self.buffers[index];
                 buffer.set(device, uploads, bytes)?;
                 *length = bytes.len();
-                count += 1;
             }
-            self.of_processes.push(first..count);
+            self.of_processes.push(first..self.bound.len());
         }
-        self.buffers.truncate(count);
+        self.buffers.truncate(uploaded.len());
         Ok(())
     }
 
     /// The buffers of a process, by index, in the order of its resources.
     pub(crate) fn of_process(&self, process: usize) -> impl Iterator<Item = wgpu::BufferBinding<'_>> + Clone {
-        let buffers = &self.buffers[self.of_processes[process].clone()];
-        buffers.iter().filter_map(|(buffer, length)| buffer.on_device.binding(0, *length))
+        let buffers = self.bound[self.of_processes[process].clone()].iter().map(|index| &self.buffers[*index]);
+        buffers.filter_map(|(buffer, length)| buffer.on_device.binding(0, *length))
     }
 
     /// Their size in bytes.

@@ -114,7 +114,7 @@ fn stages(is_compute: bool) -> [ShaderStages; 2] {
 /// What the layout of a bind group says about a resource.
 pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderResource<'_>) -> wgpu::BindingType {
     match resource {
-        ShaderResource::Bytes(_) | ShaderResource::Buffer(_) => storage(false),
+        ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) | ShaderResource::Buffer(_) => storage(false),
         ShaderResource::Texture { view, dimension } => {
             let texture = view.texture();
             // A depth-stencil texture is sampled as depth.
