@@ -67,3 +67,32 @@ impl ResourceBytes {
         self.buffers.iter().map(|(buffer, _)| buffer.on_device.size()).sum()
     }
 }
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::process::{FullScreen, ShaderResource};
+
+    #[test]
+    fn the_same_bytes_have_one_buffer_and_equal_bytes_have_two() {
+        let (device, queue) = noop_device();
+        let uploads = UploadQueue::new(queue);
+        let shared: Arc<[u8]> = vec![1; 64].into();
+        let own = || ShaderResource::Bytes(vec![1; 64].into());
+        let draws = |resources| Draws::FullScreen(FullScreen { resources, ..FullScreen::default() });
+        let same = || ShaderResource::SharedBytes(Arc::clone(&shared));
+        let draws = [draws(vec![own(), same()]), draws(Vec::new()), draws(vec![same(), own(), same()])];
+        let mut bytes = ResourceBytes::default();
+        bytes.update(&device, &uploads, &draws).unwrap();
+        assert_eq!(bytes.buffers.len(), 3);
+        let of_process =
+            |process| bytes.of_process(process).map(|binding| binding.buffer.clone()).collect::<Vec<_>>();
+        let [first, second, third] = [0, 1, 2].map(of_process);
+        assert_eq!([first.len(), second.len(), third.len()], [2, 0, 3]);
+        assert!(first[1] == third[0] && third[0] == third[2], "the same bytes");
+        assert!(first[0] != third[1] && first[0] != first[1], "equal bytes at other places");
+    }
+}
