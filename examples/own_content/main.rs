@@ -1,4 +1,5 @@
-//! What an engine brings of its own: data of objects and vertices, a material, post-processing with histories and smaller targets, and picking.
+//! What an engine brings of its own: data of objects and vertices, a material, vertex code, buffers and compute shaders,
+//! post-processing with histories and smaller targets, and picking.
 //!
 //!     cargo run --release --example own_content -- --out pictures
 //!
@@ -7,13 +8,18 @@
 //! - `tints.png`: a colour of the engine's own for each object (`tints.rs`), beside a material of its own on vertices of its own
 //!   (`metal.rs`);
 //! - `bloom.png`: the same with a glow around bright objects, at a half and a quarter of the picture's size (`bloom.rs`);
-//! - `smooth.png`: the same after frames of temporal anti-aliasing, while camera and objects move (`temporal.rs`).
+//! - `particles.png`: a fountain that a compute shader moves, drawn by an indirect draw (`particles.rs`), with the glow;
+//! - `smooth.png`: the objects after frames of temporal anti-aliasing, while camera and objects move (`temporal.rs`);
+//! - `characters.png`: characters with a morph target and joints (`characters.rs`), one of them outlined (`outline.rs`).
 //!
 //! And it prints which object is in the middle of the picture (`picking.rs`). All of it uses the public interfaces only.
 
 mod bloom;
+mod characters;
 mod device;
 mod metal;
+mod outline;
+mod particles;
 mod picking;
 mod temporal;
 mod tints;
@@ -31,7 +37,9 @@ use drawloom::{Renderer, Submitter};
 use indicatif::ProgressBar;
 
 use crate::bloom::{BloomDown, BloomUp};
+use crate::characters::{Characters, Crowd};
 use crate::metal::Metal;
+use crate::outline::{Outline, Selected};
 use crate::picking::ObjectIndex;
 use crate::temporal::{Motion, TemporalFilter};
 use crate::tints::TintedGeometryBuffer;
@@ -45,8 +53,8 @@ struct Arguments {
     /// The number of objects.
     #[arg(long, default_value_t = 20_000)]
     objects: usize,
-    /// The number of frames that the temporal filter sees.
-    #[arg(long, default_value_t = 16)]
+    /// The number of frames that the particles live for, and that the temporal filter sees.
+    #[arg(long, default_value_t = 48)]
     frames: usize,
 }
 
@@ -54,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     std::fs::create_dir_all(&arguments.out)?;
     let engine = Engine::new()?;
-    let progress = ProgressBar::new(arguments.frames as u64 + 2);
+    let progress = ProgressBar::new((2 * arguments.frames + 3) as u64);
 
     let tinted = Deferred::new().replace("geometry buffer", TintedGeometryBuffer::default());
     let mut world = World::new(arguments.objects)?;
@@ -67,6 +75,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (mut renderer, submitter) = engine.renderer(tinted.clone().post(ToneMapping::new(1.0)), true)?;
     save(&arguments.out.join("bloom.png"), &draw(&mut renderer, &submitter, &world)?.0)?;
     progress.inc(1);
+
+    let fountain = engine.builder(tinted.clone().post(ToneMapping::new(1.0)), true)?;
+    let fountain = fountain.process(particles::Begin).process(particles::Move::default()).process(particles::Draw);
+    let (mut renderer, submitter) = fountain.build(Arc::clone(&engine.scheduler))?;
+    let mut picture = None;
+    for _ in 0..arguments.frames {
+        picture = Some(draw(&mut renderer, &submitter, &world)?.0);
+        progress.inc(1);
+    }
+    if let Some(picture) = picture {
+        save(&arguments.out.join("particles.png"), &picture)?;
+    }
 
     let motion = Arc::new(Motion::default());
     let filter = |source: &str, target: &str| TemporalFilter::new(source, target);
@@ -83,9 +103,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(picture) = picture {
         save(&arguments.out.join("smooth.png"), &picture)?;
     }
+    save(&arguments.out.join("characters.png"), &engine.characters()?)?;
     progress.finish_and_clear();
     println!("{} objects; in the middle of the first picture is {}", arguments.objects, picking::describe(object));
-    println!("tints.png, bloom.png and smooth.png written to {}", arguments.out.display());
+    println!("the pictures are written to {}", arguments.out.display());
     Ok(())
 }
 
@@ -115,6 +136,20 @@ impl Engine {
             builder = builder.process(BloomDown::HALF).process(BloomDown::QUARTER).process(BloomUp);
         }
         Ok(builder)
+    }
+
+    /// The picture of a crowd.
+    fn characters(&self) -> Result<Picture, Box<dyn Error>> {
+        let characters = Arc::new(Characters::default());
+        let mut crowd = Crowd::new(Arc::clone(&characters))?;
+        crowd.walk_to(2.0);
+        let deferred = Deferred::to_picture().post(Fxaa::default()).deformation(Arc::clone(&characters));
+        let backend = WgpuBackend::new(self.device.clone(), self.queue.clone())?;
+        let builder = Renderer::builder(backend).deferred(deferred);
+        let builder = builder.process(Selected(Arc::clone(&characters))).process(Outline(characters));
+        let (mut renderer, submitter) = builder.build(Arc::clone(&self.scheduler))?;
+        let recorded = renderer.record(crowd.as_scene_ref(&crowd.columns()))?;
+        Ok(submitter.submit(recorded)?.submission.read(0, "picture")?)
     }
 
     fn renderer(

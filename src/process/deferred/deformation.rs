@@ -77,6 +77,34 @@ pub trait Deformation: Send + Sync {
     }
 }
 
+/// A deformation that an engine keeps a handle to, in order to change what it does.
+impl<D: Deformation + ?Sized> Deformation for Arc<D> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn layers(&self) -> LayerMask {
+        (**self).layers()
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (**self).declare(declare);
+    }
+
+    fn shader(&self) -> &str {
+        (**self).shader()
+    }
+
+    fn resources(&self) -> Vec<ShaderResource<'_>> {
+        (**self).resources()
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self, process: crate::process::CpuShader) -> Option<crate::process::CpuShader> {
+        (**self).cpu_shader(process)
+    }
+}
+
 /// Splits what each of these processes draws: processes of the same names for the objects that are not deformed, then one for each
 /// process and deformation.
 pub(super) fn split_by_deformation(

@@ -2,7 +2,8 @@
 //
 //   @group(0)  the frame and the view: below
 //   @group(1)  materials and their textures: below
-//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order
+//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order, then
+//              the buffers that it reads or changes
 //   @group(3)  the engine's own: the columns of objects that the process reads, then its resources, from binding 0
 //
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.

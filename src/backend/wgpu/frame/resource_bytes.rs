@@ -88,8 +88,7 @@ mod tests {
         let mut bytes = ResourceBytes::default();
         bytes.update(&device, &uploads, &draws).unwrap();
         assert_eq!(bytes.buffers.len(), 3);
-        let of_process =
-            |process| bytes.of_process(process).map(|binding| binding.buffer.clone()).collect::<Vec<_>>();
+        let of_process = |process| bytes.of_process(process).map(|binding| binding.buffer.clone()).collect::<Vec<_>>();
         let [first, second, third] = [0, 1, 2].map(of_process);
         assert_eq!([first.len(), second.len(), third.len()], [2, 0, 3]);
         assert!(first[1] == third[0] && third[0] == third[2], "the same bytes");

@@ -1,0 +1,34 @@
+struct Particle {
+    position: vec3<f32>,
+    age: f32,
+    velocity: vec3<f32>,
+    end: f32,
+}
+
+@group(2) @binding(1) var<storage, read> particles: array<Particle>;
+@group(2) @binding(2) var<storage, read> alive: array<u32>;
+
+struct Corner {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) across: vec2<f32>,
+    @location(1) color: vec3<f32>,
+}
+
+const RADIUS: f32 = 0.05;
+
+@vertex
+fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
+    let particle = particles[alive[instance]];
+    let corner = vec2<f32>(f32((0x32u >> vertex) & 1u), f32((0x2cu >> vertex) & 1u)) * 2.0 - 1.0;
+    let camera = metres_from_origin(view.position_low, view.position_high);
+    let offset = (normalize(view.right.xyz) * corner.x + normalize(view.up.xyz) * corner.y) * RADIUS;
+    let left = 1.0 - particle.age / particle.end;
+    let color = mix(vec3<f32>(0.9, 0.2, 0.02), vec3<f32>(0.5, 0.7, 1.0), left) * left;
+    return Corner(clip_position(particle.position - camera + offset), corner, color);
+}
+
+@fragment
+fn fragment(in: Corner) -> @location(0) vec4<f32> {
+    let fade = max(1.0 - dot(in.across, in.across), 0.0);
+    return vec4<f32>(in.color * fade * fade, 0.0);
+}
