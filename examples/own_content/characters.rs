@@ -177,11 +177,12 @@ pub struct Crowd {
 }
 
 impl Crowd {
-    pub fn new(characters: Arc<Characters>) -> Result<Self, SceneError> {
+    pub fn new(characters: Arc<Characters>, size: [u32; 2]) -> Result<Self, SceneError> {
         const COLUMNS: usize = 9;
         const ROWS: usize = 6;
         let mut scene = Scene::new();
-        scene.cameras = vec![Camera::looking_at("main", DVec3::new(0.0, 4.2, 10.5), DVec3::new(0.0, 0.7, 0.0))];
+        let camera = Camera::looking_at("main", DVec3::new(0.0, 4.2, 10.5), DVec3::new(0.0, 0.7, 0.0));
+        scene.cameras = vec![Camera { size, ..camera }];
         scene.lights = vec![Light::Directional {
             direction: Vec3::new(-0.5, -0.7, -0.5).normalize(),
             illuminance: Vec3::splat(2.6),

@@ -38,8 +38,8 @@ pub struct World {
 }
 
 impl World {
-    /// A hilly field of spheres in all colours of the rainbow, and metal rings above it.
-    pub fn new(field: usize) -> Result<Self, SceneError> {
+    /// A hilly field of spheres in all colours of the rainbow, and metal rings above it, in a picture of this size.
+    pub fn new(field: usize, size: [u32; 2]) -> Result<Self, SceneError> {
         let count = field + RINGS.len();
         let mut assets = Assets::default();
         let sphere = sphere()?;
@@ -55,7 +55,10 @@ impl World {
             [red, green, blue, emitted]
         };
         let mut world = Self {
-            camera: Camera::looking_at("main", DVec3::new(0.0, 9.0, 40.0), DVec3::new(0.0, 0.0, 4.0)),
+            camera: Camera {
+                size,
+                ..Camera::looking_at("main", DVec3::new(0.0, 9.0, 40.0), DVec3::new(0.0, 0.0, 4.0))
+            },
             time: 0.0,
             lights: vec![Light::Directional {
                 direction: Vec3::new(-0.5, -0.8, -0.4).normalize(),
