@@ -1,8 +1,8 @@
-//! Which objects a process draws.
+//! Which objects a process draws, and in which order.
 
-use crate::scene::{Blend, LayerMask};
+use crate::scene::{Blend, ColumnLayout, LayerMask, ObjectColumn};
 
-/// Which objects a process draws.
+/// Which objects a process draws, and in which order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Selection {
     /// By blending.
@@ -13,6 +13,8 @@ pub struct Selection {
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
     pub excluded_layers: LayerMask,
+    /// In which order they are drawn.
+    pub order: DrawOrder,
 }
 
 impl Selection {
@@ -24,7 +26,13 @@ impl Selection {
     pub const ALL: Self = Self::of(Blending::Both);
 
     const fn of(blending: Blending) -> Self {
-        Self { blending, materials: MaterialShare::ALL, layers: LayerMask::ALL, excluded_layers: LayerMask::NONE }
+        Self {
+            blending,
+            materials: MaterialShare::ALL,
+            layers: LayerMask::ALL,
+            excluded_layers: LayerMask::NONE,
+            order: DrawOrder::ByState,
+        }
     }
 
     /// Those of these objects that belong to one of some layers.
@@ -35,6 +43,11 @@ impl Selection {
     /// Those of these objects that belong to none of some layers.
     pub const fn not_in_layers(self, excluded_layers: LayerMask) -> Self {
         Self { excluded_layers, ..self }
+    }
+
+    /// The same objects in another order.
+    pub const fn in_order(self, order: DrawOrder) -> Self {
+        Self { order, ..self }
     }
 
     /// Whether it contains objects of any layer that blend like this and have the material in this slot.
@@ -52,6 +65,39 @@ impl Selection {
 impl Default for Selection {
     fn default() -> Self {
         Self::OPAQUE
+    }
+}
+
+/// The order in which a process draws objects (M 10.5, "multiple types of sorting"). Objects that it leaves open are drawn by index.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum DrawOrder {
+    /// Opaque objects by state and mesh, so that equal ones become one draw, and as
+    /// [`Quality::opaque_order`](crate::quality::Quality::opaque_order) says; then blended ones, back to front.
+    #[default]
+    ByState,
+    /// All by the distance of their centres along the view's axis, the nearest first: where pixels are dear.
+    FrontToBack,
+    /// The farthest first: where what is drawn depends on what is behind it.
+    BackToFront,
+    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`].
+    ByColumn(ColumnLayout),
+}
+
+impl DrawOrder {
+    /// By a column of the scene. The process need not declare that it reads it.
+    ///
+    /// ```
+    /// use drawloom::command::{DrawOrder, Selection};
+    /// use drawloom::scene::ObjectColumn;
+    ///
+    /// const DECAL_ORDER: ObjectColumn<u32> = ObjectColumn::new("decal order");
+    ///
+    /// let decals = Selection::BLENDED.in_order(DrawOrder::by(DECAL_ORDER));
+    /// # assert_ne!(decals, Selection::BLENDED);
+    /// ```
+    pub const fn by(column: ObjectColumn<u32>) -> Self {
+        Self::ByColumn(column.layout())
     }
 }
 

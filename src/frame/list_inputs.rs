@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Quat};
 
-use crate::command::{Blending, Selection, Version};
+use crate::command::{Blending, DrawOrder, Selection, Version};
 use crate::quality::DepthKey;
 use crate::scene::{Camera, Projection};
 use crate::view::RenderView;
@@ -35,8 +35,10 @@ impl OrderInputs {
     }
 }
 
-/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, the quality asks for no order, and the view
+/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order, and the view
 /// is not a paraboloid, where the subdivision level gives an object another state.
 pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthKey) -> bool {
-    selection.blending == Blending::Opaque && opaque_order.bits == 0 && view.camera.projection != Projection::Paraboloid
+    (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
+        && opaque_order.bits == 0
+        && view.camera.projection != Projection::Paraboloid
 }

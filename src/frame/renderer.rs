@@ -20,7 +20,7 @@ use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
 use crate::command::DrawList;
-use crate::process::{Deferred, FramePlan, Pass};
+use crate::process::{Deferred, Draws, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
@@ -136,8 +136,8 @@ impl<B: Backend> Renderer<B> {
         let FrameViews { views, lights } = frame_views;
 
         // Views → the job graph of their stages, and what all its jobs share.
-        plan.check_columns(scene)?;
         let draws = plan.draws()?;
+        plan.check_columns(&draws, scene)?;
         self.tables.cullable_meshes.update(scene.assets);
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =
@@ -188,9 +188,11 @@ impl<B: Backend> Renderer<B> {
             return Err(error.into());
         }
         if cfg!(debug_assertions) {
-            let (objects, columns) = (&self.tables.objects, plan.columns());
+            let objects = &self.tables.objects;
+            let mut columns = plan.columns().to_vec();
+            columns.extend(draws.iter().filter_map(Draws::order_column));
             let unreported = objects.unreported_change(scene).map(|object| SceneError::UnreportedChange { object });
-            let in_columns = self.column_check.check(scene, columns, objects);
+            let in_columns = self.column_check.check(scene, &columns, objects);
             if let Err(error) = unreported.map_or(in_columns, Err) {
                 graph.tuning.costs.discard_frame();
                 return Err(error.into());

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 #[cfg(feature = "wgpu")]
 use super::RawPass;
 use super::{BufferOffset, ComputeDispatch, DrawCount, ProceduralDraws, ShaderResource, Stencil, Workgroups};
-use crate::command::Selection;
-use crate::scene::Blend;
+use crate::command::{DrawOrder, Selection};
+use crate::scene::{Blend, ColumnLayout};
 use crate::view::LightClass;
 
 /// What a process draws in each of its views.
@@ -108,6 +108,14 @@ impl Draws<'_> {
     pub fn selection(&self) -> Option<Selection> {
         match self {
             Self::Commands(commands) => Some(commands.selection),
+            _ => None,
+        }
+    }
+
+    /// The column by which it orders objects; `None` if it orders them in another way.
+    pub fn order_column(&self) -> Option<ColumnLayout> {
+        match self.selection()?.order {
+            DrawOrder::ByColumn(column) => Some(column),
             _ => None,
         }
     }

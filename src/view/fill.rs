@@ -8,7 +8,7 @@ use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
 use super::{LayerFilter, ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
 use crate::chunked_array::ChunkedArray;
-use crate::command::{DrawState, RenderCommand, Selection, SortKey};
+use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, Projection, SceneRef};
 
@@ -31,11 +31,22 @@ pub(crate) struct Fill<'a> {
     pub(crate) quality: &'a Quality,
 }
 
-/// How a view orders commands by depth.
-struct DepthOrder {
+/// How a pass orders commands.
+struct OrderKeys<'a> {
     forward: DVec3,
     opaque: DepthQuantizer,
     blended: DepthQuantizer,
+    /// The engine's own numbers, as bytes, if these are the order.
+    numbers: &'a [u8],
+}
+
+impl OrderKeys<'_> {
+    /// The engine's own number of an object.
+    fn rank(&self, object: usize) -> u32 {
+        let bytes = self.numbers.get(object * size_of::<u32>()..).and_then(<[u8]>::first_chunk);
+        // A frame whose scene lacks the column has failed before.
+        bytes.map_or(0, |bytes| u32::from_ne_bytes(*bytes))
+    }
 }
 
 impl Fill<'_> {
@@ -43,10 +54,15 @@ impl Fill<'_> {
     /// among the visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
     pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
         let camera = &self.view.camera;
-        let order = DepthOrder {
+        let numbers = match self.selection.order {
+            DrawOrder::ByColumn(column) => self.scene.column(column).map_or(&[][..], |values| values.bytes()),
+            _ => &[],
+        };
+        let order = OrderKeys {
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
             opaque: self.quality.opaque_order.quantizer(camera.near, camera.far),
             blended: self.quality.blended_order.quantizer(camera.near, camera.far),
+            numbers,
         };
         for (block, part) in ChunkedArray::<RenderCommand>::block_ranges(ranks) {
             let mut slots = commands.write(block);
@@ -63,7 +79,7 @@ impl Fill<'_> {
     }
 
     #[inline]
-    fn command(&self, object: usize, objects: &ObjectBlock, order: &DepthOrder) -> RenderCommand {
+    fn command(&self, object: usize, objects: &ObjectBlock, order: &OrderKeys<'_>) -> RenderCommand {
         let entry = object % ObjectTable::BLOCK_SIZE;
         let draw = objects.draws[entry];
         let blend = draw.state.blend();
@@ -85,9 +101,11 @@ impl Fill<'_> {
         // In f64, rounded once: two depths that differ in f32 are in the right order, however far the objects are to
         // the side.
         let depth = order.forward.dot(center - self.view.camera.position) as f32;
-        let key = match blend {
-            Blend::None => SortKey::opaque(state, draw.mesh, order.opaque.quantize(depth)),
-            _ => SortKey::blended(order.blended.quantize(depth)),
+        let key = match (self.selection.order, blend) {
+            (DrawOrder::ByState, Blend::None) => SortKey::opaque(state, draw.mesh, order.opaque.quantize(depth)),
+            (DrawOrder::ByState | DrawOrder::BackToFront, _) => SortKey::blended(order.blended.quantize(depth)),
+            (DrawOrder::FrontToBack, _) => SortKey::ranked(order.blended.quantize(depth)),
+            (DrawOrder::ByColumn(_), _) => SortKey::ranked(order.rank(object)),
         };
         RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
     }

@@ -9,6 +9,7 @@ mod layers;
 mod null_backend;
 mod object_table;
 mod occlusion;
+mod order;
 mod quality;
 mod retained;
 mod shadow_interval;

@@ -1,6 +1,7 @@
 //! The columns of objects that a plan's processes read.
 
 use super::{PlanError, PlannedProcess, ProcessError};
+use crate::process::Draws;
 use crate::scene::{ColumnLayout, SceneRef};
 
 /// The columns that the processes read, each once, in the order in which they are first declared.
@@ -22,12 +23,17 @@ pub(super) fn columns_of(processes: &[PlannedProcess]) -> Result<Vec<ColumnLayou
     Ok(columns)
 }
 
-/// Checks that a scene has the columns that the processes read.
+/// Checks that a scene has the columns that the processes read, and those by which they order what they draw.
 ///
 /// # Errors
 /// If it lacks one, or its elements have another size.
-pub(super) fn check_columns(processes: &[PlannedProcess], scene: &SceneRef<'_>) -> Result<(), ProcessError> {
-    for (planned, declared) in declared_columns(processes) {
+pub(super) fn check_columns(
+    processes: &[PlannedProcess],
+    draws: &[Draws<'_>],
+    scene: &SceneRef<'_>,
+) -> Result<(), ProcessError> {
+    let orders = processes.iter().zip(draws).filter_map(|(planned, draws)| Some((planned, draws.order_column()?)));
+    for (planned, declared) in declared_columns(processes).chain(orders) {
         let (process, column) = (|| planned.name.clone(), declared.name);
         match scene.columns.iter().find(|values| values.name() == column) {
             None => return Err(ProcessError::MissingColumn { process: process(), column }),

@@ -232,12 +232,12 @@ impl FramePlan {
         &self.buffers
     }
 
-    /// Checks that a scene has the columns that the processes read.
+    /// Checks that a scene has the columns that the processes read, and those by which they order what they draw.
     ///
     /// # Errors
     /// If it lacks one, or its elements have another size.
-    pub(crate) fn check_columns(&self, scene: &SceneRef<'_>) -> Result<(), ProcessError> {
-        check_columns(&self.processes, scene)
+    pub(crate) fn check_columns(&self, draws: &[Draws<'_>], scene: &SceneRef<'_>) -> Result<(), ProcessError> {
+        check_columns(&self.processes, draws, scene)
     }
 
     /// The names of the processes that were dropped because no output depends on them.

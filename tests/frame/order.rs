@@ -1,0 +1,125 @@
+//! The order in which a process draws objects.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::command::{DrawOrder, Selection};
+use drawloom::process::{CommandDraws, Declare, Draws, Format, ProcessError, RenderProcess};
+use drawloom::scene::{Changes, ObjectColumn, Scene, SceneError, SceneRef};
+use drawloom::task::Scheduler;
+use drawloom::{FrameError, Renderer};
+use drawloom_testing::scenes::field;
+
+const RANK: ObjectColumn<u32> = ObjectColumn::new("rank");
+
+struct Ordered(DrawOrder);
+
+impl RenderProcess for Ordered {
+    fn name(&self) -> &str {
+        "ordered"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth("depth", Format::Depth32Float);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let selection = Selection::ALL.in_order(self.0);
+        Draws::Commands(CommandDraws { selection, ..CommandDraws::default() })
+    }
+}
+
+fn renderer(order: DrawOrder, workers: usize) -> Renderer<NullBackend> {
+    let builder = Renderer::builder(NullBackend).process(Ordered(order));
+    builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap().0
+}
+
+fn objects_of(renderer: &mut Renderer<NullBackend>, scene: SceneRef<'_>) -> Vec<u32> {
+    drop(renderer.record(scene).unwrap());
+    renderer.draw_list("ordered", 0).unwrap().objects.clone()
+}
+
+fn sorted(mut objects: Vec<u32>) -> Vec<u32> {
+    objects.sort_unstable();
+    objects
+}
+
+/// The distance of each object's centre along the axis of the first camera.
+fn depths(scene: &Scene) -> Vec<f64> {
+    let camera = &scene.cameras[0];
+    let forward = camera.orientation.as_dquat() * drawloom::glam::DVec3::NEG_Z;
+    // Meshes are centred.
+    scene.as_scene_ref().positions.iter().map(|position| (*position - camera.position).dot(forward)).collect()
+}
+
+#[test]
+fn objects_are_drawn_by_distance() {
+    let scene = field(2000);
+    let (all, depths) = (objects_of(&mut renderer(DrawOrder::ByState, 2), scene.as_scene_ref()), depths(&scene));
+    let blends = |objects: &[u32]| objects.windows(2).any(|pair| depths[pair[0] as usize] > depths[pair[1] as usize]);
+    assert!(blends(&all), "by state, distances go up and down");
+    for workers in [1, 2] {
+        let near_to_far = objects_of(&mut renderer(DrawOrder::FrontToBack, workers), scene.as_scene_ref());
+        let far_to_near = objects_of(&mut renderer(DrawOrder::BackToFront, workers), scene.as_scene_ref());
+        assert_eq!(sorted(near_to_far.clone()), sorted(all.clone()));
+        assert_eq!(sorted(far_to_near.clone()), sorted(all.clone()));
+        // The depths of sort keys have fewer bits than these.
+        let step = 1e-3;
+        for pair in near_to_far.windows(2) {
+            assert!(depths[pair[0] as usize] <= depths[pair[1] as usize] + step, "{pair:?}");
+        }
+        for pair in far_to_near.windows(2) {
+            assert!(depths[pair[0] as usize] >= depths[pair[1] as usize] - step, "{pair:?}");
+        }
+    }
+}
+
+#[test]
+fn objects_are_drawn_by_a_number_of_the_engines() {
+    let scene = field(2000);
+    let all = objects_of(&mut renderer(DrawOrder::ByState, 2), scene.as_scene_ref());
+    let mut ranks: Vec<u32> =
+        (0..2000_u32).map(|object| object.wrapping_mul(2_654_435_761) % 97 * 44_000_000).collect();
+    let expected = |ranks: &[u32]| {
+        let mut expected = sorted(all.clone());
+        expected.sort_by_key(|object| ranks[*object as usize]);
+        expected
+    };
+    let mut renderer = renderer(DrawOrder::by(RANK), 2);
+    let mut frame = |ranks: &[u32], changes| {
+        let columns = [RANK.values(ranks)];
+        objects_of(&mut renderer, SceneRef { columns: &columns, changes, ..scene.as_scene_ref() })
+    };
+    assert_eq!(frame(&ranks, Changes::Unknown), expected(&ranks));
+    assert_eq!(frame(&ranks, Changes::NONE), expected(&ranks));
+    let first = all[0] as usize;
+    ranks[first] = u32::MAX;
+    let found = frame(&ranks, Changes::Objects(&[all[0]]));
+    assert_eq!(found, expected(&ranks));
+    assert_eq!(found.last(), Some(&all[0]));
+}
+
+#[test]
+fn a_missing_order_and_an_unreported_change_of_it_are_named() {
+    let scene = field(100);
+    let mut renderer = renderer(DrawOrder::by(RANK), 1);
+    let error = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err();
+    let is_named = matches!(
+        &error,
+        FrameError::Process(ProcessError::MissingColumn { process, column: "rank" }) if process == "ordered"
+    );
+    assert!(is_named, "{error}");
+    let mut ranks = vec![1; 100];
+    let mut frame = |ranks: &[u32], changes| {
+        renderer.record(SceneRef { columns: &[RANK.values(ranks)], changes, ..scene.as_scene_ref() }).map(drop)
+    };
+    frame(&ranks, Changes::Unknown).unwrap();
+    ranks[7] = 5;
+    let error = frame(&ranks, Changes::NONE);
+    if cfg!(debug_assertions) {
+        let is_named =
+            matches!(error, Err(FrameError::Scene(SceneError::UnreportedColumnChange { column: "rank", object: 7 })));
+        assert!(is_named, "{error:?}");
+    }
+}
