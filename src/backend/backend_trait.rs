@@ -6,6 +6,9 @@ use std::sync::Arc;
 use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
+use crate::command::DrawState;
+use crate::process::{Draws, FramePlan};
+use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
@@ -50,6 +53,22 @@ pub trait Backend: Send + Sync + 'static {
     /// The number of bytes uploaded to the device so far; 0 for a backend without uploads.
     fn uploaded_bytes(&self) -> u64 {
         0
+    }
+
+    /// Compiles the shaders of a plan's processes, and makes the pipelines for objects of these states of each process, ahead of the first
+    /// frame that needs them. A backend without pipelines does nothing.
+    ///
+    /// # Errors
+    /// If the device refuses a shader or a pipeline.
+    fn prepare_pipelines(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        states: &[Vec<DrawState>],
+        quality: &Quality,
+    ) -> Result<(), BackendError> {
+        let _ = (plan, draws, states, quality);
+        Ok(())
     }
 
     /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines.

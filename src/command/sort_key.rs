@@ -11,13 +11,13 @@ use super::DrawState;
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
-/// ranked  0 1  | rank                | 0
+/// ordered 0 1  | number              | 0
 /// empty   1 1  | 1 … 1               | 1 … 1
 /// ```
 ///
-/// Commands of a process with a [draw order](super::DrawOrder) of its own are all ranked, opaque or not.
+/// Commands of a process with a [draw order](super::DrawOrder) of its own are all ordered by a number, opaque or not.
 ///
-/// The picture depends on bits 63 and 62 (blended after opaque), on the depth of blended commands and on ranks. All other bits only save
+/// The picture depends on bits 63 and 62 (blended after opaque), on the depth of blended commands and on those numbers. All other bits only save
 /// state changes and overdraw. Depths are codes of a [`DepthKey`](crate::quality::DepthKey): the upper 20 bits for opaque
 /// commands, all 32 for blended ones. A [`DepthKey`](crate::quality::DepthKey) with fewer bits leaves the lower ones equal in all
 /// keys, and the sort skips bits that are equal.
@@ -48,9 +48,9 @@ impl SortKey {
         Self(1 << 62 | u64::from(!depth) << 30)
     }
 
-    /// The key of a command in an order of its own: by `rank`, the smallest first.
-    pub fn ranked(rank: u32) -> Self {
-        Self(1 << 62 | u64::from(rank) << 30)
+    /// The key of a command in an order that a process chose: by `number`, the smallest first.
+    pub fn ordered(number: u32) -> Self {
+        Self(1 << 62 | u64::from(number) << 30)
     }
 
     /// The 64 bits.

@@ -67,18 +67,32 @@ impl PlanCache {
     /// # Errors
     /// If the processes make no frame.
     pub(super) fn select(&mut self, lights: &[Light], assets: &Assets) -> Result<Arc<FramePlan>, PlanError> {
-        if let Some(deferred) = &self.deferred {
-            let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights());
-            self.current = match self.compiled.get(&requirements) {
-                Some(plan) => Arc::clone(plan),
-                None => {
-                    let plan = Arc::new(compile(Some(deferred), &self.processes, &self.outputs, &requirements)?);
-                    self.compiled.insert(requirements, Arc::clone(&plan));
-                    plan
-                }
-            };
-        }
+        self.current = self.plan_for(Requirements::of(lights, assets, self.separates_shadowed_lights()))?;
         Ok(Arc::clone(&self.current))
+    }
+
+    /// The plans for a scene with these lights and assets, and for one that requires everything, compiled if the cache does not have
+    /// them. The current plan stays.
+    ///
+    /// # Errors
+    /// If the processes make no frame.
+    pub(super) fn ahead(&mut self, lights: &[Light], assets: &Assets) -> Result<[Arc<FramePlan>; 2], PlanError> {
+        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights());
+        Ok([self.plan_for(requirements)?, self.plan_for(Requirements::all())?])
+    }
+
+    /// The plan for these requirements, compiled if the cache does not have it.
+    ///
+    /// # Errors
+    /// If the processes make no frame.
+    fn plan_for(&mut self, requirements: Requirements) -> Result<Arc<FramePlan>, PlanError> {
+        let Some(deferred) = &self.deferred else { return Ok(Arc::clone(&self.current)) };
+        if let Some(plan) = self.compiled.get(&requirements) {
+            return Ok(Arc::clone(plan));
+        }
+        let plan = Arc::new(compile(Some(deferred), &self.processes, &self.outputs, &requirements)?);
+        self.compiled.insert(requirements, Arc::clone(&plan));
+        Ok(plan)
     }
 
     /// The settings of shadow maps; `None` where the current plan draws none.

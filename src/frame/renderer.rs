@@ -24,6 +24,7 @@ use crate::process::{Deferred, Draws, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
+use crate::view::possible_draw_states;
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
@@ -117,6 +118,25 @@ impl<B: Backend> Renderer<B> {
             Err(_) => self.tables.abandon_frame(),
         }
         recorded
+    }
+
+    /// Compiles the shaders of all processes that a frame may have, whatever its scene requires, and makes the pipelines that this
+    /// scene's meshes and materials need. Without this call that happens in the first frames that need them. Call it while the
+    /// world is loaded, on any thread: it also finds what is wrong with the engine's processes.
+    ///
+    /// # Errors
+    /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
+    /// frame.
+    pub fn prepare_pipelines(&mut self, scene: SceneRef<'_>) -> Result<(), FrameError> {
+        for plan in self.plans.ahead(scene.lights, scene.assets)? {
+            let draws = plan.draws()?;
+            let states_of = |draws: &Draws<'_>| {
+                draws.selection().map_or_else(Vec::new, |selection| possible_draw_states(selection, scene.assets))
+            };
+            let states: Vec<_> = draws.iter().map(states_of).collect();
+            self.backend.prepare_pipelines(&plan, &draws, &states, &self.quality)?;
+        }
+        Ok(())
     }
 
     fn record_frame(&mut self, scene: &SceneRef<'_>) -> Result<Recorded<B>, FrameError> {

@@ -8,7 +8,7 @@ use bytemuck::Pod;
 /// constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that orders them.
 ///
 /// There is one for all views. It is all zeros until a shader writes it, and keeps its content from frame to frame, in the order in
-/// which frames are submitted. If the device reports an error, it begins anew with zeros.
+/// which frames are submitted.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
 pub struct StorageBuffer<T> {

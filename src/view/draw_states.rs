@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use crate::command::{Cull, DrawState};
+use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
-use crate::scene::{Assets, Material, Mesh, Topology};
+use crate::scene::{Assets, Blend, Material, Mesh, Topology};
 
 /// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache lines; the assets
 /// themselves are much larger.
@@ -50,9 +50,7 @@ impl DrawStates {
         }
         let mut new_materials = vec![None; materials.slot_count()];
         for (handle, &Material { double_sided, blend, .. }) in materials.iter() {
-            let culls = if double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
-            let states = culls.map(|cull| DrawState::new(Topology::TriangleList, cull, blend));
-            new_materials[handle.index() as usize] = Some((handle, states));
+            new_materials[handle.index() as usize] = Some((handle, states_of(double_sided, blend)));
         }
         let changed = has_changed(&self.meshes, &new_meshes) || has_changed(&self.materials, &new_materials);
         (self.meshes, self.materials) = (new_meshes, new_materials);
@@ -69,6 +67,28 @@ impl DrawStates {
         let state = if is_mirrored { mirrored } else { as_is };
         (known_mesh == mesh && known_material == material).then(|| state.with_topology(topology))
     }
+}
+
+/// The states of objects with triangle lists and such a material, as they are and mirrored.
+fn states_of(double_sided: bool, blend: Blend) -> [DrawState; 2] {
+    let culls = if double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
+    culls.map(|cull| DrawState::new(Topology::TriangleList, cull, blend))
+}
+
+/// The states that selected objects with these meshes and materials may have, each once: without subdivision, and not mirrored.
+pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec<DrawState> {
+    let mut states = Vec::new();
+    let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();
+    topologies.retain(|topology| assets.meshes.iter().any(|(_, mesh)| mesh.topology() == *topology));
+    for (handle, &Material { double_sided, blend, .. }) in assets.materials.iter() {
+        if selection.contains(blend, handle.index()) {
+            let [state, _] = states_of(double_sided, blend);
+            states.extend(topologies.iter().map(|topology| state.with_topology(*topology)));
+        }
+    }
+    states.sort_unstable();
+    states.dedup();
+    states
 }
 
 /// Whether an entry of `before` is not the same in `now`.

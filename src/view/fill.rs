@@ -42,7 +42,7 @@ struct OrderKeys<'a> {
 
 impl OrderKeys<'_> {
     /// The engine's own number of an object.
-    fn rank(&self, object: usize) -> u32 {
+    fn number(&self, object: usize) -> u32 {
         let bytes = self.numbers.get(object * size_of::<u32>()..).and_then(<[u8]>::first_chunk);
         // A frame whose scene lacks the column has failed before.
         bytes.map_or(0, |bytes| u32::from_ne_bytes(*bytes))
@@ -104,8 +104,8 @@ impl Fill<'_> {
         let key = match (self.selection.order, blend) {
             (DrawOrder::ByState, Blend::None) => SortKey::opaque(state, draw.mesh, order.opaque.quantize(depth)),
             (DrawOrder::ByState | DrawOrder::BackToFront, _) => SortKey::blended(order.blended.quantize(depth)),
-            (DrawOrder::FrontToBack, _) => SortKey::ranked(order.blended.quantize(depth)),
-            (DrawOrder::ByColumn(_), _) => SortKey::ranked(order.rank(object)),
+            (DrawOrder::FrontToBack, _) => SortKey::ordered(order.blended.quantize(depth)),
+            (DrawOrder::ByColumn(_), _) => SortKey::ordered(order.number(object)),
         };
         RenderCommand { key, object: object as u32, mesh: draw.mesh, material: draw.material, state }
     }

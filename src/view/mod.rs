@@ -37,6 +37,7 @@ pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;
 pub use bounding_spheres::{BoundingSphere, BoundingSpheres};
 pub(crate) use changed_objects::ChangedWord;
+pub(crate) use draw_states::possible_draw_states;
 pub(crate) use fill::Fill;
 pub use fixed_position::FixedPosition;
 pub use frustum::Frustum;

@@ -10,7 +10,7 @@ use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 use drawloom_testing::scenes::field;
 
-const RANK: ObjectColumn<u32> = ObjectColumn::new("rank");
+const NUMBER: ObjectColumn<u32> = ObjectColumn::new("number");
 
 struct Ordered(DrawOrder);
 
@@ -79,47 +79,47 @@ fn objects_are_drawn_by_distance() {
 fn objects_are_drawn_by_a_number_of_the_engines() {
     let scene = field(2000);
     let all = objects_of(&mut renderer(DrawOrder::ByState, 2), scene.as_scene_ref());
-    let mut ranks: Vec<u32> =
+    let mut numbers: Vec<u32> =
         (0..2000_u32).map(|object| object.wrapping_mul(2_654_435_761) % 97 * 44_000_000).collect();
-    let expected = |ranks: &[u32]| {
+    let expected = |numbers: &[u32]| {
         let mut expected = sorted(all.clone());
-        expected.sort_by_key(|object| ranks[*object as usize]);
+        expected.sort_by_key(|object| numbers[*object as usize]);
         expected
     };
-    let mut renderer = renderer(DrawOrder::by(RANK), 2);
-    let mut frame = |ranks: &[u32], changes| {
-        let columns = [RANK.values(ranks)];
+    let mut renderer = renderer(DrawOrder::by(NUMBER), 2);
+    let mut frame = |numbers: &[u32], changes| {
+        let columns = [NUMBER.values(numbers)];
         objects_of(&mut renderer, SceneRef { columns: &columns, changes, ..scene.as_scene_ref() })
     };
-    assert_eq!(frame(&ranks, Changes::Unknown), expected(&ranks));
-    assert_eq!(frame(&ranks, Changes::NONE), expected(&ranks));
+    assert_eq!(frame(&numbers, Changes::Unknown), expected(&numbers));
+    assert_eq!(frame(&numbers, Changes::NONE), expected(&numbers));
     let first = all[0] as usize;
-    ranks[first] = u32::MAX;
-    let found = frame(&ranks, Changes::Objects(&[all[0]]));
-    assert_eq!(found, expected(&ranks));
+    numbers[first] = u32::MAX;
+    let found = frame(&numbers, Changes::Objects(&[all[0]]));
+    assert_eq!(found, expected(&numbers));
     assert_eq!(found.last(), Some(&all[0]));
 }
 
 #[test]
 fn a_missing_order_and_an_unreported_change_of_it_are_named() {
     let scene = field(100);
-    let mut renderer = renderer(DrawOrder::by(RANK), 1);
+    let mut renderer = renderer(DrawOrder::by(NUMBER), 1);
     let error = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err();
     let is_named = matches!(
         &error,
-        FrameError::Process(ProcessError::MissingColumn { process, column: "rank" }) if process == "ordered"
+        FrameError::Process(ProcessError::MissingColumn { process, column: "number" }) if process == "ordered"
     );
     assert!(is_named, "{error}");
-    let mut ranks = vec![1; 100];
-    let mut frame = |ranks: &[u32], changes| {
-        renderer.record(SceneRef { columns: &[RANK.values(ranks)], changes, ..scene.as_scene_ref() }).map(drop)
+    let mut numbers = vec![1; 100];
+    let mut frame = |numbers: &[u32], changes| {
+        renderer.record(SceneRef { columns: &[NUMBER.values(numbers)], changes, ..scene.as_scene_ref() }).map(drop)
     };
-    frame(&ranks, Changes::Unknown).unwrap();
-    ranks[7] = 5;
-    let error = frame(&ranks, Changes::NONE);
+    frame(&numbers, Changes::Unknown).unwrap();
+    numbers[7] = 5;
+    let error = frame(&numbers, Changes::NONE);
     if cfg!(debug_assertions) {
         let is_named =
-            matches!(error, Err(FrameError::Scene(SceneError::UnreportedColumnChange { column: "rank", object: 7 })));
+            matches!(error, Err(FrameError::Scene(SceneError::UnreportedColumnChange { column: "number", object: 7 })));
         assert!(is_named, "{error:?}");
     }
 }

@@ -25,6 +25,7 @@ mod light_volumes;
 mod lighting;
 mod placement;
 mod post;
+mod prepared_pipelines;
 mod processes;
 mod rays;
 mod read_back;
@@ -71,6 +72,7 @@ fn main() {
         (deformation::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
+        (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),

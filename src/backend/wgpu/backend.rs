@@ -185,14 +185,13 @@ impl WgpuBackend {
         DeviceClock::read(&self.device, self.queue(), self.adapter_name(), timeline)
     }
 
-    /// Drops all cached resources but pipelines, because a device error may have left some unusable. The next frame
+    /// Drops all cached resources but pipelines and the buffers that processes share, because a device error may have left some unusable. The next frame
     /// creates them again.
     pub(super) fn clear(&self) {
         *self.assets.lock() = AssetCache::default();
         *self.light_meshes.lock() = None;
         self.subdivisions.clear();
         *self.targets.lock() = TargetCache::default();
-        *self.storage_buffers.lock() = Arc::default();
         self.buffers.clear();
     }
 }

@@ -11,6 +11,9 @@ use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
+use crate::command::DrawState;
+use crate::process::{Draws, FramePlan};
+use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 
@@ -27,6 +30,21 @@ impl Backend for WgpuBackend {
 
     fn uploaded_bytes(&self) -> u64 {
         self.uploads.bytes()
+    }
+
+    fn prepare_pipelines(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        states: &[Vec<DrawState>],
+        quality: &Quality,
+    ) -> Result<(), BackendError> {
+        let processes = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
+        for (pipelines, states) in processes.iter().zip(states) {
+            let create = || pipelines.create_missing(&self.device, states.iter().copied());
+            pipelines.insert(with_error_scope(&self.device, pipelines.name(), create)?);
+        }
+        Ok(())
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
@@ -69,7 +87,8 @@ impl Backend for WgpuBackend {
                 }
                 RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
             }
-            Ok::<_, BackendError>(pipelines.create_missing(&self.device, &list.batches))
+            let runs = list.batches.chunk_by(|one, next| one.state == next.state);
+            Ok::<_, BackendError>(pipelines.create_missing(&self.device, runs.map(|run| run[0].state)))
         })
         .flatten()
         // Some of the resources just created may be unusable.

@@ -7,11 +7,11 @@ use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{BundleKey, WgpuFrame};
 use super::pass_bind_groups::update_bind_groups;
-use super::resources::{LightMeshes, SubdividedMesh};
+use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh};
 use super::strategy::RecordingStrategy;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{Draws, Pass};
+use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::Mesh;
 
 impl WgpuBackend {
@@ -23,7 +23,8 @@ impl WgpuBackend {
         let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
         self.check_device()?;
-        let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, request)?;
+        let quality = request.quality;
+        let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin_frame(scene.assets);
         if self.assets.lock().require_attributes(plan.attributes()) {
@@ -34,9 +35,7 @@ impl WgpuBackend {
         })??;
         let targets =
             with_error_scope(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
-        let storage_buffers = with_error_scope(&self.device, "the buffers of processes", || {
-            self.storage_buffers.lock().update(&self.device, plan)
-        })??;
+        let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
             buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
@@ -62,6 +61,21 @@ impl WgpuBackend {
             self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?
+    }
+
+    /// The buffers that a plan's processes share. Those that an error of the device leaves out are made anew in the next frame; the others
+    /// keep their content.
+    ///
+    /// # Errors
+    /// If the device lacks room.
+    fn storage_buffers(&self, plan: &FramePlan) -> Result<Arc<StorageBuffers>, BackendError> {
+        let mut current = self.storage_buffers.lock();
+        let label = "the buffers of processes";
+        let next = with_error_scope(&self.device, label, || current.with_those_of(&self.device, plan))??;
+        if let Some(next) = next {
+            *current = Arc::new(next);
+        }
+        Ok(Arc::clone(&current))
     }
 
     /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may

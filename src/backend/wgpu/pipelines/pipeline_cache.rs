@@ -4,9 +4,11 @@ use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 
 use super::process_pipelines::ProcessPipelines;
+use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
-use crate::backend::{BackendError, FrameRequest};
+use crate::process::{Draws, FramePlan};
+use crate::quality::Quality;
 
 /// Keeps the pipelines of all plans. Plans share pipelines where they can.
 #[derive(Default)]
@@ -23,7 +25,7 @@ struct PlanPipelines {
 }
 
 impl PipelineCache {
-    /// The pipelines of every render process of a frame's plan: cached ones, also of other plans, or new ones for a process whose
+    /// The pipelines of every render process of a plan: cached ones, also of other plans, or new ones for a process whose
     /// draws changed, or for another quality.
     ///
     /// # Errors
@@ -32,7 +34,9 @@ impl PipelineCache {
         &mut self,
         device: &wgpu::Device,
         layouts: &BindGroupLayouts,
-        &FrameRequest { plan, draws, quality, .. }: &FrameRequest<'_>,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        quality: &Quality,
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let cached = self.plans.get(&plan.identity()).map(|cached| &cached.processes);
         let all_fit = |cached: &&Arc<[Arc<ProcessPipelines>]>| {

@@ -12,7 +12,7 @@ use crate::backend::wgpu::resources::{
     BindGroupLayouts, binding_type, engine_layout, process_layout, vertex_attributes, vertex_format, vertex_stride,
 };
 use crate::backend::wgpu::strategy::StrategySet;
-use crate::command::{Batch, Cull, DrawState};
+use crate::command::{Cull, DrawState};
 use crate::process::{Access, Declaration, Draws, FIRST_OWN_LOCATION, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{AttributeLayout, Blend, Topology};
@@ -130,17 +130,16 @@ impl ProcessPipelines {
         self.key == PipelineKey::new(draws, quality) && resources.eq(self.resources.iter().copied())
     }
 
-    /// Creates the missing pipelines of these batches. [Insert](Self::insert) them only if the device reports no error.
+    /// Creates the missing pipelines of these states. [Insert](Self::insert) them only if the device reports no error.
     #[must_use]
     pub(crate) fn create_missing(
         &self,
         device: &wgpu::Device,
-        batches: &[Batch],
+        states: impl Iterator<Item = DrawState>,
     ) -> HashMap<DrawState, wgpu::RenderPipeline> {
         let mut created = HashMap::new();
         let by_state = self.by_state();
-        for run in batches.chunk_by(|one, next| one.state == next.state) {
-            let state = run[0].state.pipeline_state();
+        for state in states.map(DrawState::pipeline_state) {
             if !by_state.contains_key(&state) && !created.contains_key(&state) {
                 created.extend(self.create(device, state));
             }
@@ -353,7 +352,7 @@ mod tests {
         std::thread::scope(|scope| {
             let recording = pipelines.by_state();
             scope.spawn(|| {
-                pipelines.insert(pipelines.create_missing(&device, &[]));
+                pipelines.insert(pipelines.create_missing(&device, std::iter::empty()));
                 sender.send(()).unwrap();
             });
             let inserted = receiver.recv_timeout(Duration::from_secs(10));

@@ -1,7 +1,5 @@
 //! The buffers that processes share.
 
-use std::sync::Arc;
-
 use super::arena::new_buffer;
 use super::growing_buffer::check_storage_binding_size;
 use crate::backend::BackendError;
@@ -14,27 +12,25 @@ pub(crate) struct StorageBuffers {
 }
 
 impl StorageBuffers {
-    /// Adds what a plan's processes use and is missing, of zeros. A buffer of the same name and another size is replaced.
+    /// These buffers, and those that a plan's processes use and that are missing, of zeros. A buffer of the same name and another size is
+    /// replaced. `None` if none is missing.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn update(
-        self: &mut Arc<Self>,
-        device: &wgpu::Device,
-        plan: &FramePlan,
-    ) -> Result<Arc<Self>, BackendError> {
-        let is_known = |layout: &BufferLayout| self.buffers.iter().any(|(known, _)| known == layout);
-        if !plan.buffers().iter().all(is_known) {
-            let mut next = self.buffers.clone();
-            for layout in plan.buffers().iter().filter(|layout| !is_known(layout)) {
-                next.retain(|(known, _)| known.name != layout.name);
-                check_storage_binding_size(device, usize::try_from(layout.bytes).unwrap_or(usize::MAX))?;
-                let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
-                next.push((*layout, new_buffer(device, layout.name, layout.bytes, usage)?));
-            }
-            *self = Arc::new(Self { buffers: next });
+    pub(crate) fn with_those_of(&self, device: &wgpu::Device, plan: &FramePlan) -> Result<Option<Self>, BackendError> {
+        let is_missing = |layout: &&BufferLayout| self.find(**layout).is_none();
+        let mut missing = plan.buffers().iter().filter(is_missing).peekable();
+        if missing.peek().is_none() {
+            return Ok(None);
         }
-        Ok(Arc::clone(self))
+        let mut buffers = self.buffers.clone();
+        for layout in missing {
+            buffers.retain(|(known, _)| known.name != layout.name);
+            check_storage_binding_size(device, usize::try_from(layout.bytes).unwrap_or(usize::MAX))?;
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+            buffers.push((*layout, new_buffer(device, layout.name, layout.bytes, usage)?));
+        }
+        Ok(Some(Self { buffers }))
     }
 
     /// A buffer of the plan.

@@ -1,0 +1,74 @@
+//! Shaders that are compiled, and pipelines that are made, before the first frame.
+
+use drawloom::RendererBuilder;
+use drawloom::backend::WgpuBackend;
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
+use drawloom::scene::{Material, Scene};
+use drawloom_testing::scenes::{cube, field};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::fixture::Fixture;
+
+pub const CASES: &[Case] = &[
+    ("a_first_frame_makes_no_pipelines_that_were_prepared", first_frame),
+    ("preparing_pipelines_finds_what_is_wrong_with_a_shader", wrong_shader),
+];
+
+fn shipped(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
+    builder.deferred(Deferred::to_picture())
+}
+
+/// A field without mirrored objects, whose pipelines are made when they are first drawn.
+fn scene() -> Result<Scene, Failed> {
+    let mut scene = field(0);
+    let mesh = scene.add(cube())?;
+    let materials: Vec<_> = scene.as_scene_ref().assets.iter::<Material>().map(|(handle, _)| handle).collect();
+    for (index, material) in materials.into_iter().enumerate() {
+        let position = drawloom::glam::DVec3::X * (index as f64 * 2.5 - 5.0);
+        scene.add_object(drawloom::scene::RenderObject::new(mesh, material, position))?;
+    }
+    Ok(scene)
+}
+
+fn first_frame() -> Result<(), Failed> {
+    let scene = scene()?;
+    let count = |fixture: &Fixture| fixture.renderer.backend().resources().pipelines;
+    let (mut prepared, mut usual) = (Fixture::with(2, shipped)?, Fixture::with(2, shipped)?);
+    prepared.renderer.prepare_pipelines(scene.as_scene_ref())?;
+    let before = count(&prepared);
+    if prepared.draw(&scene)? != usual.draw(&scene)? {
+        return Err("prepared pipelines draw another picture".into());
+    }
+    if before == 0 || count(&prepared) != before || count(&usual) > before {
+        return Err(format!("{before} pipelines, {} after a frame, {} usually", count(&prepared), count(&usual)).into());
+    }
+    Ok(())
+}
+
+/// A process that no frame has drawn yet, with a mistake in its second line.
+struct Wrong;
+
+impl RenderProcess for Wrong {
+    fn name(&self) -> &str {
+        "wrong"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("wrong", Format::Rgba8Unorm, ClearColor::Background);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "@fragment\nfn fragment() -> @location(0) vec4<f32> { return missing; }";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
+    }
+}
+
+fn wrong_shader() -> Result<(), Failed> {
+    let mut fixture = Fixture::with(2, |builder| shipped(builder).process(Wrong))?;
+    let error = fixture.renderer.prepare_pipelines(scene()?.as_scene_ref()).err().ok_or("it is compiled")?;
+    let found = error.to_string();
+    let is_complete = ["\"wrong\"", "line 2", "missing"].iter().all(|part| found.contains(part));
+    if is_complete { Ok(()) } else { Err(found.into()) }
+}
