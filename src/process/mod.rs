@@ -22,6 +22,7 @@ mod procedural_draws;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
+mod shader_file;
 mod shader_resource;
 mod stencil;
 mod storage_buffer;
@@ -50,6 +51,7 @@ pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
+pub use shader_file::ShaderFile;
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};
 pub use storage_buffer::{BufferAccess, BufferLayout, BufferOffset, StorageBuffer};

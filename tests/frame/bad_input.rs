@@ -456,7 +456,8 @@ fn arguments_are_in_a_buffer_that_the_process_declares() {
         declare.changes_buffer(COUNTS);
         declare.reads_arguments(COUNTS);
     }
-    let cases: [(fn(&mut Declare), fn() -> Draws<'static>, &str); 4] = [
+    type Case = (fn(&mut Declare), fn() -> Draws<'static>, &'static str);
+    let cases: [Case; 4] = [
         (
             |declare| declare.changes_buffer(COUNTS),
             || {

@@ -1,4 +1,4 @@
-//! Cached bundles of a process whose shader and parameters change from frame to frame.
+//! Processes whose shaders and parameters change from frame to frame.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -15,8 +15,10 @@ use crate::Case;
 use crate::fixture::Fixture;
 use crate::strategies::{counts, device, expect, many_batches};
 
-pub const CASES: &[Case] =
-    &[("cached_bundles_are_recorded_again_when_a_shader_or_its_parameters_change", changing_shader)];
+pub const CASES: &[Case] = &[
+    ("cached_bundles_are_recorded_again_when_a_shader_or_its_parameters_change", changing_shader),
+    ("a_broken_shader_keeps_the_one_before_it_if_asked_to", broken_shader),
+];
 
 /// Draws everything in one colour: a constant of its shader, or one of a varying number of parameters.
 struct Painted {
@@ -106,4 +108,90 @@ fn changing_shader() -> Result<(), Failed> {
         }
     }
     Ok(())
+}
+
+/// Draws everything with one of these fragment shaders, of which some are wrong.
+struct Edited {
+    step: Arc<AtomicU32>,
+}
+
+const RED: u32 = 0;
+const SYNTAX: u32 = 1;
+const NO_ENTRY_POINT: u32 = 2;
+const GREEN: u32 = 3;
+
+impl RenderProcess for Edited {
+    fn name(&self) -> &str {
+        "edited"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("paint", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        macro_rules! edited {
+            ($fragment:literal) => {
+                concat!(
+                    "@vertex fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
+                        return clip_position(relative_position(drawn_object(in.instance), in.position));
+                    }\n",
+                    $fragment
+                )
+            };
+        }
+        let shader = match self.step.load(Ordering::Relaxed) {
+            RED => {
+                edited!("@fragment fn fragment() -> @location(0) vec4<f32> { return vec4<f32>(1.0, 0.0, 0.0, 1.0); }")
+            }
+            SYNTAX => edited!("@fragment fn fragment() -> @location(0) vec4<f32> { return red; }"),
+            NO_ENTRY_POINT => edited!("@fragment fn other() -> @location(0) vec4<f32> { return vec4<f32>(1.0); }"),
+            _ => edited!("@fragment fn fragment() -> @location(0) vec4<f32> { return vec4<f32>(0.0, 1.0, 0.0, 1.0); }"),
+        };
+        Draws::Commands(CommandDraws { shader, selection: Selection::ALL, ..CommandDraws::default() })
+    }
+}
+
+fn broken_shader() -> Result<(), Failed> {
+    let (scene, step) = (many_batches(), Arc::new(AtomicU32::new(RED)));
+    let build = |keeps| -> Result<Fixture, Failed> {
+        let (device, queue) = device()?;
+        let backend = WgpuBackend::new(device, queue)?;
+        let backend = if keeps { backend.keep_working_shaders() } else { backend };
+        let builder = Renderer::builder(backend).process(Edited { step: Arc::clone(&step) }).output("paint");
+        let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
+        Ok(Fixture { renderer, submitter })
+    };
+    let draw = |fixture: &mut Fixture, edited: u32| -> Result<Vec<u8>, Failed> {
+        step.store(edited, Ordering::Relaxed);
+        let recorded = fixture.record(&scene)?;
+        Ok(fixture.submit(recorded)?.read(0, "paint")?.bytes)
+    };
+    let mut keeping = build(true)?;
+    if draw(&mut keeping, SYNTAX).is_ok() {
+        return Err("the first shader is broken, and drawn".into());
+    }
+    let (red, green) = (draw(&mut keeping, RED)?, draw(&mut keeping, GREEN)?);
+    expect(red != green, || "red is green".to_owned())?;
+    for (edited, expected, error) in [
+        (RED, &red, None),
+        (SYNTAX, &red, Some("line 4")),
+        (SYNTAX, &red, Some("line 4")),
+        (NO_ENTRY_POINT, &red, Some("fragment")),
+        (GREEN, &green, None),
+        (SYNTAX, &green, Some("line 4")),
+        (GREEN, &green, None),
+    ] {
+        expect(draw(&mut keeping, edited)? == *expected, || format!("step {edited} is drawn in another colour"))?;
+        let errors = keeping.renderer.backend().shader_errors();
+        let is_told = match error {
+            None => errors.is_empty(),
+            Some(part) => errors.len() == 1 && errors[0].contains(part) && errors[0].contains("edited"),
+        };
+        expect(is_told, || format!("step {edited}: {errors:?}"))?;
+    }
+    let mut usual = build(false)?;
+    draw(&mut usual, RED)?;
+    expect(draw(&mut usual, SYNTAX).is_err(), || "a broken shader is drawn".to_owned())?;
+    expect(draw(&mut usual, GREEN)? == green, || "the frame after an error is wrong".to_owned())
 }

@@ -9,7 +9,7 @@ use drawloom::process::{
     CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, PassInputs, ShaderObject, ShaderResource,
     VertexInput,
 };
-use drawloom::raster::Real;
+use drawloom::raster::{Real, Vector};
 use drawloom::scene::{
     Blend, Bounds, Camera, LayerMask, Light, Material, Mesh, ObjectColumn, RenderObject, Scene, SceneRef, Topology,
     Vertex, VertexAttribute,
@@ -97,8 +97,8 @@ impl<R: Real> DeformationCpuShader<R> for CpuPush {
     fn deform(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexInput<R> {
         let mut moved = *vertex;
         let down = R::of(f64::from(pass.columns.get(PUSH, object.index))) * vertex.attributes[0][0];
-        moved.position[1] = moved.position[1] - down;
-        moved.position[0] = moved.position[0] + R::of(f64::from(ASIDE)) * down;
+        let [x, y, z] = vertex.position.0;
+        moved.position = Vector([x + R::of(f64::from(ASIDE)) * down, y - down, z]);
         moved
     }
 }

@@ -141,6 +141,18 @@ impl WgpuBackend {
         Self { strategies: self.strategies.with_encoding(encoding), ..self }
     }
 
+    /// Draws a process whose new shader does not compile with the shader that it had, instead of failing the frame: for shaders that
+    /// change while the engine runs, such as those of a [`ShaderFile`](crate::process::ShaderFile). The error goes through `tracing`
+    /// once, and is among [`WgpuBackend::shader_errors`] until the shader is mended.
+    pub fn keep_working_shaders(self) -> Self {
+        Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
+    }
+
+    /// Why shaders do not compile whose processes are drawn with the [shader before](WgpuBackend::keep_working_shaders); in any order.
+    pub fn shader_errors(&self) -> Vec<String> {
+        self.pipelines.lock().shader_errors()
+    }
+
     /// Has the device write timestamps at the begin and end of each pass: see
     /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a
     /// timeline's log. [Raw passes](crate::process::RawPass) are timed only if the device has

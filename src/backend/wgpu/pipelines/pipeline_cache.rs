@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 
+use super::pipeline_key::PipelineKey;
 use super::process_pipelines::ProcessPipelines;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
@@ -15,6 +16,10 @@ use crate::quality::Quality;
 pub(crate) struct PipelineCache {
     /// By the plan's identity.
     plans: HashMap<u64, PlanPipelines>,
+    /// Whether a process whose new shader does not compile keeps the pipelines that it had.
+    keeps_working_shaders: bool,
+    /// The latest shader of each process that did not compile, and why.
+    failed: HashMap<String, (PipelineKey<'static>, BackendError)>,
 }
 
 struct PlanPipelines {
@@ -25,6 +30,15 @@ struct PlanPipelines {
 }
 
 impl PipelineCache {
+    pub(crate) fn new(keeps_working_shaders: bool) -> Self {
+        Self { keeps_working_shaders, ..Self::default() }
+    }
+
+    /// Why the shaders of processes do not compile that are drawn with those that they had before.
+    pub(crate) fn shader_errors(&self) -> Vec<String> {
+        self.failed.values().map(|(_, error)| error.to_string()).collect()
+    }
+
     /// The pipelines of every render process of a plan: cached ones, also of other plans, or new ones for a process whose
     /// draws changed, or for another quality.
     ///
@@ -43,11 +57,14 @@ impl PipelineCache {
             cached.iter().zip(draws).all(|(pipelines, draws)| pipelines.fits_draws(draws, quality))
         };
         if let Some(cached) = cached.filter(all_fit) {
-            return Ok(Arc::clone(cached));
+            let cached = Arc::clone(cached);
+            self.failed.retain(|name, _| plan.processes().iter().all(|planned| planned.name != *name));
+            return Ok(cached);
         }
         let mut processes = cached.map_or_else(Vec::new, |cached| cached.to_vec());
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
             if processes.get(index).is_some_and(|pipelines| pipelines.fits_draws(draws, quality)) {
+                self.failed.remove(&planned.name);
                 continue;
             }
             let mut all = self.plans.values().flat_map(|cached| cached.processes.iter());
@@ -56,8 +73,35 @@ impl PipelineCache {
                 Some(fitting) => fitting,
                 None => {
                     let label = format!("the shader of {:?}", planned.name.as_str());
-                    let create = || ProcessPipelines::new(device, layouts, plan, planned, draws, quality);
-                    Arc::new(with_error_scope(device, &label, create)??)
+                    let working = processes.get(index).filter(|old| old.differ_in_text_only(draws, quality));
+                    let working = working.filter(|_| self.keeps_working_shaders).cloned();
+                    let create = || {
+                        let created = ProcessPipelines::new(device, layouts, plan, planned, draws, quality)?;
+                        if let Some(working) = &working {
+                            // Only a pipeline shows that a shader lacks an entry point, or reads what there is not.
+                            created.insert(created.create_missing(device, working.by_state().keys().copied()));
+                        }
+                        Ok(created)
+                    };
+                    let has_failed = |failed: &HashMap<String, (PipelineKey<'static>, BackendError)>| {
+                        failed.get(&planned.name).is_some_and(|(key, _)| *key == PipelineKey::new(draws, quality))
+                    };
+                    match &working {
+                        Some(working) if has_failed(&self.failed) => Arc::clone(working),
+                        _ => match (with_error_scope(device, &label, create).flatten(), &working) {
+                            (Ok(created), _) => {
+                                self.failed.remove(&planned.name);
+                                Arc::new(created)
+                            }
+                            (Err(error), Some(working)) => {
+                                tracing::error!(target: "drawloom", %error, "the shader before it is used");
+                                let key = PipelineKey::new(draws, quality).into_owned();
+                                self.failed.insert(planned.name.clone(), (key, error));
+                                Arc::clone(working)
+                            }
+                            (Err(error), None) => return Err(error),
+                        },
+                    }
                 }
             };
             // The loop visits processes in order, so this either replaces an entry or appends one.

@@ -63,6 +63,12 @@ impl<'a> PipelineKey<'a> {
         }
     }
 
+    /// The same with another key's WGSL.
+    pub(crate) fn with_text_of(self, other: &'a PipelineKey<'_>) -> Self {
+        let deformation = other.deformation.as_deref().map(Cow::Borrowed);
+        Self { shader: Cow::Borrowed(&other.shader), deformation, ..self }
+    }
+
     pub(crate) fn into_owned(self) -> PipelineKey<'static> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
         let [deformation, fragment] = [self.deformation, self.fragment].map(|text| text.map(owned));

@@ -130,6 +130,13 @@ impl ProcessPipelines {
         self.key == PipelineKey::new(draws, quality) && resources.eq(self.resources.iter().copied())
     }
 
+    /// Whether the process's pipelines for these draws would be made of another text, and of nothing else that is other.
+    pub(crate) fn differ_in_text_only(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
+        let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
+        PipelineKey::new(draws, quality).with_text_of(&self.key) == self.key
+            && resources.eq(self.resources.iter().copied())
+    }
+
     /// Creates the missing pipelines of these states. [Insert](Self::insert) them only if the device reports no error.
     #[must_use]
     pub(crate) fn create_missing(

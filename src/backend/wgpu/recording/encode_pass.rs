@@ -22,9 +22,13 @@ pub(crate) fn encode_pass(
     parts: &[WgpuPart],
 ) -> Result<wgpu::CommandEncoder, BackendError> {
     use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
-    let WgpuPassState { pass, strategy, .. } = *frame.pass(index);
+    let WgpuPassState { pass, strategy, timed_pass_index, .. } = *frame.pass(index);
+    let accesses = &request.plan.processes()[pass.process_index].declaration.accesses;
+    let clears = accesses.iter().any(|(_, access)| access.writes() && !access.reads());
     encode(device, frame, index, |encoder| match (&request.draws[pass.process_index], strategy.recording) {
         (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
+        // A pass that would only load and store its targets.
+        (Draws::Commands(_), _) if list.batches.is_empty() && timed_pass_index.is_none() && !clears => Ok(()),
         (Draws::Compute(dispatch), _) => encode_compute(encoder, frame, index, dispatch),
         (Draws::Commands(_), Direct | Indirect) => {
             record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())
