@@ -7,6 +7,8 @@ use crate::quality::{DiffuseFormat, NormalFormat};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
+    /// A byte, linear, 0 to 1.
+    R8Unorm,
     /// Two bytes, linear, 0 to 1.
     Rg8Unorm,
     /// Four bytes, linear, 0 to 1.
@@ -24,6 +26,10 @@ pub enum Format {
     Rgba16Float,
     /// Two half floats.
     Rg16Float,
+    /// A half float.
+    R16Float,
+    /// Four floats.
+    Rgba32Float,
     /// A float.
     R32Float,
     /// A whole number: shaders write and read `u32`.
@@ -56,12 +62,12 @@ impl Format {
 
     /// Whether a compute shader can write it as a storage texture on every adapter.
     pub fn can_be_stored(self) -> bool {
-        matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::R32Float | Self::R32Uint)
+        matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
 
     /// Whether what is drawn can be blended with it on every adapter.
     pub fn can_be_blended(self) -> bool {
-        !self.is_depth_stencil() && !matches!(self, Self::R32Float | Self::R32Uint)
+        !self.is_depth_stencil() && !matches!(self, Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
 
     /// Whether it holds whole numbers.
@@ -76,16 +82,16 @@ impl Format {
 
     /// Whether it holds negative numbers.
     pub fn is_signed(self) -> bool {
-        matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R32Float)
+        matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R16Float | Self::Rgba32Float | Self::R32Float)
     }
 
     /// Channels per pixel, as shaders sample them.
     pub fn channels(self) -> usize {
         match self {
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => 4,
-            Self::Rgb10a2Unorm | Self::Rgba16Float => 4,
+            Self::Rgb10a2Unorm | Self::Rgba16Float | Self::Rgba32Float => 4,
             Self::Rg8Unorm | Self::Rg16Float => 2,
-            Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
+            Self::R8Unorm | Self::R16Float | Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
             Self::Depth32FloatStencil8 | Self::Stencil8 => 1,
         }
     }
@@ -93,12 +99,13 @@ impl Format {
     /// Bytes per pixel, without the stencil beside depth.
     pub fn bytes(self) -> usize {
         match self {
-            Self::Stencil8 => 1,
-            Self::Rg8Unorm => 2,
+            Self::R8Unorm | Self::Stencil8 => 1,
+            Self::Rg8Unorm | Self::R16Float => 2,
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb | Self::Rgb10a2Unorm => 4,
             Self::Rg16Float | Self::R32Float | Self::R32Uint => 4,
             Self::Depth32Float | Self::Depth32FloatStencil8 => 4,
             Self::Rgba16Float => 8,
+            Self::Rgba32Float => 16,
         }
     }
 }

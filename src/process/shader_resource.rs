@@ -16,8 +16,8 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ShaderResource<'a> {
-    /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is recorded, and
-    /// uploaded if they changed. There are 4 or more, in multiples of 4.
+    /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is recorded; the blocks
+    /// of 1 KiB that changed are uploaded. There are 4 or more, in multiples of 4.
     Bytes(Cow<'a, [u8]>),
     /// The same for several processes: uploaded once for all that have this `Arc`.
     SharedBytes(Arc<[u8]>),

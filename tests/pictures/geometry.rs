@@ -152,12 +152,14 @@ fn unsuitable() -> Result<(), Failed> {
     let with = |target, format| match target {
         "normal" => GeometryFormats { normal: format, ..usual },
         "diffuse" => GeometryFormats { diffuse: format, ..usual },
+        "depth" => GeometryFormats { depth: format, ..usual },
         _ => GeometryFormats { radiance: format, ..usual },
     };
     for (target, unsuitable) in [
         ("normal", &[Format::R32Float, Format::Depth32Float][..]),
         ("diffuse", &[Format::R32Float, Format::Rg16Float, Format::Depth32Float]),
-        ("radiance", &[Format::R32Float, Format::Rg16Float, Format::Depth32Float]),
+        ("radiance", &[Format::R32Float, Format::Rg16Float, Format::Rgba32Float, Format::Depth32Float]),
+        ("depth", &[Format::R32Float, Format::Stencil8]),
     ] {
         for &format in unsuitable {
             let deferred = Deferred::to_picture().formats(with(target, format));

@@ -40,6 +40,7 @@ mod shadows;
 mod software;
 mod stencil;
 mod strategies;
+mod target_formats;
 mod transforms;
 mod transparency;
 mod triangles;
@@ -91,6 +92,7 @@ fn main() {
         (shadows::CASES, Needs::Adapter),
         (software::CASES, Needs::Adapter),
         (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (target_formats::CASES, Needs::Adapter),
         (transforms::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),

@@ -88,10 +88,12 @@ fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
         Format::Rgba8Srgb | Format::Bgra8Srgb if channel < 3 => ChannelEncoding::Srgb,
         Format::Rgb10a2Unorm if channel < 3 => ChannelEncoding::Steps(1023.0),
         Format::Rgb10a2Unorm => ChannelEncoding::Steps(3.0),
-        Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm => ChannelEncoding::Steps(255.0),
+        Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm | Format::R8Unorm => ChannelEncoding::Steps(255.0),
         Format::Bgra8Srgb | Format::Bgra8Unorm => ChannelEncoding::Steps(255.0),
-        Format::Rgba16Float | Format::Rg16Float => ChannelEncoding::Half,
-        Format::R32Float | Format::Depth32Float | Format::Depth32FloatStencil8 => ChannelEncoding::Float,
+        Format::Rgba16Float | Format::Rg16Float | Format::R16Float => ChannelEncoding::Half,
+        Format::Rgba32Float | Format::R32Float | Format::Depth32Float | Format::Depth32FloatStencil8 => {
+            ChannelEncoding::Float
+        }
         Format::R32Uint => ChannelEncoding::Integer,
         Format::Stencil8 => ChannelEncoding::Steps(255.0),
     }

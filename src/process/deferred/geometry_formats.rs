@@ -31,8 +31,14 @@ impl GeometryFormats {
     /// The first target whose format lacks what it needs.
     pub(super) fn first_unsuitable(&self) -> Option<(&'static str, Format)> {
         let targets = [("normal", self.normal, 2), ("diffuse", self.diffuse, 3), ("radiance", self.radiance, 3)];
-        let lacks =
-            |(_, format, channels): &(_, Format, usize)| format.is_depth_stencil() || format.channels() < *channels;
+        let lacks = |(target, format, channels): &(&str, Format, usize)| {
+            // Lights are added to radiance.
+            let is_blended = *target == "radiance";
+            format.is_depth_stencil()
+                || format.is_integer()
+                || format.channels() < *channels
+                || (is_blended && !format.can_be_blended())
+        };
         let unsuitable = targets.into_iter().find(lacks).map(|(target, format, _)| (target, format));
         unsuitable.or_else(|| (!self.depth.has_depth()).then_some(("depth", self.depth)))
     }

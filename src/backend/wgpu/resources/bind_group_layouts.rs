@@ -136,6 +136,7 @@ pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderRes
 /// A target's format as a wgpu format.
 pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
     match format {
+        Format::R8Unorm => wgpu::TextureFormat::R8Unorm,
         Format::Rg8Unorm => wgpu::TextureFormat::Rg8Unorm,
         Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
         Format::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
@@ -144,6 +145,8 @@ pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
         Format::Rgb10a2Unorm => wgpu::TextureFormat::Rgb10a2Unorm,
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
         Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
+        Format::R16Float => wgpu::TextureFormat::R16Float,
+        Format::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
         Format::R32Float => wgpu::TextureFormat::R32Float,
         Format::R32Uint => wgpu::TextureFormat::R32Uint,
         Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
