@@ -70,9 +70,9 @@ impl WgpuBackend {
     /// If the device lacks room.
     fn storage_buffers(&self, plan: &FramePlan) -> Result<Arc<StorageBuffers>, BackendError> {
         let mut current = self.storage_buffers.lock();
-        let label = "the buffers of processes";
-        let next = with_error_scope(&self.device, label, || current.with_those_of(&self.device, plan))??;
-        if let Some(next) = next {
+        if !current.suffice_for(plan) {
+            let label = "the buffers of processes";
+            let next = with_error_scope(&self.device, label, || current.with_those_of(&self.device, plan))??;
             *current = Arc::new(next);
         }
         Ok(Arc::clone(&current))

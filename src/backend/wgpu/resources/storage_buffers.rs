@@ -12,25 +12,25 @@ pub(crate) struct StorageBuffers {
 }
 
 impl StorageBuffers {
+    /// Whether these are all that a plan's processes use.
+    pub(crate) fn suffice_for(&self, plan: &FramePlan) -> bool {
+        plan.buffers().iter().all(|layout| self.find(*layout).is_some())
+    }
+
     /// These buffers, and those that a plan's processes use and that are missing, of zeros. A buffer of the same name and another size is
-    /// replaced. `None` if none is missing.
+    /// replaced.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn with_those_of(&self, device: &wgpu::Device, plan: &FramePlan) -> Result<Option<Self>, BackendError> {
-        let is_missing = |layout: &&BufferLayout| self.find(**layout).is_none();
-        let mut missing = plan.buffers().iter().filter(is_missing).peekable();
-        if missing.peek().is_none() {
-            return Ok(None);
-        }
+    pub(crate) fn with_those_of(&self, device: &wgpu::Device, plan: &FramePlan) -> Result<Self, BackendError> {
         let mut buffers = self.buffers.clone();
-        for layout in missing {
+        for layout in plan.buffers().iter().filter(|layout| self.find(**layout).is_none()) {
             buffers.retain(|(known, _)| known.name != layout.name);
             check_storage_binding_size(device, usize::try_from(layout.bytes).unwrap_or(usize::MAX))?;
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
             buffers.push((*layout, new_buffer(device, layout.name, layout.bytes, usage)?));
         }
-        Ok(Some(Self { buffers }))
+        Ok(Self { buffers })
     }
 
     /// A buffer of the plan.
