@@ -9,14 +9,15 @@ use drawloom::scene::LayerMask;
 /// The layer of the selected objects.
 pub const LAYER: LayerMask = LayerMask::layer(3);
 
-const STENCIL: &str = "selected";
+/// The target of the stencil.
+const STENCIL: &str = "stencil of selected objects";
 
 /// Sets the stencil where selected objects are, hidden or not.
 pub struct Selected<D>(pub D);
 
 impl<D: Deformation> RenderProcess for Selected<D> {
     fn name(&self) -> &str {
-        STENCIL
+        "selected"
     }
 
     fn declare(&self, declare: &mut Declare) {

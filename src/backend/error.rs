@@ -21,11 +21,13 @@ pub enum BackendError {
         needed: u64,
     },
     /// A process's WGSL does not compile.
-    #[error("the shader of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
+    #[error("the {part} of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
     Shader {
         /// The process.
         process: String,
-        /// The line of the process's own text, from 1.
+        /// Which of the process's own texts it is: "shader" or "deformation".
+        part: &'static str,
+        /// The line of that text, from 1.
         line: usize,
         /// The column in that line, from 1.
         column: usize,

@@ -35,14 +35,14 @@ impl Selection {
         }
     }
 
-    /// Those of these objects that belong to one of some layers.
+    /// Objects that belong to one of these layers, instead of those of the layers before.
     pub const fn in_layers(self, layers: LayerMask) -> Self {
         Self { layers, ..self }
     }
 
     /// Those of these objects that belong to none of some layers.
-    pub const fn not_in_layers(self, excluded_layers: LayerMask) -> Self {
-        Self { excluded_layers, ..self }
+    pub const fn not_in_layers(self, layers: LayerMask) -> Self {
+        Self { excluded_layers: LayerMask(self.excluded_layers.0 | layers.0), ..self }
     }
 
     /// The same objects in another order.
@@ -76,11 +76,12 @@ pub enum DrawOrder {
     /// [`Quality::opaque_order`](crate::quality::Quality::opaque_order) says; then blended ones, back to front.
     #[default]
     ByState,
-    /// All by the distance of their centres along the view's axis, the nearest first: where pixels are dear.
+    /// All by the distance of their centres along the view's axis, the nearest first: for expensive fragment shaders. As precise as
+    /// [`Quality::blended_order`](crate::quality::Quality::blended_order).
     FrontToBack,
-    /// The farthest first: where what is drawn depends on what is behind it.
+    /// The farthest first, with the same precision: where what is drawn depends on what is behind it.
     BackToFront,
-    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`].
+    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`]. It is the first `u32` of each element.
     ByColumn(ColumnLayout),
 }
 

@@ -76,7 +76,11 @@ impl PlanCache {
     ///
     /// # Errors
     /// If the processes make no frame.
-    pub(super) fn ahead(&mut self, lights: &[Light], assets: &Assets) -> Result<[Arc<FramePlan>; 2], PlanError> {
+    pub(super) fn plans_to_prepare(
+        &mut self,
+        lights: &[Light],
+        assets: &Assets,
+    ) -> Result<[Arc<FramePlan>; 2], PlanError> {
         let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights());
         Ok([self.plan_for(requirements)?, self.plan_for(Requirements::all())?])
     }

@@ -120,15 +120,16 @@ impl<B: Backend> Renderer<B> {
         recorded
     }
 
-    /// Compiles the shaders of all processes that a frame may have, whatever its scene requires, and makes the pipelines that this
-    /// scene's meshes and materials need. Without this call that happens in the first frames that need them. Call it while the
-    /// world is loaded, on any thread: it also finds what is wrong with the engine's processes.
+    /// Compiles the shaders of frames of this scene, and of one that requires every process of the pipeline, and makes their pipelines for
+    /// this scene's meshes and materials. Without this call that happens in the first frames that need them, as it still does
+    /// for mirrored objects, and for pipelines between these two. Call it while the world is loaded, on any thread: it also finds what is
+    /// wrong with the engine's processes.
     ///
     /// # Errors
     /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
     /// frame.
     pub fn prepare_pipelines(&mut self, scene: SceneRef<'_>) -> Result<(), FrameError> {
-        for plan in self.plans.ahead(scene.lights, scene.assets)? {
+        for plan in self.plans.plans_to_prepare(scene.lights, scene.assets)? {
             let draws = plan.draws()?;
             let states_of = |draws: &Draws<'_>| {
                 draws.selection().map_or_else(Vec::new, |selection| possible_draw_states(selection, scene.assets))

@@ -173,7 +173,10 @@ impl Declare {
     /// ```
     pub fn reads_attribute<T: AttributeValue>(&mut self, attribute: VertexAttribute<T>, default: T) {
         let default = bytemuck::bytes_of(&default).to_vec();
-        self.declaration.attributes.push(DeclaredAttribute { layout: attribute.layout(), default });
+        let declared = DeclaredAttribute { layout: attribute.layout(), default };
+        if !self.declaration.attributes.contains(&declared) {
+            self.declaration.attributes.push(declared);
+        }
     }
 
     /// Reads a buffer in the shader, at `@group(2)` after the sampled targets: the first of the process's buffers has the next binding,
@@ -186,7 +189,8 @@ impl Declare {
     }
 
     /// Reads and writes a buffer in the shader, with a binding as [`Declare::reads_buffer`] has. Compute and fragment shaders have it, and
-    /// vertex shaders have not. Processes that change the same buffer need an order.
+    /// vertex shaders have not. Processes that change the same buffer need an order. A process that draws in several views sees what it
+    /// changed in those that are submitted before: in the order of the scene's cameras, if these are of one kind.
     pub fn changes_buffer<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
         self.declaration.buffers.push((buffer.layout(), BufferAccess::Change));
     }
@@ -230,8 +234,8 @@ impl Declare {
     }
 
     /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute shader
-    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. Of shadow maps, the first
-    /// is the first that is drawn anew; in frames that keep all of them, the process does not draw.
+    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. In shadow views it draws
+    /// with the first map that the frame draws anew, and not at all if every map is cached.
     pub fn once_a_frame(&mut self) {
         self.declaration.once_a_frame = true;
     }

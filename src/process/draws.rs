@@ -21,7 +21,7 @@ pub enum Draws<'a> {
     Lights(LightDraws<'a>),
     /// Vertices that the shader makes itself.
     Procedural(ProceduralDraws<'a>),
-    /// Nothing: a compute shader runs.
+    /// A compute shader runs; nothing is drawn.
     Compute(ComputeDispatch<'a>),
     /// Commands that the process encodes itself: compute, copies, render passes.
     #[cfg(feature = "wgpu")]

@@ -17,8 +17,8 @@ pub enum Format {
     Rgba8Srgb,
     /// As [`Format::Rgba8Unorm`], with blue first.
     Bgra8Unorm,
-    /// As [`Format::Rgba8Srgb`], with blue first, as the surfaces of many windows are. It can be copied to a surface whose format is not
-    /// said to be sRGB too, whose bytes mean the same.
+    /// As [`Format::Rgba8Srgb`], with blue first, as the surfaces of many windows are. Its bytes can be copied
+    /// unchanged to a surface of [`Format::Bgra8Unorm`].
     Bgra8Srgb,
     /// Three channels of 10 bits and one of 2, linear, 0 to 1.
     Rgb10a2Unorm,
@@ -37,7 +37,7 @@ pub enum Format {
     /// Depth, a float.
     Depth32Float,
     /// Depth, a float, and a [stencil](super::Stencil). Devices need the feature `DEPTH32FLOAT_STENCIL8`, which
-    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) requests where there is it. It is not read
+    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) has if the adapter has it. It is not read
     /// back, and shaders sample its depth.
     Depth32FloatStencil8,
     /// A [stencil](super::Stencil) without depth, which shaders sample as a whole number.

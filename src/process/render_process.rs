@@ -48,7 +48,7 @@ pub trait RenderProcess: Send + Sync {
     /// beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// What it draws. Called once per frame, and the result may change: new parameters cost nothing, another shader or
+    /// What it draws. Called once per frame, and by [`Renderer::prepare_pipelines`](crate::Renderer::prepare_pipelines); the result may change: new parameters cost nothing, another shader or
     /// blending needs new pipelines.
     fn draws(&self) -> Draws<'_>;
 

@@ -40,14 +40,23 @@ use parking_lot::Mutex;
 pub struct ShaderFile {
     path: PathBuf,
     first: Version,
-    checked: Mutex<Instant>,
+    checked: Mutex<Check>,
 }
+
+/// When the file was looked at, and what it was then.
+#[derive(Debug)]
+struct Check {
+    at: Instant,
+    stamp: Option<Stamp>,
+}
+
+/// What changes with a file: its time of change, and its length. `None` for a file that is not there.
+type Stamp = (Option<SystemTime>, u64);
 
 /// A text that the file had. Texts that shaders were made from are lent, so each stays until the file is dropped.
 #[derive(Debug)]
 struct Version {
     text: String,
-    modified: Option<SystemTime>,
     next: OnceLock<Box<Version>>,
 }
 
@@ -61,8 +70,10 @@ impl ShaderFile {
     /// If it cannot be read, or is not UTF-8.
     pub fn open(path: impl Into<PathBuf>) -> io::Result<Self> {
         let path = path.into();
+        // Taken first: a change while the text is read is found the next time.
+        let stamp = stamp(&path);
         let first = Version::read(&path)?;
-        Ok(Self { path, first, checked: Mutex::new(Instant::now()) })
+        Ok(Self { path, first, checked: Mutex::new(Check { at: Instant::now(), stamp }) })
     }
 
     /// The text that the file has, or had a moment ago. A file that cannot be read keeps the text that it had; that is warned of
@@ -73,11 +84,12 @@ impl ShaderFile {
             latest = next;
         }
         let mut checked = self.checked.lock();
-        if checked.elapsed() < Self::INTERVAL {
+        if checked.at.elapsed() < Self::INTERVAL {
             return &latest.text;
         }
-        *checked = Instant::now();
-        if modified(&self.path) == latest.modified {
+        let stamp = stamp(&self.path);
+        checked.at = Instant::now();
+        if std::mem::replace(&mut checked.stamp, stamp) == stamp {
             return &latest.text;
         }
         match Version::read(&self.path) {
@@ -98,15 +110,13 @@ impl ShaderFile {
 
 impl Version {
     fn read(path: &Path) -> io::Result<Self> {
-        // Taken first: a change while the text is read is found the next time.
-        let modified = modified(path);
-        Ok(Self { text: fs::read_to_string(path)?, modified, next: OnceLock::new() })
+        Ok(Self { text: fs::read_to_string(path)?, next: OnceLock::new() })
     }
 }
 
-/// `None` if the file is not there, or the system does not know.
-fn modified(path: &Path) -> Option<SystemTime> {
-    fs::metadata(path).and_then(|metadata| metadata.modified()).ok()
+fn stamp(path: &Path) -> Option<Stamp> {
+    let metadata = fs::metadata(path).ok()?;
+    Some((metadata.modified().ok(), metadata.len()))
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -125,7 +135,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("drawloom-shader-{}.wgsl", std::process::id()));
         write(&path, "first", 1);
         let file = ShaderFile::open(&path).unwrap();
-        let look_again = || *file.checked.lock() = Instant::now() - 2 * ShaderFile::INTERVAL;
+        let look_again = || file.checked.lock().at = Instant::now() - 2 * ShaderFile::INTERVAL;
         let first = file.text();
         write(&path, "second", 2);
         assert_eq!(file.text(), "first", "it is looked at a few times a second");

@@ -10,7 +10,7 @@ use super::{LayerFilter, ObjectBlock, ObjectTable, RejectionReason, RenderView, 
 use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
-use crate::scene::{Blend, Projection, SceneRef};
+use crate::scene::{Blend, ColumnValues, Projection, SceneRef};
 
 /// Fills the commands of one pass. Mesh, material and draw state are copied from the object table, which workers only
 /// read. The depth is computed for each view, and so is the state's subdivision level if the view is a paraboloid.
@@ -36,16 +36,17 @@ struct OrderKeys<'a> {
     forward: DVec3,
     opaque: DepthQuantizer,
     blended: DepthQuantizer,
-    /// The engine's own numbers, as bytes, if these are the order.
-    numbers: &'a [u8],
+    /// The engine's own numbers, if these are the order.
+    numbers: Option<ColumnValues<'a>>,
 }
 
 impl OrderKeys<'_> {
     /// The engine's own number of an object.
     fn number(&self, object: usize) -> u32 {
-        let bytes = self.numbers.get(object * size_of::<u32>()..).and_then(<[u8]>::first_chunk);
         // A frame whose scene lacks the column has failed before.
-        bytes.map_or(0, |bytes| u32::from_ne_bytes(*bytes))
+        let value =
+            self.numbers.and_then(|values| values.bytes().get(object * values.layout().stride..)?.first_chunk());
+        value.map_or(0, |bytes| u32::from_ne_bytes(*bytes))
     }
 }
 
@@ -55,8 +56,8 @@ impl Fill<'_> {
     pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
         let camera = &self.view.camera;
         let numbers = match self.selection.order {
-            DrawOrder::ByColumn(column) => self.scene.column(column).map_or(&[][..], |values| values.bytes()),
-            _ => &[],
+            DrawOrder::ByColumn(column) => self.scene.column(column),
+            _ => None,
         };
         let order = OrderKeys {
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,

@@ -31,7 +31,8 @@ impl<'a> LayerFilter<'a> {
         match self.layers.get(object) {
             Some(layers) => {
                 let is_drawn = self.drawn == LayerMask::ALL || layers.intersects(self.drawn);
-                is_drawn && !layers.intersects(self.excluded)
+                let is_excluded = self.excluded == LayerMask::ALL || layers.intersects(self.excluded);
+                is_drawn && !is_excluded
             }
             None => self.passes_every_layer(),
         }

@@ -441,6 +441,13 @@ fn buffers_that_nothing_writes_or_that_differ_are_refused() {
 
     let other = |declare: &mut Declare| declare.changes_buffer(StorageBuffer::<[u32; 4]>::new("counts", 8));
     let other = Buffering { name: "other", declare: other, draws: dispatch };
+    let both = |declare: &mut Declare| {
+        declare.changes_buffer(COUNTS);
+        declare.reads_arguments(COUNTS);
+    };
+    let error = build(vec![Buffering { name: "both", declare: both, draws: dispatch }]).unwrap_err().to_string();
+    assert!(error.contains("\"both\" changes the buffer \"counts\""), "{error}");
+
     let error = build(vec![reads(), other]).unwrap_err();
     let is_named = matches!(
         &error,
@@ -452,10 +459,6 @@ fn buffers_that_nothing_writes_or_that_differ_are_refused() {
 
 #[test]
 fn arguments_are_in_a_buffer_that_the_process_declares() {
-    fn both(declare: &mut Declare) {
-        declare.changes_buffer(COUNTS);
-        declare.reads_arguments(COUNTS);
-    }
     type Case = (fn(&mut Declare), fn() -> Draws<'static>, &'static str);
     let cases: [Case; 4] = [
         (
@@ -464,10 +467,10 @@ fn arguments_are_in_a_buffer_that_the_process_declares() {
                 let workgroups = Workgroups::Indirect(COUNTS.at(0));
                 Draws::Compute(ComputeDispatch { workgroups, ..ComputeDispatch::default() })
             },
-            "which it does not declare",
+            "\"counts\", which it does not declare",
         ),
         (
-            both,
+            |declare| declare.reads_arguments(COUNTS),
             || {
                 let workgroups = Workgroups::Indirect(COUNTS.at(6));
                 Draws::Compute(ComputeDispatch { workgroups, ..ComputeDispatch::default() })
@@ -475,7 +478,7 @@ fn arguments_are_in_a_buffer_that_the_process_declares() {
             "past its end",
         ),
         (
-            both,
+            |declare| declare.reads_arguments(COUNTS),
             || {
                 let count = DrawCount::Indirect(COUNTS.at(5));
                 Draws::Procedural(ProceduralDraws { count, ..ProceduralDraws::default() })
@@ -490,7 +493,11 @@ fn arguments_are_in_a_buffer_that_the_process_declares() {
     ];
     for (declare, draws, problem) in cases {
         let process = Buffering { name: "wrong", declare, draws };
-        let builder = Renderer::builder(NullBackend).process(process);
+        let writer = Buffering { name: "writer", declare: |declare| declare.changes_buffer(COUNTS), draws: dispatch };
+        let mut builder = Renderer::builder(NullBackend).process(process);
+        if !problem.contains("does not declare") {
+            builder = builder.process(writer);
+        }
         let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         let error = renderer.record(field(3).as_scene_ref()).map(drop).unwrap_err().to_string();
         assert!(error.contains(problem) && error.contains("\"wrong\""), "{error}");

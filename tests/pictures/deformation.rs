@@ -256,6 +256,8 @@ fn error_lines() -> Result<(), Failed> {
     let broken = SceneRef { layers: &layers, ..scene.as_scene_ref() };
     let error = fixture.renderer.record(broken).err().ok_or("it is drawn")?;
     let found = error.to_string();
-    let is_complete = ["broken: ", "line 3", "out.position.y -= unknown"].iter().all(|part| found.contains(part));
+    let is_complete = ["the deformation of \"broken: ", "line 3", "out.position.y -= unknown"]
+        .iter()
+        .all(|part| found.contains(part));
     if is_complete { Ok(()) } else { Err(found.into()) }
 }

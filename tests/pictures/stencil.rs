@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::process::{
@@ -11,6 +10,7 @@ use drawloom::process::{
 };
 use drawloom::scene::{LayerMask, Scene, SceneRef};
 use drawloom::task::Scheduler;
+use drawloom::{Renderer, RendererBuilder};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
@@ -69,7 +69,7 @@ impl RenderProcess for Mark {
 /// Draws white where a stencil compares like this.
 struct White {
     target: &'static str,
-    stencil: Stencil,
+    stencil: Option<Stencil>,
 }
 
 impl RenderProcess for White {
@@ -90,7 +90,7 @@ impl RenderProcess for White {
                 return vec4<f32>(1.0);
             }
         ";
-        Draws::FullScreen(FullScreen { shader, stencil: Some(self.stencil), ..FullScreen::default() })
+        Draws::FullScreen(FullScreen { shader, stencil: self.stencil, ..FullScreen::default() })
     }
 }
 
@@ -154,7 +154,7 @@ fn draw(fixture: &mut Fixture, target: &str) -> Result<Picture, Failed> {
 
 /// What is white where a stencil that was marked compares like this.
 fn white(mark: Mark, stencil: Stencil) -> Result<Picture, Failed> {
-    let white = White { target: mark.target, stencil };
+    let white = White { target: mark.target, stencil: Some(stencil) };
     let mut fixture =
         Fixture::with(2, |builder| builder.deferred(pipeline()).process(mark).process(white).output("white"))?;
     draw(&mut fixture, "white")
@@ -205,7 +205,7 @@ fn every_strategy() -> Result<(), Failed> {
     for (recording, encoding) in strategies()? {
         let (device, queue) = device()?;
         let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
-        let white = White { target: "depth", stencil: Stencil::test(Comparison::Equal, 3) };
+        let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
         let builder = Renderer::builder(backend).deferred(pipeline()).process(Mark::BESIDE_DEPTH);
         let (renderer, submitter) = builder.process(white).output("white").build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };
@@ -229,13 +229,20 @@ fn operations() -> Result<(), Failed> {
         on_pass: StencilOperation::Zero,
         ..Stencil::mark(5)
     });
-    let inverting = with(Stencil { write_mask: 1, on_pass: StencilOperation::Keep, ..Stencil::mark(1) });
+    let keeping = with(Stencil { write_mask: 1, on_pass: StencilOperation::Keep, ..Stencil::mark(1) });
+    let by = |on_pass| with(Stencil { on_pass, ..Stencil::mark(9) });
+    let any = Stencil::test(Comparison::NotEqual, 0);
     for (mark, stencil, is_covered) in [
         (masked, equal(2), true),
         (masked, Stencil { read_mask: 1, ..equal(3) }, false),
         (masked, Stencil { read_mask: 2, ..equal(3) }, true),
         (failing, equal(5), true),
-        (inverting, equal(1), false),
+        (keeping, equal(1), false),
+        (by(StencilOperation::IncrementClamp), any, true),
+        (by(StencilOperation::IncrementWrap), any, true),
+        (by(StencilOperation::DecrementWrap), Stencil::test(Comparison::Less, 200), true),
+        (by(StencilOperation::DecrementClamp), any, false),
+        (by(StencilOperation::Zero), any, false),
     ] {
         let found = white(mark, stencil)?;
         let is_white = found.bytes == covered.bytes;
@@ -247,18 +254,24 @@ fn operations() -> Result<(), Failed> {
 }
 
 fn without() -> Result<(), Failed> {
-    let problem = |mark: Mark, white: White| -> Result<String, Failed> {
-        let usual = Deferred::to_picture();
-        let mut fixture =
-            Fixture::with(2, |builder| builder.deferred(usual).process(mark).process(white).output("white"))?;
-        let (scene, _) = scene();
-        let recorded = fixture.renderer.record(scene.as_scene_ref());
-        Ok(recorded.err().ok_or("it is recorded")?.to_string())
-    };
     let test = Stencil::test(Comparison::Equal, 3);
-    let no_stencil = problem(Mark::ALONE, White { target: "depth", stencil: test })?;
-    let read_only = problem(Mark::ALONE, White { target: "marked", stencil: Stencil::mark(1) })?;
-    for (found, part) in [(no_stencil, "has none"), (read_only, "declares only")] {
+    let problem = |white: White| -> Result<String, Failed> {
+        let process = |builder: RendererBuilder<WgpuBackend>| {
+            builder.deferred(Deferred::to_picture()).process(Mark::ALONE).process(white).output("white")
+        };
+        let mut fixture = match Fixture::with(2, process) {
+            Ok(fixture) => fixture,
+            Err(error) => return Ok(error.message().unwrap_or_default().to_owned()),
+        };
+        let (scene, _) = scene();
+        Ok(fixture.renderer.record(scene.as_scene_ref()).err().ok_or("it is recorded")?.to_string())
+    };
+    for (target, stencil, part) in [
+        ("depth", Some(test), "Depth32Float"),
+        ("marked", Some(Stencil::mark(1)), "declares only"),
+        ("marked", None, "without a test"),
+    ] {
+        let found = problem(White { target, stencil })?;
         if !found.contains(part) || !found.contains("\"white\"") {
             return Err(found.into());
         }

@@ -143,12 +143,12 @@ impl WgpuBackend {
 
     /// Draws a process whose new shader does not compile with the shader that it had, instead of failing the frame: for shaders that
     /// change while the engine runs, such as those of a [`ShaderFile`](crate::process::ShaderFile). The error goes through `tracing`
-    /// once, and is among [`WgpuBackend::shader_errors`] until the shader is mended.
+    /// once, and is among [`WgpuBackend::shader_errors`] until the shader compiles.
     pub fn keep_working_shaders(self) -> Self {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
     }
 
-    /// Why shaders do not compile whose processes are drawn with the [shader before](WgpuBackend::keep_working_shaders); in any order.
+    /// The errors of processes that are still drawn with the [shader before](WgpuBackend::keep_working_shaders), in any order.
     pub fn shader_errors(&self) -> Vec<String> {
         self.pipelines.lock().shader_errors()
     }

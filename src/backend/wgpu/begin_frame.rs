@@ -63,16 +63,15 @@ impl WgpuBackend {
         })?
     }
 
-    /// The buffers that a plan's processes share. Those that an error of the device leaves out are made anew in the next frame; the others
-    /// keep their content.
+    /// The buffers that a plan's processes share. If creation fails, existing buffers keep their content, and the next frame tries again.
     ///
     /// # Errors
     /// If the device lacks room.
     fn storage_buffers(&self, plan: &FramePlan) -> Result<Arc<StorageBuffers>, BackendError> {
         let mut current = self.storage_buffers.lock();
-        if !current.suffice_for(plan) {
+        if !current.covers(plan) {
             let label = "the buffers of processes";
-            let next = with_error_scope(&self.device, label, || current.with_those_of(&self.device, plan))??;
+            let next = with_error_scope(&self.device, label, || current.with_missing_buffers_of(&self.device, plan))??;
             *current = Arc::new(next);
         }
         Ok(Arc::clone(&current))

@@ -1,8 +1,9 @@
 //! Reading back parts of targets without waiting for the device.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use parking_lot::Mutex;
+use parking_lot::{Condvar, Mutex};
 
 use super::error_scope::{poll, with_error_scope};
 use super::resources::{ViewTarget, WgpuTargets};
@@ -17,7 +18,13 @@ pub struct WgpuReadBack {
     size: [u32; 2],
     format: Format,
     /// Shared with the copy while that is not submitted, and then with the callback of the mapping.
-    state: Arc<Mutex<State>>,
+    progress: Arc<Progress>,
+}
+
+struct Progress {
+    state: Mutex<State>,
+    /// Notified when the buffer is mapped, or will not be.
+    ended: Condvar,
 }
 
 /// How far a read-back is.
@@ -32,14 +39,17 @@ enum State {
 }
 
 impl WgpuReadBack {
+    /// A thread that is about to run a callback does so much sooner, however busy the machine is.
+    const MAX_CALLBACK_DELAY: Duration = Duration::from_secs(30);
+
     /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It does not wait.
     ///
     /// # Errors
     /// If the frame was dropped, or the device is lost.
     pub fn try_read(&self) -> Result<Option<Picture>, BackendError> {
         poll(&self.device, wgpu::PollType::Poll)?;
-        match &*self.state.lock() {
-            State::Recorded if Arc::strong_count(&self.state) == 1 => Err(BackendError::NotSubmitted),
+        match &*self.progress.state.lock() {
+            State::Recorded if Arc::strong_count(&self.progress) == 1 => Err(BackendError::NotSubmitted),
             State::Recorded | State::Submitted(_) => Ok(None),
             State::Done => self.picture().map(Some),
             State::Failed(message) => Err(BackendError::DeviceLost { message: message.clone() }),
@@ -55,21 +65,29 @@ impl WgpuReadBack {
             State::Submitted(index) => Some(index.clone()),
             _ => None,
         };
-        let mut index = submitted(&self.state.lock());
+        let mut index = submitted(&self.progress.state.lock());
         if index.is_none() {
             if let Some(picture) = self.try_read()? {
                 return Ok(picture);
             }
             // Another thread may have submitted it meanwhile.
-            index = submitted(&self.state.lock());
+            index = submitted(&self.progress.state.lock());
         }
-        if index.is_none() && matches!(*self.state.lock(), State::Recorded) {
+        if index.is_none() && matches!(*self.progress.state.lock(), State::Recorded) {
             return Err(BackendError::NotSubmitted);
         }
         poll(&self.device, wgpu::PollType::Wait { submission_index: index, timeout: None })?;
-        // The device is done with the frame, so it has mapped the buffer, or is lost.
-        let lost = || BackendError::DeviceLost { message: "pixels that were read back never came".to_owned() };
-        self.try_read()?.ok_or_else(lost)
+        // The device is done with the frame, so the callback has run, or another thread that polled is about to run it.
+        let deadline = Instant::now() + Self::MAX_CALLBACK_DELAY;
+        let mut state = self.progress.state.lock();
+        while matches!(*state, State::Recorded | State::Submitted(_)) {
+            if self.progress.ended.wait_until(&mut state, deadline).timed_out() {
+                let message = "pixels that were read back never came".to_owned();
+                return Err(BackendError::DeviceLost { message });
+            }
+        }
+        drop(state);
+        self.try_read()?.ok_or(BackendError::NotSubmitted)
     }
 
     fn picture(&self) -> Result<Picture, BackendError> {
@@ -88,7 +106,7 @@ pub(crate) struct ReadBackCopy {
     origin: [u32; 2],
     size: [u32; 2],
     buffer: wgpu::Buffer,
-    state: Arc<Mutex<State>>,
+    progress: Arc<Progress>,
 }
 
 impl ReadBackCopy {
@@ -107,17 +125,18 @@ impl ReadBackCopy {
 
     /// Maps the buffer when the device is done with the frame, which was submitted.
     pub(crate) fn submitted(self, index: &wgpu::SubmissionIndex) {
-        let Self { buffer, state, .. } = self;
-        let in_callback = Arc::clone(&state);
+        let Self { buffer, progress, .. } = self;
+        let in_callback = Arc::clone(&progress);
         buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            *in_callback.lock() = match result {
+            *in_callback.state.lock() = match result {
                 Ok(()) => State::Done,
                 Err(error) => State::Failed(error.to_string()),
             };
+            in_callback.ended.notify_all();
         });
         // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped. Another thread may
         // have polled already.
-        let mut state = state.lock();
+        let mut state = progress.state.lock();
         if matches!(*state, State::Recorded) {
             *state = State::Submitted(index.clone());
         }
@@ -160,9 +179,9 @@ pub(crate) fn new_read_back(
         mapped_at_creation: false,
     };
     let buffer = with_error_scope(device, target, || device.create_buffer(&descriptor))?;
-    let state = Arc::new(Mutex::new(State::Recorded));
-    let copy = ReadBackCopy { target: found, origin, size, buffer: buffer.clone(), state: Arc::clone(&state) };
-    Ok((WgpuReadBack { device: device.clone(), buffer, size, format, state }, copy))
+    let progress = Arc::new(Progress { state: Mutex::new(State::Recorded), ended: Condvar::new() });
+    let copy = ReadBackCopy { target: found, origin, size, buffer: buffer.clone(), progress: Arc::clone(&progress) };
+    Ok((WgpuReadBack { device: device.clone(), buffer, size, format, progress }, copy))
 }
 
 /// The number of bytes of a row in a buffer.

@@ -9,7 +9,8 @@ use crate::scene::LayerMask;
 /// these objects as it draws others, with their shadows, in processes of their own: `skinning: geometry buffer` and so on.
 ///
 /// The objects' [bounds](crate::scene::SceneRef::bounds) contain what the shader returns: culling knows nothing else of it. Deformed
-/// objects do not hide others from occlusion culling. Blended ones are drawn after the blended objects that are not deformed.
+/// objects do not hide others from occlusion culling. Blended ones are drawn after the blended objects that are not deformed. The
+/// pipeline's draw lists depend on layers, so they are made anew in each frame in which an object changes.
 ///
 /// ```
 /// use drawloom::process::{Declare, Deferred, Deformation};
@@ -52,8 +53,8 @@ pub trait Deformation: Send + Sync {
     fn name(&self) -> &str;
 
     /// The objects that it deforms: those that belong to one of these layers, and to none of the deformations that were added earlier.
-    /// No other process of the pipeline draws them, except those that an engine has [put in place](super::Deferred::replace) of
-    /// shipped ones.
+    /// No other process of the pipeline draws them. Objects without layers of their own belong to all layers, and so to these. Called
+    /// when a plan is made.
     fn layers(&self) -> LayerMask;
 
     /// Declares the [attributes](Declare::reads_attribute) and the [columns](Declare::reads_column) that its shader reads. Called for
@@ -117,18 +118,40 @@ pub(super) fn split_by_deformation(
     let mut deformed: Vec<Arc<dyn RenderProcess>> = Vec::new();
     let mut earlier = LayerMask::NONE;
     for deformation in deformations {
+        // Read once: what this process draws, the others leave out.
+        let layers = deformation.layers();
         for process in &processes {
             deformed.push(Arc::new(Deformed {
-                name: format!("{}: {}", deformation.name(), process.name()),
+                name: prefix_of(&**deformation) + process.name(),
                 process: Arc::clone(process),
                 deformation: Arc::clone(deformation),
+                layers,
                 excluded: earlier,
             }));
         }
-        earlier = earlier | deformation.layers();
+        earlier = earlier | layers;
     }
-    let undeformed = processes.into_iter().map(|process| Arc::new(Undeformed { process, excluded: earlier }) as _);
-    undeformed.chain(deformed).collect()
+    processes.into_iter().map(|process| undeformed(process, deformations)).chain(deformed).collect()
+}
+
+/// A process without the objects of any of these deformations.
+pub(super) fn undeformed(
+    process: Arc<dyn RenderProcess>,
+    deformations: &[Arc<dyn Deformation>],
+) -> Arc<dyn RenderProcess> {
+    let layers = deformations.iter().map(|deformation| deformation.layers());
+    let excluded = layers.fold(LayerMask::NONE, |all, layers| all | layers);
+    if excluded == LayerMask::NONE { process } else { Arc::new(Undeformed { process, excluded }) }
+}
+
+/// Whether a process of this name draws the objects of a deformation.
+pub(super) fn is_process_of(deformation: &dyn Deformation, name: &str) -> bool {
+    name.starts_with(&prefix_of(deformation))
+}
+
+/// What the names of a deformation's processes begin with.
+fn prefix_of(deformation: &dyn Deformation) -> String {
+    format!("{}: ", deformation.name())
 }
 
 /// A process without the objects of some layers.
@@ -167,6 +190,7 @@ struct Deformed {
     name: String,
     process: Arc<dyn RenderProcess>,
     deformation: Arc<dyn Deformation>,
+    layers: LayerMask,
     excluded: LayerMask,
 }
 
@@ -188,7 +212,7 @@ impl RenderProcess for Deformed {
     fn draws(&self) -> Draws<'_> {
         match self.process.draws() {
             Draws::Commands(draws) => {
-                let selection = draws.selection.in_layers(self.deformation.layers()).not_in_layers(self.excluded);
+                let selection = draws.selection.in_layers(self.layers).not_in_layers(self.excluded);
                 let (deformation, resources) = (Some(self.deformation.shader()), self.deformation.resources());
                 Draws::Commands(CommandDraws { selection, deformation, resources, ..draws })
             }

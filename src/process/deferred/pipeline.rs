@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::deformation::{Deformation, split_by_deformation};
+use super::deformation::{Deformation, is_process_of, split_by_deformation, undeformed};
 use super::{
     DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters, Transparency,
 };
@@ -161,6 +161,10 @@ impl Deferred {
             let shipped = built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
             let replacement =
                 self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, process)| Arc::clone(process));
+            // A replacement of a process that draws deformed objects draws these.
+            let is_deformed = self.deformations.iter().any(|deformation| is_process_of(&**deformation, &name));
+            let excluded = if is_deformed { &[][..] } else { &self.deformations };
+            let replacement = replacement.map(|process| undeformed(process, excluded));
             let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
             ChainSlot { process: process.filter(|_| !self.left_out.contains(&name)), name }
         };

@@ -136,6 +136,14 @@ pub enum PlanError {
         /// The same of the second process's buffer.
         second: u64,
     },
+    /// A process changes a buffer that it also reads or takes arguments from.
+    #[error("process {process:?} changes the buffer {buffer:?}, and cannot use it in another way too")]
+    BufferInUse {
+        /// The process.
+        process: String,
+        /// The buffer.
+        buffer: &'static str,
+    },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {
@@ -219,10 +227,12 @@ pub enum ProcessError {
         bytes: usize,
     },
     /// The arguments of an indirect draw or dispatch are not where the process may read them.
-    #[error("process {process:?} takes its arguments from a buffer, {problem}")]
+    #[error("process {process:?} takes its arguments from the buffer {buffer:?}, {problem}")]
     Arguments {
         /// The process.
         process: String,
+        /// The buffer.
+        buffer: &'static str,
         /// What is wrong.
         problem: &'static str,
     },

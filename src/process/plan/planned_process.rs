@@ -58,8 +58,10 @@ impl PlannedProcess {
         if let (Draws::Compute(_), Some((target, _))) = (&draws, self.declaration.accesses.iter().find(attached)) {
             return Err(ProcessError::ComputeDraws { process: process(), target: target.clone() });
         }
-        if let Some(problem) = draws.arguments().and_then(|arguments| self.problem_of_arguments(arguments)) {
-            return Err(ProcessError::Arguments { process: process(), problem });
+        if let Some((offset, bytes)) = draws.arguments()
+            && let Some(problem) = self.problem_of_arguments(offset, bytes)
+        {
+            return Err(ProcessError::Arguments { process: process(), buffer: offset.buffer.name, problem });
         }
         for (resource, own) in draws.resources().iter().enumerate() {
             let Some(bytes) = own.bytes().map(<[u8]>::len) else { continue };
@@ -71,7 +73,7 @@ impl PlannedProcess {
     }
 
     /// What is wrong with arguments of this many bytes; `None` if nothing is.
-    fn problem_of_arguments(&self, (offset, bytes): (BufferOffset, u64)) -> Option<&'static str> {
+    fn problem_of_arguments(&self, offset: BufferOffset, bytes: u64) -> Option<&'static str> {
         if !self.declaration.buffers.contains(&(offset.buffer, BufferAccess::Arguments)) {
             Some("which it does not declare")
         } else if !offset.bytes.is_multiple_of(4) {

@@ -41,6 +41,11 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
         {
             return Err(PlanError::WrongFormat { process: process(), target: name.clone(), format: known.format });
         }
+        let tests_depth_only = matches!(access, Access::TestDepth | Access::MatchDepth);
+        let tests_stencil_only = matches!(access, Access::MarkStencil | Access::TestStencil);
+        if tests_depth_only && !known.format.has_depth() || tests_stencil_only && !known.format.has_stencil() {
+            return Err(PlanError::WrongFormat { process: process(), target: name.clone(), format: known.format });
+        }
         if matches!(access, Access::SampleLayers(_)) && !known.layered {
             return Err(PlanError::LayeringMismatch { process: process(), target: name.clone() });
         }
@@ -152,19 +157,22 @@ pub(super) fn check_blending(
 }
 
 /// # Errors
-/// If a process tests or writes a stencil that it does not have.
+/// If a process tests or writes a stencil that it does not have, or declares that and does not.
 pub(super) fn check_stencil(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
     targets: &[PlannedTarget],
 ) -> Result<(), ProcessError> {
-    let Some(stencil) = draws.stencil() else { return Ok(()) };
+    let access = planned.declaration.depth().map(|(_, access)| access);
+    let declares_test = matches!(access, Some(Access::MarkStencil | Access::TestStencil));
     let has_stencil = attached_targets(planned, targets).any(|target| target.format.has_stencil());
-    let can_write = planned.declaration.depth().is_some_and(|(_, access)| access.writes());
-    let problem = match stencil.writes() && !can_write {
-        _ if !has_stencil => "but its depth target has none",
-        true => "and writes it, but declares only that it tests depth",
-        false => return Ok(()),
+    let problem = match draws.stencil() {
+        Some(_) if !has_stencil => "but has no depth target with one",
+        Some(stencil) if stencil.writes() && !access.is_some_and(Access::writes) => {
+            "and writes it, but declares only that it tests depth"
+        }
+        None if declares_test => "as it declares, but draws without a test of it",
+        _ => return Ok(()),
     };
     Err(ProcessError::Stencil { process: planned.name.clone(), problem })
 }

@@ -51,7 +51,8 @@ impl ViewGroup {
 /// Groups the kinds of views that a plan draws. `edges` are the dependencies between processes, by index.
 ///
 /// A kind is submitted after the kinds that it depends on. Kinds that depend on each other are one group, process by process; so
-/// is a kind whose views read the layers of all views of that kind.
+/// is a kind whose views read the layers of all views of that kind, or that has a process which draws once a frame, after one that draws
+/// in each view.
 pub(super) fn view_groups(processes: &[PlannedProcess], edges: &[(usize, usize)]) -> Vec<ViewGroup> {
     let kind_of = |process: usize| processes[process].declaration.views;
     let mut kinds: Vec<_> = processes.iter().map(|planned| planned.declaration.views).collect();
@@ -62,6 +63,10 @@ pub(super) fn view_groups(processes: &[PlannedProcess], edges: &[(usize, usize)]
     let mut precedes = [[false; ViewKind::COUNT]; ViewKind::COUNT];
     for &(before, after) in edges.iter().filter(|(before, after)| kind_of(*before) != kind_of(*after)) {
         precedes[kind_of(before) as usize][kind_of(after) as usize] = true;
+    }
+    for &(before, after) in edges.iter().filter(|(before, after)| kind_of(*before) == kind_of(*after)) {
+        let [before, after] = [before, after].map(|process| &processes[process].declaration);
+        precedes[after.views as usize][after.views as usize] |= after.once_a_frame && !before.once_a_frame;
     }
     for planned in processes {
         let kind = planned.declaration.views;

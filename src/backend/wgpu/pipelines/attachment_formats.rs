@@ -58,7 +58,7 @@ impl AttachmentFormats {
 
 impl DepthAttachmentFormat {
     /// The same for bundles.
-    pub(super) fn of_bundles(self) -> wgpu::RenderBundleDepthStencil {
+    pub(super) fn bundle_state(self) -> wgpu::RenderBundleDepthStencil {
         wgpu::RenderBundleDepthStencil {
             format: texture_format(self.format),
             depth_read_only: !(self.format.has_depth() && self.writes_depth),
@@ -67,7 +67,7 @@ impl DepthAttachmentFormat {
     }
 
     /// The same for a pipeline.
-    pub(super) fn of_pipeline(
+    pub(super) fn pipeline_state_of(
         self,
         writes_depth: bool,
         depth_compare: wgpu::CompareFunction,

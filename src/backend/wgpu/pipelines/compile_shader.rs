@@ -4,7 +4,7 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::wgpu::error_scope::with_error_scope;
 
-/// Compiles the shader of a process: its own texts of WGSL, behind what the crate puts before them.
+/// Compiles the shader of a process: its own texts of WGSL, each with what it is, behind what the crate puts before them.
 ///
 /// # Errors
 /// If it does not compile: [`BackendError::Shader`], with the line and column in that of the process's own texts which has the error.
@@ -12,9 +12,10 @@ pub(super) fn compile_shader(
     device: &wgpu::Device,
     process: &str,
     before: &str,
-    own: &[&str],
+    own: &[(&'static str, &str)],
 ) -> Result<wgpu::ShaderModule, BackendError> {
-    let source = [&[before], own].concat().join("\n");
+    let source: Vec<_> = std::iter::once(before).chain(own.iter().map(|(_, text)| *text)).collect();
+    let source = source.join("\n");
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let mut created = None;
     let outcome = with_error_scope(device, process, || {
@@ -28,12 +29,17 @@ pub(super) fn compile_shader(
 }
 
 /// The first error of a shader at its line; `None` if it is not in one of the process's own texts, which follow after `before`.
-fn located(process: &str, before: &str, own: &[&str], module: &wgpu::ShaderModule) -> Option<BackendError> {
+fn located(
+    process: &str,
+    before: &str,
+    own: &[(&'static str, &str)],
+    module: &wgpu::ShaderModule,
+) -> Option<BackendError> {
     // The future is ready at once on every native backend.
     let messages = pollster::block_on(module.get_compilation_info()).messages;
     let (message, location) = messages.into_iter().find_map(|message| Some((message.message, message.location?)))?;
     let mut offset = (location.offset as usize).checked_sub(before.len() + 1)?;
-    let own = own.iter().find(|own| match offset.checked_sub(own.len() + 1) {
+    let (part, own) = *own.iter().find(|(_, own)| match offset.checked_sub(own.len() + 1) {
         None => true,
         Some(in_later) => {
             offset = in_later;
@@ -42,7 +48,7 @@ fn located(process: &str, before: &str, own: &[&str], module: &wgpu::ShaderModul
     })?;
     let (line, column, text) = line_and_column(own, offset)?;
     let (process, message, text) = (process.to_owned(), without_excerpts(&message), text.to_owned());
-    Some(BackendError::Shader { process, line, column, message, text })
+    Some(BackendError::Shader { process, part, line, column, message, text })
 }
 
 /// What a diagnostic of wgpu says, without its excerpts, whose lines are counted from the beginning of the prelude: its first line, and
@@ -85,7 +91,8 @@ mod tests {
         let (device, _) = noop_device();
         let before = "const A: u32 = 1u;\n// two lines\n";
         let own = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return vec4<f32>(unknown);\n}\n";
-        let error = compile_shader(&device, "wrong", before, &["const B: u32 = A;", own]).unwrap_err();
+        let error = compile_shader(&device, "wrong", before, &[("deformation", "const B: u32 = A;"), ("shader", own)])
+            .unwrap_err();
         let BackendError::Shader { process, line, column, text, .. } = &error else { panic!("{error}") };
         assert_eq!(
             (process.as_str(), *line, *column, text.as_str()),
@@ -94,13 +101,16 @@ mod tests {
         let message = error.to_string();
         assert!(message.contains("`unknown`") && !message.contains("wgsl:"), "{error}");
         let invalid = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return 1u;\n}\n";
-        let invalid = compile_shader(&device, "invalid", before, &[invalid]).unwrap_err();
-        let is_told = matches!(&invalid, BackendError::Shader { message, .. } if !message.contains("wgsl:"));
-        assert!(is_told && invalid.to_string().contains("return"), "{invalid}");
-        let syntax = compile_shader(&device, "wrong", before, &["\nfn fragment( {", own]).unwrap_err();
-        assert!(matches!(syntax, BackendError::Shader { line: 2, .. }), "{syntax}");
-        let twice = compile_shader(&device, "twice", before, &["const A: u32 = 2u;"]).unwrap_err();
+        let invalid = compile_shader(&device, "invalid", before, &[("shader", invalid)]).unwrap_err();
+        let reports_error = matches!(&invalid, BackendError::Shader { message, .. } if !message.contains("wgsl:"));
+        assert!(reports_error && invalid.to_string().contains("return"), "{invalid}");
+        let syntax = compile_shader(&device, "wrong", before, &[("deformation", "\nfn fragment( {"), ("shader", own)])
+            .unwrap_err();
+        assert!(matches!(syntax, BackendError::Shader { part: "deformation", line: 2, .. }), "{syntax}");
+        let twice = compile_shader(&device, "twice", before, &[("shader", "const A: u32 = 2u;")]).unwrap_err();
         assert!(matches!(&twice, BackendError::Shader { line: 1, .. }), "{twice}");
-        assert!(compile_shader(&device, "right", before, &["", "const B: u32 = A;"]).is_ok());
+        assert!(
+            compile_shader(&device, "right", before, &[("deformation", ""), ("shader", "const B: u32 = A;")]).is_ok()
+        );
     }
 }

@@ -18,6 +18,8 @@ pub(crate) struct PipelineCache {
     plans: HashMap<u64, PlanPipelines>,
     /// Whether a process whose new shader does not compile keeps the pipelines that it had.
     keeps_working_shaders: bool,
+    /// The latest pipelines of each process by its name, if processes keep them.
+    working: HashMap<String, Arc<ProcessPipelines>>,
     /// The latest shader of each process that did not compile, and why.
     failed: HashMap<String, (PipelineKey<'static>, BackendError)>,
 }
@@ -34,7 +36,7 @@ impl PipelineCache {
         Self { keeps_working_shaders, ..Self::default() }
     }
 
-    /// Why the shaders of processes do not compile that are drawn with those that they had before.
+    /// The errors of processes that are still drawn with the shader before, in any order.
     pub(crate) fn shader_errors(&self) -> Vec<String> {
         self.failed.values().map(|(_, error)| error.to_string()).collect()
     }
@@ -67,14 +69,13 @@ impl PipelineCache {
                 self.failed.remove(&planned.name);
                 continue;
             }
-            let mut all = self.plans.values().flat_map(|cached| cached.processes.iter());
-            let fitting = all.find(|pipelines| pipelines.fits(plan, planned, draws, quality)).cloned();
+            let fitting = all_of(&self.plans).find(|pipelines| pipelines.fits(plan, planned, draws, quality)).cloned();
             let pipelines = match fitting {
                 Some(fitting) => fitting,
                 None => {
                     let label = format!("the shader of {:?}", planned.name.as_str());
-                    let working = processes.get(index).filter(|old| old.differ_in_text_only(draws, quality));
-                    let working = working.filter(|_| self.keeps_working_shaders).cloned();
+                    let working = self.working.get(&planned.name).cloned();
+                    let working = working.filter(|old| old.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
                         let created = ProcessPipelines::new(device, layouts, plan, planned, draws, quality)?;
                         if let Some(working) = &working {
@@ -94,7 +95,7 @@ impl PipelineCache {
                                 Arc::new(created)
                             }
                             (Err(error), Some(working)) => {
-                                tracing::error!(target: "drawloom", %error, "the shader before it is used");
+                                tracing::error!(target: "drawloom", %error, "a shader does not compile; the one before it stays in use");
                                 let key = PipelineKey::new(draws, quality).into_owned();
                                 self.failed.insert(planned.name.clone(), (key, error));
                                 Arc::clone(working)
@@ -104,6 +105,9 @@ impl PipelineCache {
                     }
                 }
             };
+            if self.keeps_working_shaders {
+                self.working.insert(planned.name.clone(), Arc::clone(&pipelines));
+            }
             // The loop visits processes in order, so this either replaces an entry or appends one.
             match processes.get_mut(index) {
                 Some(old) => *old = pipelines,
@@ -125,4 +129,9 @@ impl PipelineCache {
         distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.into_iter().map(|pipelines| pipelines.by_state().len()).sum()
     }
+}
+
+/// The pipelines of the processes of all plans.
+fn all_of(plans: &HashMap<u64, PlanPipelines>) -> impl Iterator<Item = &Arc<ProcessPipelines>> {
+    plans.values().flat_map(|cached| cached.processes.iter())
 }

@@ -45,7 +45,8 @@ impl<'a> PipelineKey<'a> {
         let state = fixed_state(draws);
         let with = |shader: &'a str, vertices, fragment: Option<&'a str>, writes_depth| {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
-            let (deformation, stencil) = (None, draws.stencil());
+            // The reference is state of the pass.
+            let (deformation, stencil) = (None, draws.stencil().map(|stencil| Stencil { reference: 0, ..stencil }));
             Self { shader, deformation, vertices, fragment, parameter_bytes, writes_depth, stencil, state, transforms }
         };
         match draws {
@@ -82,9 +83,9 @@ impl<'a> PipelineKey<'a> {
         format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{prelude}\n")
     }
 
-    /// The process's own WGSL: its deformation, and its shader.
-    pub(crate) fn own_shaders(&self) -> [&str; 2] {
-        [self.deformation.as_deref().unwrap_or_default(), &self.shader]
+    /// The process's own texts of WGSL, each with what it is.
+    pub(crate) fn own_shaders(&self) -> [(&'static str, &str); 2] {
+        [("deformation", self.deformation.as_deref().unwrap_or_default()), ("shader", &self.shader)]
     }
 }
 

@@ -117,8 +117,12 @@ impl ProcessPipelines {
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> bool {
+        self.fits_draws(draws, quality) && self.fits_declaration(plan, planned)
+    }
+
+    /// Whether these pipelines still fit what a process of this plan declares.
+    fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
-            && self.fits_draws(draws, quality)
             && self.columns == planned.declaration.columns.len()
             && attributes_of(&planned.declaration).eq(self.attributes.iter().copied())
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
@@ -130,11 +134,18 @@ impl ProcessPipelines {
         self.key == PipelineKey::new(draws, quality) && resources.eq(self.resources.iter().copied())
     }
 
-    /// Whether the process's pipelines for these draws would be made of another text, and of nothing else that is other.
-    pub(crate) fn differ_in_text_only(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
+    /// Whether the pipelines of a process of this plan for these draws would differ from these in the text of their shader only.
+    pub(crate) fn differ_in_text_only(
+        &self,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> bool {
         let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
         PipelineKey::new(draws, quality).with_text_of(&self.key) == self.key
             && resources.eq(self.resources.iter().copied())
+            && self.fits_declaration(plan, planned)
     }
 
     /// Creates the missing pipelines of these states. [Insert](Self::insert) them only if the device reports no error.
@@ -178,7 +189,7 @@ impl ProcessPipelines {
         wgpu::RenderBundleEncoderDescriptor {
             label: Some(label),
             color_formats: &self.attachments.colors,
-            depth_stencil: self.attachments.depth.map(DepthAttachmentFormat::of_bundles),
+            depth_stencil: self.attachments.depth.map(DepthAttachmentFormat::bundle_state),
             sample_count: 1,
             multiview: None,
         }
@@ -254,7 +265,7 @@ impl ProcessPipelines {
             depth_stencil: self.attachments.depth.map(|depth| {
                 // A blended surface must not hide what is drawn after it.
                 let writes_depth = self.key.writes_depth && state.blend() == Blend::None;
-                depth.of_pipeline(writes_depth, self.depth_compare(depth), self.key.stencil)
+                depth.pipeline_state_of(writes_depth, self.depth_compare(depth), self.key.stencil)
             }),
             multisample: wgpu::MultisampleState::default(),
             fragment: self.key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {

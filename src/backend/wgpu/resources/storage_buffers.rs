@@ -13,7 +13,7 @@ pub(crate) struct StorageBuffers {
 
 impl StorageBuffers {
     /// Whether these are all that a plan's processes use.
-    pub(crate) fn suffice_for(&self, plan: &FramePlan) -> bool {
+    pub(crate) fn covers(&self, plan: &FramePlan) -> bool {
         plan.buffers().iter().all(|layout| self.find(*layout).is_some())
     }
 
@@ -22,7 +22,11 @@ impl StorageBuffers {
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn with_those_of(&self, device: &wgpu::Device, plan: &FramePlan) -> Result<Self, BackendError> {
+    pub(crate) fn with_missing_buffers_of(
+        &self,
+        device: &wgpu::Device,
+        plan: &FramePlan,
+    ) -> Result<Self, BackendError> {
         let mut buffers = self.buffers.clone();
         for layout in plan.buffers().iter().filter(|layout| self.find(**layout).is_none()) {
             buffers.retain(|(known, _)| known.name != layout.name);
