@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::{
-    ClearColor, Declare, Draws, Format, FullScreen, PlanError, ProcessError, RenderProcess, TargetSize,
+    ClearColor, Declare, Draws, Format, FullScreen, PlanError, ProcessError, RenderProcess, StorageBuffer, TargetSize,
 };
 use drawloom::scene::{Blend, ViewKind};
 use drawloom::task::Scheduler;
@@ -180,6 +180,26 @@ fn a_process_that_draws_once_a_frame_draws_in_the_first_of_its_views() {
         let expected = [("each", 0), ("each", 1), ("once", 0)].into_iter().filter(|(_, view)| *view < views);
         assert_eq!(passes, expected.collect::<Vec<_>>());
     }
+}
+
+#[test]
+fn a_process_that_draws_once_a_frame_comes_after_those_of_each_view_that_it_depends_on() {
+    const COUNTS: StorageBuffer<u32> = StorageBuffer::new("counts", 4);
+    let each = Declaring::new("each", |declare| {
+        clears(declare, "picture");
+        declare.changes_buffer(COUNTS);
+    });
+    let once = Declaring::new("once", |declare| {
+        clears(declare, "sum");
+        declare.reads_buffer(COUNTS);
+        declare.once_a_frame();
+    });
+    let builder = Renderer::builder(NullBackend).process(once).process(each);
+    let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let recorded = renderer.record(field(5).as_scene_ref()).unwrap();
+    let submission = submitter.submit(recorded).unwrap().submission;
+    let passes: Vec<_> = submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
+    assert_eq!(passes, [("each", 0), ("each", 1), ("once", 0)]);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, PassInputs, ShaderObject, ShaderResource,
-    VertexInput,
+    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, GeometryBuffer, GeometryFormats, PassInputs,
+    ShaderObject, ShaderResource, VertexInput,
 };
 use drawloom::raster::{Real, Vector};
 use drawloom::scene::{
@@ -180,6 +180,7 @@ fn shape() -> Result<(), Failed> {
         Deferred::to_picture().depth_pre_pass(true),
         Deferred::to_picture().geometry_shares(2),
         Deferred::to_picture().shadow_maps(None),
+        Deferred::to_picture().replace("geometry buffer", GeometryBuffer::new(GeometryFormats::default())),
     ] {
         let expected = picture_of(pipeline.clone(), &moved, &layers, &pushes())?;
         if expected == picture_of(pipeline.clone(), &scene, &layers, &pushes())? {
