@@ -7,7 +7,7 @@ use bytemuck::Pod;
 /// A buffer on the device that processes of a renderer share: particles, palettes, arguments of indirect draws. Make it once, as a
 /// constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that orders them.
 ///
-/// There is one for all views. It is all zeros until a shader writes it, and keeps its content from frame to frame, in the order in
+/// There is one for all views. It is all zeros until a shader writes it, or a [raw pass](super::RawPassResources::buffer) fills it, and keeps its content from frame to frame, in the order in
 /// which frames are submitted.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.

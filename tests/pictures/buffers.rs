@@ -1,17 +1,18 @@
 //! Buffers that processes share, compute shaders, and vertices that a shader makes.
 
+use std::error::Error;
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::command::Cull;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    ClearColor, ComputeDispatch, Declare, DrawCount, Draws, Format, Primitive, ProceduralDraws, RenderProcess,
-    StorageBuffer, Workgroups,
+    ClearColor, ComputeDispatch, Declare, DrawCount, Draws, Format, Primitive, ProceduralDraws, RawPass,
+    RawPassResources, RenderProcess, StorageBuffer, Workgroups,
 };
 use drawloom::scene::{Blend, Camera, Scene};
 use drawloom::task::Scheduler;
+use drawloom::{Renderer, wgpu};
 use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
 
@@ -22,6 +23,7 @@ use crate::image_distance::assert_color;
 pub const CASES: &[Case] = &[
     ("buffers_keep_what_compute_shaders_wrote_in_frames_submitted_before", counting),
     ("a_compute_shader_decides_how_often_another_runs", indirect_dispatch),
+    ("a_raw_pass_fills_a_buffer_that_it_declares", filled),
     ("each_view_of_a_process_that_is_not_once_a_frame_changes_a_buffer", once_a_view),
     ("vertices_that_a_shader_makes_form_lines_and_are_blended_and_culled", primitives),
     ("the_software_backend_names_what_it_cannot_run", on_software),
@@ -151,6 +153,47 @@ fn once_a_view() -> Result<(), Failed> {
         check_columns(&submission.read(1, "picture")?, frame * 2 + 2)?;
     }
     Ok(())
+}
+
+/// Has five columns drawn, without a shader.
+struct Fill;
+
+impl RenderProcess for Fill {
+    fn name(&self) -> &str {
+        "fill"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.changes_buffer(COLUMNS);
+        declare.once_a_frame();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Raw(self)
+    }
+}
+
+impl RawPass for Fill {
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &RawPassResources<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        if resources.buffer(RUNS).is_some() {
+            return Err("it does not declare this buffer".into());
+        }
+        let columns = resources.buffer(COLUMNS).ok_or("no columns")?;
+        let arguments = [[0; 4], [6_u32, 5, 0, 0]];
+        let staged = resources.buffer_of("columns", wgpu::BufferUsages::COPY_SRC, bytemuck::bytes_of(&arguments));
+        encoder.copy_buffer_to_buffer(&staged, 0, columns, 0, staged.size());
+        Ok(())
+    }
+}
+
+fn filled() -> Result<(), Failed> {
+    let mut fixture = Fixture::with(2, |builder| builder.process(DrawColumns).process(Fill).output("picture"))?;
+    let recorded = fixture.record(&scene(1))?;
+    check_columns(&fixture.submit(recorded)?.read(0, "picture")?, 5)
 }
 
 /// Asks for 3 × 2 × 1 workgroups.

@@ -137,8 +137,10 @@ pub(crate) fn encode_raw(
     let textures = |name: &str| frame.targets.find(pass.view_index, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
     let size = request.views[pass.view_index].camera.size;
-    let declared = &request.plan.processes()[pass.process_index].declaration.columns;
-    let columns = |column| frame.buffers.objects().column(column).filter(|_| declared.contains(&column));
+    let declaration = &request.plan.processes()[pass.process_index].declaration;
+    let columns = |column| frame.buffers.objects().column(column).filter(|_| declaration.columns.contains(&column));
+    let is_declared = |buffer| declaration.buffers.iter().any(|(declared, _)| *declared == buffer);
+    let buffers = |buffer| frame.storage_buffers.find(buffer).filter(|_| is_declared(buffer));
     let of_frame = frame.pass(index).frame_bind_group.as_ref();
     let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
     let resources = RawPassResources {
@@ -148,6 +150,7 @@ pub(crate) fn encode_raw(
         bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
         bind_groups: [of_frame, &frame.assets.group],
         columns: &columns,
+        buffers: &buffers,
         textures: &textures,
         layered: &layered,
     };

@@ -31,7 +31,10 @@ impl StorageBuffers {
         for layout in plan.buffers().iter().filter(|layout| self.find(**layout).is_none()) {
             buffers.retain(|(known, _)| known.name != layout.name);
             check_storage_binding_size(device, usize::try_from(layout.bytes).unwrap_or(usize::MAX))?;
-            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+            let usage = wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::INDIRECT
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST;
             buffers.push((*layout, new_buffer(device, layout.name, layout.bytes, usage)?));
         }
         Ok(Self { buffers })
