@@ -104,8 +104,8 @@ impl<B: Backend> FrameContext<'_, B> {
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
         let process = self.request.passes[pass].process_index;
         // The test is of the triangles of the mesh, and of the pixels of the picture.
-        let is_exact =
-            !self.request.draws[process].deforms() && self.request.plan.drawn_size(process) == TargetSize::Picture;
+        let is_exact = self.request.draws[process].draws_plain_meshes()
+            && self.request.plan.drawn_size(process) == TargetSize::Picture;
         self.culls_triangles && is_exact && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 

@@ -33,9 +33,17 @@ pub(super) struct StageGraph<B: Backend> {
 #[derive(Debug)]
 struct GraphKey {
     views: Vec<ViewKey>,
-    /// For each process, the objects that it draws, and whether these hide what is behind them.
-    draws: Vec<(Option<Selection>, bool)>,
+    /// Of each process.
+    draws: Vec<DrawsKey>,
     options: StageOptions,
+}
+
+/// What decides which stages the passes of a process have, and what they may leave out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct DrawsKey {
+    selection: Option<Selection>,
+    hides: bool,
+    changes_where_hidden: bool,
 }
 
 /// The optional parts of a frame.
@@ -75,6 +83,13 @@ impl ViewKey {
     }
 }
 
+impl DrawsKey {
+    fn new(draws: &Draws<'_>) -> Self {
+        let (hides, changes_where_hidden) = (draws.hides(), draws.changes_where_hidden());
+        Self { selection: draws.selection(), hides, changes_where_hidden }
+    }
+}
+
 fn is_paraboloid(view: &RenderView) -> bool {
     view.camera.projection == Projection::Paraboloid
 }
@@ -83,7 +98,7 @@ impl GraphKey {
     fn new(draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> Self {
         Self {
             views: views.iter().map(ViewKey::new).collect(),
-            draws: draws.iter().map(|draws| (draws.selection(), draws.hides())).collect(),
+            draws: draws.iter().map(DrawsKey::new).collect(),
             options,
         }
     }
@@ -93,7 +108,7 @@ impl GraphKey {
         self.options == options
             && self.views.len() == views.len()
             && self.views.iter().zip(views).all(|(key, view)| key.fits(view))
-            && self.draws.iter().copied().eq(draws.iter().map(|draws| (draws.selection(), draws.hides())))
+            && self.draws.iter().copied().eq(draws.iter().map(DrawsKey::new))
     }
 }
 
@@ -174,7 +189,7 @@ impl<B: Backend> StageGraph<B> {
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
-            let (selection, _) = self.key.draws[pass.process_index];
+            let DrawsKey { selection, .. } = self.key.draws[pass.process_index];
             let orders_by_bin =
                 selection.is_some_and(|selection| orders_by_bin(selection, &views[pass.view_index], opaque_order));
             table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
@@ -185,7 +200,7 @@ impl<B: Backend> StageGraph<B> {
         for (index, view) in views.iter().enumerate() {
             tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
             let draws_commands =
-                |pass: &Pass| pass.view_index == index && self.key.draws[pass.process_index].0.is_some();
+                |pass: &Pass| pass.view_index == index && self.key.draws[pass.process_index].selection.is_some();
             if self.passes.iter().any(draws_commands) {
                 let tests_occlusion = tables.occlusion[index].is_on();
                 tables.visibility[index].begin_frame(view, &tables.objects, culling, tests_occlusion);

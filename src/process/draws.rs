@@ -4,7 +4,10 @@ use std::borrow::Cow;
 
 #[cfg(feature = "wgpu")]
 use super::RawPass;
-use super::{BufferOffset, ComputeDispatch, DrawCount, ProceduralDraws, ShaderResource, Stencil, Workgroups};
+use super::{
+    BlendEquation, BufferOffset, ComputeDispatch, DrawCount, FaceCulling, ProceduralDraws, ShaderResource, Stencil,
+    StencilOperation, Workgroups,
+};
 use crate::command::{DrawOrder, Selection};
 use crate::scene::{Blend, ColumnLayout};
 use crate::view::LightClass;
@@ -45,7 +48,11 @@ pub struct CommandDraws<'a> {
     pub deformation: Option<&'a str>,
     /// Which objects are drawn.
     pub selection: Selection,
-    /// Whether depth is written.
+    /// Which sides of the objects are drawn.
+    pub culling: FaceCulling,
+    /// How the objects mix with each colour target, in the order declared; if empty, as their materials say.
+    pub blend_equations: Vec<BlendEquation>,
+    /// Whether depth is written. Objects with a blending material write none, unless there are `blend_equations`.
     pub writes_depth: bool,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
@@ -62,6 +69,8 @@ impl Default for CommandDraws<'_> {
             fragment: Some("fragment"),
             deformation: None,
             selection: Selection::OPAQUE,
+            culling: FaceCulling::ByMaterial,
+            blend_equations: Vec::new(),
             writes_depth: true,
             stencil: None,
             parameters: Cow::Borrowed(&[]),
@@ -79,6 +88,8 @@ pub struct FullScreen<'a> {
     pub shader: &'a str,
     /// How it blends with the targets' content.
     pub blend: Blend,
+    /// How it mixes with each colour target, in the order declared; if empty, as `blend` says.
+    pub blend_equations: Vec<BlendEquation>,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
     /// The bytes of the uniform at `@group(2) @binding(0)`; if empty, there is no such binding.
@@ -122,12 +133,29 @@ impl Draws<'_> {
 
     /// Whether it draws objects that write depth in the shape of their meshes, and so hide what is behind them.
     pub fn hides(&self) -> bool {
-        matches!(self, Self::Commands(CommandDraws { writes_depth: true, deformation: None, .. }))
+        let Self::Commands(draws) = self else { return false };
+        let is_opaque = draws.blend_equations.is_empty() && draws.culling != FaceCulling::Reversed;
+        draws.writes_depth && draws.deformation.is_none() && is_opaque
     }
 
-    /// Whether it draws objects whose vertices its shader moves.
-    pub fn deforms(&self) -> bool {
-        matches!(self, Self::Commands(CommandDraws { deformation: Some(_), .. }))
+    /// Whether objects that are hidden behind others change something: the stencil.
+    pub fn changes_where_hidden(&self) -> bool {
+        self.stencil().is_some_and(|stencil| stencil.writes() && stencil.on_depth_fail != StencilOperation::Keep)
+    }
+
+    /// Whether it draws the triangles of meshes where they are, and of each the sides that the material says.
+    pub fn draws_plain_meshes(&self) -> bool {
+        matches!(self, Self::Commands(CommandDraws { deformation: None, culling: FaceCulling::ByMaterial, .. }))
+    }
+
+    /// How what is drawn mixes with each colour target; empty if materials, or the kind of draws, decide.
+    pub fn blend_equations(&self) -> &[BlendEquation] {
+        match self {
+            Self::Commands(commands) => &commands.blend_equations,
+            Self::FullScreen(full_screen) => &full_screen.blend_equations,
+            Self::Procedural(procedural) => &procedural.blend_equations,
+            _ => &[],
+        }
     }
 
     /// The engine's own resources that the shader reads; none for a raw pass.

@@ -8,12 +8,14 @@
 //! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
 //!   post-processing.
 
+mod blend_equation;
 mod compute_dispatch;
 #[cfg(feature = "software")]
 mod cpu_shader;
 mod declaration;
 mod deferred;
 mod draws;
+mod face_culling;
 mod format;
 mod plan;
 mod post;
@@ -28,6 +30,7 @@ mod stencil;
 mod storage_buffer;
 mod target_size;
 
+pub use blend_equation::{BlendComponent, BlendEquation, BlendFactor};
 pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
 pub use cpu_shader::{
@@ -41,6 +44,7 @@ pub use deferred::{
     Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
+pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use plan::{
     ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup, ViewOrder,

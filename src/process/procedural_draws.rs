@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{BufferOffset, ShaderResource, Stencil};
+use super::{BlendEquation, BufferOffset, ShaderResource, Stencil};
 use crate::command::Cull;
 use crate::scene::Blend;
 
@@ -26,7 +26,9 @@ pub struct ProceduralDraws<'a> {
     pub cull: Cull,
     /// How they blend with the targets' content.
     pub blend: Blend,
-    /// Whether depth is written. What is blended writes none.
+    /// How they mix with each colour target, in the order declared; if empty, as `blend` says.
+    pub blend_equations: Vec<BlendEquation>,
+    /// Whether depth is written. What is blended writes none, unless there are `blend_equations`.
     pub writes_depth: bool,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
@@ -46,6 +48,7 @@ impl Default for ProceduralDraws<'_> {
             primitive: Primitive::Triangles,
             cull: Cull::Back,
             blend: Blend::None,
+            blend_equations: Vec::new(),
             writes_depth: true,
             stencil: None,
             parameters: Cow::Borrowed(&[]),

@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::{
-    ClearColor, Declare, Draws, Format, FullScreen, PlanError, ProcessError, RenderProcess, StorageBuffer, TargetSize,
+    BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, PlanError, ProcessError,
+    RenderProcess, StorageBuffer, TargetSize,
 };
 use drawloom::scene::{Blend, ViewKind};
 use drawloom::task::Scheduler;
@@ -288,4 +289,39 @@ fn what_cannot_be_blended_is_named() {
             if process == "sum" && target == "sum"
     );
     assert!(is_named, "{error}");
+}
+
+#[test]
+fn blend_equations_fit_the_targets() {
+    struct Mixed(Format, Vec<BlendEquation>);
+    impl RenderProcess for Mixed {
+        fn name(&self) -> &str {
+            "mixed"
+        }
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+            declare.clears_color("other", self.0, ClearColor::Value([0.0; 4]));
+            declare.keep();
+        }
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws { blend_equations: self.1.clone(), ..CommandDraws::default() })
+        }
+    }
+    let record = |format, equations| {
+        let builder = Renderer::builder(NullBackend).process(Mixed(format, equations));
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        renderer.record(field(3).as_scene_ref()).map(drop)
+    };
+    let (add, replace) = (BlendEquation::ADDITIVE, BlendEquation::REPLACE);
+    record(Format::R32Float, vec![add, replace]).unwrap();
+    record(Format::Rgba16Float, vec![add, add]).unwrap();
+    let error = record(Format::R32Float, vec![replace, add]).unwrap_err();
+    let is_named = matches!(
+        &error,
+        FrameError::Process(ProcessError::CannotBlend { process, target, format: Format::R32Float })
+            if process == "mixed" && target == "other"
+    );
+    assert!(is_named, "{error}");
+    let error = record(Format::Rgba16Float, vec![add]).unwrap_err();
+    assert_eq!(error.to_string(), "process \"mixed\" has 1 blend equations for 2 colour targets");
 }

@@ -23,6 +23,7 @@ mod image_distance;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
+mod pipeline_state;
 mod placement;
 mod post;
 mod prepared_pipelines;
@@ -71,6 +72,7 @@ fn main() {
         (columns::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
+        (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (prepared_pipelines::CASES, Needs::Adapter),

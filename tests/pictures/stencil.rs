@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::command::Selection;
+use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, CommandDraws, Comparison, Declare, Deferred, Draws, Format, FullScreen, GeometryFormats, RenderProcess,
     SURFACE_SHADER, Stencil, StencilOperation,
 };
-use drawloom::scene::{LayerMask, Scene, SceneRef};
+use drawloom::quality::Quality;
+use drawloom::scene::{Camera, LayerMask, Material, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder};
-use drawloom_testing::scenes::field;
+use drawloom_testing::scenes::{cube, field, sized};
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -23,6 +25,7 @@ pub const CASES: &[Case] = &[
     ("a_stencil_beside_depth_marks_visible_pixels", beside_depth),
     ("every_strategy_tests_the_same_stencil", every_strategy),
     ("operations_and_masks_are_those_of_the_device", operations),
+    ("hidden_objects_are_marked_where_depth_fails", where_depth_fails),
     ("a_process_that_has_no_stencil_is_named", without),
 ];
 
@@ -251,6 +254,34 @@ fn operations() -> Result<(), Failed> {
         }
     }
     Ok(())
+}
+
+/// A cube behind a wall, which occlusion culling removes unless somebody sees where it is.
+fn where_depth_fails() -> Result<(), Failed> {
+    let mut scene = Scene::new();
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 0.0, 12.0), DVec3::ZERO), [160, 90])];
+    let (mesh, stone) = (scene.add(cube())?, scene.add(Material::default())?);
+    let wall = RenderObject::new(mesh, stone, DVec3::ZERO);
+    scene.add_object(RenderObject { scale: Vec3::new(6.0, 4.0, 0.5), ..wall })?;
+    scene.add_object(RenderObject::new(mesh, stone, DVec3::new(0.0, 0.0, -6.0)))?;
+    let layers = [LayerMask::layer(0), MARKED];
+    let hidden =
+        Stencil { on_depth_fail: StencilOperation::Replace, on_pass: StencilOperation::Keep, ..Stencil::mark(3) };
+    let white_of = |occlusion| -> Result<Picture, Failed> {
+        let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
+        let quality = Quality { occlusion, ..Quality::balanced() };
+        let mark = Mark { stencil: hidden, ..Mark::BESIDE_DEPTH };
+        let mut fixture = Fixture::with(2, |builder| {
+            builder.deferred(pipeline()).process(mark).process(white).output("white").quality(quality)
+        })?;
+        let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
+        Ok(fixture.submit(recorded)?.read(0, "white")?)
+    };
+    let expected = white_of(None)?;
+    if !expected.bytes.contains(&255) {
+        return Err("nothing is marked".into());
+    }
+    if white_of(Some(16))? == expected { Ok(()) } else { Err("occlusion culling changes the stencil".into()) }
 }
 
 fn without() -> Result<(), Failed> {

@@ -9,7 +9,7 @@ use super::precision::Precision;
 use super::targets::{SoftwareTarget, TargetReader, TiledTexture};
 use super::tiles::{Tile, Tiling, index_in_tile};
 use crate::backend::BackendError;
-use crate::process::{Format, SampledTexture};
+use crate::process::{BlendEquation, Format, SampledTexture};
 use crate::raster::{PixelBounds, Vector4};
 use crate::scene::Blend;
 
@@ -26,6 +26,8 @@ pub(super) struct ColorAttachment<R> {
     pub(super) target: SoftwareTarget<R>,
     /// The colour that it is cleared to first, if it is cleared.
     pub(super) clear: Option<[R; 4]>,
+    /// How everything that is drawn mixes with it; `None` if materials, or the kind of draws, decide.
+    pub(super) equation: Option<BlendEquation>,
 }
 
 /// The depth target that a pass tests.
@@ -178,14 +180,15 @@ impl<R: Precision> TileAttachments<'_, R> {
         }
     }
 
-    /// Draws a pixel of the tile into the colour targets.
+    /// Draws a pixel of the tile into the colour targets. Those that have no equation of their own are blended with.
     #[inline]
     pub(super) fn draw(&mut self, pixel: [usize; 2], blend: Blend, colors: &[Vector4<R>]) {
         for ((numbers, target), &color) in self.colors.iter_mut().zip(self.color_attachments).zip(colors) {
             let format = target.target.texture.planned.format;
             let channels = format.channels();
             let stored = &mut numbers[index_in_tile(pixel) * channels..][..channels];
-            let color = blend_into(format, blend, color, stored);
+            let equation = target.equation.unwrap_or_else(|| blend.into());
+            let color = blend_into(format, equation, color, stored);
             // A loop: a call to copy that few numbers takes longer.
             stored.iter_mut().zip(color).for_each(|(number, color)| *number = color);
         }
@@ -197,11 +200,11 @@ impl<R: Precision> TileAttachments<'_, R> {
     }
 }
 
-fn blend_into<R: Precision>(format: Format, blend: Blend, color: Vector4<R>, destination: &[R]) -> [R; 4] {
-    if blend == Blend::None {
+fn blend_into<R: Precision>(format: Format, equation: BlendEquation, color: Vector4<R>, destination: &[R]) -> [R; 4] {
+    if equation == BlendEquation::REPLACE {
         return stored(format, color.0);
     }
     let mut whole = [R::zero(), R::zero(), R::zero(), R::one()];
     whole.iter_mut().zip(destination).for_each(|(number, destination)| *number = *destination);
-    blended(format, blend, color, whole)
+    blended(format, equation, color, whole)
 }

@@ -82,7 +82,7 @@ impl<R: Precision> TypedFrame<R> {
             columns: ShaderColumns { columns: &self.columns },
         };
         let outcome = match &pass.draws {
-            SoftwareDraws::Objects { shader, writes_depth, attributes } => {
+            SoftwareDraws::Objects { shader, culling, depth, attributes } => {
                 let subdivided = self.subdivided.lock();
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
@@ -93,8 +93,9 @@ impl<R: Precision> TypedFrame<R> {
                 };
                 let chunks = setup_chunks(commands, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
-                let (shader, writes_depth) = (&**shader, *writes_depth);
-                ObjectPass { context, shader, attributes, writes_depth, chunks: &chunks, object_of: &object_of }.draw()
+                let (shader, culling, depth) = (&**shader, *culling, *depth);
+                let (chunks, object_of) = (&chunks, &object_of);
+                ObjectPass { context, shader, attributes, culling, depth, chunks, object_of }.draw()
             }
             SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &**shader, *blend),
             SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &**shader, lights.clone()),

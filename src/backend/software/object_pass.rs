@@ -3,8 +3,11 @@
 use super::attachments::{MAX_COLOR_ATTACHMENTS, OpenAttachments, TileAttachments};
 use super::pass_context::PassContext;
 use super::precision::Precision;
+use super::software_pass::DepthWrites;
 use super::triangle_setup::{TriangleRange, TriangleSetup, TriangleState};
-use crate::process::{DeclaredAttribute, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS};
+use crate::process::{
+    DeclaredAttribute, FaceCulling, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS,
+};
 use crate::raster::{Triangle, Vector4};
 use crate::scene::Blend;
 use crate::task::JobPanic;
@@ -15,8 +18,10 @@ pub(super) struct ObjectPass<'a, R: Precision> {
     pub(super) shader: &'a dyn ObjectCpuShader<R>,
     /// The attributes of vertices that the process reads.
     pub(super) attributes: &'a [DeclaredAttribute],
-    /// Whether what is drawn occludes what is behind it.
-    pub(super) writes_depth: bool,
+    /// Which sides of the objects are drawn.
+    pub(super) culling: FaceCulling,
+    /// Which objects occlude what is behind them.
+    pub(super) depth: DepthWrites,
     /// One job sets up the triangles of a chunk.
     pub(super) chunks: &'a [Vec<TriangleRange>],
     /// An object relative to the camera.
@@ -46,7 +51,8 @@ impl<R: Precision> ObjectPass<'_, R> {
         executor.for_each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
         for chunks in chunks.chunks(CHUNKS_IN_MEMORY) {
             let set_up = |chunk: usize| -> TriangleSetup<R, V> {
-                TriangleSetup::new(*shader, self.attributes, &inputs, &open.tiling, &chunks[chunk], object_of)
+                let drawn = (&*chunks[chunk], self.culling);
+                TriangleSetup::new(*shader, self.attributes, &inputs, &open.tiling, drawn, object_of)
             };
             let setups = executor.map(chunks.len(), set_up)?;
             executor.for_each(open.tiles.len(), |index| {
@@ -68,8 +74,11 @@ impl<R: Precision> ObjectPass<'_, R> {
         state: TriangleState,
     ) {
         let tests_equal = self.context.attachments.depth.as_ref().is_some_and(|depth| depth.tests_equal);
-        // A blended triangle must not occlude what is drawn after it.
-        let writes_depth = self.writes_depth && state.blend == Blend::None;
+        let writes_depth = match self.depth {
+            DepthWrites::Never => false,
+            DepthWrites::WhereOpaque => state.blend == Blend::None,
+            DepthWrites::Always => true,
+        };
         let (draws_pixels, colors) = (self.shader.draws_pixels(), tile.color_count());
         let mut targets = [Vector4::zero(); MAX_COLOR_ATTACHMENTS];
         triangle.rasterize(tile.bounds, |pixel, depth| {

@@ -7,34 +7,62 @@ use half::f16;
 
 use super::precision::Precision;
 use crate::backend::mip_generation::srgb_to_linear;
-use crate::process::Format;
+use crate::process::{BlendComponent, BlendEquation, BlendFactor, Format};
 use crate::raster::Vector4;
-use crate::scene::Blend;
 
-/// Blends a colour with the one in the target, and converts the result to the format.
+/// Mixes a colour with the one in the target, and converts the result to the format.
 ///
 /// In formats from 0 to 1, colours are clamped before and after blending, as Vulkan and D3D specify. NaN becomes 0.
-pub(super) fn blended<R: Precision>(format: Format, blend: Blend, color: Vector4<R>, destination: [R; 4]) -> [R; 4] {
-    let Vector4 { 0: color } = color.map(|value| clamped(format, value));
-    let mix = |new: fn(R, R, R) -> R, opacity: fn(R, R, R) -> R| -> [R; 4] {
-        let of = |channel: usize| if channel == 3 { opacity } else { new };
-        from_fn(|channel| of(channel)(color[channel], destination[channel], color[3]))
-    };
-    let result = match blend {
-        _ if !format.can_be_blended() => color,
-        Blend::None => color,
-        Blend::Alpha => mix(
-            |source, destination, alpha| source * alpha + destination * (R::one() - alpha),
-            |source, destination, alpha| source + destination * (R::one() - alpha),
-        ),
-        Blend::Additive => {
-            mix(|source, destination, _| source + destination, |source, destination, _| source + destination)
+pub(super) fn blended<R: Precision>(
+    format: Format,
+    equation: BlendEquation,
+    color: Vector4<R>,
+    destination: [R; 4],
+) -> [R; 4] {
+    let Vector4 { 0: source } = color.map(|value| clamped(format, value));
+    if equation == BlendEquation::REPLACE || !format.can_be_blended() {
+        return stored(format, source);
+    }
+    let mix = |component, channel: usize| {
+        let factor_of = |factor| factor_of(factor, channel, &source, &destination);
+        let products = |of_source, of_destination| {
+            (source[channel] * factor_of(of_source), destination[channel] * factor_of(of_destination))
+        };
+        match component {
+            BlendComponent::Sum { source, destination } => {
+                let (source, destination) = products(source, destination);
+                source + destination
+            }
+            BlendComponent::Difference { source, destination } => {
+                let (source, destination) = products(source, destination);
+                source - destination
+            }
+            BlendComponent::ReverseDifference { source, destination } => {
+                let (source, destination) = products(source, destination);
+                destination - source
+            }
+            BlendComponent::Minimum if destination[channel] < source[channel] => destination[channel],
+            BlendComponent::Maximum if destination[channel] > source[channel] => destination[channel],
+            BlendComponent::Minimum | BlendComponent::Maximum => source[channel],
         }
-        Blend::Subtractive => {
-            mix(|source, destination, _| destination - source, |source, destination, _| destination - source)
-        }
     };
-    stored(format, result)
+    let component_of = |channel: usize| if channel == 3 { equation.alpha } else { equation.color };
+    stored(format, from_fn(|channel| mix(component_of(channel), channel)))
+}
+
+fn factor_of<R: Precision>(factor: BlendFactor, channel: usize, source: &[R; 4], destination: &[R; 4]) -> R {
+    match factor {
+        BlendFactor::Zero => R::zero(),
+        BlendFactor::One => R::one(),
+        BlendFactor::Source => source[channel],
+        BlendFactor::OneMinusSource => R::one() - source[channel],
+        BlendFactor::SourceAlpha => source[3],
+        BlendFactor::OneMinusSourceAlpha => R::one() - source[3],
+        BlendFactor::Destination => destination[channel],
+        BlendFactor::OneMinusDestination => R::one() - destination[channel],
+        BlendFactor::DestinationAlpha => destination[3],
+        BlendFactor::OneMinusDestinationAlpha => R::one() - destination[3],
+    }
 }
 
 /// A colour as a target of this format holds it.
@@ -150,6 +178,7 @@ mod tests {
 
     use super::*;
     use crate::raster::Vector;
+    use crate::scene::Blend;
 
     fn srgb(light: f64) -> f64 {
         if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
@@ -169,7 +198,7 @@ mod tests {
         let bright = stored::<f32>(Format::Rgba16Float, [1e30, 65_505.0, -1e30, 1.0]);
         assert_eq!(bright, [65_504.0, 65_504.0, -65_504.0, 1.0]);
         let pane = Vector([0.25, 0.5, 0.75, 1.0]);
-        assert_eq!(blended::<f32>(Format::Rgba16Float, Blend::Alpha, pane, bright), [0.25, 0.5, 0.75, 1.0]);
+        assert_eq!(blended::<f32>(Format::Rgba16Float, Blend::Alpha.into(), pane, bright), [0.25, 0.5, 0.75, 1.0]);
     }
 
     proptest! {
@@ -186,7 +215,7 @@ mod tests {
             color in prop::array::uniform4(-2.0..2.0_f64),
             there in prop::array::uniform4(-2.0..2.0_f64),
         ) {
-            let mix = |blend| blended(Format::Rgba16Float, blend, Vector(color), there);
+            let mix = |blend: Blend| blended(Format::Rgba16Float, blend.into(), Vector(color), there);
             let alpha = color[3];
             for channel in 0..4 {
                 let share = if channel == 3 { 1.0 } else { alpha };
@@ -196,7 +225,7 @@ mod tests {
                 let over = color[channel] * share + there[channel] * (1.0 - alpha);
                 prop_assert!((mix(Blend::Alpha)[channel] - over).abs() < 1e-12);
             }
-            let sum = blended(Format::Rgba8Unorm, Blend::Additive, Vector(color), there.map(f64::abs).map(|one| one.min(1.0)));
+            let sum = blended(Format::Rgba8Unorm, BlendEquation::ADDITIVE, Vector(color), there.map(f64::abs).map(|one| one.min(1.0)));
             prop_assert!(sum.iter().all(|value| (0.0..=1.0).contains(value)));
         }
     }

@@ -13,7 +13,7 @@ use super::materials::MaterialCache;
 use super::meshes::MeshCache;
 use super::precision::Precision;
 use super::shader_inputs::CameraPosition;
-use super::software_pass::{SoftwareDraws, SoftwarePass};
+use super::software_pass::{DepthWrites, SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::SubdivisionCache;
@@ -129,7 +129,14 @@ fn software_pass<R: Precision>(
     let draws = match (&request.draws[pass.process_index], R::shader(shader)) {
         (Draws::Commands(draws), TypedCpuShader::Objects(shader)) => {
             let attributes = planned.declaration.attributes.clone();
-            SoftwareDraws::Objects { shader: Arc::clone(shader), writes_depth: draws.writes_depth, attributes }
+            let depth = if !draws.writes_depth {
+                DepthWrites::Never
+            } else if draws.blend_equations.is_empty() {
+                DepthWrites::WhereOpaque
+            } else {
+                DepthWrites::Always
+            };
+            SoftwareDraws::Objects { shader: Arc::clone(shader), culling: draws.culling, depth, attributes }
         }
         (Draws::FullScreen(draws), TypedCpuShader::FullScreen(shader)) => {
             SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
@@ -165,9 +172,10 @@ fn attachments<R: Precision>(
         targets.find(pass.view_index, name).cloned().ok_or_else(|| missing(name))
     };
     let layered = |kind: ViewKind, name: &str| targets.find_layered(kind, name).ok_or_else(|| missing(name));
-    let color = |(name, clear): (&str, Option<ClearColor>)| {
+    let equations = request.draws[pass.process_index].blend_equations();
+    let color = |(index, (name, clear)): (usize, (&str, Option<ClearColor>))| {
         let clear = clear.map(|clear| clear_color(clear, request));
-        Ok(ColorAttachment { target: of_view(name)?, clear })
+        Ok(ColorAttachment { target: of_view(name)?, clear, equation: equations.get(index).copied() })
     };
     let depth = |(name, access): (&str, Access)| {
         let is_writable = access.writes_depth();
@@ -181,7 +189,7 @@ fn attachments<R: Precision>(
         _ => None,
     });
     Ok(Attachments {
-        colors: declaration.colors().map(color).collect::<Result<_, BackendError>>()?,
+        colors: declaration.colors().enumerate().map(color).collect::<Result<_, BackendError>>()?,
         depth: declaration.depth().map(depth).transpose()?,
         sampled: sampled.collect::<Result<_, _>>()?,
     })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::attachments::Attachments;
 use super::precision::Precision;
-use crate::process::{DeclaredAttribute, FullScreenCpuShader, LightCpuShader, ObjectCpuShader, Pass};
+use crate::process::{DeclaredAttribute, FaceCulling, FullScreenCpuShader, LightCpuShader, ObjectCpuShader, Pass};
 use crate::scene::Blend;
 
 /// A pass of a frame: one process in one view.
@@ -19,7 +19,27 @@ pub(super) struct SoftwarePass<R: Precision> {
 
 /// What a pass draws.
 pub(super) enum SoftwareDraws<R: Precision> {
-    Objects { shader: Arc<dyn ObjectCpuShader<R>>, writes_depth: bool, attributes: Vec<DeclaredAttribute> },
-    FullScreen { shader: Arc<dyn FullScreenCpuShader<R>>, blend: Blend },
-    Lights { shader: Arc<dyn LightCpuShader<R>>, lights: Range<usize> },
+    Objects {
+        shader: Arc<dyn ObjectCpuShader<R>>,
+        culling: FaceCulling,
+        depth: DepthWrites,
+        attributes: Vec<DeclaredAttribute>,
+    },
+    FullScreen {
+        shader: Arc<dyn FullScreenCpuShader<R>>,
+        blend: Blend,
+    },
+    Lights {
+        shader: Arc<dyn LightCpuShader<R>>,
+        lights: Range<usize>,
+    },
+}
+
+/// Which objects write depth, so that they occlude what is behind them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DepthWrites {
+    Never,
+    /// Those whose materials do not blend.
+    WhereOpaque,
+    Always,
 }

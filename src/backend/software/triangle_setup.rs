@@ -8,7 +8,8 @@ use super::precision::Precision;
 use super::tiles::Tiling;
 use crate::command::{Batch, Cull};
 use crate::process::{
-    DeclaredAttribute, MAX_ATTRIBUTES, ObjectCpuShader, PassInputs, ShaderObject, VertexInput, VertexOutput,
+    DeclaredAttribute, FaceCulling, MAX_ATTRIBUTES, ObjectCpuShader, PassInputs, ShaderObject, VertexInput,
+    VertexOutput,
 };
 use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
 use crate::scene::{Blend, Mesh};
@@ -98,13 +99,13 @@ pub(super) struct TriangleState {
 }
 
 impl<R: Precision, const V: usize> TriangleSetup<R, V> {
-    /// Runs the vertex shader for a chunk, and sets up and bins its triangles.
+    /// Runs the vertex shader for a chunk, and sets up and bins the sides of its triangles that this culling leaves.
     pub(super) fn new(
         shader: &dyn ObjectCpuShader<R>,
         attributes: &[DeclaredAttribute],
         pass: &PassInputs<'_, R>,
         tiling: &Tiling,
-        chunk: &[TriangleRange],
+        (chunk, culling): (&[TriangleRange], FaceCulling),
         object_of: impl Fn(u32) -> Option<ShaderObject<R>>,
     ) -> Self {
         let mut setup = Self { triangles: Vec::new(), states: Vec::new(), bins: Vec::new(), unbinned: Vec::new() };
@@ -113,7 +114,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
             let Some(object) = object_of(range.object) else { continue };
             let state =
                 TriangleState { material: object.material, blend: range.batch.state.blend(), object: object.index };
-            let culled = culled_winding(range.batch.state.cull());
+            let culled = culled_winding(culling.applied_to(range.batch.state.cull()));
             let mut cache = PostTransformCache::new(shader, pass, &object, &range.mesh, attributes);
             range.each_triangle(|indices| {
                 let corners = indices.map(|index| cache.vertex(index));

@@ -206,7 +206,7 @@ pub enum ProcessError {
         /// The size of an element of the scene, in bytes.
         found: usize,
     },
-    /// Lights or a full-screen triangle are to be blended with a target whose format cannot be blended.
+    /// What a process draws is to be blended with a target whose format cannot be blended.
     #[error("process {process:?} blends with target {target:?}, whose format {format:?} cannot be blended")]
     CannotBlend {
         /// The process.
@@ -215,6 +215,16 @@ pub enum ProcessError {
         target: String,
         /// Its format.
         format: Format,
+    },
+    /// A process has blend equations for another number of colour targets than it draws into.
+    #[error("process {process:?} has {equations} blend equations for {targets} colour targets")]
+    BlendEquations {
+        /// The process.
+        process: String,
+        /// The number of equations.
+        equations: usize,
+        /// The number of colour targets.
+        targets: usize,
     },
     /// A [resource](crate::process::ShaderResource::Bytes) of a size that no storage buffer can have.
     #[error("resource {resource} of process {process:?} has {bytes} bytes, instead of 4, 8, 12 ...")]

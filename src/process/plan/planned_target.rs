@@ -1,7 +1,7 @@
 //! The targets that a plan's processes use.
 
 use super::{PlanError, PlannedProcess, ProcessError};
-use crate::process::{Access, Declaration, Draws, Format, TargetSize, previous_name};
+use crate::process::{Access, BlendEquation, Declaration, Draws, Format, TargetSize, previous_name};
 use crate::scene::{Blend, ViewKind};
 
 /// A target that each view of one kind has.
@@ -134,8 +134,8 @@ pub(super) fn drawn_size(planned: &PlannedProcess, targets: &[PlannedTarget]) ->
 }
 
 /// # Errors
-/// If lights or a full-screen triangle are blended with a target that cannot be blended. Objects have materials of all kinds, and
-/// those that blend are drawn there as if they did not.
+/// If a target that cannot be blended is blended with, or there are blend equations for another number of targets. Objects that have no
+/// equations have materials of all kinds, and those that blend are drawn there as if they did not.
 pub(super) fn check_blending(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
@@ -147,13 +147,21 @@ pub(super) fn check_blending(
         Draws::Lights(_) => true,
         _ => false,
     };
-    let refuses = |target: &&PlannedTarget| !target.format.is_depth_stencil() && !target.format.can_be_blended();
-    match attached_targets(planned, targets).find(refuses) {
-        Some(PlannedTarget { name, format, .. }) if blends => {
-            Err(ProcessError::CannotBlend { process: planned.name.clone(), target: name.clone(), format: *format })
-        }
-        _ => Ok(()),
+    let process = || planned.name.clone();
+    let equations = draws.blend_equations();
+    let count = planned.declaration.colors().count();
+    if !equations.is_empty() && equations.len() != count {
+        return Err(ProcessError::BlendEquations { process: process(), equations: equations.len(), targets: count });
     }
+    let colors = attached_targets(planned, targets).filter(|target| !target.format.is_depth_stencil());
+    for (index, target) in colors.enumerate() {
+        let blends = equations.get(index).map_or(blends, |equation| *equation != BlendEquation::REPLACE);
+        if blends && !target.format.can_be_blended() {
+            let (target, format) = (target.name.clone(), target.format);
+            return Err(ProcessError::CannotBlend { process: process(), target, format });
+        }
+    }
+    Ok(())
 }
 
 /// # Errors

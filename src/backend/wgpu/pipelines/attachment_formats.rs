@@ -1,7 +1,10 @@
 //! The attachments of a process's passes, as its pipelines and bundles see them.
 
 use crate::backend::wgpu::resources::{SampledTarget, texture_format};
-use crate::process::{Access, Comparison, Declaration, Format, FramePlan, Stencil, StencilOperation};
+use crate::process::{
+    Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Declaration, Format, FramePlan, Stencil,
+    StencilOperation,
+};
 use crate::scene::ViewKind;
 
 /// The formats of the targets that a process draws into and samples, and how it uses buffers.
@@ -80,6 +83,43 @@ impl DepthAttachmentFormat {
             stencil: stencil.map_or_else(wgpu::StencilState::default, stencil_state),
             bias: wgpu::DepthBiasState::default(),
         }
+    }
+}
+
+/// `None` where nothing is mixed.
+pub(super) fn blend_state(equation: BlendEquation) -> Option<wgpu::BlendState> {
+    let [color, alpha] = [equation.color, equation.alpha].map(blend_component);
+    (equation != BlendEquation::REPLACE).then_some(wgpu::BlendState { color, alpha })
+}
+
+fn blend_component(component: BlendComponent) -> wgpu::BlendComponent {
+    use wgpu::BlendOperation;
+    let one = BlendFactor::One;
+    let (source, destination, operation) = match component {
+        BlendComponent::Sum { source, destination } => (source, destination, BlendOperation::Add),
+        BlendComponent::Difference { source, destination } => (source, destination, BlendOperation::Subtract),
+        BlendComponent::ReverseDifference { source, destination } => {
+            (source, destination, BlendOperation::ReverseSubtract)
+        }
+        BlendComponent::Minimum => (one, one, BlendOperation::Min),
+        BlendComponent::Maximum => (one, one, BlendOperation::Max),
+    };
+    let [src_factor, dst_factor] = [source, destination].map(blend_factor);
+    wgpu::BlendComponent { src_factor, dst_factor, operation }
+}
+
+fn blend_factor(factor: BlendFactor) -> wgpu::BlendFactor {
+    match factor {
+        BlendFactor::Zero => wgpu::BlendFactor::Zero,
+        BlendFactor::One => wgpu::BlendFactor::One,
+        BlendFactor::Source => wgpu::BlendFactor::Src,
+        BlendFactor::OneMinusSource => wgpu::BlendFactor::OneMinusSrc,
+        BlendFactor::SourceAlpha => wgpu::BlendFactor::SrcAlpha,
+        BlendFactor::OneMinusSourceAlpha => wgpu::BlendFactor::OneMinusSrcAlpha,
+        BlendFactor::Destination => wgpu::BlendFactor::Dst,
+        BlendFactor::OneMinusDestination => wgpu::BlendFactor::OneMinusDst,
+        BlendFactor::DestinationAlpha => wgpu::BlendFactor::DstAlpha,
+        BlendFactor::OneMinusDestinationAlpha => wgpu::BlendFactor::OneMinusDstAlpha,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::command::{Cull, DrawState};
-use crate::process::{Draws, Primitive, Stencil, prelude_with};
+use crate::process::{BlendEquation, Draws, FaceCulling, Primitive, Stencil, prelude_with};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
 use crate::scene::{AttributeLayout, Blend, LightKind, Topology};
 
@@ -16,6 +16,9 @@ pub(crate) struct PipelineKey<'a> {
     pub(crate) fragment: Option<Cow<'a, str>>,
     pub(crate) parameter_bytes: usize,
     pub(crate) writes_depth: bool,
+    pub(crate) culling: FaceCulling,
+    /// Of each colour target; empty if the state decides.
+    pub(crate) blend_equations: Cow<'a, [BlendEquation]>,
     pub(crate) stencil: Option<Stencil>,
     /// The only draw state of a process without commands.
     pub(crate) state: Option<DrawState>,
@@ -39,7 +42,7 @@ pub(crate) enum VertexSource {
 
 impl<'a> PipelineKey<'a> {
     /// Borrows the shader, because every frame compares this key with the pipelines' own.
-    pub(crate) fn new(draws: &Draws<'a>, quality: &Quality) -> Self {
+    pub(crate) fn new(draws: &'a Draws<'a>, quality: &Quality) -> Self {
         let (transforms, format) = (quality.transforms, quality.vertices);
         let parameter_bytes = draws.parameters().len();
         let state = fixed_state(draws);
@@ -47,12 +50,25 @@ impl<'a> PipelineKey<'a> {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
             // The reference is state of the pass.
             let (deformation, stencil) = (None, draws.stencil().map(|stencil| Stencil { reference: 0, ..stencil }));
-            Self { shader, deformation, vertices, fragment, parameter_bytes, writes_depth, stencil, state, transforms }
+            let (culling, blend_equations) = (FaceCulling::ByMaterial, Cow::Borrowed(draws.blend_equations()));
+            Self {
+                shader,
+                deformation,
+                vertices,
+                fragment,
+                parameter_bytes,
+                writes_depth,
+                culling,
+                blend_equations,
+                stencil,
+                state,
+                transforms,
+            }
         };
         match draws {
             Draws::Commands(draws) => {
                 let key = with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth);
-                Self { deformation: draws.deformation.map(Cow::Borrowed), ..key }
+                Self { deformation: draws.deformation.map(Cow::Borrowed), culling: draws.culling, ..key }
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
@@ -73,7 +89,8 @@ impl<'a> PipelineKey<'a> {
     pub(crate) fn into_owned(self) -> PipelineKey<'static> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
         let [deformation, fragment] = [self.deformation, self.fragment].map(|text| text.map(owned));
-        PipelineKey { shader: owned(self.shader), deformation, fragment, ..self }
+        let blend_equations = Cow::Owned(self.blend_equations.into_owned());
+        PipelineKey { shader: owned(self.shader), deformation, fragment, blend_equations, ..self }
     }
 
     /// What goes before the process's own WGSL, which reads these attributes.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
-use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat};
+use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
 use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::BackendError;
@@ -218,11 +218,13 @@ impl ProcessPipelines {
     fn create(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
         let shader = self.shader.as_ref()?;
         let AttachmentFormats { colors, can_be_blended, .. } = &self.attachments;
-        let target = |(format, can_be_blended): (&Option<wgpu::TextureFormat>, &bool)| {
-            let blend = blend_state(state.blend()).filter(|_| *can_be_blended);
+        let equations = &self.key.blend_equations;
+        let target = |(index, (format, can_be_blended)): (usize, (&Option<wgpu::TextureFormat>, &bool))| {
+            let equation = equations.get(index).copied().unwrap_or_else(|| state.blend().into());
+            let blend = blend_state(equation).filter(|_| *can_be_blended);
             format.map(|format| wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
         };
-        let targets: Vec<_> = colors.iter().zip(can_be_blended).map(target).collect();
+        let targets: Vec<_> = colors.iter().zip(can_be_blended).enumerate().map(target).collect();
         let own: Vec<_> = (FIRST_OWN_LOCATION..).zip(&self.attributes).map(own_attribute).collect();
         let own = self.attributes.iter().zip(&own);
         let own = own.map(|(layout, attribute)| buffer_layout(layout.format.bytes() as u64, attribute));
@@ -255,7 +257,7 @@ impl ProcessPipelines {
                 topology,
                 strip_index_format,
                 front_face: wgpu::FrontFace::Ccw,
-                cull_mode: match state.cull() {
+                cull_mode: match self.key.culling.applied_to(state.cull()) {
                     Cull::Back => Some(wgpu::Face::Back),
                     Cull::Front => Some(wgpu::Face::Front),
                     Cull::Nothing => None,
@@ -263,8 +265,9 @@ impl ProcessPipelines {
                 ..wgpu::PrimitiveState::default()
             },
             depth_stencil: self.attachments.depth.map(|depth| {
-                // A blended surface must not hide what is drawn after it.
-                let writes_depth = self.key.writes_depth && state.blend() == Blend::None;
+                // A blended surface must not hide what is drawn after it, unless the process says so.
+                let is_opaque = !equations.is_empty() || state.blend() == Blend::None;
+                let writes_depth = self.key.writes_depth && is_opaque;
                 depth.pipeline_state_of(writes_depth, self.depth_compare(depth), self.key.stencil)
             }),
             multisample: wgpu::MultisampleState::default(),
@@ -331,18 +334,6 @@ fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
         Primitive::Lines => wgpu::PrimitiveTopology::LineList,
         Primitive::LineStrip => wgpu::PrimitiveTopology::LineStrip,
         Primitive::Points => wgpu::PrimitiveTopology::PointList,
-    }
-}
-
-fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
-    use wgpu::{BlendComponent, BlendFactor, BlendOperation};
-    let both = |component: BlendComponent| wgpu::BlendState { color: component, alpha: component };
-    let add = |operation| BlendComponent { src_factor: BlendFactor::One, dst_factor: BlendFactor::One, operation };
-    match blend {
-        Blend::None => None,
-        Blend::Alpha => Some(wgpu::BlendState::ALPHA_BLENDING),
-        Blend::Additive => Some(both(add(BlendOperation::Add))),
-        Blend::Subtractive => Some(both(add(BlendOperation::ReverseSubtract))),
     }
 }
 
