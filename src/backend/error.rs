@@ -70,6 +70,27 @@ pub enum BackendError {
         /// The render process's name.
         process: String,
     },
+    /// A mesh [in the engine's own buffers](crate::scene::Mesh::on_device) has an attribute in a format that shaders read as another kind
+    /// of number.
+    #[error("process {process:?} reads {attribute:?} as {expected}, but mesh `{mesh}` has it as {format}")]
+    AttributeFormat {
+        /// The process.
+        process: String,
+        /// The mesh, or another one with the same layout.
+        mesh: String,
+        /// The attribute.
+        attribute: String,
+        /// Its format in the mesh.
+        format: String,
+        /// The type of number in the shader.
+        expected: &'static str,
+    },
+    /// A mesh in buffers of a device, whose triangles the software backend cannot see.
+    #[error("mesh `{mesh}` is in buffers of a device, so the software backend cannot draw it")]
+    MeshOnDevice {
+        /// The mesh.
+        mesh: String,
+    },
     /// The CPU shader of a render process panicked.
     #[error("the CPU shader of process {process:?} panicked: {message}")]
     CpuShaderPanicked {

@@ -130,6 +130,6 @@ fn subdivided(mesh: &Mesh, level: u32) -> (Mesh, bool) {
 }
 
 /// The error for a batch without a mesh. This is a bug in Drawloom.
-pub(super) fn missing_mesh_error() -> BackendError {
+pub(crate) fn missing_mesh_error() -> BackendError {
     BackendError::BrokenRule { rule: "a batch draws an existing mesh".to_owned() }
 }

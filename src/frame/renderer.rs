@@ -122,7 +122,7 @@ impl<B: Backend> Renderer<B> {
 
     /// Compiles the shaders of frames of this scene, and of one that requires every process of the pipeline, and makes their pipelines for
     /// this scene's meshes and materials. Without this call that happens in the first frames that need them, as it still does
-    /// for mirrored objects, and for pipelines between these two. Call it while the world is loaded, on any thread: it also finds what is
+    /// for mirrored objects, for meshes in the engine's own buffers, and for pipelines between these two. Call it while the world is loaded, on any thread: it also finds what is
     /// wrong with the engine's processes.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ pub enum FaceCulling {
 
 impl FaceCulling {
     /// What is culled of an object for which its material culls this.
-    pub(crate) fn applied_to(self, cull: Cull) -> Cull {
+    pub fn applied_to(self, cull: Cull) -> Cull {
         match (self, cull) {
             (Self::ByMaterial, cull) => cull,
             (Self::Nothing, _) | (Self::Reversed, Cull::Nothing) => Cull::Nothing,

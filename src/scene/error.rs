@@ -30,6 +30,14 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: String,
     },
+    /// [Geometry on the device](super::Mesh::on_device) that no mesh can have.
+    #[error("mesh `{mesh}`: {problem}")]
+    InvalidDeviceGeometry {
+        /// The name of the mesh.
+        mesh: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// An index that points past the vertices.
     #[error("mesh `{mesh}`: index {index} points past its {vertices} vertices")]
     IndexOutOfRange {

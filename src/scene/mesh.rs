@@ -1,9 +1,13 @@
 //! Triangle meshes.
 
 use std::ops::Range;
+#[cfg(feature = "wgpu")]
+use std::sync::Arc;
 
 use glam::Vec3;
 
+#[cfg(feature = "wgpu")]
+use super::DeviceGeometry;
 use super::vertex_attribute::MeshAttribute;
 use super::{AttributeFormat, AttributeLayout, AttributeValue, SceneError, VertexAttribute};
 
@@ -19,6 +23,9 @@ pub struct Mesh {
     corners: [Vec3; 2],
     longest_edge: f32,
     culls_triangles: bool,
+    /// If it is not in `vertices` and `indices`.
+    #[cfg(feature = "wgpu")]
+    on_device: Option<Arc<DeviceGeometry>>,
 }
 
 impl Mesh {
@@ -34,12 +41,7 @@ impl Mesh {
         indices: Vec<u32>,
     ) -> Result<Self, SceneError> {
         let name = name.into();
-        if indices.len() < 3 {
-            return Err(SceneError::EmptyMesh { mesh: name });
-        }
-        if topology == Topology::TriangleList && !indices.len().is_multiple_of(3) {
-            return Err(SceneError::PartialTriangle { mesh: name, indices: indices.len() });
-        }
+        check_corner_count(&name, topology, indices.len())?;
         if let Some(&index) = indices.iter().find(|&&index| index as usize >= vertices.len()) {
             return Err(SceneError::IndexOutOfRange { mesh: name, index, vertices: vertices.len() });
         }
@@ -53,6 +55,49 @@ impl Mesh {
         Ok(mesh)
     }
 
+    /// A mesh in the engine's own buffers, within a box in object space, of which these are the lowest and the highest corner.
+    ///
+    /// The CPU does not see its triangles. So it has no [`vertices`](Self::vertices), [`indices`](Self::indices) or
+    /// [`attribute`](Self::attribute), hides nothing from culling, is neither subdivided for paraboloids nor culled by triangle, and
+    /// the software backend refuses it. Batches of meshes with equal layouts share pipelines.
+    ///
+    /// # Errors
+    /// If it has no triangle, no positions, an attribute twice, a stream that does not fit its buffer, or the box is none.
+    #[cfg(feature = "wgpu")]
+    pub fn on_device(
+        name: impl Into<String>,
+        topology: Topology,
+        corners: [Vec3; 2],
+        geometry: DeviceGeometry,
+    ) -> Result<Self, SceneError> {
+        let name = name.into();
+        check_corner_count(&name, topology, geometry.corners() as usize)?;
+        let [low, high] = corners;
+        let is_box = low.is_finite() && high.is_finite() && low.cmple(high).all();
+        let problem = if is_box { geometry.problem() } else { Some(format!("its box from {low} to {high} is none")) };
+        if let Some(problem) = problem {
+            return Err(SceneError::InvalidDeviceGeometry { mesh: name, problem });
+        }
+        let mut mesh = Self::from_valid_parts(name, topology, Vec::new(), Vec::new());
+        (mesh.bounds, mesh.corners) = (Bounds::around(corners.into_iter()), corners);
+        if !mesh.bounds.is_valid() {
+            return Err(SceneError::MeshTooLarge { mesh: mesh.name });
+        }
+        mesh.on_device = Some(Arc::new(geometry));
+        Ok(mesh)
+    }
+
+    /// Its geometry, if that is in [the engine's own buffers](Self::on_device).
+    #[cfg(feature = "wgpu")]
+    pub fn device_geometry(&self) -> Option<&Arc<DeviceGeometry>> {
+        self.on_device.as_ref()
+    }
+
+    /// Whether its triangles are known here, and not on a device alone.
+    pub(crate) fn has_triangles(&self) -> bool {
+        !self.indices.is_empty()
+    }
+
     /// Computes bounds and the length of the longest edge of a mesh whose parts are known to be valid.
     pub(super) fn from_valid_parts(name: String, topology: Topology, vertices: Vec<Vertex>, indices: Vec<u32>) -> Self {
         let bounds = Bounds::around(vertices.iter().map(|vertex| Vec3::from(vertex.position)));
@@ -61,9 +106,19 @@ impl Mesh {
             let position = Vec3::from(vertex.position);
             [low.min(position), high.max(position)]
         });
-        let (attributes, longest_edge, culls_triangles) = (Vec::new(), 0.0, false);
-        let mut mesh =
-            Self { name, topology, vertices, indices, attributes, bounds, corners, longest_edge, culls_triangles };
+        let mut mesh = Self {
+            name,
+            topology,
+            vertices,
+            indices,
+            attributes: Vec::new(),
+            bounds,
+            corners,
+            longest_edge: 0.0,
+            culls_triangles: false,
+            #[cfg(feature = "wgpu")]
+            on_device: None,
+        };
         let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
         let edges = triangles.filter(has_distinct_corners).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
@@ -83,6 +138,9 @@ impl Mesh {
         let (layout, vertices) = (attribute.layout(), self.vertices.len());
         let refused =
             |problem: String| SceneError::InvalidAttribute { mesh: self.name.clone(), attribute: layout.name, problem };
+        if !self.has_triangles() {
+            return Err(refused("belongs into a stream of the mesh, whose vertices are on the device".to_owned()));
+        }
         if values.len() != vertices {
             return Err(refused(format!("has {} values for {vertices} vertices", values.len())));
         }
@@ -121,8 +179,9 @@ impl Mesh {
     /// a mesh: triangles that a shader would move into view may be missing.
     ///
     /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
-    /// triangles at most; further objects are drawn whole.
+    /// triangles at most; further objects are drawn whole. So are meshes [on the device](Self::on_device).
     pub fn with_triangle_culling(mut self, enabled: bool) -> Self {
+        let enabled = enabled && self.has_triangles();
         if enabled && self.topology == Topology::TriangleStrip {
             (self.topology, self.indices) = (Topology::TriangleList, self.triangles().flatten().collect());
         }
@@ -173,13 +232,16 @@ impl Mesh {
 
     /// The number of triangles.
     pub fn triangle_count(&self) -> usize {
+        let corners = self.indices.len();
+        #[cfg(feature = "wgpu")]
+        let corners = self.on_device.as_ref().map_or(corners, |geometry| geometry.corners() as usize);
         match self.topology {
-            Topology::TriangleList => self.indices.len() / 3,
-            Topology::TriangleStrip => self.indices.len() - 2,
+            Topology::TriangleList => corners / 3,
+            Topology::TriangleStrip => corners.saturating_sub(2),
         }
     }
 
-    /// The indices of each triangle's corners, counter-clockwise seen from its front.
+    /// The indices of each triangle's corners, counter-clockwise seen from its front; none of a mesh [on the device](Self::on_device).
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.triangles_in(0..self.triangle_count())
     }
@@ -193,10 +255,23 @@ impl Mesh {
             Topology::TriangleList => (3, false),
             Topology::TriangleStrip => (1, true),
         };
+        let numbers = if self.has_triangles() { numbers } else { 0..0 };
         let indices = &self.indices[numbers.start * step..];
         let triangles = numbers.zip(indices.array_windows().step_by(step));
         triangles.map(move |(number, &[a, b, c])| if alternates && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
     }
+}
+
+/// # Errors
+/// If this many corners form no triangle, or a part of one.
+fn check_corner_count(mesh: &str, topology: Topology, corners: usize) -> Result<(), SceneError> {
+    if corners < 3 {
+        return Err(SceneError::EmptyMesh { mesh: mesh.to_owned() });
+    }
+    if topology == Topology::TriangleList && !corners.is_multiple_of(3) {
+        return Err(SceneError::PartialTriangle { mesh: mesh.to_owned(), indices: corners });
+    }
+    Ok(())
 }
 
 /// Whether a triangle's corners are at three different positions. Otherwise it has no area in any projection.

@@ -6,6 +6,8 @@
 mod assets;
 mod camera;
 mod changes;
+#[cfg(feature = "wgpu")]
+mod device_geometry;
 mod error;
 mod layer_mask;
 mod light;
@@ -24,6 +26,10 @@ mod vertex_attribute;
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
 pub use changes::Changes;
+#[cfg(feature = "wgpu")]
+pub use device_geometry::{DeviceGeometry, IndexStream, StreamAttribute, StreamLayout, VertexStream};
+#[cfg(feature = "wgpu")]
+pub(crate) use device_geometry::{NORMAL, NumberKind, POSITION, UV};
 pub use error::SceneError;
 pub use layer_mask::LayerMask;
 pub use light::{Light, LightKind};

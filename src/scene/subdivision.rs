@@ -23,7 +23,7 @@ impl Mesh {
     /// [`longest_edge`](Self::longest_edge) of the result is then still above `longest`. A `longest` that is NaN or not
     /// positive cannot be reached, and subdivides up to the limit.
     ///
-    /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result
+    /// A mesh on the device stays as it is. Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result
     /// is a single degenerate triangle.
     ///
     /// ```
@@ -38,6 +38,9 @@ impl Mesh {
     /// # }
     /// ```
     pub fn subdivided(&self, longest: f32, triangle_limit: usize) -> Self {
+        if !self.has_triangles() {
+            return self.clone();
+        }
         // `max` returns the other operand if one is NaN.
         let longest = f64::from(longest.max(0.0));
         let mut surface =

@@ -30,11 +30,11 @@ pub const CASES: &[Case] = &[
     ("every_strategy_and_the_software_backend_read_the_same_attributes", same_everywhere),
 ];
 
-const COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("colour");
-const STRENGTH: VertexAttribute<u32> = VertexAttribute::new("strength");
-const SHADE: VertexAttribute<[u8; 4]> = VertexAttribute::new("shade");
+pub const COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("colour");
+pub const STRENGTH: VertexAttribute<u32> = VertexAttribute::new("strength");
+pub const SHADE: VertexAttribute<[u8; 4]> = VertexAttribute::new("shade");
 
-const SHADER: &str = "
+pub const SHADER: &str = "
     struct Corner {
         @builtin(position) position: vec4<f32>,
         @location(0) color: vec3<f32>,
@@ -59,9 +59,9 @@ fn reads_attributes(declare: &mut Declare) {
     declare.reads_attribute(SHADE, [0, 255, 0, 0]);
 }
 
-/// Draws the product of three attributes.
+/// Draws the product of three attributes into the target "coloured".
 #[derive(Clone, Copy)]
-struct Colored;
+pub struct Colored;
 
 impl RenderProcess for Colored {
     fn name(&self) -> &str {
@@ -140,7 +140,8 @@ fn interpolated() -> Result<(), Failed> {
     assert_color(pixel(&picture, 86, 16), [0, 0, 26])
 }
 
-fn with_colors(mesh: Mesh, red: f32) -> Result<Mesh, Failed> {
+/// The mesh with one colour.
+pub fn with_colors(mesh: Mesh, red: f32) -> Result<Mesh, Failed> {
     let count = mesh.vertices().len();
     Ok(mesh.with_attribute(COLOR, &vec![[red, 0.5, 0.25]; count])?.with_attribute(STRENGTH, &vec![100; count])?)
 }

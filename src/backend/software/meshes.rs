@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::backend::BackendError;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 
@@ -20,10 +21,16 @@ pub(super) struct MeshCache {
 
 impl MeshCache {
     /// The meshes of these assets, with the vertices that a device would fetch.
-    pub(super) fn update(&mut self, assets: &Assets, vertices: VertexFormat) -> Meshes {
+    ///
+    /// # Errors
+    /// If a mesh is in buffers of a device.
+    pub(super) fn update(&mut self, assets: &Assets, vertices: VertexFormat) -> Result<Meshes, BackendError> {
         let wanted = (assets.meshes.identity(), assets.meshes.revision(), vertices);
         if self.assets == wanted {
-            return Arc::clone(&self.meshes);
+            return Ok(Arc::clone(&self.meshes));
+        }
+        if let Some((_, mesh)) = assets.iter::<Mesh>().find(|(_, mesh)| !mesh.has_triangles()) {
+            return Err(BackendError::MeshOnDevice { mesh: mesh.name().to_owned() });
         }
         let mut before = std::mem::take(&mut self.kept);
         if (self.assets.0, self.assets.2) != (wanted.0, wanted.2) {
@@ -37,7 +44,7 @@ impl MeshCache {
         }
         self.assets = wanted;
         self.meshes = self.kept.iter().map(|kept| kept.as_ref().map(|(_, mesh)| Arc::clone(mesh))).collect();
-        Arc::clone(&self.meshes)
+        Ok(Arc::clone(&self.meshes))
     }
 }
 

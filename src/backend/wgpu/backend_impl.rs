@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
+use super::pipelines::PipelineVariant;
 use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
@@ -41,8 +42,9 @@ impl Backend for WgpuBackend {
     ) -> Result<(), BackendError> {
         let processes = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
         for (pipelines, states) in processes.iter().zip(states) {
-            let create = || pipelines.create_missing(&self.device, states.iter().copied());
-            pipelines.insert(with_error_scope(&self.device, pipelines.name(), create)?);
+            let variants = states.iter().map(|state| PipelineVariant::of_arenas(*state));
+            let create = || pipelines.create_missing(&self.device, variants);
+            pipelines.insert(with_error_scope(&self.device, pipelines.name(), create).flatten()?);
         }
         Ok(())
     }
@@ -87,8 +89,8 @@ impl Backend for WgpuBackend {
                 }
                 RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
             }
-            let runs = list.batches.chunk_by(|one, next| one.state == next.state);
-            Ok::<_, BackendError>(pipelines.create_missing(&self.device, runs.map(|run| run[0].state)))
+            let runs = list.batches.chunk_by(|one, next| frame.assets.share_pipeline(one, next));
+            pipelines.create_missing(&self.device, runs.map(|run| PipelineVariant::of_batch(&frame.assets, &run[0])))
         })
         .flatten()
         // Some of the resources just created may be unusable.

@@ -27,7 +27,7 @@ impl IndirectArguments {
         *self.buffer.get_mut() = None;
     }
 
-    /// Uploads the arguments of all batches if they changed. Batches of subdivided meshes and partial batches have zeros.
+    /// Uploads the arguments of all batches if they changed. Partial batches and meshes outside of the arenas have zeros.
     ///
     /// # Errors
     /// If a batch draws no mesh, or the device has no room.
@@ -53,7 +53,7 @@ impl IndirectArguments {
                         first_instance: batch.first,
                     }
                 }
-                // Drawn directly, because it has an index buffer of its own.
+                // Drawn directly, because it has buffers of its own.
                 _ => DrawIndexedIndirectArgs::default(),
             };
             bytes.extend_from_slice(arguments.as_bytes());

@@ -4,8 +4,11 @@ mod attachment_formats;
 mod compile_shader;
 mod pipeline_cache;
 mod pipeline_key;
+mod pipeline_variant;
 mod process_pipelines;
+mod vertex_buffers;
 
 pub(crate) use pipeline_cache::PipelineCache;
 pub(crate) use pipeline_key::fixed_state;
+pub(crate) use pipeline_variant::PipelineVariant;
 pub(crate) use process_pipelines::ProcessPipelines;

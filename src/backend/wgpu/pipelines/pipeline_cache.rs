@@ -80,7 +80,7 @@ impl PipelineCache {
                         let created = ProcessPipelines::new(device, layouts, plan, planned, draws, quality)?;
                         if let Some(working) = &working {
                             // Only a pipeline shows that a shader lacks an entry point, or reads what there is not.
-                            created.insert(created.create_missing(device, working.by_state().keys().copied()));
+                            created.insert(created.create_missing(device, working.variants().keys().cloned())?);
                         }
                         Ok(created)
                     };
@@ -127,7 +127,7 @@ impl PipelineCache {
         let mut distinct: Vec<_> = self.plans.values().flat_map(|cached| cached.processes.iter()).collect();
         distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
-        distinct.into_iter().map(|pipelines| pipelines.by_state().len()).sum()
+        distinct.into_iter().map(|pipelines| pipelines.variants().len()).sum()
     }
 }
 

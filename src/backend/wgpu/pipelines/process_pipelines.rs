@@ -7,13 +7,13 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
 use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
+use super::pipeline_variant::PipelineVariant;
+use super::vertex_buffers::VertexBuffers;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{
-    BindGroupLayouts, binding_type, engine_layout, process_layout, vertex_attributes, vertex_format, vertex_stride,
-};
+use crate::backend::wgpu::resources::{BindGroupLayouts, binding_type, engine_layout, process_layout};
 use crate::backend::wgpu::strategy::StrategySet;
-use crate::command::{Cull, DrawState};
-use crate::process::{Access, Declaration, Draws, FIRST_OWN_LOCATION, FramePlan, PlannedProcess, Primitive};
+use crate::command::Cull;
+use crate::process::{Access, Declaration, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{AttributeLayout, Blend, Topology};
 use crate::tuning::Tuner;
@@ -38,7 +38,7 @@ pub(crate) struct ProcessPipelines {
     shader: Option<CompiledShader>,
     /// Of a compute shader.
     compute: Option<wgpu::ComputePipeline>,
-    by_state: RwLock<HashMap<DrawState, wgpu::RenderPipeline>>,
+    variants: RwLock<HashMap<PipelineVariant, wgpu::RenderPipeline>>,
     /// The tuner of each view's pass.
     tuners: Mutex<Vec<Option<Tuner>>>,
 }
@@ -87,7 +87,7 @@ impl ProcessPipelines {
             Some(CompiledShader { module, layout })
         };
         let compute = shader.as_ref().filter(|_| is_compute).map(|shader| compute_pipeline(device, shader));
-        let (name, by_state, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
+        let (name, variants, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
         let pipelines = Self {
             name,
             key,
@@ -100,11 +100,11 @@ impl ProcessPipelines {
             features,
             shader,
             compute,
-            by_state,
+            variants,
             tuners,
         };
         if let Some(state) = pipelines.key.state {
-            pipelines.insert(pipelines.create(device, state));
+            pipelines.insert(pipelines.create(device, PipelineVariant::of_arenas(state))?);
         }
         Ok(pipelines)
     }
@@ -148,35 +148,37 @@ impl ProcessPipelines {
             && self.fits_declaration(plan, planned)
     }
 
-    /// Creates the missing pipelines of these states. [Insert](Self::insert) them only if the device reports no error.
-    #[must_use]
+    /// Creates the missing ones of these pipelines. [Insert](Self::insert) them only if the device reports no error.
+    ///
+    /// # Errors
+    /// If the shader cannot read an attribute of a mesh.
     pub(crate) fn create_missing(
         &self,
         device: &wgpu::Device,
-        states: impl Iterator<Item = DrawState>,
-    ) -> HashMap<DrawState, wgpu::RenderPipeline> {
+        variants: impl Iterator<Item = PipelineVariant>,
+    ) -> Result<HashMap<PipelineVariant, wgpu::RenderPipeline>, BackendError> {
         let mut created = HashMap::new();
-        let by_state = self.by_state();
-        for state in states.map(DrawState::pipeline_state) {
-            if !by_state.contains_key(&state) && !created.contains_key(&state) {
-                created.extend(self.create(device, state));
+        let known = self.variants();
+        for variant in variants {
+            if !known.contains_key(&variant) && !created.contains_key(&variant) {
+                created.extend(self.create(device, variant)?);
             }
         }
-        created
+        Ok(created)
     }
 
     /// Adds created pipelines.
-    pub(crate) fn insert(&self, created: impl IntoIterator<Item = (DrawState, wgpu::RenderPipeline)>) {
+    pub(crate) fn insert(&self, created: impl IntoIterator<Item = (PipelineVariant, wgpu::RenderPipeline)>) {
         let mut created = created.into_iter().peekable();
         // Recording holds the read lock. Mostly there is no pipeline to add, and then this does not wait for it.
         if created.peek().is_some() {
-            self.by_state.write().extend(created);
+            self.variants.write().extend(created);
         }
     }
 
-    /// The pipelines by draw state.
-    pub(crate) fn by_state(&self) -> RwLockReadGuard<'_, HashMap<DrawState, wgpu::RenderPipeline>> {
-        self.by_state.read()
+    /// The pipelines.
+    pub(crate) fn variants(&self) -> RwLockReadGuard<'_, HashMap<PipelineVariant, wgpu::RenderPipeline>> {
+        self.variants.read()
     }
 
     /// The pipeline of a compute shader; `None` for a process that draws.
@@ -215,8 +217,16 @@ impl ProcessPipelines {
     }
 
     /// `None` for a raw pass, which has no pipeline.
-    fn create(&self, device: &wgpu::Device, state: DrawState) -> Option<(DrawState, wgpu::RenderPipeline)> {
-        let shader = self.shader.as_ref()?;
+    ///
+    /// # Errors
+    /// If the shader cannot read an attribute of a mesh.
+    fn create(
+        &self,
+        device: &wgpu::Device,
+        variant: PipelineVariant,
+    ) -> Result<Option<(PipelineVariant, wgpu::RenderPipeline)>, BackendError> {
+        let Some(shader) = &self.shader else { return Ok(None) };
+        let state = variant.state;
         let AttachmentFormats { colors, can_be_blended, .. } = &self.attachments;
         let equations = &self.key.blend_equations;
         let target = |(index, (format, can_be_blended)): (usize, (&Option<wgpu::TextureFormat>, &bool))| {
@@ -225,24 +235,23 @@ impl ProcessPipelines {
             format.map(|format| wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
         };
         let targets: Vec<_> = colors.iter().zip(can_be_blended).enumerate().map(target).collect();
-        let own: Vec<_> = (FIRST_OWN_LOCATION..).zip(&self.attributes).map(own_attribute).collect();
-        let own = self.attributes.iter().zip(&own);
-        let own = own.map(|(layout, attribute)| buffer_layout(layout.format.bytes() as u64, attribute));
-        let (entry_point, vertices) = match self.key.vertices {
-            VertexSource::Meshes(format) => {
-                let shipped = buffer_layout(vertex_stride(format), vertex_attributes(format));
-                ("vertex", std::iter::once(shipped).chain(own).collect())
-            }
-            VertexSource::LightVolumes => {
-                ("light_volume", vec![buffer_layout(size_of::<[f32; 3]>() as u64, &POSITION_ONLY)])
-            }
-            VertexSource::Procedural(_) => ("vertex", Vec::new()),
-            VertexSource::FullScreen | VertexSource::Compute | VertexSource::None => ("full_screen", Vec::new()),
+        let buffers = match &variant.layout {
+            Some(layout) => VertexBuffers::of_device_meshes(layout, &self.attributes, &self.name)?,
+            None => VertexBuffers::new(self.key.vertices, &self.attributes),
+        };
+        let entry_point = match self.key.vertices {
+            VertexSource::Meshes(_) | VertexSource::Procedural(_) => "vertex",
+            VertexSource::LightVolumes => "light_volume",
+            VertexSource::FullScreen | VertexSource::Compute | VertexSource::None => "full_screen",
         };
         let (topology, strip_index_format) = match (self.key.vertices, state.topology()) {
             (VertexSource::Procedural(primitive), _) => (primitive_topology(primitive), None),
             (_, Topology::TriangleList) => (wgpu::PrimitiveTopology::TriangleList, None),
-            (_, Topology::TriangleStrip) => (wgpu::PrimitiveTopology::TriangleStrip, Some(wgpu::IndexFormat::Uint32)),
+            (_, Topology::TriangleStrip) => {
+                let of_arenas = Some(wgpu::IndexFormat::Uint32);
+                let format = variant.layout.as_ref().map_or(of_arenas, |layout| layout.strip_index_format);
+                (wgpu::PrimitiveTopology::TriangleStrip, format)
+            }
         };
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: None,
@@ -251,7 +260,7 @@ impl ProcessPipelines {
                 module: &shader.module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &vertices,
+                buffers: &buffers.layouts(),
             },
             primitive: wgpu::PrimitiveState {
                 topology,
@@ -280,7 +289,7 @@ impl ProcessPipelines {
             multiview_mask: None,
             cache: None,
         });
-        Some((state, pipeline))
+        Ok(Some((variant, pipeline)))
     }
 
     /// Depth is reversed: nearer is greater.
@@ -315,18 +324,6 @@ fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLay
     declaration.attributes.iter().map(|declared| declared.layout)
 }
 
-/// An attribute at a location, alone in its buffer.
-fn own_attribute((shader_location, layout): (u32, &AttributeLayout)) -> [wgpu::VertexAttribute; 1] {
-    [wgpu::VertexAttribute { format: vertex_format(layout.format), offset: 0, shader_location }]
-}
-
-fn buffer_layout(array_stride: u64, attributes: &[wgpu::VertexAttribute]) -> Option<wgpu::VertexBufferLayout<'_>> {
-    Some(wgpu::VertexBufferLayout { array_stride, step_mode: wgpu::VertexStepMode::Vertex, attributes })
-}
-
-/// Of light volumes.
-const POSITION_ONLY: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
-
 fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
     match primitive {
         Primitive::Triangles => wgpu::PrimitiveTopology::TriangleList,
@@ -359,9 +356,9 @@ mod tests {
 
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {
-            let recording = pipelines.by_state();
+            let recording = pipelines.variants();
             scope.spawn(|| {
-                pipelines.insert(pipelines.create_missing(&device, std::iter::empty()));
+                pipelines.insert(pipelines.create_missing(&device, std::iter::empty()).unwrap());
                 sender.send(()).unwrap();
             });
             let inserted = receiver.recv_timeout(Duration::from_secs(10));

@@ -8,17 +8,18 @@ use wgpu::util::RenderEncoder;
 
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
-use crate::backend::subdivision_cache::SubdividedMeshes;
+use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
 use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
+use crate::backend::wgpu::pipelines::PipelineVariant;
 use crate::backend::wgpu::resources::{SubdividedMesh, attribute_of};
-use crate::command::{Batch, DrawList, DrawState};
+use crate::command::{Batch, DrawList};
 
 /// Records the batches of a pass.
 pub(crate) struct BatchRecorder<'a> {
     pub(crate) frame: &'a WgpuFrame,
     pub(crate) pass: &'a WgpuPassState,
     pub(crate) list: &'a DrawList,
-    pub(crate) pipelines: &'a HashMap<DrawState, wgpu::RenderPipeline>,
+    pub(crate) pipelines: &'a HashMap<PipelineVariant, wgpu::RenderPipeline>,
     pub(crate) subdivided: &'a SubdividedMeshes<SubdividedMesh>,
     /// The indices of partial batches' remaining triangles.
     pub(crate) partial_indices: Option<&'a wgpu::Buffer>,
@@ -26,7 +27,7 @@ pub(crate) struct BatchRecorder<'a> {
 
 impl<'a> BatchRecorder<'a> {
     /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` is
-    /// called for consecutive unculled, unsubdivided batches of one state, and draws them.
+    /// called for consecutive unculled, unsubdivided batches of one state whose meshes are in the arenas, and draws them.
     ///
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.
@@ -39,12 +40,16 @@ impl<'a> BatchRecorder<'a> {
         self.set_bind_groups(encoder);
         self.set_arenas(encoder)?;
         let mut start = batches.start;
-        for run in self.list.batches[batches].chunk_by(|one, next| one.state == next.state) {
-            let state = run[0].state;
-            let pipeline = self.pipelines.get(&state.pipeline_state());
+        let assets = &self.frame.assets;
+        for run in self.list.batches[batches].chunk_by(|one, next| assets.share_pipeline(one, next)) {
+            let variant = PipelineVariant::of_batch(assets, &run[0]);
+            let pipeline = self.pipelines.get(&variant);
             encoder.set_pipeline(pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?);
             let end = start + run.len();
-            if state.subdivision_level() > 0 {
+            if variant.layout.is_some() {
+                self.draw_device_meshes(encoder, run)?;
+                self.set_arenas(encoder)?;
+            } else if run[0].state.subdivision_level() > 0 {
                 self.draw_subdivided(encoder, run)?;
                 self.set_arenas(encoder)?;
             } else if self.list.is_whole() {
@@ -120,6 +125,22 @@ impl<'a> BatchRecorder<'a> {
             }
             encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
+        }
+        Ok(())
+    }
+
+    /// Draws meshes in the engine's own buffers.
+    fn draw_device_meshes(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        let attributes = self.frame.pipelines(self.pass.pass).attributes();
+        let meshes = &self.frame.assets.device_meshes;
+        for batch in run {
+            let mesh = meshes.get(batch.mesh).ok_or_else(missing_mesh_error)?;
+            meshes.set_buffers(encoder, mesh, attributes)?;
+            let instances = batch.first..batch.first + batch.count;
+            match &mesh.geometry.indices {
+                Some(indices) => encoder.draw_indexed(0..indices.count, 0, instances),
+                None => encoder.draw(0..mesh.geometry.vertices, instances),
+            }
         }
         Ok(())
     }

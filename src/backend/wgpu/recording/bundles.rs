@@ -61,11 +61,11 @@ fn new_bundle(
     subdivided: &SubdividedMeshes<SubdividedMesh>,
 ) -> Result<wgpu::RenderBundle, BackendError> {
     let pipelines = frame.pipelines(pass.pass);
-    let by_state = pipelines.by_state();
+    let variants = pipelines.variants();
     let mut encoder = device.create_render_bundle_encoder(&pipelines.bundle_descriptor(&pass.label));
     let indices = pass.partial_indices.read();
     let partial_indices = indices.buffer();
-    let recorder = BatchRecorder { frame, pass, list, pipelines: &by_state, subdivided, partial_indices };
+    let recorder = BatchRecorder { frame, pass, list, pipelines: &variants, subdivided, partial_indices };
     let first = bundle * DrawList::BATCHES_PER_BUNDLE;
     let batches = first..first + list.bundle(bundle).len();
     recorder.draw(&mut encoder, batches, |encoder, run| recorder.draw_each(encoder, &list.batches[run]))?;

@@ -7,7 +7,7 @@ use super::begin_pass::begin_pass;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::frame::{IndirectArguments, WgpuFrame, WgpuPassState};
-use crate::backend::wgpu::pipelines::fixed_state;
+use crate::backend::wgpu::pipelines::{PipelineVariant, fixed_state};
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -27,12 +27,12 @@ pub(crate) fn record_batches(
     bundles: Range<usize>,
 ) -> Result<(), BackendError> {
     let pass = frame.pass(index);
-    let by_state = frame.pipelines(pass.pass).by_state();
+    let pipelines = frame.pipelines(pass.pass).variants();
     let subdivided = frame.buffers.subdivided().read();
     let arguments = pass.indirect_arguments.read();
     let indices = pass.partial_indices.read();
     let partial_indices = indices.buffer();
-    let recorder = BatchRecorder { frame, pass, list, pipelines: &by_state, subdivided: &subdivided, partial_indices };
+    let recorder = BatchRecorder { frame, pass, list, pipelines: &pipelines, subdivided: &subdivided, partial_indices };
     let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
     let batches = first..end.min(list.batches.len());
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
@@ -67,10 +67,11 @@ pub(crate) fn replay_bundles<'a>(
     bundles: impl IntoIterator<Item = &'a wgpu::RenderBundle>,
 ) {
     let pass = frame.pass(index).pass;
-    let by_state = frame.pipelines(pass).by_state();
+    let pipelines = frame.pipelines(pass).variants();
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
     // wgpu gives the device the reference only with a pipeline that tests it, and does not look for one in bundles.
-    if let Some(pipeline) = by_state.values().next().filter(|_| request.draws[pass.process_index].stencil().is_some()) {
+    if let Some(pipeline) = pipelines.values().next().filter(|_| request.draws[pass.process_index].stencil().is_some())
+    {
         render_pass.set_pipeline(pipeline);
     }
     render_pass.execute_bundles(bundles);
@@ -89,12 +90,19 @@ pub(crate) fn record_without_commands(
     let pass = frame.pass(index);
     let Pass { process_index: process, view_index: view } = pass.pass;
     let draws = &request.draws[process];
-    let by_state = frame.pipelines(pass.pass).by_state();
-    let pipeline = fixed_state(draws).and_then(|state| by_state.get(&state));
+    let pipelines = frame.pipelines(pass.pass).variants();
+    let variant = fixed_state(draws).map(PipelineVariant::of_arenas);
+    let pipeline = variant.and_then(|variant| pipelines.get(&variant));
     let pipeline = pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?;
     let (list, subdivided) = (DrawList::default(), SubdividedMeshes::new());
-    let (pipelines, partial_indices) = (&*by_state, None);
-    let recorder = BatchRecorder { frame, pass, list: &list, pipelines, subdivided: &subdivided, partial_indices };
+    let recorder = BatchRecorder {
+        frame,
+        pass,
+        list: &list,
+        pipelines: &pipelines,
+        subdivided: &subdivided,
+        partial_indices: None,
+    };
     let mut render_pass = begin_pass(encoder, frame, request, index, PassSegment::WHOLE);
     render_pass.set_pipeline(pipeline);
     recorder.set_bind_groups(&mut render_pass);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::arena::{Arena, filled_buffer};
 use super::attribute_arenas::{AttributeArenas, AttributeBuffers};
 use super::bind_group_layouts::BindGroupLayouts;
+use super::device_meshes::DeviceMeshes;
 use super::gpu_material::GpuMaterial;
 use super::growing_buffer::check_storage_binding_size;
 use super::texture_arrays::{TextureArrays, TextureLocation};
@@ -26,6 +27,8 @@ pub(crate) struct AssetSnapshot {
     attributes: AttributeBuffers,
     /// By mesh slot.
     meshes: Vec<Option<MeshRange>>,
+    /// Those that are not in the arenas.
+    pub(crate) device_meshes: DeviceMeshes,
     /// Materials and textures: `@group(1)`.
     pub(crate) group: wgpu::BindGroup,
 }
@@ -40,7 +43,13 @@ impl AssetSnapshot {
         mesh.ok_or_else(missing_mesh_error)
     }
 
-    /// The values of an attribute of all meshes.
+    /// Whether one pipeline of each process draws both batches.
+    pub(crate) fn share_pipeline(&self, one: &Batch, other: &Batch) -> bool {
+        one.state == other.state
+            && (self.device_meshes.is_empty() || self.device_meshes.have_equal_layouts(one.mesh, other.mesh))
+    }
+
+    /// The values of an attribute of all meshes in the arenas.
     ///
     /// # Errors
     /// If no plan has required it. This is a bug in Drawloom.
@@ -78,6 +87,7 @@ pub(crate) struct AssetCache {
     indices: Arena,
     attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
+    device_meshes: DeviceMeshes,
     textures: TextureArrays,
     /// Identities and revisions of the snapshot's meshes, materials and textures.
     current: Option<[(u64, u64); 3]>,
@@ -94,6 +104,7 @@ impl Default for AssetCache {
             indices: Arena::new("indices", wgpu::BufferUsages::INDEX),
             attributes: AttributeArenas::default(),
             meshes: Vec::new(),
+            device_meshes: DeviceMeshes::default(),
             textures: TextureArrays::default(),
             current: None,
             snapshot: None,
@@ -160,6 +171,9 @@ impl AssetCache {
                 // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
                 self.current = None;
                 self.update_meshes(device, uploads, assets)?;
+                let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
+                let attributes = self.attributes.required();
+                self.device_meshes = self.device_meshes.updated(device, uploads, meshes, attributes)?;
                 self.textures.update(device, uploads, assets, &mut self.rejected);
                 let snapshot = Arc::new(self.snapshot(device, uploads, layouts, assets)?);
                 self.current = Some(requested);
@@ -262,7 +276,8 @@ impl AssetCache {
             return Err(BackendError::BrokenRule { rule: "arenas have buffers".to_owned() });
         };
         let (vertices, indices, attributes) = (vertices.clone(), indices.clone(), self.attributes.buffers().clone());
-        Ok(AssetSnapshot { vertices, indices, attributes, meshes: self.meshes.clone(), group })
+        let (meshes, device_meshes) = (self.meshes.clone(), self.device_meshes.clone());
+        Ok(AssetSnapshot { vertices, indices, attributes, meshes, device_meshes, group })
     }
 
     fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {

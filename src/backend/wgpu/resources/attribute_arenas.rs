@@ -70,6 +70,11 @@ impl AttributeArenas {
         self.attributes.iter().map(upload).collect()
     }
 
+    /// The attributes that processes have read so far.
+    pub(crate) fn required(&self) -> &[DeclaredAttribute] {
+        &self.attributes
+    }
+
     pub(crate) fn buffers(&self) -> &AttributeBuffers {
         &self.buffers
     }

@@ -5,6 +5,7 @@ mod asset_cache;
 mod attribute_arenas;
 mod bind_group_layouts;
 mod cached_bind_group;
+mod device_meshes;
 mod gpu_material;
 mod growing_buffer;
 mod light_meshes;
@@ -24,6 +25,7 @@ pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
+pub(crate) use device_meshes::{DeviceLayout, VertexSlot};
 pub(crate) use growing_buffer::{
     ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,
 };

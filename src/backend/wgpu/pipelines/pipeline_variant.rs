@@ -1,0 +1,27 @@
+//! What distinguishes the pipelines of a process.
+
+use std::sync::Arc;
+
+use crate::backend::wgpu::resources::{AssetSnapshot, DeviceLayout};
+use crate::command::{Batch, DrawState};
+
+/// What distinguishes the pipelines of a process: the draw state, and where vertices are.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct PipelineVariant {
+    pub(crate) state: DrawState,
+    /// `None` for meshes in the crate's arenas.
+    pub(crate) layout: Option<Arc<DeviceLayout>>,
+}
+
+impl PipelineVariant {
+    /// That of a state, for meshes in the crate's arenas.
+    pub(crate) fn of_arenas(state: DrawState) -> Self {
+        Self { state: state.pipeline_state(), layout: None }
+    }
+
+    /// The one that draws a batch.
+    pub(crate) fn of_batch(assets: &AssetSnapshot, batch: &Batch) -> Self {
+        let layout = assets.device_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
+        Self { layout, ..Self::of_arenas(batch.state) }
+    }
+}

@@ -1,0 +1,442 @@
+//! Meshes in the engine's own buffers.
+
+use std::error::Error;
+use std::sync::Arc;
+
+use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
+use drawloom::glam::Vec3;
+use drawloom::process::Deferred;
+use drawloom::quality::{Quality, VertexFormat};
+use drawloom::scene::{
+    DeviceGeometry, IndexStream, Material, Mesh, RenderObject, Scene, SceneError, StreamAttribute, StreamLayout,
+    Topology, Vertex, VertexAttribute, VertexStream,
+};
+use drawloom::task::Scheduler;
+use drawloom::wgpu::util::DeviceExt;
+use drawloom::wgpu::{BufferUsages, IndexFormat, VertexFormat as Format};
+use drawloom::{Renderer, wgpu};
+use drawloom_testing::adapter;
+use drawloom_testing::scenes::{field, with_meshes};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::attributes::{COLOR, Colored, SHADE, STRENGTH, with_colors};
+use crate::fixture::Fixture;
+use crate::strategies::{device, strategies};
+
+pub const CASES: &[Case] = &[
+    ("a_mesh_in_the_engines_buffers_looks_like_one_in_the_arenas", same_picture),
+    ("every_strategy_draws_meshes_in_the_engines_buffers", every_strategy),
+    ("meshes_in_the_engines_buffers_come_and_go", coming_and_going),
+    ("without_normals_a_mesh_in_the_engines_buffers_is_flat", without_normals),
+    ("another_layout_costs_a_pipeline_of_each_process", pipelines),
+    ("geometry_that_no_mesh_can_have_is_named", invalid),
+    ("an_attribute_in_a_format_of_another_kind_is_named", another_kind),
+    ("buffers_of_another_device_are_named", another_device),
+    ("a_frame_in_flight_whose_mesh_is_destroyed_is_an_error", destroyed),
+    ("the_software_backend_names_meshes_on_a_device", on_software),
+];
+
+/// How a mesh lies in an engine's buffers.
+#[derive(Clone, Copy, Debug)]
+enum Storage {
+    /// One buffer has everything: interleaved vertices with gaps behind some other bytes, then 16-bit indices.
+    Interleaved,
+    /// A stream for positions, one for the rest, and 32-bit indices.
+    Apart,
+    /// A vertex for each corner of each triangle.
+    WithoutIndices,
+    /// As interleaved, but with the defaults of the engine's own attributes.
+    WithoutColors,
+}
+
+const STORAGES: [Storage; 4] = [Storage::Interleaved, Storage::Apart, Storage::WithoutIndices, Storage::WithoutColors];
+
+/// The colour's bytes, and `Uint16x2`, of which the shader reads the first number.
+const COLOR_AND_STRENGTH: [[u8; 4]; 2] = [[255, 128, 64, 255], [80, 0, 7, 0]];
+
+fn on_device(device: &wgpu::Device, mesh: &Mesh, storage: Storage) -> Result<Mesh, SceneError> {
+    let buffer = |bytes: &[u8], usage| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents: bytes, usage })
+    };
+    let (vertices, indices) = (mesh.vertices(), mesh.indices());
+    let (topology, geometry) = match storage {
+        Storage::Interleaved | Storage::WithoutColors => {
+            let mut bytes = vec![9; 64];
+            for vertex in vertices {
+                bytes.extend_from_slice(bytemuck::bytes_of(&vertex.uv));
+                bytes.extend([7; 4]);
+                bytes.extend_from_slice(bytemuck::bytes_of(&vertex.position));
+                bytes.extend(COLOR_AND_STRENGTH.as_flattened());
+                bytes.extend_from_slice(bytemuck::bytes_of(&vertex.normal));
+                bytes.extend([7; 8]);
+            }
+            let start = bytes.len() as u64;
+            indices.iter().for_each(|index| bytes.extend((*index as u16).to_ne_bytes()));
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+            let buffer = buffer(&bytes, BufferUsages::VERTEX | BufferUsages::INDEX);
+            let attributes = vec![
+                StreamAttribute::uv(Format::Float32x2, 0),
+                StreamAttribute::position(Format::Float32x3, 12),
+                StreamAttribute::of(COLOR, Format::Unorm8x4, 24),
+                StreamAttribute::of(STRENGTH, Format::Uint16x2, 28),
+                StreamAttribute::normal(Format::Float32x3, 32),
+            ];
+            let is_own = |attribute: &StreamAttribute| ["colour", "strength"].contains(&attribute.name());
+            let has_colors = matches!(storage, Storage::Interleaved);
+            let attributes = attributes.into_iter().filter(|attribute| has_colors || !is_own(attribute)).collect();
+            let layout = StreamLayout { stride: 52, attributes };
+            let count = indices.len() as u32;
+            let indices = IndexStream { buffer: buffer.clone(), offset: start, format: IndexFormat::Uint16, count };
+            let streams = vec![VertexStream { buffer, offset: 64, layout }];
+            let vertices = vertices.len() as u32;
+            (mesh.topology(), DeviceGeometry { streams, vertices, indices: Some(indices) })
+        }
+        Storage::Apart => {
+            let count = indices.len() as u32;
+            let indices = buffer(bytemuck::cast_slice(indices), BufferUsages::INDEX);
+            let indices = IndexStream { buffer: indices, offset: 0, format: IndexFormat::Uint32, count };
+            let streams = streams_apart(vertices, buffer);
+            let vertices = vertices.len() as u32;
+            (mesh.topology(), DeviceGeometry { streams, vertices, indices: Some(indices) })
+        }
+        Storage::WithoutIndices => {
+            let corners: Vec<_> = mesh.triangles().flatten().map(|corner| vertices[corner as usize]).collect();
+            let streams = streams_apart(&corners, buffer);
+            (Topology::TriangleList, DeviceGeometry { streams, vertices: corners.len() as u32, indices: None })
+        }
+    };
+    Mesh::on_device(mesh.name(), topology, mesh.corners(), geometry)
+}
+
+fn streams_apart(vertices: &[Vertex], buffer: impl Fn(&[u8], BufferUsages) -> wgpu::Buffer) -> Vec<VertexStream> {
+    let positions: Vec<_> = vertices.iter().map(|vertex| vertex.position).collect();
+    let rest: Vec<_> = vertices.iter().map(|vertex| (vertex.uv, vertex.normal)).collect();
+    let rest: Vec<u8> =
+        rest.iter().flat_map(|(uv, normal)| [bytemuck::bytes_of(uv), bytemuck::bytes_of(normal)].concat()).collect();
+    // The default of an unused attribute is not read.
+    const UNUSED: VertexAttribute<f32> = VertexAttribute::new("unused");
+    let rest_attributes = vec![
+        StreamAttribute::normal(Format::Float32x3, 8),
+        StreamAttribute::uv(Format::Float32x2, 0),
+        StreamAttribute::of(UNUSED, Format::Float32, 0),
+    ];
+    let positions_layout =
+        StreamLayout { stride: 12, attributes: vec![StreamAttribute::position(Format::Float32x3, 0)] };
+    let unused_layout = StreamLayout { stride: 4, attributes: vec![] };
+    let stream = |bytes: &[u8], layout| VertexStream { buffer: buffer(bytes, BufferUsages::VERTEX), offset: 0, layout };
+    vec![
+        stream(&rest, StreamLayout { stride: 20, attributes: rest_attributes }),
+        stream(&[0; 4], unused_layout),
+        stream(bytemuck::cast_slice(&positions), positions_layout),
+    ]
+}
+
+/// The meshes of a scene in the arenas, with the colours that those of [`on_device`] have, and others.
+fn colored(scene: Scene) -> Scene {
+    with_meshes(scene, |mesh| {
+        let (count, plain) = (mesh.vertices().len(), mesh.clone());
+        let [red, green, blue] = [1.0, 128.0 / 255.0, 64.0 / 255.0];
+        let plain = plain.with_attribute(COLOR, &vec![[red, green, blue]; count]).unwrap();
+        plain.with_attribute(STRENGTH, &vec![80; count]).unwrap()
+    })
+}
+
+fn quality() -> Quality {
+    Quality { vertices: VertexFormat::Full, ..Quality::balanced() }
+}
+
+fn pictures(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+    let recorded = fixture.record(scene)?;
+    let submission = fixture.submit(recorded)?;
+    let targets = (0..scene.cameras.len()).flat_map(|view| ["picture", "coloured"].map(|target| (view, target)));
+    targets.map(|(view, target)| Ok(submission.read(view, target)?)).collect()
+}
+
+fn fixture() -> Result<Fixture, Failed> {
+    fixture_of(WgpuBackend::new(device()?.0, device()?.1)?)
+}
+
+fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
+    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Colored).output("coloured");
+    let (renderer, submitter) = builder.quality(quality()).build(Arc::new(Scheduler::new(2)?))?;
+    Ok(Fixture { renderer, submitter })
+}
+
+/// The scene with meshes in the engine's buffers, from the `first` one on.
+fn moved_to_device(scene: Scene, storage: Storage, first: usize) -> Result<Scene, Failed> {
+    let (device, _) = device()?;
+    let number = std::cell::Cell::new(0);
+    Ok(with_meshes(scene, |mesh| {
+        number.set(number.get() + 1);
+        if number.get() <= first { mesh.clone() } else { on_device(&device, mesh, storage).unwrap() }
+    }))
+}
+
+fn same_picture() -> Result<(), Failed> {
+    for storage in STORAGES {
+        let mut arenas = field(300);
+        if let Storage::Interleaved = storage {
+            arenas = colored(arenas);
+        }
+        let expected = pictures(&mut fixture()?, &arenas)?;
+        for first in [0, 1, 2] {
+            let scene = moved_to_device(with_meshes(field(300), Mesh::clone), storage, first)?;
+            // Meshes that are not moved keep the colours of the others.
+            let scene = if first > 0 && matches!(storage, Storage::Interleaved) {
+                with_meshes(scene, |mesh| match mesh.device_geometry() {
+                    Some(_) => mesh.clone(),
+                    None => {
+                        let count = mesh.vertices().len();
+                        let color = vec![[1.0, 128.0 / 255.0, 64.0 / 255.0]; count];
+                        let mesh = mesh.clone().with_attribute(COLOR, &color).unwrap();
+                        mesh.with_attribute(STRENGTH, &vec![80; count]).unwrap()
+                    }
+                })
+            } else {
+                scene
+            };
+            if pictures(&mut fixture()?, &scene)? != expected {
+                return Err(format!("{storage:?} from mesh {first} on differs").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Every mesh three times, so that there are several layouts of each state. The first of the three is in the arenas.
+fn with_copies(storages: Option<[Storage; 2]>) -> Result<Scene, Failed> {
+    let (device, _) = device()?;
+    let mut scene = field(90);
+    let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
+    let mut copies = Vec::new();
+    for (handle, mesh) in &meshes {
+        let mut of_mesh = vec![*handle];
+        for copy in 0..2 {
+            let copied = match storages {
+                None => mesh.clone(),
+                Some(storages) => on_device(&device, mesh, storages[copy])?,
+            };
+            of_mesh.push(scene.add(copied)?);
+        }
+        copies.push((*handle, of_mesh));
+    }
+    for (index, object) in scene.objects().collect::<Vec<_>>().into_iter().enumerate() {
+        let before = scene.object(object)?;
+        let (_, of_mesh) = copies.iter().find(|(handle, _)| *handle == before.mesh).ok_or("it is one of them")?;
+        scene.replace_object(object, RenderObject { mesh: of_mesh[index / 5 % 3], ..before })?;
+    }
+    Ok(scene)
+}
+
+fn every_strategy() -> Result<(), Failed> {
+    let expected = pictures(&mut fixture()?, &with_copies(None)?)?;
+    let scene = with_copies(Some([Storage::Apart, Storage::WithoutColors]))?;
+    for (recording, encoding) in strategies()? {
+        let (device, queue) = device()?;
+        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let mut fixture = fixture_of(backend)?;
+        for frame in 0..2 {
+            if pictures(&mut fixture, &scene)? != expected {
+                return Err(format!("frame {frame} of {recording:?} and {encoding:?} differs").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn coming_and_going() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let mut scene = field(60);
+    let handles: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
+    let mut kept = fixture()?;
+    for step in 0..12 {
+        let (handle, mesh) = &handles[step % handles.len()];
+        let is_moved = step / handles.len() % 2 == 0;
+        let mesh = match is_moved {
+            true => on_device(&device, mesh, STORAGES[step % 2 + step / 6])?,
+            false => with_colors(mesh.clone(), 0.1 * step as f32)?,
+        };
+        scene.replace(*handle, mesh)?;
+        if pictures(&mut kept, &scene)? != pictures(&mut fixture()?, &scene)? {
+            return Err(format!("step {step} differs from a new renderer").into());
+        }
+    }
+    Ok(())
+}
+
+fn without_normals() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let flat = |mesh: &Mesh| {
+        let vertices = mesh.vertices().iter().map(|vertex| Vertex { normal: [0.0; 3], uv: [0.0; 2], ..*vertex });
+        Mesh::new(mesh.name(), mesh.topology(), vertices.collect(), mesh.indices().to_vec()).unwrap()
+    };
+    let expected = pictures(&mut fixture()?, &with_meshes(field(100), flat))?;
+    let only_positions = |mesh: &Mesh| {
+        let moved = on_device(&device, mesh, Storage::Apart).unwrap();
+        let geometry = DeviceGeometry::clone(moved.device_geometry().unwrap());
+        let streams = geometry.streams[2..].to_vec();
+        Mesh::on_device(mesh.name(), mesh.topology(), mesh.corners(), DeviceGeometry { streams, ..geometry }).unwrap()
+    };
+    if pictures(&mut fixture()?, &with_meshes(field(100), only_positions))? == expected {
+        Ok(())
+    } else {
+        Err("it differs".into())
+    }
+}
+
+fn pipelines() -> Result<(), Failed> {
+    let count = |scene: &Scene| -> Result<usize, Failed> {
+        let mut fixture = Fixture::on(Some(device()?), 2, |builder| builder.process(Colored).output("coloured"))?;
+        let recorded = fixture.record(scene)?;
+        fixture.submit(recorded)?;
+        Ok(fixture.renderer.backend().resources().pipelines)
+    };
+    let (device, _) = device()?;
+    // Only lists of one material, so that there is one state.
+    let scene = |storages: &[Storage]| -> Result<Scene, Failed> {
+        let mut scene = field(0);
+        let material = scene.add(Material::default())?;
+        let cube = drawloom_testing::scenes::cube();
+        for mesh in std::iter::once(Ok(cube.clone())).chain(storages.iter().map(|one| on_device(&device, &cube, *one)))
+        {
+            let mesh = scene.add(mesh?)?;
+            scene.add_object(RenderObject::new(mesh, material, drawloom::glam::DVec3::ZERO))?;
+        }
+        Ok(scene)
+    };
+    let counts = [
+        count(&scene(&[])?)?,
+        count(&scene(&[Storage::Apart])?)?,
+        count(&scene(&[Storage::Apart, Storage::Apart, Storage::WithoutIndices])?)?,
+        count(&scene(&[Storage::Apart, Storage::Interleaved])?)?,
+    ];
+    if counts == [1, 2, 2, 3] { Ok(()) } else { Err(format!("{counts:?} pipelines").into()) }
+}
+
+fn invalid() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let valid = on_device(&device, &drawloom_testing::scenes::cube(), Storage::Interleaved)?;
+    let corners = [Vec3::splat(-1.0), Vec3::splat(1.0)];
+    let usage = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
+    };
+    type Break = fn(&mut DeviceGeometry);
+    let broken: [(&str, Break); 12] = [
+        ("no positions", |geometry| _ = geometry.streams[0].layout.attributes.remove(1)),
+        ("\"normal\" is there twice", |geometry| {
+            geometry.streams[0].layout.attributes.push(StreamAttribute::normal(Format::Float32x3, 0));
+        }),
+        ("\"position\" has Uint32x3", |geometry| {
+            geometry.streams[0].layout.attributes[1] = StreamAttribute::position(Format::Uint32x3, 12);
+        }),
+        ("stride of 50 bytes", |geometry| geometry.streams[0].layout.stride = 50),
+        ("stride of 0 bytes", |geometry| geometry.streams[0].layout.stride = 0),
+        ("begins at byte 66", |geometry| geometry.streams[0].offset = 66),
+        ("up to byte 44 of vertices that have 40", |geometry| geometry.streams[0].layout.stride = 40),
+        ("\"uv\" at byte 2", |geometry| {
+            geometry.streams[0].layout.attributes[0] = StreamAttribute::uv(Format::Float32x2, 2);
+        }),
+        ("for 1000 vertices", |geometry| geometry.vertices = 1000),
+        ("index stream ends at byte", |geometry| geometry.indices.as_mut().unwrap().count = 999),
+        ("index stream begins at byte 3", |geometry| geometry.indices.as_mut().unwrap().offset = 3),
+        ("18446744073709551615", |geometry| geometry.streams[0].offset = u64::MAX - 3),
+    ];
+    let geometry = || DeviceGeometry::clone(valid.device_geometry().unwrap());
+    let error_of = |geometry, corners| {
+        let mesh = Mesh::on_device("rock", Topology::TriangleList, corners, geometry);
+        mesh.err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let mut found: Vec<(String, &str)> = broken
+        .into_iter()
+        .map(|(part, break_it)| {
+            let mut geometry = geometry();
+            break_it(&mut geometry);
+            (error_of(geometry, corners), part)
+        })
+        .collect();
+    let mut without_vertex_usage = geometry();
+    without_vertex_usage.streams[0].buffer = usage(BufferUsages::INDEX);
+    let mut without_index_usage = geometry();
+    without_index_usage.indices.as_mut().unwrap().buffer = usage(BufferUsages::VERTEX);
+    let mut partial = geometry();
+    partial.indices.as_mut().unwrap().count = 4;
+    let mut empty = geometry();
+    (empty.indices, empty.vertices) = (None, 0);
+    found.push((error_of(without_vertex_usage, corners), "without the usage VERTEX"));
+    found.push((error_of(without_index_usage, corners), "without the usage INDEX"));
+    found.push((error_of(partial, corners), "not a multiple of 3"));
+    found.push((error_of(empty, corners), "no triangle"));
+    found.push((error_of(geometry(), [Vec3::ONE, Vec3::ZERO]), "is none"));
+    found.push((error_of(geometry(), [Vec3::NAN, Vec3::ZERO]), "is none"));
+    found.push((error_of(geometry(), [Vec3::splat(-3e38), Vec3::splat(3e38)]), "too large"));
+    for (error, part) in found {
+        if !error.contains("`rock`") || !error.contains(part) {
+            return Err(format!("{error:?} lacks {part:?}").into());
+        }
+    }
+    let late = valid.with_attribute(SHADE, &[[0; 4]; 24]).err().map(|error| error.to_string()).unwrap_or_default();
+    if late.contains("belongs into a stream") { Ok(()) } else { Err(late.into()) }
+}
+
+fn another_kind() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let moved = on_device(&device, &drawloom_testing::scenes::cube(), Storage::Interleaved)?;
+    let with_color = |format| {
+        let mut geometry = DeviceGeometry::clone(moved.device_geometry().unwrap());
+        geometry.streams[0].layout.attributes[2] = StreamAttribute::of(COLOR, format, 24);
+        Mesh::on_device("rock", Topology::TriangleList, moved.corners(), geometry).unwrap()
+    };
+    let mut fixture = fixture()?;
+    let expected = pictures(&mut fixture, &with_meshes(field(30), |_| with_color(Format::Unorm8x4)))?;
+    let refused = fixture.renderer.record(with_meshes(field(30), |_| with_color(Format::Uint8x4)).as_scene_ref()).err();
+    let message = refused.and_then(|error| Some(error.source()?.to_string())).unwrap_or_default();
+    if message != "process \"coloured\" reads \"colour\" as f32, but mesh `rock` has it as Uint8x4" {
+        return Err(message.into());
+    }
+    let next = pictures(&mut fixture, &with_meshes(field(30), |_| with_color(Format::Unorm8x4)))?;
+    if next == expected { Ok(()) } else { Err("the next frame differs".into()) }
+}
+
+fn another_device() -> Result<(), Failed> {
+    let [(device, queue), (other, _)] = adapter::two_devices()?;
+    let mut fixture = fixture_of(WgpuBackend::new(device.clone(), queue)?)?;
+    let moved_to =
+        |device: &wgpu::Device| with_meshes(field(30), |mesh| on_device(device, mesh, Storage::Apart).unwrap());
+    let expected = pictures(&mut fixture, &moved_to(&device))?;
+    let refused = fixture.renderer.record(moved_to(&other).as_scene_ref()).err();
+    let message = refused.map(|error| error.to_string()).unwrap_or_default();
+    if !message.contains("the buffers of mesh `cube`") {
+        return Err(message.into());
+    }
+    if pictures(&mut fixture, &moved_to(&device))? == expected { Ok(()) } else { Err("the next frame differs".into()) }
+}
+
+fn destroyed() -> Result<(), Failed> {
+    let (device, queue) = adapter::device()?;
+    let mut fixture = fixture_of(WgpuBackend::new(device.clone(), queue)?)?;
+    let moved = || with_meshes(field(30), |mesh| on_device(&device, mesh, Storage::Apart).unwrap());
+    let expected = pictures(&mut fixture, &moved())?;
+    let scene = moved();
+    let recorded = fixture.record(&scene)?;
+    for (_, mesh) in scene.assets().iter::<Mesh>() {
+        mesh.device_geometry().ok_or("it is on the device")?.streams[0].buffer.destroy();
+    }
+    let refused = fixture.submitter.submit(recorded).err().map(|error| error.to_string()).unwrap_or_default();
+    if !refused.contains("destroyed") {
+        return Err(refused.into());
+    }
+    if pictures(&mut fixture, &moved())? == expected { Ok(()) } else { Err("the next frame differs".into()) }
+}
+
+fn on_software() -> Result<(), Failed> {
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
+    let (mut renderer, _) = builder.build(scheduler)?;
+    let refused = renderer.record(moved_to_device(field(30), Storage::Apart, 2)?.as_scene_ref()).err();
+    let message = refused.map(|error| error.to_string()).unwrap_or_default();
+    if !message.contains("mesh `square` is in buffers of a device") {
+        return Err(message.into());
+    }
+    Ok(renderer.record(field(30).as_scene_ref()).map(drop)?)
+}
