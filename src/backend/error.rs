@@ -110,6 +110,16 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
+    /// A texture cannot take the place of a view's target.
+    #[error("the texture that was imported as target {target:?} of view {view:?} cannot be it: {problem}")]
+    ImportedTarget {
+        /// The view's name.
+        view: String,
+        /// The name of the target.
+        target: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// A rectangle that cannot be read back.
     #[error(
         "a rectangle of {}x{} pixels at {origin:?} cannot be read back from target {target:?} of view {view}, which has {}x{} pixels: {problem}",

@@ -21,6 +21,7 @@ mod formats;
 mod geometry;
 mod history;
 mod image_distance;
+mod imported_targets;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
@@ -66,6 +67,7 @@ fn main() {
         (formats::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
         (history::CASES, Needs::Adapter),
+        (imported_targets::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),

@@ -9,8 +9,8 @@ use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::PipelineCache;
 use super::resources::{
-    AssetCache, BindGroupLayouts, LightMeshes, StorageBuffers, SubdividedMesh, TargetCache, UploadQueue, new_buffer,
-    shares_memory,
+    AssetCache, BindGroupLayouts, ImportedTarget, LightMeshes, StorageBuffers, SubdividedMesh, TargetCache,
+    UploadQueue, new_buffer, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::timing::{DeviceClock, DeviceTiming};
@@ -37,6 +37,8 @@ pub struct WgpuBackend {
     pub(super) assets: Mutex<AssetCache>,
     pub(super) subdivisions: SubdivisionCache<SubdividedMesh>,
     pub(super) targets: Mutex<TargetCache>,
+    /// Textures that take the place of targets in the next frame.
+    pub(super) imports: Mutex<Vec<ImportedTarget>>,
     pub(super) storage_buffers: Mutex<Arc<StorageBuffers>>,
     pub(super) buffers: Arc<BufferPool>,
     pub(super) strategies: StrategySet,
@@ -112,6 +114,7 @@ impl WgpuBackend {
             assets: Mutex::default(),
             subdivisions: SubdivisionCache::default(),
             targets: Mutex::default(),
+            imports: Mutex::default(),
             storage_buffers: Mutex::default(),
             buffers: Arc::new(BufferPool::new(maps_memory)),
             strategies: StrategySet::new(supports_indirect, tunes_indirect),
@@ -146,6 +149,33 @@ impl WgpuBackend {
     /// once, and is among [`WgpuBackend::shader_errors`] until the shader compiles.
     pub fn keep_working_shaders(self) -> Self {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
+    }
+
+    /// Has the next frame that is recorded draw into a texture of the engine's instead of a target of the view with this name, such as
+    /// that of a window's surface instead of the picture. The view is that of the camera with this name.
+    ///
+    /// The texture has the target's size and format, but for the sRGB encoding: the texture of a surface whose format has none is drawn
+    /// into as sRGB if the surface is configured with that among its `view_formats`. It has the usages that the frame's processes need:
+    /// `RENDER_ATTACHMENT` if they draw into it, `TEXTURE_BINDING` if they sample it, `COPY_SRC` if they read its history. If it does not
+    /// fit, the frame returns an error. Frames after the next one draw into the crate's own target again.
+    ///
+    /// ```no_run
+    /// # use drawloom::{Renderer, Submitter, backend::WgpuBackend, scene::SceneRef, wgpu};
+    /// # fn frame(renderer: &mut Renderer<WgpuBackend>, submitter: &Submitter<WgpuBackend>, surface_texture: wgpu::SurfaceTexture,
+    /// #     scene: SceneRef<'_>) -> Result<(), Box<dyn std::error::Error>> {
+    /// // The pipeline's tone mapping has the format of the surface.
+    /// renderer.backend().import_target("main", "picture", surface_texture.texture.clone());
+    /// let recorded = renderer.record(scene)?;
+    /// submitter.submit(recorded)?;
+    /// renderer.backend().queue().present(surface_texture);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn import_target(&self, view: impl Into<String>, target: impl Into<String>, texture: wgpu::Texture) {
+        let import = ImportedTarget { view: view.into(), target: target.into(), texture };
+        let mut imports = self.imports.lock();
+        imports.retain(|other| !other.is_of(&import.view, &import.target));
+        imports.push(import);
     }
 
     /// The errors of processes that are still drawn with the [shader before](WgpuBackend::keep_working_shaders), in any order.

@@ -1,5 +1,6 @@
 //! The beginning of a frame: uploads, cached resources, and the strategy of each pass.
 
+use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -22,6 +23,8 @@ impl WgpuBackend {
     pub(super) fn begin_frame(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
+        // They are of this frame, even if it fails.
+        let imports = mem::take(&mut *self.imports.lock());
         self.check_device()?;
         let quality = request.quality;
         let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
@@ -33,8 +36,8 @@ impl WgpuBackend {
         let assets = with_error_scope(&self.device, "meshes, materials and textures", || {
             self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, vertices, rejections)
         })??;
-        let targets =
-            with_error_scope(&self.device, "targets", || self.targets.lock().update(&self.device, plan, views))??;
+        let update = || self.targets.lock().update(&self.device, plan, views, &imports);
+        let targets = with_error_scope(&self.device, "targets", update)??;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {

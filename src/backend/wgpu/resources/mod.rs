@@ -8,6 +8,7 @@ mod cached_bind_group;
 mod device_meshes;
 mod gpu_material;
 mod growing_buffer;
+mod imported_target;
 mod light_meshes;
 mod mirrored_buffer;
 mod object_buffer;
@@ -29,6 +30,7 @@ pub(crate) use device_meshes::{DeviceLayout, VertexSlot};
 pub(crate) use growing_buffer::{
     ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,
 };
+pub(crate) use imported_target::ImportedTarget;
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use mirrored_buffer::MirroredBuffer;
 pub(crate) use object_buffer::{ObjectBuffer, shares_memory};

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::bind_group_layouts::texture_format;
+use super::imported_target::ImportedTarget;
 use crate::backend::BackendError;
 use crate::process::{Format, FramePlan, PlannedTarget};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
 /// The targets of one frame.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct WgpuTargets {
     /// For each view its name, its own targets, and its layers of the shared ones.
     views: Vec<(String, Vec<ViewTarget>)>,
@@ -93,25 +94,63 @@ pub(crate) struct TargetCache {
     /// The key of the current targets, beside the views' names: the plan's identity, and kind, size and layer of each view.
     plan: Option<u64>,
     views: Vec<(ViewKind, [u32; 2], u32)>,
+    /// The targets that are not among the current ones, because textures of the engine's took their place: views and names.
+    imported: Vec<(String, String)>,
 }
 
 impl TargetCache {
-    /// The targets of these views.
+    /// The targets of these views. Imported textures are those of this frame only.
     ///
     /// # Errors
     /// - If a picture is larger than the device allows.
+    /// - If an imported texture does not fit, or is of a target that there is not.
     /// - If more views share a target than a texture can have layers.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
         plan: &FramePlan,
         views: &[RenderView],
+        imports: &[ImportedTarget],
     ) -> Result<Arc<WgpuTargets>, BackendError> {
+        self.update_own(device, plan, views, imports)?;
+        if imports.is_empty() {
+            return Ok(Arc::clone(&self.current));
+        }
+        let mut with_imports = WgpuTargets::clone(&self.current);
+        for import in imports {
+            let index = views.iter().position(|view| view.name() == import.view);
+            let index = index.ok_or_else(|| import.refused("there is no such view"))?;
+            let (view, own) = (&views[index], &mut with_imports.views[index].1);
+            let mut planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
+            let planned = planned.find(|planned| planned.name == import.target);
+            let planned = planned.ok_or_else(|| import.refused("the view has no such target"))?;
+            import.check(plan, planned, planned.size.in_view(view.camera.size))?;
+            let texture = import.texture.clone();
+            let (view, sampled) = new_views(&texture, planned.format, &ImportedTarget::view_descriptor(planned));
+            own.push(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 });
+        }
+        Ok(Arc::new(with_imports))
+    }
+
+    /// Updates the current targets: those that are not imported.
+    ///
+    /// # Errors
+    /// - If a picture is larger than the device allows.
+    /// - If more views share a target than a texture can have layers.
+    fn update_own(
+        &mut self,
+        device: &wgpu::Device,
+        plan: &FramePlan,
+        views: &[RenderView],
+        imports: &[ImportedTarget],
+    ) -> Result<(), BackendError> {
         let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
         let names = self.current.views.iter().map(|(name, _)| name.as_str());
         let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
-        if self.plan == Some(plan.identity()) && are_same_views {
-            return Ok(Arc::clone(&self.current));
+        let imported = || imports.iter().map(|import| (import.view.as_str(), import.target.as_str()));
+        let known = self.imported.iter().map(|(view, target)| (view.as_str(), target.as_str()));
+        if self.plan == Some(plan.identity()) && are_same_views && known.eq(imported()) {
+            return Ok(());
         }
         // If an error occurs below, no targets are current.
         self.plan = None;
@@ -120,7 +159,9 @@ impl TargetCache {
             next.layered.push(self.layered_target(device, planned, views)?);
         }
         for (index, view) in views.iter().enumerate() {
-            let planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
+            let is_own =
+                |planned: &&PlannedTarget| !imports.iter().any(|import| import.is_of(view.name(), &planned.name));
+            let planned = plan.targets().iter().filter(|planned| planned.views == view.kind()).filter(is_own);
             let targets = planned.map(|planned| {
                 if !planned.layered {
                     return self.own_target(device, planned, index, view);
@@ -136,7 +177,8 @@ impl TargetCache {
         self.plan = Some(plan.identity());
         self.views.clear();
         self.views.extend(requested());
-        Ok(Arc::clone(&self.current))
+        self.imported = imported().map(|(view, target)| (view.to_owned(), target.to_owned())).collect();
+        Ok(())
     }
 
     /// The latest frame's targets.
