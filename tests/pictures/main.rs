@@ -25,6 +25,7 @@ mod imported_targets;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
+mod materials;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -75,6 +76,7 @@ fn main() {
         (columns::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
+        (materials::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),

@@ -9,8 +9,8 @@ use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::PipelineCache;
 use super::resources::{
-    AssetCache, BindGroupLayouts, ImportedTarget, LightMeshes, StorageBuffers, SubdividedMesh, TargetCache,
-    UploadQueue, new_buffer, shares_memory,
+    BindGroupLayouts, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers, SubdividedMesh,
+    TargetCache, UploadQueue, new_buffer, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::timing::{DeviceClock, DeviceTiming};
@@ -34,7 +34,8 @@ pub struct WgpuBackend {
     pub(super) pipelines: Mutex<PipelineCache>,
     /// Created when a plan draws lights for the first time.
     pub(super) light_meshes: Mutex<Option<Arc<LightMeshes>>>,
-    pub(super) assets: Mutex<AssetCache>,
+    pub(super) meshes: Mutex<MeshCache>,
+    pub(super) materials: Mutex<MaterialCache>,
     pub(super) subdivisions: SubdivisionCache<SubdividedMesh>,
     pub(super) targets: Mutex<TargetCache>,
     /// Textures that take the place of targets in the next frame.
@@ -111,7 +112,8 @@ impl WgpuBackend {
             layouts,
             pipelines: Mutex::default(),
             light_meshes: Mutex::default(),
-            assets: Mutex::default(),
+            meshes: Mutex::default(),
+            materials: Mutex::default(),
             subdivisions: SubdivisionCache::default(),
             targets: Mutex::default(),
             imports: Mutex::default(),
@@ -230,7 +232,8 @@ impl WgpuBackend {
     /// Drops all cached resources but pipelines and the buffers that processes share, because a device error may have left some unusable. The next frame
     /// creates them again.
     pub(super) fn clear(&self) {
-        *self.assets.lock() = AssetCache::default();
+        *self.meshes.lock() = MeshCache::default();
+        *self.materials.lock() = MaterialCache::default();
         *self.light_meshes.lock() = None;
         self.subdivisions.clear();
         *self.targets.lock() = TargetCache::default();

@@ -84,13 +84,13 @@ impl Backend for WgpuBackend {
             match pass.strategy.recording {
                 RecordingStrategy::CachedBundles => pass.bundle_cache.set_bundle_count(list.bundle_count()),
                 RecordingStrategy::Indirect => {
-                    let upload = || pass.indirect_arguments.upload(&self.device, &self.uploads, &frame.assets, list);
+                    let upload = || pass.indirect_arguments.upload(&self.device, &self.uploads, &frame.meshes, list);
                     pass.timing.time_serial(upload)?;
                 }
                 RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
             }
-            let runs = list.batches.chunk_by(|one, next| frame.assets.share_pipeline(one, next));
-            pipelines.create_missing(&self.device, runs.map(|run| PipelineVariant::of_batch(&frame.assets, &run[0])))
+            let runs = list.batches.chunk_by(|one, next| frame.meshes.share_pipeline(one, next));
+            pipelines.create_missing(&self.device, runs.map(|run| PipelineVariant::of_batch(&frame.meshes, &run[0])))
         })
         .flatten()
         // Some of the resources just created may be unusable.

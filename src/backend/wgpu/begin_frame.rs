@@ -30,18 +30,20 @@ impl WgpuBackend {
         let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin_frame(scene.assets);
-        if self.assets.lock().require_attributes(plan.attributes()) {
+        if self.meshes.lock().require_attributes(plan.attributes()) {
             self.subdivisions.clear();
         }
-        let assets = with_error_scope(&self.device, "meshes, materials and textures", || {
-            self.assets.lock().update(&self.device, &self.uploads, &self.layouts, scene.assets, vertices, rejections)
-        })??;
+        let (meshes, materials) = with_error_scope(&self.device, "meshes, materials and textures", || {
+            let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, vertices)?;
+            Ok((meshes, self.materials.lock().update(&self.device, &self.uploads, scene.assets, rejections)))
+        })
+        .flatten()?;
         let update = || self.targets.lock().update(&self.device, plan, views, &imports);
         let targets = with_error_scope(&self.device, "targets", update)??;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
-            buffers.begin(&self.device, &self.uploads, &self.layouts, request)?;
+            buffers.begin(&self.device, &self.uploads, &self.layouts, &materials, request)?;
             if let Some(timing) = &self.device_timing {
                 buffers.begin_timestamps(&self.device, request, timing.times_raw_passes)?;
             }
@@ -53,7 +55,7 @@ impl WgpuBackend {
                 number,
                 pipelines,
                 layouts,
-                assets,
+                meshes,
                 light_meshes,
                 targets,
                 storage_buffers,
@@ -103,7 +105,7 @@ impl WgpuBackend {
     /// If the device refuses a resource of the engine's.
     fn begin_passes(&self, frame: &mut WgpuFrame, request: &FrameRequest<'_>) -> Result<(), BackendError> {
         let (strategies, mut may_try) = (self.strategies.strategies(), true);
-        let WgpuFrame { number, pipelines, assets, targets, storage_buffers, buffers, .. } = frame;
+        let WgpuFrame { number, pipelines, meshes, targets, storage_buffers, buffers, .. } = frame;
         let (passes, resources) = buffers.passes_mut();
         for pass in passes {
             let Pass { process_index: process, view_index: view } = pass.pass;
@@ -119,12 +121,14 @@ impl WgpuBackend {
             pass.set_strategy(strategies[index], index, is_trial);
             let caches_bundles =
                 pass.command_pass_index.is_some() && pass.strategy.recording == RecordingStrategy::CachedBundles;
-            if let Some(frame_bind_group) = pass.frame_bind_group.as_ref().filter(|_| caches_bundles) {
+            let shared = pass.frame_bind_group.as_ref().zip(resources.materials_bind_group);
+            if let Some((frame_bind_group, materials_bind_group)) = shared.filter(|_| caches_bundles) {
                 pass.bundle_cache.begin_frame(BundleKey {
                     frame_bind_group: frame_bind_group.clone(),
+                    materials_bind_group: materials_bind_group.clone(),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
                     engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
-                    assets: Arc::clone(assets),
+                    meshes: Arc::clone(meshes),
                     pipelines: Arc::clone(pipelines),
                 });
             }
@@ -144,7 +148,7 @@ impl WgpuBackend {
     ) -> Result<(), BackendError> {
         let vertices = request.quality.vertices;
         let make = |mesh: Mesh| {
-            let attributes = self.assets.lock().attributes_of(&self.device, &self.uploads, &mesh)?;
+            let attributes = self.meshes.lock().attributes_of(&self.device, &self.uploads, &mesh)?;
             SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices, attributes)
         };
         self.subdivisions.collect(request, list, vertices, make, |key, mesh| {

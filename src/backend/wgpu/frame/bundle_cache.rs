@@ -8,7 +8,7 @@ use parking_lot::Mutex;
 
 use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes};
 use crate::backend::wgpu::pipelines::ProcessPipelines;
-use crate::backend::wgpu::resources::{AssetSnapshot, SubdividedMesh};
+use crate::backend::wgpu::resources::{MeshSnapshot, SubdividedMesh};
 use crate::command::Batch;
 
 /// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot determines the
@@ -16,18 +16,20 @@ use crate::command::Batch;
 #[derive(Clone)]
 pub(crate) struct BundleKey {
     pub(crate) frame_bind_group: wgpu::BindGroup,
+    pub(crate) materials_bind_group: wgpu::BindGroup,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
     pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
-    pub(crate) assets: Arc<AssetSnapshot>,
+    pub(crate) meshes: Arc<MeshSnapshot>,
     pub(crate) pipelines: Arc<ProcessPipelines>,
 }
 
 impl PartialEq for BundleKey {
     fn eq(&self, other: &Self) -> bool {
         self.frame_bind_group == other.frame_bind_group
+            && self.materials_bind_group == other.materials_bind_group
             && self.process_bind_group == other.process_bind_group
             && self.engine_bind_group == other.engine_bind_group
-            && Arc::ptr_eq(&self.assets, &other.assets)
+            && Arc::ptr_eq(&self.meshes, &other.meshes)
             && Arc::ptr_eq(&self.pipelines, &other.pipelines)
     }
 }

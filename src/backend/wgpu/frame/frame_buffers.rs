@@ -6,14 +6,15 @@ use std::sync::Arc;
 
 use parking_lot::{Mutex, RwLock};
 
+use super::material_buffer::MaterialBuffer;
 use super::object_buffers::ObjectBuffers;
 use super::pass_state::WgpuPassState;
 use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
-    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MirroredBuffer, SubdividedMesh, UploadQueue, append_aligned,
-    check_storage_binding_size, size_with_headroom,
+    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MaterialSnapshot, MirroredBuffer, SubdividedMesh, UploadQueue,
+    append_aligned, check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
@@ -59,6 +60,7 @@ impl BufferPool {
             buffers.all().map(GrowingBuffer::size).iter().sum::<u64>()
                 + buffers.objects.size()
                 + buffers.bytes.size()
+                + buffers.materials.size()
                 + index_bytes(buffers)
         };
         self.free.lock().buffers.iter().map(total).sum()
@@ -129,7 +131,7 @@ impl Drop for FrameBuffers {
 }
 
 impl FrameBuffers {
-    /// Makes room for a frame, and uploads its views, lights and parameters. After an error the buffers are unusable.
+    /// Makes room for a frame, and uploads its materials, views, lights and parameters. After an error the buffers are unusable.
     ///
     /// # Errors
     /// If the device has no room, or a camera is out of reach.
@@ -138,6 +140,7 @@ impl FrameBuffers {
         device: &wgpu::Device,
         uploads: &UploadQueue,
         layouts: &BindGroupLayouts,
+        materials: &MaterialSnapshot,
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
         let buffers = &mut self.buffers;
@@ -165,6 +168,7 @@ impl FrameBuffers {
         if reallocated {
             self.held_epoch = 0;
         }
+        buffers.materials.update(device, uploads, layouts, materials)?;
         buffers.bytes.update(device, uploads, request.draws)?;
         reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
@@ -227,8 +231,9 @@ impl FrameBuffers {
 
     /// The passes, and what their bind groups bind.
     pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], PassResources<'_>) {
-        let Buffers { passes, parameters, objects, bytes, .. } = &mut self.buffers;
-        (passes, PassResources { parameters: &parameters.on_device, objects, bytes })
+        let Buffers { passes, parameters, objects, materials, bytes, .. } = &mut self.buffers;
+        let materials_bind_group = materials.bind_group();
+        (passes, PassResources { parameters: &parameters.on_device, objects, bytes, materials_bind_group })
     }
 
     /// The meshes that the frame draws subdivided.
@@ -239,6 +244,11 @@ impl FrameBuffers {
     /// The buffers of the frame's objects.
     pub(crate) fn objects(&self) -> &ObjectBuffers {
         &self.buffers.objects
+    }
+
+    /// `@group(1)`; `None` before the frame begins.
+    pub(crate) fn materials_bind_group(&self) -> Option<&wgpu::BindGroup> {
+        self.buffers.materials.bind_group()
     }
 
     /// Uploads what changed in blocks of objects since [`FrameBuffers::held_epoch`].
@@ -273,10 +283,12 @@ pub(crate) struct PassResources<'a> {
     pub(crate) parameters: &'a GrowingBuffer,
     pub(crate) objects: &'a ObjectBuffers,
     pub(crate) bytes: &'a ResourceBytes,
+    pub(crate) materials_bind_group: Option<&'a wgpu::BindGroup>,
 }
 
 struct Buffers {
     objects: ObjectBuffers,
+    materials: MaterialBuffer,
     /// One [`GpuView`] per view.
     views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
@@ -314,6 +326,7 @@ impl Buffers {
         use wgpu::BufferUsages;
         Self {
             objects: ObjectBuffers::new(maps_memory),
+            materials: MaterialBuffer::new(),
             views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
             lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
             object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
@@ -329,7 +342,7 @@ impl Buffers {
         }
     }
 
-    /// All but those of objects, and the bytes of the engine's own.
+    /// All but those of objects and materials, and the bytes of the engine's own.
     fn all(&self) -> [&GrowingBuffer; 4] {
         let Self { views, lights, object_indices, parameters, .. } = self;
         [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]

@@ -4,7 +4,7 @@ use parking_lot::{RwLock, RwLockReadGuard};
 use wgpu::util::DrawIndexedIndirectArgs;
 
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{AssetSnapshot, MirroredBuffer, UploadQueue};
+use crate::backend::wgpu::resources::{MeshSnapshot, MirroredBuffer, UploadQueue};
 use crate::command::DrawList;
 
 /// The arguments of a pass's indirect draws, at the index of their batch.
@@ -35,7 +35,7 @@ impl IndirectArguments {
         &self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
-        assets: &AssetSnapshot,
+        meshes: &MeshSnapshot,
         list: &DrawList,
     ) -> Result<(), BackendError> {
         let mut buffer = self.buffer.write();
@@ -44,7 +44,7 @@ impl IndirectArguments {
         for (index, batch) in list.batches.iter().enumerate() {
             let arguments = match (batch.state.subdivision_level(), list.remaining(index)) {
                 (0, None) => {
-                    let mesh = assets.mesh_range(batch)?;
+                    let mesh = meshes.mesh_range(batch)?;
                     DrawIndexedIndirectArgs {
                         index_count: mesh.index_count,
                         instance_count: batch.count,

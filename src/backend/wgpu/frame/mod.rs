@@ -4,6 +4,7 @@ mod bundle_cache;
 mod commands;
 mod frame_buffers;
 mod indirect_arguments;
+mod material_buffer;
 mod object_buffers;
 mod pass_state;
 mod pass_statistics;

@@ -7,7 +7,7 @@ use super::pass_state::WgpuPassState;
 use crate::backend::BackendError;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
-use crate::backend::wgpu::resources::{AssetSnapshot, BindGroupLayouts, LightMeshes, StorageBuffers, WgpuTargets};
+use crate::backend::wgpu::resources::{BindGroupLayouts, LightMeshes, MeshSnapshot, StorageBuffers, WgpuTargets};
 use crate::process::Pass;
 
 /// A frame in flight through the wgpu backend.
@@ -17,7 +17,7 @@ pub struct WgpuFrame {
     /// One for each render process.
     pub(crate) pipelines: Arc<[Arc<ProcessPipelines>]>,
     pub(crate) layouts: BindGroupLayouts,
-    pub(crate) assets: Arc<AssetSnapshot>,
+    pub(crate) meshes: Arc<MeshSnapshot>,
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) storage_buffers: Arc<StorageBuffers>,

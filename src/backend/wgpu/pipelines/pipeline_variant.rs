@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::backend::wgpu::resources::{AssetSnapshot, DeviceLayout};
+use crate::backend::wgpu::resources::{DeviceLayout, MeshSnapshot};
 use crate::command::{Batch, DrawState};
 
 /// What distinguishes the pipelines of a process: the draw state, and where vertices are.
@@ -20,8 +20,8 @@ impl PipelineVariant {
     }
 
     /// The one that draws a batch.
-    pub(crate) fn of_batch(assets: &AssetSnapshot, batch: &Batch) -> Self {
-        let layout = assets.device_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
+    pub(crate) fn of_batch(meshes: &MeshSnapshot, batch: &Batch) -> Self {
+        let layout = meshes.device_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
         Self { layout, ..Self::of_arenas(batch.state) }
     }
 }

@@ -40,9 +40,9 @@ impl<'a> BatchRecorder<'a> {
         self.set_bind_groups(encoder);
         self.set_arenas(encoder)?;
         let mut start = batches.start;
-        let assets = &self.frame.assets;
-        for run in self.list.batches[batches].chunk_by(|one, next| assets.share_pipeline(one, next)) {
-            let variant = PipelineVariant::of_batch(assets, &run[0]);
+        let meshes = &self.frame.meshes;
+        for run in self.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
+            let variant = PipelineVariant::of_batch(meshes, &run[0]);
             let pipeline = self.pipelines.get(&variant);
             encoder.set_pipeline(pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?);
             let end = start + run.len();
@@ -92,7 +92,7 @@ impl<'a> BatchRecorder<'a> {
                 encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
             }
             let batch = &self.list.batches[index];
-            let base_vertex = self.frame.assets.mesh_range(batch)?.base_vertex;
+            let base_vertex = self.frame.meshes.mesh_range(batch)?.base_vertex;
             encoder.draw_indexed(remaining, base_vertex, batch.first..batch.first + batch.count);
         }
         if binds_partial_indices {
@@ -107,7 +107,7 @@ impl<'a> BatchRecorder<'a> {
     /// If a mesh is missing. This is a bug in Drawloom.
     pub(crate) fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         for batch in run {
-            let mesh = self.frame.assets.mesh_range(batch)?;
+            let mesh = self.frame.meshes.mesh_range(batch)?;
             let indices = mesh.first_index..mesh.first_index + mesh.index_count;
             encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
         }
@@ -132,7 +132,7 @@ impl<'a> BatchRecorder<'a> {
     /// Draws meshes in the engine's own buffers.
     fn draw_device_meshes(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         let attributes = self.frame.pipelines(self.pass.pass).attributes();
-        let meshes = &self.frame.assets.device_meshes;
+        let meshes = &self.frame.meshes.device_meshes;
         for batch in run {
             let mesh = meshes.get(batch.mesh).ok_or_else(missing_mesh_error)?;
             meshes.set_buffers(encoder, mesh, attributes)?;
@@ -147,7 +147,7 @@ impl<'a> BatchRecorder<'a> {
 
     pub(crate) fn set_bind_groups(&self, encoder: &mut impl RenderEncoder<'a>) {
         encoder.set_bind_group(0, self.pass.frame_bind_group.as_ref(), &[]);
-        encoder.set_bind_group(1, Some(&self.frame.assets.group), &[]);
+        encoder.set_bind_group(1, self.frame.buffers.materials_bind_group(), &[]);
         for (index, own) in [(2, &self.pass.process_bind_group), (3, &self.pass.engine_bind_group)] {
             if let Some(own) = own {
                 encoder.set_bind_group(index, Some(&own.group), &[]);
@@ -156,16 +156,16 @@ impl<'a> BatchRecorder<'a> {
     }
 
     fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) -> Result<(), BackendError> {
-        let assets = &self.frame.assets;
-        encoder.set_vertex_buffer(0, Some(assets.vertices.slice(..)));
+        let meshes = &self.frame.meshes;
+        encoder.set_vertex_buffer(0, Some(meshes.vertices.slice(..)));
         for (slot, layout) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
-            encoder.set_vertex_buffer(slot, Some(assets.attribute(*layout)?.slice(..)));
+            encoder.set_vertex_buffer(slot, Some(meshes.attribute(*layout)?.slice(..)));
         }
         self.set_index_arena(encoder);
         Ok(())
     }
 
     fn set_index_arena(&self, encoder: &mut impl RenderEncoder<'a>) {
-        encoder.set_index_buffer(self.frame.assets.indices.slice(..), wgpu::IndexFormat::Uint32);
+        encoder.set_index_buffer(self.frame.meshes.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }

@@ -28,7 +28,7 @@ pub(crate) fn encode_compute(
     let mut compute_pass = encoder.begin_compute_pass(&descriptor);
     compute_pass.set_pipeline(pipeline);
     compute_pass.set_bind_group(0, pass.frame_bind_group.as_ref(), &[]);
-    compute_pass.set_bind_group(1, Some(&frame.assets.group), &[]);
+    compute_pass.set_bind_group(1, frame.buffers.materials_bind_group(), &[]);
     for (index, own) in [(2, &pass.process_bind_group), (3, &pass.engine_bind_group)] {
         if let Some(own) = own {
             compute_pass.set_bind_group(index, Some(&own.group), &[]);

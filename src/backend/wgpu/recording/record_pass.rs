@@ -151,12 +151,14 @@ pub(crate) fn encode_raw(
     let buffers = |buffer| frame.storage_buffers.find(buffer).filter(|_| is_declared(buffer));
     let of_frame = frame.pass(index).frame_bind_group.as_ref();
     let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
+    let of_materials = frame.buffers.materials_bind_group();
+    let of_materials = of_materials.ok_or_else(|| broken_rule("a frame has its materials before it is recorded"))?;
     let resources = RawPassResources {
         device,
         view: pass.view_index,
         size,
         bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
-        bind_groups: [of_frame, &frame.assets.group],
+        bind_groups: [of_frame, of_materials],
         columns: &columns,
         buffers: &buffers,
         textures: &textures,

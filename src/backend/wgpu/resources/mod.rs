@@ -1,7 +1,6 @@
 //! Buffers, textures and bind group layouts on the device.
 
 mod arena;
-mod asset_cache;
 mod attribute_arenas;
 mod bind_group_layouts;
 mod cached_bind_group;
@@ -10,6 +9,8 @@ mod gpu_material;
 mod growing_buffer;
 mod imported_target;
 mod light_meshes;
+mod material_cache;
+mod mesh_cache;
 mod mirrored_buffer;
 mod object_buffer;
 mod storage_buffers;
@@ -20,7 +21,6 @@ mod upload_queue;
 mod vertex_layout;
 
 pub(crate) use arena::new_buffer;
-pub(crate) use asset_cache::{AssetCache, AssetSnapshot, attribute_of};
 pub(crate) use attribute_arenas::vertex_format;
 pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
@@ -32,6 +32,8 @@ pub(crate) use growing_buffer::{
 };
 pub(crate) use imported_target::ImportedTarget;
 pub(crate) use light_meshes::LightMeshes;
+pub(crate) use material_cache::{MaterialCache, MaterialSnapshot};
+pub(crate) use mesh_cache::{MeshCache, MeshSnapshot, attribute_of};
 pub(crate) use mirrored_buffer::MirroredBuffer;
 pub(crate) use object_buffer::{ObjectBuffer, shares_memory};
 pub(crate) use storage_buffers::StorageBuffers;

@@ -1,14 +1,10 @@
-//! The cache of meshes, materials and textures on the device.
+//! The cache of meshes on the device.
 
 use std::sync::Arc;
 
-use super::arena::{Arena, filled_buffer};
+use super::arena::Arena;
 use super::attribute_arenas::{AttributeArenas, AttributeBuffers};
-use super::bind_group_layouts::BindGroupLayouts;
 use super::device_meshes::DeviceMeshes;
-use super::gpu_material::GpuMaterial;
-use super::growing_buffer::check_storage_binding_size;
-use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::{vertex_stride, with_vertex_bytes};
 use crate::backend::BackendError;
@@ -17,11 +13,10 @@ use crate::backend::subdivision_cache::missing_mesh_error;
 use crate::command::Batch;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
-use crate::scene::{Assets, AttributeLayout, Material, Mesh};
-use crate::view::{RejectionReason, Rejections};
+use crate::scene::{Assets, AttributeLayout, Mesh};
 
-/// The meshes, materials and textures of a frame. It stays valid while assets change for later frames.
-pub(crate) struct AssetSnapshot {
+/// The meshes of a frame. It stays valid while meshes change for later frames.
+pub(crate) struct MeshSnapshot {
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
     attributes: AttributeBuffers,
@@ -29,11 +24,9 @@ pub(crate) struct AssetSnapshot {
     meshes: Vec<Option<MeshRange>>,
     /// Those that are not in the arenas.
     pub(crate) device_meshes: DeviceMeshes,
-    /// Materials and textures: `@group(1)`.
-    pub(crate) group: wgpu::BindGroup,
 }
 
-impl AssetSnapshot {
+impl MeshSnapshot {
     /// The range of a batch's mesh in the arenas.
     ///
     /// # Errors
@@ -79,8 +72,8 @@ pub(crate) struct MeshRange {
     revision: u64,
 }
 
-/// Keeps meshes, materials and textures on the device, and uploads those that changed since the last frame.
-pub(crate) struct AssetCache {
+/// Keeps meshes on the device, and uploads those that changed since the last frame.
+pub(crate) struct MeshCache {
     vertices: Arena,
     /// Of the vertices in the arena.
     format: VertexFormat,
@@ -88,15 +81,12 @@ pub(crate) struct AssetCache {
     attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
     device_meshes: DeviceMeshes,
-    textures: TextureArrays,
-    /// Identities and revisions of the snapshot's meshes, materials and textures.
-    current: Option<[(u64, u64); 3]>,
-    snapshot: Option<Arc<AssetSnapshot>>,
-    /// Rejections that making the snapshot found. Every frame that uses the snapshot reports them.
-    rejected: Vec<(RejectionReason, usize)>,
+    /// Identity and revision of the snapshot's meshes.
+    current: Option<(u64, u64)>,
+    snapshot: Option<Arc<MeshSnapshot>>,
 }
 
-impl Default for AssetCache {
+impl Default for MeshCache {
     fn default() -> Self {
         Self {
             vertices: new_vertex_arena(),
@@ -105,15 +95,13 @@ impl Default for AssetCache {
             attributes: AttributeArenas::default(),
             meshes: Vec::new(),
             device_meshes: DeviceMeshes::default(),
-            textures: TextureArrays::default(),
             current: None,
             snapshot: None,
-            rejected: Vec::new(),
         }
     }
 }
 
-impl AssetCache {
+impl MeshCache {
     /// Adds the attributes that a plan's processes read. Returns whether one of them is new.
     pub(crate) fn require_attributes(&mut self, attributes: &[DeclaredAttribute]) -> bool {
         let changed = self.attributes.require(attributes);
@@ -138,7 +126,7 @@ impl AssetCache {
         self.attributes.of_mesh(device, uploads, mesh)
     }
 
-    /// The snapshot of these assets, with vertices of this format: the latest one if nothing changed.
+    /// The snapshot of these meshes, with vertices of this format: the latest one if nothing changed.
     ///
     /// # Errors
     /// If the device has no room for them.
@@ -146,44 +134,41 @@ impl AssetCache {
         &mut self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
-        layouts: &BindGroupLayouts,
         assets: &Assets,
         vertices: VertexFormat,
-        rejections: &Rejections,
-    ) -> Result<Arc<AssetSnapshot>, BackendError> {
-        let requested = [
-            (assets.meshes.identity(), assets.meshes.revision()),
-            (assets.materials.identity(), assets.materials.revision()),
-            (assets.textures.identity(), assets.textures.revision()),
-        ];
-        let snapshot = match &self.snapshot {
-            Some(snapshot) if self.current == Some(requested) && self.format == vertices => Arc::clone(snapshot),
-            _ => {
-                if self.format != vertices {
-                    // `base_vertex` counts in vertices, so all vertices in an arena have one size.
-                    (self.vertices, self.format) = (new_vertex_arena(), vertices);
-                    self.meshes.clear();
-                }
-                if self.current.is_none_or(|current| current[0].0 != requested[0].0) {
-                    self.meshes.clear();
-                }
-                self.rejected.clear();
-                // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
-                self.current = None;
-                self.update_meshes(device, uploads, assets)?;
-                let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
-                let attributes = self.attributes.required();
-                self.device_meshes = self.device_meshes.updated(device, uploads, meshes, attributes)?;
-                self.textures.update(device, uploads, assets, &mut self.rejected);
-                let snapshot = Arc::new(self.snapshot(device, uploads, layouts, assets)?);
-                self.current = Some(requested);
-                self.snapshot = Some(Arc::clone(&snapshot));
-                snapshot
-            }
-        };
-        for &(reason, index) in &self.rejected {
-            rejections.count(reason, index);
+    ) -> Result<Arc<MeshSnapshot>, BackendError> {
+        let requested = (assets.meshes.identity(), assets.meshes.revision());
+        if let Some(snapshot) = &self.snapshot
+            && self.current == Some(requested)
+            && self.format == vertices
+        {
+            return Ok(Arc::clone(snapshot));
         }
+        if self.format != vertices {
+            // `base_vertex` counts in vertices, so all vertices in an arena have one size.
+            (self.vertices, self.format) = (new_vertex_arena(), vertices);
+            self.meshes.clear();
+        }
+        if self.current.is_none_or(|(identity, _)| identity != requested.0) {
+            self.meshes.clear();
+        }
+        // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
+        self.current = None;
+        self.update_meshes(device, uploads, assets)?;
+        let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
+        self.device_meshes = self.device_meshes.updated(device, uploads, meshes, self.attributes.required())?;
+        let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
+            return Err(broken_rule("arenas have buffers"));
+        };
+        let snapshot = Arc::new(MeshSnapshot {
+            vertices: vertices.clone(),
+            indices: indices.clone(),
+            attributes: self.attributes.buffers().clone(),
+            meshes: self.meshes.clone(),
+            device_meshes: self.device_meshes.clone(),
+        });
+        self.current = Some(requested);
+        self.snapshot = Some(Arc::clone(&snapshot));
         Ok(snapshot)
     }
 
@@ -237,69 +222,6 @@ impl AssetCache {
         }
         Ok(())
     }
-
-    fn snapshot(
-        &mut self,
-        device: &wgpu::Device,
-        uploads: &UploadQueue,
-        layouts: &BindGroupLayouts,
-        assets: &Assets,
-    ) -> Result<AssetSnapshot, BackendError> {
-        let mut materials = vec![GpuMaterial::default(); assets.materials.slot_count().max(1)];
-        for (handle, material) in assets.iter::<Material>() {
-            let texture = self.texture_location(assets, handle.index(), material);
-            materials[handle.index() as usize] = GpuMaterial::new(material, texture);
-        }
-        let bytes: &[u8] = bytemuck::cast_slice(&materials);
-        check_storage_binding_size(device, bytes.len())?;
-        let materials = filled_buffer(device, uploads, "materials", bytes, wgpu::BufferUsages::STORAGE)?;
-
-        let views = self.textures.views(device);
-        let samplers = [
-            linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
-            linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
-        ];
-        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: materials.as_entire_binding() }];
-        for (binding, view) in (1..).zip(&views) {
-            entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) });
-        }
-        for (binding, sampler) in (5..).zip(&samplers) {
-            entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Sampler(sampler) });
-        }
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("assets"),
-            layout: &layouts.assets,
-            entries: &entries,
-        });
-
-        let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
-            return Err(BackendError::BrokenRule { rule: "arenas have buffers".to_owned() });
-        };
-        let (vertices, indices, attributes) = (vertices.clone(), indices.clone(), self.attributes.buffers().clone());
-        let (meshes, device_meshes) = (self.meshes.clone(), self.device_meshes.clone());
-        Ok(AssetSnapshot { vertices, indices, attributes, meshes, device_meshes, group })
-    }
-
-    fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {
-        let texture = material.texture?;
-        if assets.get(texture).is_err() {
-            self.rejected.push((RejectionReason::StaleTexture, slot as usize));
-            return None;
-        }
-        self.textures.location(texture.index())
-    }
-}
-
-fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {
-    device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some(label),
-        address_mode_u: outside,
-        address_mode_v: outside,
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        mipmap_filter: wgpu::MipmapFilterMode::Linear,
-        ..wgpu::SamplerDescriptor::default()
-    })
 }
 
 fn new_vertex_arena() -> Arena {

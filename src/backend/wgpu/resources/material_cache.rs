@@ -1,0 +1,107 @@
+//! The cache of materials and their textures.
+
+use std::sync::Arc;
+
+use super::gpu_material::GpuMaterial;
+use super::texture_arrays::{TextureArrays, TextureLocation};
+use super::upload_queue::UploadQueue;
+use crate::scene::{Assets, Material};
+use crate::view::{RejectionReason, Rejections};
+
+/// The materials of a frame, and their textures. It stays valid while they change for later frames.
+#[derive(Clone)]
+pub(crate) struct MaterialSnapshot {
+    /// A [`GpuMaterial`] for each slot.
+    pub(crate) materials: Arc<[u8]>,
+    pub(crate) textures: Arc<MaterialTextures>,
+}
+
+/// The textures of materials, and their samplers: what `@group(1)` binds behind the materials, in that order.
+pub(crate) struct MaterialTextures {
+    pub(crate) arrays: Vec<wgpu::TextureView>,
+    pub(crate) samplers: [wgpu::Sampler; 2],
+}
+
+/// Keeps materials and textures, and uploads textures that changed since the last frame. Materials are uploaded by the buffers of a frame.
+#[derive(Default)]
+pub(crate) struct MaterialCache {
+    textures: TextureArrays,
+    current: Option<Current>,
+    /// Rejections that making the snapshot found. Every frame that uses the snapshot reports them.
+    rejected_textures: Vec<(RejectionReason, usize)>,
+    rejected_materials: Vec<(RejectionReason, usize)>,
+}
+
+struct Current {
+    /// Identity and revision of the snapshot's materials, and of its textures.
+    materials: (u64, u64),
+    textures: (u64, u64),
+    snapshot: MaterialSnapshot,
+}
+
+impl MaterialCache {
+    /// The snapshot of these materials and textures: the latest one if nothing changed.
+    pub(crate) fn update(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        assets: &Assets,
+        rejections: &Rejections,
+    ) -> MaterialSnapshot {
+        let materials = (assets.materials.identity(), assets.materials.revision());
+        let textures = (assets.textures.identity(), assets.textures.revision());
+        let snapshot = match self.current.take() {
+            Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
+            Some(current) if current.textures == textures => {
+                MaterialSnapshot { materials: self.materials(assets), ..current.snapshot }
+            }
+            _ => {
+                self.rejected_textures.clear();
+                self.textures.update(device, uploads, assets, &mut self.rejected_textures);
+                let samplers = [
+                    linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
+                    linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
+                ];
+                let arrays = self.textures.views(device).into();
+                let textures = Arc::new(MaterialTextures { arrays, samplers });
+                MaterialSnapshot { materials: self.materials(assets), textures }
+            }
+        };
+        self.current = Some(Current { materials, textures, snapshot: snapshot.clone() });
+        for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
+            rejections.count(reason, index);
+        }
+        snapshot
+    }
+
+    fn materials(&mut self, assets: &Assets) -> Arc<[u8]> {
+        self.rejected_materials.clear();
+        let mut materials = vec![GpuMaterial::default(); assets.materials.slot_count().max(1)];
+        for (handle, material) in assets.iter::<Material>() {
+            let texture = self.texture_location(assets, handle.index(), material);
+            materials[handle.index() as usize] = GpuMaterial::new(material, texture);
+        }
+        bytemuck::cast_slice(&materials).into()
+    }
+
+    fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {
+        let texture = material.texture?;
+        if assets.get(texture).is_err() {
+            self.rejected_materials.push((RejectionReason::StaleTexture, slot as usize));
+            return None;
+        }
+        self.textures.location(texture.index())
+    }
+}
+
+fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some(label),
+        address_mode_u: outside,
+        address_mode_v: outside,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..wgpu::SamplerDescriptor::default()
+    })
+}
