@@ -1,6 +1,8 @@
 //! Which objects a process draws, and in which order.
 
-use crate::scene::{Blend, ColumnLayout, LayerMask, ObjectColumn};
+use bytemuck::Pod;
+
+use crate::scene::{Blend, ColumnLayout, LayerMask, MaterialLayout, MaterialType, ObjectColumn};
 
 /// Which objects a process draws, and in which order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -9,6 +11,8 @@ pub struct Selection {
     pub blending: Blending,
     /// By material.
     pub materials: MaterialShare,
+    /// By the type of the material.
+    pub material_types: MaterialTypes,
     /// By layer: objects that belong to one of these layers.
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
@@ -29,6 +33,7 @@ impl Selection {
         Self {
             blending,
             materials: MaterialShare::ALL,
+            material_types: MaterialTypes::Any,
             layers: LayerMask::ALL,
             excluded_layers: LayerMask::NONE,
             order: DrawOrder::ByState,
@@ -38,6 +43,16 @@ impl Selection {
     /// Objects that belong to one of these layers, instead of those of the layers before.
     pub const fn in_layers(self, layers: LayerMask) -> Self {
         Self { layers, ..self }
+    }
+
+    /// Those of these objects whose material is of a type of the engine's own.
+    pub const fn of_material_type<T: Pod>(self, material: MaterialType<T>) -> Self {
+        Self { material_types: MaterialTypes::Only(material.layout()), ..self }
+    }
+
+    /// Those of these objects whose material is of no type of the engine's own: those that the shipped processes draw.
+    pub const fn of_shipped_materials(self) -> Self {
+        Self { material_types: MaterialTypes::Shipped, ..self }
     }
 
     /// Those of these objects that belong to none of some layers.
@@ -50,7 +65,7 @@ impl Selection {
         Self { order, ..self }
     }
 
-    /// Whether it contains objects of any layer that blend like this and have the material in this slot.
+    /// Whether it contains objects of any layer, and of any type of material, that blend like this and have the material in this slot.
     pub fn contains(self, blend: Blend, material: u32) -> bool {
         let blends = match self.blending {
             Blending::Opaque => blend == Blend::None,
@@ -112,6 +127,30 @@ pub enum Blending {
     Blended,
     /// Both.
     Both,
+}
+
+/// Objects by the types of their materials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MaterialTypes {
+    /// All.
+    #[default]
+    Any,
+    /// Those without a [type of the engine's own](MaterialType).
+    Shipped,
+    /// Those of one type.
+    Only(MaterialLayout),
+}
+
+impl MaterialTypes {
+    /// Whether it contains a type; `None` for materials without one.
+    #[inline]
+    pub fn contain(self, material: Option<MaterialLayout>) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Shipped => material.is_none(),
+            Self::Only(only) => material == Some(only),
+        }
+    }
 }
 
 /// A share of the materials: those whose slot modulo `of` is `index`. The shares 0 to `of` − 1 are disjoint and contain every

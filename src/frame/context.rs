@@ -11,7 +11,7 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::TargetSize;
 use crate::scene::Projection;
-use crate::view::LayerFilter;
+use crate::view::ObjectFilter;
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -57,10 +57,12 @@ impl<B: Backend> FrameContext<'_, B> {
         let view_index = self.view_index_of(pass);
         let objects = &self.tables.objects;
         let selection = self.tables.passes[pass].selection.unwrap_or_default();
+        let filter = ObjectFilter::new(objects, self.request.scene, selection);
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
             selection,
-            layers: (!LayerFilter::new(self.request.scene, selection).passes_all()).then(|| objects.epoch()),
+            layers: (!filter.passes_all_layers()).then(|| objects.epoch()),
+            material_types: objects.material_types_version(),
             instancing: self.instancing,
             order: if self.orders_by_bin(pass) {
                 OrderInputs::Bins { draws_changed_in: objects.draws_changed_in() }

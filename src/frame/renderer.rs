@@ -158,7 +158,7 @@ impl<B: Backend> Renderer<B> {
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
-        plan.check_columns(&draws, scene)?;
+        plan.check_scene(&draws, scene, self.tables.objects.material_layouts())?;
         self.tables.cullable_meshes.update(scene.assets);
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =

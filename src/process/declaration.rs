@@ -3,7 +3,10 @@
 use bytemuck::Pod;
 
 use super::{BufferAccess, BufferLayout, Format, Place, StorageBuffer, TargetSize};
-use crate::scene::{AttributeLayout, AttributeValue, ColumnLayout, ObjectColumn, VertexAttribute, ViewKind};
+use crate::scene::{
+    AttributeLayout, AttributeValue, ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, VertexAttribute,
+    ViewKind,
+};
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
 /// of the size of its picture unless [`Declare::size`] says otherwise.
@@ -156,6 +159,17 @@ impl Declare {
         self.declaration.columns.push(column.layout());
     }
 
+    /// Reads the values of materials of a [type of the engine's own](MaterialType) in the shader, at `@group(3)` behind the columns: the
+    /// first such type has the next binding, and so on. Each is an array with an element for each material of the scene, by
+    /// `Object.material`; those of other types are all zeros. If a material changes, its bytes are uploaded, and nothing else.
+    ///
+    /// For the number of storage buffers that a device needs, see [`Declare::reads_column`].
+    pub fn reads_materials<T: Pod>(&mut self, material: MaterialType<T>) {
+        if !self.declaration.materials.contains(&material.layout()) {
+            self.declaration.materials.push(material.layout());
+        }
+    }
+
     /// Reads an engine's own attribute of vertices: a field of the prelude's `VertexInput`, by its name. Meshes without it have the
     /// default for each vertex.
     ///
@@ -273,6 +287,8 @@ pub struct Declaration {
     pub sizes: Vec<(String, TargetSize)>,
     /// The data of objects that its shader reads, in the order of their bindings.
     pub columns: Vec<ColumnLayout>,
+    /// The types of materials whose values its shader reads, in the order of their bindings.
+    pub materials: Vec<MaterialLayout>,
     /// The attributes of vertices that its shader reads, in the order of their locations.
     pub attributes: Vec<DeclaredAttribute>,
     /// The buffers that it uses, and how, in the order declared.

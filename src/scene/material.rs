@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::SceneError;
+use super::{MaterialValues, SceneError};
 use crate::handle::Handle;
 
 /// The optical properties of a surface.
@@ -22,6 +22,8 @@ pub struct Material {
     pub blend: Blend,
     /// Whether back faces are drawn too.
     pub double_sided: bool,
+    /// What the engine's own process reads of it, if it is of a [type of the engine's own](super::MaterialType).
+    pub values: Option<MaterialValues>,
 }
 
 impl Default for Material {
@@ -34,6 +36,7 @@ impl Default for Material {
             opacity: 1.0,
             blend: Blend::None,
             double_sided: false,
+            values: None,
         }
     }
 }

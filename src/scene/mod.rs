@@ -12,6 +12,7 @@ mod error;
 mod layer_mask;
 mod light;
 mod material;
+mod material_type;
 mod mesh;
 #[cfg(feature = "obj")]
 pub mod obj;
@@ -34,6 +35,7 @@ pub use error::SceneError;
 pub use layer_mask::LayerMask;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
+pub use material_type::{MaterialLayout, MaterialType, MaterialValues};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
 pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::block_reader::BlockReader;
-use super::{LayerFilter, ObjectTable, VisibleSet, set_bits};
+use super::{ObjectFilter, ObjectTable, VisibleSet, set_bits};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 use crate::scene::Blend;
 
@@ -21,7 +21,7 @@ pub(crate) fn bin_visible(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    layers: LayerFilter<'_>,
+    filter: ObjectFilter<'_>,
     (index, count): (usize, usize),
     segment: &mut BinnedSegment,
 ) {
@@ -33,16 +33,16 @@ pub(crate) fn bin_visible(
     {
         let is_opaque = |bin| bins.get(bin).state.blend() == Blend::None;
         let is_visible = |object: u32| visible.contains(object as usize);
-        if layers.passes_all() {
+        if filter.passes_all() {
             segment.select(&all, part(all.len()), is_opaque, is_visible);
         } else {
             segment.select(&all, part(all.len()), is_opaque, |object| {
-                is_visible(object) && layers.passes(object as usize)
+                is_visible(object) && filter.passes(object as usize)
             });
         }
     } else {
         segment.clear();
-        collect(table, visible, selection, layers, part(visible.filled_word_count()), segment);
+        collect(table, visible, selection, filter, part(visible.filled_word_count()), segment);
         segment.order(&bins);
     }
 }
@@ -52,7 +52,7 @@ fn collect(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    layers: LayerFilter<'_>,
+    filter: ObjectFilter<'_>,
     words: Range<usize>,
     segment: &mut BinnedSegment,
 ) {
@@ -61,7 +61,7 @@ fn collect(
     visible.visit_words(words, |word, bits| {
         let block = reader.block(word / in_block);
         let first = word * VisibleSet::OBJECTS_PER_WORD;
-        for object in set_bits(layers.pass(first, bits & block.opaque[word % in_block])).map(|bit| first + bit) {
+        for object in set_bits(filter.pass(first, bits & block.opaque[word % in_block])).map(|bit| first + bit) {
             let entry = object % ObjectTable::BLOCK_SIZE;
             let draw = &block.draws[entry];
             if selection.materials == MaterialShare::ALL || selection.contains(draw.state.blend(), draw.material) {

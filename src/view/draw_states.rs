@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
-use crate::scene::{Assets, Blend, Material, Mesh, Topology};
+use crate::scene::{Assets, Blend, Material, MaterialLayout, MaterialValues, Mesh, Topology};
 
 /// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache lines; the assets
 /// themselves are much larger.
@@ -15,6 +15,12 @@ pub(super) struct DrawStates {
     meshes: Vec<Option<MeshEntry>>,
     /// With the states of objects with triangle lists, as they are and mirrored.
     materials: Vec<Option<(Handle<Material>, [DrawState; 2])>>,
+    /// The types of materials; empty if none has one.
+    types: Vec<Option<MaterialLayout>>,
+    /// Each type once.
+    layouts: Vec<MaterialLayout>,
+    /// Counts how often `types` changed.
+    types_version: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,12 +55,47 @@ impl DrawStates {
             new_meshes[mesh.index() as usize] = Some(MeshEntry { mesh, topology: content.topology(), revision });
         }
         let mut new_materials = vec![None; materials.slot_count()];
-        for (handle, &Material { double_sided, blend, .. }) in materials.iter() {
-            new_materials[handle.index() as usize] = Some((handle, states_of(double_sided, blend)));
+        let mut types = Vec::new();
+        for (handle, Material { double_sided, blend, values, .. }) in materials.iter() {
+            new_materials[handle.index() as usize] = Some((handle, states_of(*double_sided, *blend)));
+            if let Some(values) = values {
+                types.resize(materials.slot_count(), None);
+                types[handle.index() as usize] = Some(values.layout());
+            }
         }
+        self.set_types(types);
         let changed = has_changed(&self.meshes, &new_meshes) || has_changed(&self.materials, &new_materials);
         (self.meshes, self.materials) = (new_meshes, new_materials);
         changed
+    }
+
+    fn set_types(&mut self, types: Vec<Option<MaterialLayout>>) {
+        if types == self.types {
+            return;
+        }
+        self.types_version += 1;
+        self.layouts.clear();
+        for layout in types.iter().copied().flatten() {
+            if !self.layouts.contains(&layout) {
+                self.layouts.push(layout);
+            }
+        }
+        self.types = types;
+    }
+
+    /// The types of materials by slot; empty if none has one.
+    pub(super) fn types(&self) -> &[Option<MaterialLayout>] {
+        &self.types
+    }
+
+    /// The types of materials, each once.
+    pub(super) fn layouts(&self) -> &[MaterialLayout] {
+        &self.layouts
+    }
+
+    /// Counts how often the types of materials changed.
+    pub(super) fn types_version(&self) -> u64 {
+        self.types_version
     }
 
     /// The state of an object; `None` if a handle is stale.
@@ -80,9 +121,10 @@ pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec
     let mut states = Vec::new();
     let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();
     topologies.retain(|topology| assets.meshes.iter().any(|(_, mesh)| mesh.topology() == *topology));
-    for (handle, &Material { double_sided, blend, .. }) in assets.materials.iter() {
-        if selection.contains(blend, handle.index()) {
-            let [state, _] = states_of(double_sided, blend);
+    for (handle, Material { double_sided, blend, values, .. }) in assets.materials.iter() {
+        let is_of_type = selection.material_types.contain(values.as_ref().map(MaterialValues::layout));
+        if is_of_type && selection.contains(*blend, handle.index()) {
+            let [state, _] = states_of(*double_sided, *blend);
             states.extend(topologies.iter().map(|topology| state.with_topology(*topology)));
         }
     }

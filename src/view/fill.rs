@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
-use super::{LayerFilter, ObjectBlock, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
+use super::{ObjectBlock, ObjectFilter, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
 use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
@@ -24,7 +24,7 @@ pub(crate) struct Fill<'a> {
     pub(crate) visible: &'a VisibleSet,
     /// The objects that the render process draws.
     pub(crate) selection: Selection,
-    pub(crate) layers: LayerFilter<'a>,
+    pub(crate) filter: ObjectFilter<'a>,
     /// The scene, for the subdivision level.
     pub(crate) scene: &'a SceneRef<'a>,
     /// The precision of the depth order, and of the subdivision for paraboloids.
@@ -84,7 +84,7 @@ impl Fill<'_> {
         let entry = object % ObjectTable::BLOCK_SIZE;
         let draw = objects.draws[entry];
         let blend = draw.state.blend();
-        if !self.selection.contains(blend, draw.material) || !self.layers.passes(object) {
+        if !self.selection.contains(blend, draw.material) || !self.filter.passes(object) {
             return RenderCommand::EMPTY;
         }
         let mut state = draw.state;

@@ -15,7 +15,7 @@ use super::{BoundingBoxes, GpuObject, Rejections};
 use crate::chunked_array::block_ranges;
 use crate::command::{BinnedSegment, Bins};
 use crate::quality::CullingVolume;
-use crate::scene::{Changes, SceneRef};
+use crate::scene::{Changes, MaterialLayout, SceneRef};
 
 /// A scene's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are rejected.
 ///
@@ -119,6 +119,21 @@ impl ObjectTable {
         for object in self.length..length_before {
             self.blocks[object / Self::BLOCK_SIZE].get_mut().remove(object % Self::BLOCK_SIZE);
         }
+    }
+
+    /// The types of materials by slot; empty if none has one.
+    pub(crate) fn material_types(&self) -> &[Option<MaterialLayout>] {
+        self.draw_states.types()
+    }
+
+    /// The types of the scene's materials, each once.
+    pub(crate) fn material_layouts(&self) -> &[MaterialLayout] {
+        self.draw_states.layouts()
+    }
+
+    /// Counts how often the types of materials changed.
+    pub(crate) fn material_types_version(&self) -> u64 {
+        self.draw_states.types_version()
     }
 
     /// Ends a frame that succeeded: the next one describes the objects that change until then. Without this call it describes all.

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::mip_chain::MipChain;
 use crate::process::{Materials, ShaderMaterial};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
-use crate::scene::{Assets, Blend, Material};
+use crate::scene::{Assets, Blend, Material, MaterialValues};
 use crate::view::{RejectionReason, Rejections};
 
 /// Keeps the materials of the last frame, and the mip chains of their textures.
@@ -90,13 +90,14 @@ struct TableEntry {
     emission: Vec3,
     double_sided: bool,
     blend: Blend,
+    values: Option<MaterialValues>,
     chain: Option<Arc<MipChain>>,
 }
 
 impl TableEntry {
     fn new(material: &Material, chain: Option<Arc<MipChain>>) -> Self {
         let Material { diffuse, opacity, emission, double_sided, blend, .. } = *material;
-        Self { diffuse, opacity, emission, double_sided, blend, chain }
+        Self { diffuse, opacity, emission, double_sided, blend, values: material.values.clone(), chain }
     }
 }
 
@@ -114,6 +115,10 @@ impl<R: Real> Materials<R> for MaterialTable {
             double_sided: entry.double_sided,
             blend: entry.blend,
         }
+    }
+
+    fn values(&self, slot: u32) -> Option<&MaterialValues> {
+        self.slots.get(slot as usize)?.as_ref()?.values.as_ref()
     }
 
     fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {

@@ -35,7 +35,9 @@ impl WgpuBackend {
         }
         let (meshes, materials) = with_error_scope(&self.device, "meshes, materials and textures", || {
             let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, vertices)?;
-            Ok((meshes, self.materials.lock().update(&self.device, &self.uploads, scene.assets, rejections)))
+            let types = plan.materials();
+            let mut materials = self.materials.lock();
+            Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))
         })
         .flatten()?;
         let update = || self.targets.lock().update(&self.device, plan, views, &imports);

@@ -39,6 +39,7 @@ pub(super) fn update_bind_groups(
     let columns = declaration.columns.iter().filter_map(|column| resources.objects.column(*column));
     let draws = &request.draws[process];
     let mut bytes = resources.bytes.of_process(process);
+    let materials: Vec<_> = bytes.by_ref().take(declaration.materials.len()).map(BindingResource::Buffer).collect();
     let own = draws.resources().iter().filter_map(move |resource| match resource {
         ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) => bytes.next().map(BindingResource::Buffer),
         ShaderResource::Buffer(buffer) => Some(BindingResource::Buffer(buffer.as_entire_buffer_binding())),
@@ -46,7 +47,7 @@ pub(super) fn update_bind_groups(
         ShaderResource::Sampler { sampler, .. } => Some(BindingResource::Sampler(sampler)),
     });
     let (before, layout) = (pass.engine_bind_group.take(), pipelines.engine_layout.as_ref());
-    let bound = (0..).zip(columns.map(BindingResource::Buffer).chain(own));
+    let bound = (0..).zip(columns.map(BindingResource::Buffer).chain(materials).chain(own));
     pass.engine_bind_group = CachedBindGroup::update(before, device, &pass.label, layout, bound)?;
     Ok(())
 }

@@ -8,7 +8,7 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::{DrawList, instance, sort};
-use crate::view::{self, LayerFilter};
+use crate::view::{self, ObjectFilter};
 
 /// Makes a command for each visible object (M 10.3).
 pub(super) struct Fill {
@@ -43,7 +43,7 @@ impl<B: Backend> Stage<B> for Fill {
             view: &frame.request.views[view_index],
             visible: &frame.tables.visibility[view_index].set,
             selection,
-            layers: LayerFilter::new(frame.request.scene, selection),
+            filter: ObjectFilter::new(&frame.tables.objects, frame.request.scene, selection),
             scene: frame.request.scene,
             quality: frame.request.quality,
         };
@@ -196,10 +196,10 @@ impl<B: Backend> Stage<B> for Bin {
         let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
         let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
         let selection = table.selection.unwrap_or_default();
-        let layers = LayerFilter::new(frame.request.scene, selection);
+        let filter = ObjectFilter::new(objects, frame.request.scene, selection);
         for index in job.items {
             let part = (index, frame.segment_count(self.pass));
-            view::bin_visible(objects, visible, selection, layers, part, &mut table.segments[index].write());
+            view::bin_visible(objects, visible, selection, filter, part, &mut table.segments[index].write());
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::Selection;
 use crate::scene::Blend;
-use crate::view::{Frustum, LayerFilter};
+use crate::view::{Frustum, ObjectFilter};
 
 /// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
 pub(super) struct Visibility {
@@ -74,7 +74,8 @@ impl<B: Backend> Stage<B> for Occluders {
             |object, draw| {
                 let blend = draw.state.blend();
                 let is_drawn = |selection: &Selection| {
-                    selection.contains(blend, draw.material) && LayerFilter::new(scene, *selection).passes(object)
+                    selection.contains(blend, draw.material)
+                        && ObjectFilter::new(&tables.objects, scene, *selection).passes(object)
                 };
                 blend == Blend::None && selections.iter().any(is_drawn)
             },

@@ -3,7 +3,7 @@
 use bytemuck::Pod;
 
 use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
-use crate::scene::{Blend, ColumnLayout, LightKind, ObjectColumn, Projection};
+use crate::scene::{Blend, ColumnLayout, LightKind, MaterialType, MaterialValues, ObjectColumn, Projection};
 
 /// How many numbers a vertex hands on to the pixels.
 pub const VARYINGS: usize = 9;
@@ -60,6 +60,15 @@ pub struct PassInputs<'a, R: Real> {
     pub columns: ShaderColumns<'a>,
 }
 
+impl<R: Real> PassInputs<'_, R> {
+    /// The values of a material in a slot: those that a shader on the device has after
+    /// [`Declare::reads_materials`](crate::process::Declare::reads_materials), all zeros if the material is of another type.
+    pub fn material_values<T: Pod>(&self, material: MaterialType<T>, slot: u32) -> T {
+        let values = self.materials.values(slot).filter(|values| values.layout() == material.layout());
+        values.map_or_else(T::zeroed, |values| bytemuck::pod_read_unaligned(values.bytes()))
+    }
+}
+
 /// The columns of objects that the processes of a frame read.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ShaderColumns<'a> {
@@ -84,6 +93,9 @@ impl ShaderColumns<'_> {
 pub trait Materials<R: Real>: Sync {
     /// The material in a slot.
     fn get(&self, slot: u32) -> ShaderMaterial<R>;
+
+    /// The engine's own values of the material in a slot; `None` if it has none.
+    fn values(&self, slot: u32) -> Option<&MaterialValues>;
 
     /// `textureSampleGrad` of a material's texture, linear; white where the material has none.
     fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R>;

@@ -30,7 +30,7 @@ pub struct GeometryBuffer {
 }
 
 impl GeometryBuffer {
-    /// Draws every opaque object.
+    /// Draws every opaque object whose material is of no [type of the engine's own](crate::scene::MaterialType).
     pub fn new(formats: GeometryFormats) -> Self {
         Self::of_share(formats, MaterialShare::ALL)
     }
@@ -85,7 +85,7 @@ impl RenderProcess for GeometryBuffer {
     fn draws(&self) -> Draws<'_> {
         Draws::Commands(CommandDraws {
             shader: &self.shader,
-            selection: Selection { materials: self.share, ..Selection::OPAQUE },
+            selection: Selection { materials: self.share, ..Selection::OPAQUE.of_shipped_materials() },
             writes_depth: !self.has_depth,
             ..CommandDraws::default()
         })

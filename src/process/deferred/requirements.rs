@@ -22,7 +22,8 @@ impl Requirements {
             requirements.lights |= 1 << LightClass::of(light, shadows).index();
         }
         let mut materials = assets.iter::<Material>();
-        requirements.transparency = materials.any(|(_, material)| material.blend != Blend::None);
+        requirements.transparency =
+            materials.any(|(_, material)| material.blend != Blend::None && material.values.is_none());
         requirements
     }
 

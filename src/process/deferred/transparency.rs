@@ -54,7 +54,7 @@ impl RenderProcess for Transparency {
     fn draws(&self) -> Draws<'_> {
         Draws::Commands(CommandDraws {
             shader: &self.shader,
-            selection: Selection::BLENDED,
+            selection: Selection::BLENDED.of_shipped_materials(),
             writes_depth: false,
             ..CommandDraws::default()
         })

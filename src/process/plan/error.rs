@@ -102,6 +102,18 @@ pub enum PlanError {
         /// The process.
         process: String,
     },
+    /// Two processes read materials of one type with values of different sizes.
+    #[error("process {process:?} reads materials {material:?} of {second} bytes, another process of {first}")]
+    ConflictingMaterials {
+        /// The second process.
+        process: String,
+        /// The type of material.
+        material: &'static str,
+        /// The size of the values that the first process reads, in bytes.
+        first: usize,
+        /// The same of the second process.
+        second: usize,
+    },
     /// Two processes read columns of one name with elements of different sizes.
     #[error(
         "process {process:?} reads {second} bytes of the column {column:?} for each object, another process {first}"
@@ -191,6 +203,18 @@ pub enum ProcessError {
         process: String,
         /// The column.
         column: &'static str,
+    },
+    /// The values of the scene's materials of a type have another size than those that the process declares or selects.
+    #[error("process {process:?} knows materials {material:?} of {declared} bytes, but the scene has some of {found}")]
+    MaterialSize {
+        /// The process.
+        process: String,
+        /// The type of material.
+        material: &'static str,
+        /// The size that the process knows, in bytes.
+        declared: usize,
+        /// The size of the scene's, in bytes.
+        found: usize,
     },
     /// The elements of the scene's column have another size than those that the process declares.
     #[error(

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::attributes::attributes_of;
 use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
+use super::materials::{check_materials, materials_of};
 use super::order::{AddedProcess, order_constraints};
 use super::planned_target::{check_blending, check_stencil, drawn_size, targets_of};
 use super::view_group::view_groups;
@@ -17,7 +18,7 @@ use crate::process::{
     Access, BufferAccess, BufferLayout, Declaration, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters,
     TargetSize, previous_name,
 };
-use crate::scene::{ColumnLayout, SceneRef, ViewKind};
+use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
 
 /// What every frame does: its processes in the order they are submitted, and the targets that they use.
@@ -29,6 +30,7 @@ pub struct FramePlan {
     view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
+    materials: Vec<MaterialLayout>,
     attributes: Vec<DeclaredAttribute>,
     buffers: Vec<BufferLayout>,
     /// Of each process.
@@ -140,8 +142,8 @@ impl FramePlan {
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
-        let (columns, attributes) = (columns_of(&processes)?, attributes_of(&processes)?);
-        let buffers = buffers_of(&processes)?;
+        let (columns, materials) = (columns_of(&processes)?, materials_of(&processes)?);
+        let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
         let drawn_sizes = processes.iter().map(|planned| drawn_size(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
@@ -152,6 +154,7 @@ impl FramePlan {
             view_groups,
             targets,
             columns,
+            materials,
             attributes,
             buffers,
             drawn_sizes,
@@ -222,6 +225,11 @@ impl FramePlan {
         &self.columns
     }
 
+    /// The types of materials of the engine's own that the processes read, each once.
+    pub fn materials(&self) -> &[MaterialLayout] {
+        &self.materials
+    }
+
     /// The attributes of vertices that the processes read, each once.
     pub fn attributes(&self) -> &[DeclaredAttribute] {
         &self.attributes
@@ -232,12 +240,16 @@ impl FramePlan {
         &self.buffers
     }
 
-    /// Checks that a scene has the columns that the processes read, and those by which they order what they draw.
-    ///
     /// # Errors
-    /// If it lacks one, or its elements have another size.
-    pub(crate) fn check_columns(&self, draws: &[Draws<'_>], scene: &SceneRef<'_>) -> Result<(), ProcessError> {
-        check_columns(&self.processes, draws, scene)
+    /// If a scene with these types of materials lacks what the processes read, select or order by, or has it in another size.
+    pub(crate) fn check_scene(
+        &self,
+        draws: &[Draws<'_>],
+        scene: &SceneRef<'_>,
+        materials: &[MaterialLayout],
+    ) -> Result<(), ProcessError> {
+        check_columns(&self.processes, draws, scene)?;
+        check_materials(&self.processes, draws, materials)
     }
 
     /// The names of the processes that were dropped because no output depends on them.

@@ -6,6 +6,7 @@ mod chain;
 mod columns;
 mod error;
 mod frame_plan;
+mod materials;
 mod order;
 mod pass;
 mod planned_process;

@@ -112,6 +112,7 @@ impl TextureCache<'_> {
             opacity,
             blend: if opacity < 1.0 { Blend::Alpha } else { Blend::None },
             double_sided: true,
+            values: None,
         })
     }
 

@@ -19,7 +19,7 @@ use crate::backend::wgpu::resources::{
 use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
-use crate::process::{Draws, Pass};
+use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
 use crate::view::GpuView;
 
 /// A pool of frame buffers.
@@ -169,7 +169,9 @@ impl FrameBuffers {
             self.held_epoch = 0;
         }
         buffers.materials.update(device, uploads, layouts, materials)?;
-        buffers.bytes.update(device, uploads, request.draws)?;
+        let processes = request.plan.processes().iter().zip(request.draws);
+        let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
+        buffers.bytes.update(device, uploads, bytes)?;
         reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
             reallocated |= mirrored.upload(device, uploads)?;
@@ -408,6 +410,16 @@ impl Buffers {
             entries: &entries,
         })
     }
+}
+
+/// The bytes that a process's shader reads: the values of materials, then resources.
+fn bytes_of_process<'a>(
+    materials: &'a MaterialSnapshot,
+    planned: &'a PlannedProcess,
+    draws: &'a Draws<'_>,
+) -> impl Iterator<Item = &'a [u8]> {
+    let of_materials = planned.declaration.materials.iter().filter_map(|layout| materials.values(*layout));
+    of_materials.chain(draws.resources().iter().filter_map(ShaderResource::bytes))
 }
 
 /// Appends the views' GPU layouts.

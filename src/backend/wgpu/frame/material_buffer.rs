@@ -31,7 +31,7 @@ impl MaterialBuffer {
         device: &wgpu::Device,
         uploads: &UploadQueue,
         layouts: &BindGroupLayouts,
-        MaterialSnapshot { materials, textures }: &MaterialSnapshot,
+        MaterialSnapshot { materials, textures, .. }: &MaterialSnapshot,
     ) -> Result<(), BackendError> {
         let is_held = self.held.as_ref().is_some_and(|held| Arc::ptr_eq(held, materials));
         if !is_held {

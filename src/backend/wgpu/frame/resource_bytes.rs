@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{MirroredBuffer, UploadQueue, check_storage_binding_size};
-use crate::process::Draws;
 
-/// The buffers of [`ShaderResource::Bytes`](crate::process::ShaderResource::Bytes) and
-/// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), which all views of a process share.
+/// The buffers of [`ShaderResource::Bytes`](crate::process::ShaderResource::Bytes),
+/// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), and the values of materials of the engine's own, which all
+/// views of a process share.
 #[derive(Default)]
 pub(crate) struct ResourceBytes {
     /// Each with the number of its bytes.
@@ -23,19 +23,19 @@ impl ResourceBytes {
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn update(
+    pub(crate) fn update<'a, B: Iterator<Item = &'a [u8]>>(
         &mut self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
-        draws: &[Draws<'_>],
+        bytes_of_processes: impl Iterator<Item = B>,
     ) -> Result<(), BackendError> {
         self.bound.clear();
         self.of_processes.clear();
         let mut uploaded: Vec<&[u8]> = Vec::new();
-        for draws in draws {
+        for bytes_of_process in bytes_of_processes {
             let first = self.bound.len();
-            for bytes in draws.resources().iter().filter_map(|resource| resource.bytes()) {
-                // All draws of the frame are alive, so bytes at the same place are the same.
+            for bytes in bytes_of_process {
+                // All of them are alive, so bytes at the same place are the same.
                 let index = uploaded.iter().position(|other| std::ptr::eq(*other, bytes)).unwrap_or(uploaded.len());
                 self.bound.push(index);
                 if index < uploaded.len() {
@@ -56,7 +56,7 @@ impl ResourceBytes {
         Ok(())
     }
 
-    /// The buffers of a process, by index, in the order of its resources.
+    /// The buffers of a process, by index, in the order of its bytes.
     pub(crate) fn of_process(&self, process: usize) -> impl Iterator<Item = wgpu::BufferBinding<'_>> + Clone {
         let buffers = self.bound[self.of_processes[process].clone()].iter().map(|index| &self.buffers[*index]);
         buffers.filter_map(|(buffer, length)| buffer.on_device.binding(0, *length))
@@ -74,7 +74,7 @@ mod tests {
 
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
-    use crate::process::{FullScreen, ShaderResource};
+    use crate::process::ShaderResource;
 
     #[test]
     fn the_same_bytes_have_one_buffer_and_equal_bytes_have_two() {
@@ -82,11 +82,11 @@ mod tests {
         let uploads = UploadQueue::new(queue);
         let shared: Arc<[u8]> = vec![1; 64].into();
         let own = || ShaderResource::Bytes(vec![1; 64].into());
-        let draws = |resources| Draws::FullScreen(FullScreen { resources, ..FullScreen::default() });
         let same = || ShaderResource::SharedBytes(Arc::clone(&shared));
-        let draws = [draws(vec![own(), same()]), draws(Vec::new()), draws(vec![same(), own(), same()])];
+        let resources = [vec![own(), same()], Vec::new(), vec![same(), own(), same()]];
         let mut bytes = ResourceBytes::default();
-        bytes.update(&device, &uploads, &draws).unwrap();
+        let of_processes = resources.iter().map(|of_process| of_process.iter().filter_map(ShaderResource::bytes));
+        bytes.update(&device, &uploads, of_processes).unwrap();
         assert_eq!(bytes.buffers.len(), 3);
         let of_process = |process| bytes.of_process(process).map(|binding| binding.buffer.clone()).collect::<Vec<_>>();
         let [first, second, third] = [0, 1, 2].map(of_process);

@@ -29,8 +29,8 @@ pub(crate) struct ProcessPipelines {
     pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
     /// The attributes of vertices that it reads.
     attributes: Vec<AttributeLayout>,
-    /// How many columns it reads.
-    columns: usize,
+    /// How many columns and types of materials it reads.
+    arrays: usize,
     /// What it says about its resources.
     resources: Vec<wgpu::BindingType>,
     features: wgpu::Features,
@@ -64,14 +64,14 @@ impl ProcessPipelines {
         let name = planned.name.as_str();
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
-        let columns = planned.declaration.columns.len();
+        let arrays = array_count(&planned.declaration);
         let attributes: Vec<_> = attributes_of(&planned.declaration).collect();
         let is_compute = key.vertices == VertexSource::Compute;
         let AttachmentFormats { sampled, writes_buffers, .. } = &attachments;
         let process_layout = process_layout(device, key.parameter_bytes, sampled, writes_buffers, is_compute);
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
-        let engine_layout = engine_layout(device, columns, &resources, is_compute);
+        let engine_layout = engine_layout(device, arrays, &resources, is_compute);
         let shader = if key.vertices == VertexSource::None {
             None
         } else {
@@ -95,7 +95,7 @@ impl ProcessPipelines {
             process_layout,
             engine_layout,
             attributes,
-            columns,
+            arrays,
             resources,
             features,
             shader,
@@ -123,7 +123,7 @@ impl ProcessPipelines {
     /// Whether these pipelines still fit what a process of this plan declares.
     fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
-            && self.columns == planned.declaration.columns.len()
+            && self.arrays == array_count(&planned.declaration)
             && attributes_of(&planned.declaration).eq(self.attributes.iter().copied())
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
     }
@@ -318,6 +318,10 @@ fn compute_pipeline(device: &wgpu::Device, shader: &CompiledShader) -> wgpu::Com
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     })
+}
+
+fn array_count(declaration: &Declaration) -> usize {
+    declaration.columns.len() + declaration.materials.len()
 }
 
 fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLayout> {

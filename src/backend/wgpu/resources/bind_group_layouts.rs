@@ -91,16 +91,16 @@ pub(crate) fn process_layout(
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
 }
 
-/// The layout of a process's `@group(3)`: the columns of objects that it reads, then the resources of the engine's own. `None`
-/// if it has neither.
+/// The layout of a process's `@group(3)`: arrays for the columns of objects and the materials that it reads, then the resources of the
+/// engine's own. `None` if it has neither.
 pub(crate) fn engine_layout(
     device: &wgpu::Device,
-    columns: usize,
+    arrays: usize,
     resources: &[wgpu::BindingType],
     is_compute: bool,
 ) -> Option<wgpu::BindGroupLayout> {
     let [stages, _] = stages(is_compute);
-    let types = std::iter::repeat_n(storage(false), columns).chain(resources.iter().copied());
+    let types = std::iter::repeat_n(storage(false), arrays).chain(resources.iter().copied());
     let entries: Vec<_> = (0..).zip(types).map(|(binding, ty)| entry(binding, stages, ty)).collect();
     let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("engine"), entries: &entries };
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::gpu_material::GpuMaterial;
 use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
-use crate::scene::{Assets, Material};
+use crate::scene::{Assets, Material, MaterialLayout};
 use crate::view::{RejectionReason, Rejections};
 
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
@@ -14,6 +14,15 @@ pub(crate) struct MaterialSnapshot {
     /// A [`GpuMaterial`] for each slot.
     pub(crate) materials: Arc<[u8]>,
     pub(crate) textures: Arc<MaterialTextures>,
+    /// The values of each type of the engine's own that processes read: an element for each slot.
+    pub(crate) values: Vec<(MaterialLayout, Arc<[u8]>)>,
+}
+
+impl MaterialSnapshot {
+    /// The values of a type, for each slot.
+    pub(crate) fn values(&self, layout: MaterialLayout) -> Option<&[u8]> {
+        self.values.iter().find(|(known, _)| *known == layout).map(|(_, values)| &**values)
+    }
 }
 
 /// The textures of materials, and their samplers: what `@group(1)` binds behind the materials, in that order.
@@ -40,20 +49,21 @@ struct Current {
 }
 
 impl MaterialCache {
-    /// The snapshot of these materials and textures: the latest one if nothing changed.
+    /// The snapshot of these materials and textures, with the values of these types: the latest one if nothing changed.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
         assets: &Assets,
+        types: &[MaterialLayout],
         rejections: &Rejections,
     ) -> MaterialSnapshot {
         let materials = (assets.materials.identity(), assets.materials.revision());
         let textures = (assets.textures.identity(), assets.textures.revision());
-        let snapshot = match self.current.take() {
+        let mut snapshot = match self.current.take() {
             Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
             Some(current) if current.textures == textures => {
-                MaterialSnapshot { materials: self.materials(assets), ..current.snapshot }
+                MaterialSnapshot { materials: self.materials(assets), values: Vec::new(), ..current.snapshot }
             }
             _ => {
                 self.rejected_textures.clear();
@@ -64,9 +74,14 @@ impl MaterialCache {
                 ];
                 let arrays = self.textures.views(device).into();
                 let textures = Arc::new(MaterialTextures { arrays, samplers });
-                MaterialSnapshot { materials: self.materials(assets), textures }
+                MaterialSnapshot { materials: self.materials(assets), textures, values: Vec::new() }
             }
         };
+        for layout in types {
+            if snapshot.values(*layout).is_none() {
+                snapshot.values.push((*layout, values_of(assets, *layout)));
+            }
+        }
         self.current = Some(Current { materials, textures, snapshot: snapshot.clone() });
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             rejections.count(reason, index);
@@ -92,6 +107,17 @@ impl MaterialCache {
         }
         self.textures.location(texture.index())
     }
+}
+
+/// The values of a type, for each slot; all zeros for materials of another type.
+fn values_of(assets: &Assets, layout: MaterialLayout) -> Arc<[u8]> {
+    let mut bytes = vec![0; assets.materials.slot_count().max(1) * layout.bytes];
+    for (handle, material) in assets.iter::<Material>() {
+        if let Some(values) = material.values.as_ref().filter(|values| values.layout() == layout) {
+            bytes[handle.index() as usize * layout.bytes..][..layout.bytes].copy_from_slice(values.bytes());
+        }
+    }
+    bytes.into()
 }
 
 fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {

@@ -1,0 +1,87 @@
+//! Which objects a process draws by their layers and the types of their materials.
+
+use super::{ObjectTable, set_bits};
+use crate::command::{MaterialTypes, Selection};
+use crate::handle::Handle;
+use crate::scene::{LayerMask, Material, MaterialLayout, SceneRef};
+
+/// Which objects a process draws by their layers and the types of their materials.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ObjectFilter<'a> {
+    /// Of each object; empty if all have the same answer.
+    layers: &'a [LayerMask],
+    drawn: LayerMask,
+    excluded: LayerMask,
+    /// Of each object.
+    materials: &'a [Handle<Material>],
+    /// Of each material, by slot; empty if all have the same answer.
+    types: &'a [Option<MaterialLayout>],
+    drawn_types: MaterialTypes,
+}
+
+impl<'a> ObjectFilter<'a> {
+    pub(crate) fn new(table: &'a ObjectTable, scene: &SceneRef<'a>, selection: Selection) -> Self {
+        let (drawn, excluded) = (selection.layers, selection.excluded_layers);
+        let is_of_all = drawn == LayerMask::ALL && excluded == LayerMask::NONE;
+        let drawn_types = selection.material_types;
+        Self {
+            layers: if is_of_all { &[] } else { scene.layers },
+            drawn,
+            excluded,
+            materials: scene.materials,
+            types: if drawn_types == MaterialTypes::Any { &[] } else { table.material_types() },
+            drawn_types,
+        }
+    }
+
+    /// Whether it lets all objects pass.
+    pub(crate) fn passes_all(&self) -> bool {
+        self.passes_all_layers() && self.types.is_empty() && self.drawn_types.contain(None)
+    }
+
+    /// Whether it lets objects of all layers pass.
+    pub(crate) fn passes_all_layers(&self) -> bool {
+        self.layers.is_empty() && self.passes_every_layer()
+    }
+
+    /// Whether it lets an object pass.
+    #[inline]
+    pub(crate) fn passes(&self, object: usize) -> bool {
+        self.passes_layers(object) && self.passes_type(object)
+    }
+
+    #[inline]
+    fn passes_layers(&self, object: usize) -> bool {
+        match self.layers.get(object) {
+            Some(layers) => {
+                let is_drawn = self.drawn == LayerMask::ALL || layers.intersects(self.drawn);
+                let is_excluded = self.excluded == LayerMask::ALL || layers.intersects(self.excluded);
+                is_drawn && !is_excluded
+            }
+            None => self.passes_every_layer(),
+        }
+    }
+
+    #[inline]
+    fn passes_type(&self, object: usize) -> bool {
+        if self.types.is_empty() {
+            return self.drawn_types.contain(None);
+        }
+        let material = self.materials[object].index() as usize;
+        self.drawn_types.contain(self.types.get(material).copied().flatten())
+    }
+
+    /// Whether it lets objects that belong to all layers pass.
+    fn passes_every_layer(&self) -> bool {
+        self.drawn != LayerMask::NONE && self.excluded == LayerMask::NONE
+    }
+
+    /// Those of up to 64 objects that pass: bit 0 is object `first`.
+    #[inline]
+    pub(super) fn pass(&self, first: usize, objects: u64) -> u64 {
+        if self.passes_all() {
+            return objects;
+        }
+        set_bits(objects).filter(|bit| self.passes(first + bit)).fold(0, |passed, bit| passed | 1 << bit)
+    }
+}
