@@ -10,7 +10,7 @@ use drawloom::{Renderer, RendererBuilder, Submitter};
 
 use crate::bloom::{BloomDown, BloomUp};
 use crate::characters::{Characters, Crowd};
-use crate::metal::Metal;
+use crate::metal::MetalSurfaces;
 use crate::outline::{Outline, Selected};
 use crate::particles;
 use crate::picking::{self, ObjectIndex};
@@ -93,7 +93,7 @@ impl Engine {
     /// A pipeline with the engine's own material, and with picking.
     fn world(&self, deferred: Deferred) -> Result<RendererBuilder<WgpuBackend>, Box<dyn Error>> {
         let builder = self.builder()?.deferred(deferred).process(ObjectIndex).output(picking::TARGET);
-        Ok(builder.process(Metal::new(&self.device, &self.queue)))
+        Ok(builder.process(MetalSurfaces::new(&self.device, &self.queue)))
     }
 
     /// The same with bloom.

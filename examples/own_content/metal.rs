@@ -1,12 +1,12 @@
-//! A material of the engine's own: base colour, normals, and metalness with roughness from three textures, on vertices with tangents
-//! and colours.
+//! A material type of the engine's own: base colour, normals, and metalness with roughness from three textures, on vertices with
+//! tangents and colours.
 
 use std::f32::consts::TAU;
 
 use drawloom::command::Selection;
 use drawloom::glam::{Vec2, Vec3};
 use drawloom::process::{CommandDraws, Declare, Draws, ILLUMINATION_SHADER, Place, RenderProcess, ShaderResource};
-use drawloom::scene::{LayerMask, Mesh, SceneError, Topology, Vertex, VertexAttribute};
+use drawloom::scene::{MaterialType, Mesh, SceneError, Topology, Vertex, VertexAttribute};
 use drawloom::wgpu;
 use wgpu::util::DeviceExt;
 
@@ -16,19 +16,29 @@ pub const TANGENT: VertexAttribute<[f32; 4]> = VertexAttribute::new("tangent");
 /// The colour that the base colour is multiplied by.
 pub const COLOR: VertexAttribute<[u8; 4]> = VertexAttribute::new("colour");
 
-/// The layer of objects with this material.
-pub const LAYER: LayerMask = LayerMask::layer(1);
+/// What distinguishes one material of this type from another: `Metal` in `metal.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Metal {
+    /// Multiplied by the base colour.
+    pub color: [f32; 3],
+    /// Multiplied by the roughness.
+    pub roughness: f32,
+}
+
+/// The type of material.
+pub const METAL: MaterialType<Metal> = MaterialType::new("metal");
 
 /// The name of the process.
 pub const NAME: &str = "metal";
 
-/// Draws the objects of [`LAYER`], lit by all lights that reach the view, without their shadows.
-pub struct Metal {
+/// Draws the objects whose material is of the type [`METAL`], lit by all lights that reach the view, without their shadows.
+pub struct MetalSurfaces {
     shader: String,
     resources: Vec<ShaderResource<'static>>,
 }
 
-impl Metal {
+impl MetalSurfaces {
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Self {
         use wgpu::TextureFormat::{Rgba8Unorm, Rgba8UnormSrgb};
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
@@ -48,7 +58,7 @@ impl Metal {
     }
 }
 
-impl RenderProcess for Metal {
+impl RenderProcess for MetalSurfaces {
     fn name(&self) -> &str {
         NAME
     }
@@ -57,13 +67,14 @@ impl RenderProcess for Metal {
         declare.at(Place::AfterLighting);
         declare.draws_over("radiance");
         declare.draws_depth("depth");
+        declare.reads_materials(METAL);
         declare.reads_attribute(TANGENT, [1.0, 0.0, 0.0, 1.0]);
         declare.reads_attribute(COLOR, [255; 4]);
     }
 
     fn draws(&self) -> Draws<'_> {
         let (shader, resources) = (&self.shader, self.resources.clone());
-        let selection = Selection::OPAQUE.in_layers(LAYER);
+        let selection = Selection::OPAQUE.of_material_type(METAL);
         Draws::Commands(CommandDraws { shader, selection, resources, ..CommandDraws::default() })
     }
 }

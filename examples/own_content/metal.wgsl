@@ -1,7 +1,13 @@
-@group(3) @binding(0) var base_colors: texture_2d<f32>;
-@group(3) @binding(1) var normals: texture_2d<f32>;
-@group(3) @binding(2) var metalness_and_roughness: texture_2d<f32>;
-@group(3) @binding(3) var repeat: sampler;
+struct Metal {
+    color: vec3<f32>,
+    roughness: f32,
+}
+
+@group(3) @binding(0) var<storage, read> metals: array<Metal>;
+@group(3) @binding(1) var base_colors: texture_2d<f32>;
+@group(3) @binding(2) var normals: texture_2d<f32>;
+@group(3) @binding(3) var metalness_and_roughness: texture_2d<f32>;
+@group(3) @binding(4) var repeat: sampler;
 
 struct Corner {
     @invariant @builtin(position) clip: vec4<f32>,
@@ -10,6 +16,7 @@ struct Corner {
     @location(2) tangent: vec4<f32>,
     @location(3) uv: vec2<f32>,
     @location(4) color: vec3<f32>,
+    @location(5) @interpolate(flat) material: u32,
 }
 
 @vertex
@@ -18,16 +25,18 @@ fn vertex(in: VertexInput) -> Corner {
     let relative = relative_position(object, in.position);
     let turned = rotate(object.orientation, object.scale * in.tangent.xyz);
     let normal = world_normal(object, in.normal);
-    return Corner(clip_position(relative), relative, normal, vec4<f32>(turned, in.tangent.w), in.uv, in.colour.rgb);
+    let tangent = vec4<f32>(turned, in.tangent.w);
+    return Corner(clip_position(relative), relative, normal, tangent, in.uv, in.colour.rgb, object.material);
 }
 
 @fragment
 fn fragment(in: Corner) -> @location(0) vec4<f32> {
-    let base = textureSample(base_colors, repeat, in.uv).rgb * in.color;
+    let metal = metals[in.material];
+    let base = textureSample(base_colors, repeat, in.uv).rgb * in.color * metal.color;
     let bump = textureSample(normals, repeat, in.uv).xyz * 2.0 - 1.0;
     let surface = textureSample(metalness_and_roughness, repeat, in.uv);
     let metalness = surface.r;
-    let roughness = max(surface.g, 0.05);
+    let roughness = clamp(surface.g * metal.roughness, 0.05, 1.0);
 
     // From the tangent space of the texture to the world's axes.
     let smooth_normal = normalize(in.normal);

@@ -4,8 +4,6 @@ use drawloom::command::Selection;
 use drawloom::process::{CommandDraws, Declare, Draws, GeometryBuffer, GeometryFormats, RenderProcess, SURFACE_SHADER};
 use drawloom::scene::ObjectColumn;
 
-use crate::world::FIELD;
-
 /// The colour of each object, linear, and how much of it is emitted.
 pub const TINT: ObjectColumn<[f32; 4]> = ObjectColumn::new("tint");
 
@@ -34,7 +32,7 @@ impl RenderProcess for TintedGeometryBuffer {
     }
 
     fn draws(&self) -> Draws<'_> {
-        let selection = Selection::OPAQUE.in_layers(FIELD);
+        let selection = Selection::OPAQUE.of_shipped_materials();
         Draws::Commands(CommandDraws { shader: &self.shader, selection, ..CommandDraws::default() })
     }
 }

@@ -3,19 +3,22 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
-    Assets, Bounds, Camera, Changes, ColumnValues, LayerMask, Light, Material, Mesh, SceneError, SceneRef, Topology,
-    Vertex,
+    Assets, Bounds, Camera, Changes, ColumnValues, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
 };
 
-use crate::metal;
+use crate::metal::{self, METAL, Metal};
 use crate::temporal::DISPLACEMENT;
 use crate::tints::TINT;
 
-/// The layer of the spheres.
-pub const FIELD: LayerMask = LayerMask::layer(0);
-
 /// The positions of the rings in metres, and how far each is turned towards the camera.
 const RINGS: [([f64; 3], f32); 3] = [([-9.0, 6.0, 16.0], 0.9), ([0.0, 6.5, 18.0], 1.57), ([9.0, 6.0, 16.0], 0.5)];
+
+/// The material of each ring.
+const METALS: [(&str, Metal); 3] = [
+    ("gold", Metal { color: [1.0, 1.0, 1.0], roughness: 1.0 }),
+    ("copper", Metal { color: [1.0, 0.62, 0.5], roughness: 0.5 }),
+    ("blued steel", Metal { color: [0.35, 0.5, 1.0], roughness: 1.6 }),
+];
 
 pub struct World {
     pub camera: Camera,
@@ -28,7 +31,6 @@ pub struct World {
     bounds: Vec<Bounds>,
     meshes: Vec<Handle<Mesh>>,
     materials: Vec<Handle<Material>>,
-    layers: Vec<LayerMask>,
     /// How many objects are in the field; rings follow.
     field: usize,
     /// Red, green, blue, and how much of it is emitted.
@@ -49,6 +51,12 @@ impl World {
         let torus_bounds = torus.bounds();
         let torus = assets.add(torus)?;
         let white = assets.add(Material { name: "white".into(), diffuse: Vec3::ONE, ..Material::default() })?;
+        let metals = METALS.map(|(name, metal)| Material {
+            name: name.into(),
+            values: Some(METAL.values(metal)),
+            ..Material::default()
+        });
+        let metals = metals.map(|metal| assets.add(metal));
         let tint = |object: usize| {
             let [red, green, blue] = hue(object as f32 / count as f32 * 5.0);
             let emitted = if object.is_multiple_of(97) { 6.0 } else { 0.0 };
@@ -72,18 +80,17 @@ impl World {
             bounds: vec![bounds; count],
             meshes: vec![sphere; count],
             materials: vec![white; count],
-            layers: vec![FIELD; count],
             field,
             tints: (0..count).map(tint).collect(),
             displacements: vec![[0.0; 4]; count],
         };
-        for (object, (position, turn)) in (field..).zip(RINGS) {
+        for ((object, (position, turn)), metal) in (field..).zip(RINGS).zip(metals) {
             world.positions[object] = position.into();
             world.orientations[object] = Quat::from_rotation_x(turn);
             world.scales[object] = Vec3::splat(3.0);
             world.bounds[object] = torus_bounds;
             world.meshes[object] = torus;
-            world.layers[object] = metal::LAYER;
+            world.materials[object] = metal?;
         }
         world.place();
         world.displacements.fill([0.0; 4]);
@@ -122,7 +129,7 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
-            layers: &self.layers,
+            layers: &[],
             columns,
             changes: Changes::Unknown,
             assets: &self.assets,

@@ -180,8 +180,15 @@ impl RenderProcess for Colored {
             }
         };
         let shader = &SHADERS[usize::from(self.is_striped)];
-        let blend_equations = vec![BlendEquation::REPLACE];
-        Draws::Commands(CommandDraws { shader, selection, resources, blend_equations, ..CommandDraws::default() })
+        Draws::Commands(CommandDraws {
+            shader,
+            selection,
+            blend_equations: vec![BlendEquation::REPLACE],
+            // Otherwise the depth hides what the shipped processes draw in the same place.
+            writes_depth: !self.is_striped,
+            resources,
+            ..CommandDraws::default()
+        })
     }
 
     fn cpu_shader(&self) -> Option<CpuShader> {
