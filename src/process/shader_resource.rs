@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Something of the engine's own that a process's shader reads, at `@group(3)`: after the
-/// [columns](super::Declare::reads_column) that the process reads, each has the next binding.
+/// [columns](super::Declare::reads_column) and [materials](super::Declare::reads_materials) that the process reads, each has the next
+/// binding.
 ///
 /// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another `wgpu::Instance`.
 ///

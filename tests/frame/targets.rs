@@ -2,12 +2,14 @@
 
 use std::sync::{Arc, Mutex};
 
+use bytemuck::Pod;
 use drawloom::backend::NullBackend;
+use drawloom::command::Selection;
 use drawloom::process::{
     BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, PlanError, ProcessError,
     RenderProcess, StorageBuffer, TargetSize,
 };
-use drawloom::scene::{Blend, ViewKind};
+use drawloom::scene::{Blend, Material, MaterialType, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
@@ -324,4 +326,70 @@ fn blend_equations_fit_the_targets() {
     assert!(is_named, "{error}");
     let error = record(Format::Rgba16Float, vec![add]).unwrap_err();
     assert_eq!(error.to_string(), "process \"mixed\" has 1 blend equations for 2 colour targets");
+}
+
+#[test]
+fn materials_of_another_size_are_named() {
+    struct Reading<const N: usize>(bool);
+    impl<const N: usize> Reading<N>
+    where
+        [u32; N]: Pod,
+    {
+        const METAL: MaterialType<[u32; N]> = MaterialType::new("metal");
+    }
+    impl RenderProcess for Reading<4> {
+        fn name(&self) -> &str {
+            "four"
+        }
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_color("four", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+            declare.keep();
+            if self.0 {
+                declare.reads_materials(Self::METAL);
+            }
+        }
+        fn draws(&self) -> Draws<'_> {
+            let selection = Selection::OPAQUE.of_material_type(Self::METAL);
+            Draws::Commands(CommandDraws { selection, ..CommandDraws::default() })
+        }
+    }
+    impl RenderProcess for Reading<2> {
+        fn name(&self) -> &str {
+            "two"
+        }
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_color("two", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+            declare.keep();
+            declare.reads_materials(Self::METAL);
+        }
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws::default())
+        }
+    }
+    let build = |declares| {
+        let builder = Renderer::builder(NullBackend).process(Reading::<4>(declares));
+        builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap().0
+    };
+    let mut scene = field(3);
+    for declares in [true, false] {
+        let mut renderer = build(declares);
+        let values = Some(Reading::<4>::METAL.values([1; 4]));
+        let fitting = scene.add(Material { values, ..Material::default() }).unwrap();
+        renderer.record(scene.as_scene_ref()).map(drop).unwrap();
+        let values = Some(Reading::<2>::METAL.values([1; 2]));
+        let other = scene.add(Material { values, ..Material::default() }).unwrap();
+        let error = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err().to_string();
+        assert_eq!(error, "process \"four\" knows materials \"metal\" of 16 bytes, but the scene has some of 8");
+        scene.remove(other).unwrap();
+        scene.remove(fitting).unwrap();
+        renderer.record(scene.as_scene_ref()).map(drop).unwrap();
+    }
+    let builder = Renderer::builder(NullBackend).process(Reading::<4>(true)).process(Reading::<2>(true));
+    let error = builder.build(Arc::new(Scheduler::new(1).unwrap())).map(drop).unwrap_err();
+    let is_named = matches!(
+        &error,
+        BuildError::Plan(PlanError::ConflictingMaterials { process, material: "metal", first: 16, second: 8 })
+            if process == "two"
+    );
+    assert!(is_named, "{error}");
 }

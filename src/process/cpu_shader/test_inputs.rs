@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::{Materials, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderView};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
-use crate::scene::{Blend, Camera, Light, Projection, ViewKind};
+use crate::scene::{Blend, Camera, Light, MaterialValues, Projection, ViewKind};
 use crate::view::{GpuLight, RenderView};
 
 /// The unit roundoff of f32: 2⁻²⁴.
@@ -109,6 +109,10 @@ pub(in crate::process) struct OneMaterial<R>(pub(in crate::process) ShaderMateri
 impl<R: Real> Materials<R> for OneMaterial<R> {
     fn get(&self, _slot: u32) -> ShaderMaterial<R> {
         self.0
+    }
+
+    fn values(&self, _: u32) -> Option<&MaterialValues> {
+        None
     }
 
     fn sample(&self, _slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {

@@ -4,7 +4,8 @@
 //   @group(1)  materials and their textures: below
 //   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order, then
 //              the buffers that it reads or changes
-//   @group(3)  the engine's own: the columns of objects that the process reads, then its resources, from binding 0
+//   @group(3)  the engine's own, from binding 0: the columns of objects that the process reads, the values of materials, then its
+//              resources
 //
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 
