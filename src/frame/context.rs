@@ -9,7 +9,7 @@ use super::stage_clock::StageClock;
 use super::tables::FrameTables;
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
-use crate::process::TargetSize;
+use crate::process::DrawnArea;
 use crate::scene::Projection;
 use crate::view::ObjectFilter;
 
@@ -107,7 +107,7 @@ impl<B: Backend> FrameContext<'_, B> {
         let process = self.request.passes[pass].process_index;
         // The test is of the triangles of the mesh, and of the pixels of the picture.
         let is_exact = self.request.draws[process].draws_plain_meshes()
-            && self.request.plan.drawn_size(process) == TargetSize::Picture;
+            && self.request.plan.drawn_area(process) == DrawnArea::PICTURE;
         self.culls_triangles && is_exact && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 

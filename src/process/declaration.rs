@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use super::{BufferAccess, BufferLayout, Format, Place, StorageBuffer, TargetSize};
+use super::{Access, BufferAccess, BufferLayout, ClearColor, Format, Place, StorageBuffer, TargetSize};
 use crate::scene::{
     AttributeLayout, AttributeValue, ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, VertexAttribute,
     ViewKind,
@@ -93,6 +93,34 @@ impl Declare {
     pub fn size(&mut self, target: &str, size: TargetSize) {
         let size = if size == TargetSize::Divided(1) { TargetSize::Picture } else { size };
         self.declaration.sizes.push((target.to_owned(), size));
+    }
+
+    /// Gives a target that the process clears four samples a pixel, which every device has, so that edges are smooth. All targets that a
+    /// process draws into, and the depth that it tests, have the same number of samples. Shaders read one as
+    /// `texture_multisampled_2d`, or `texture_depth_multisampled_2d`, if it is not [resolved](Declare::resolves) first.
+    ///
+    /// Triangle culling, which looks at the centres of pixels, leaves such a process out. The software backend refuses it.
+    ///
+    /// ```
+    /// use drawloom::process::{ClearColor, Declare, Format};
+    ///
+    /// fn declare(declare: &mut Declare) {
+    ///     declare.clears_color("samples", Format::Rgba16Float, ClearColor::Background);
+    ///     declare.clears_depth("depth of samples", Format::Depth32Float);
+    ///     declare.multisampled("samples");
+    ///     declare.multisampled("depth of samples");
+    ///     // What tone mapping samples: the mean of the four.
+    ///     declare.resolves("samples", "radiance", Format::Rgba16Float);
+    /// }
+    /// ```
+    pub fn multisampled(&mut self, target: &str) {
+        self.declaration.multisampled.push(target.to_owned());
+    }
+
+    /// Writes the mean of a colour target's samples into another target of the same format and size, once the process has drawn.
+    pub fn resolves(&mut self, target: &str, into: &str, format: Format) {
+        self.declaration.resolves.push((target.to_owned(), into.to_owned()));
+        self.access(into, Access::Resolve(format));
     }
 
     /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
@@ -285,6 +313,10 @@ pub struct Declaration {
     pub accesses: Vec<(String, Access)>,
     /// The sizes of targets that it creates, if they are not those of the pictures.
     pub sizes: Vec<(String, TargetSize)>,
+    /// The targets that it creates with several samples a pixel.
+    pub multisampled: Vec<String>,
+    /// The targets whose samples it resolves, each with the one that gets their means.
+    pub resolves: Vec<(String, String)>,
     /// The data of objects that its shader reads, in the order of their bindings.
     pub columns: Vec<ColumnLayout>,
     /// The types of materials whose values its shader reads, in the order of their bindings.
@@ -354,130 +386,4 @@ pub struct DeclaredAttribute {
 /// the frame before, and once the frame is submitted, the copy is that of the frame itself.
 pub fn previous_name(target: &str) -> String {
     format!("{target} of the frame before")
-}
-
-/// How a process uses a target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Access {
-    /// Drawn into; cleared first.
-    ClearColor(Format, ClearColor),
-    /// Drawn into, over its content.
-    DrawOver,
-    /// Tested and written; cleared first.
-    ClearDepth(Format),
-    /// Tested and written; cleared first. A layer of a texture array that all views of the kind share.
-    ClearDepthLayer(Format),
-    /// Tested and written, over its content.
-    DrawDepth,
-    /// Tested; its stencil is written.
-    MarkStencil,
-    /// Only its stencil is tested.
-    TestStencil,
-    /// Tested.
-    TestDepth,
-    /// Tested for equality.
-    MatchDepth,
-    /// Read by the shader.
-    Sample,
-    /// Read by the shader: what another target held at the end of the frame before. The name is that of [`previous_name`].
-    SamplePrevious,
-    /// Read by the shader: a texture array that all views of this kind share.
-    SampleLayers(ViewKind),
-    /// Written by a raw pass.
-    Write(Format),
-    /// Read and written by a raw pass.
-    Change,
-    /// Read by a raw pass.
-    Read,
-}
-
-impl Access {
-    /// Whether it depends on what other processes wrote in the same frame.
-    pub fn reads(self) -> bool {
-        !matches!(
-            self,
-            Self::SamplePrevious
-                | Self::ClearColor(..)
-                | Self::ClearDepth(_)
-                | Self::ClearDepthLayer(_)
-                | Self::Write(_)
-        )
-    }
-
-    /// Whether it changes the target.
-    pub fn writes(self) -> bool {
-        !matches!(
-            self,
-            Self::TestStencil
-                | Self::TestDepth
-                | Self::MatchDepth
-                | Self::Sample
-                | Self::SamplePrevious
-                | Self::SampleLayers(_)
-                | Self::Read
-        )
-    }
-
-    /// The target's format, if the access creates the target.
-    pub fn format(self) -> Option<Format> {
-        match self {
-            Self::ClearColor(format, _)
-            | Self::ClearDepth(format)
-            | Self::ClearDepthLayer(format)
-            | Self::Write(format) => Some(format),
-            _ => None,
-        }
-    }
-
-    /// The kind of view that the target belongs to, for a process that draws in views of the kind `own`.
-    pub fn views(self, own: ViewKind) -> ViewKind {
-        match self {
-            Self::SampleLayers(views) => views,
-            _ => own,
-        }
-    }
-
-    /// Whether the target is the depth target.
-    pub fn is_depth(self) -> bool {
-        matches!(
-            self,
-            Self::ClearDepth(_)
-                | Self::ClearDepthLayer(_)
-                | Self::DrawDepth
-                | Self::MarkStencil
-                | Self::TestStencil
-                | Self::TestDepth
-                | Self::MatchDepth
-        )
-    }
-
-    /// Whether it may write the depth of a depth target.
-    pub fn writes_depth(self) -> bool {
-        self.is_depth() && self.writes() && self != Self::MarkStencil
-    }
-
-    /// Whether it keeps what a depth target holds.
-    pub fn keeps_depth(self) -> bool {
-        self.is_depth() && self.reads()
-    }
-
-    /// Whether the target is drawn into as colour.
-    pub fn is_color(self) -> bool {
-        matches!(self, Self::ClearColor(..) | Self::DrawOver)
-    }
-
-    /// Whether a raw pass makes the access.
-    pub fn is_raw(self) -> bool {
-        matches!(self, Self::Write(_) | Self::Change | Self::Read)
-    }
-}
-
-/// The colour that a target is cleared to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ClearColor {
-    /// Red, green, blue and alpha, linear.
-    Value([f64; 4]),
-    /// The scene's background, opaque.
-    Background,
 }

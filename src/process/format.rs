@@ -70,6 +70,16 @@ impl Format {
         !self.is_depth_stencil() && !matches!(self, Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
 
+    /// Whether a target can have [several samples a pixel](super::Declare::multisampled) on every adapter.
+    pub fn can_be_multisampled(self) -> bool {
+        self.is_depth_stencil() || self.can_be_resolved()
+    }
+
+    /// Whether such a target's samples can be [resolved](super::Declare::resolves) on every adapter.
+    pub fn can_be_resolved(self) -> bool {
+        self.can_be_blended()
+    }
+
     /// Whether it holds whole numbers.
     pub fn is_integer(self) -> bool {
         matches!(self, Self::R32Uint | Self::Stencil8)

@@ -8,6 +8,7 @@
 //! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
 //!   post-processing.
 
+mod access;
 mod blend_equation;
 mod compute_dispatch;
 #[cfg(feature = "software")]
@@ -30,6 +31,7 @@ mod stencil;
 mod storage_buffer;
 mod target_size;
 
+pub use access::{Access, ClearColor};
 pub use blend_equation::{BlendComponent, BlendEquation, BlendFactor};
 pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
@@ -38,7 +40,7 @@ pub use cpu_shader::{
     ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject,
     ShaderView, VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
-pub use declaration::{Access, ClearColor, Declaration, Declare, DeclaredAttribute, previous_name};
+pub use declaration::{Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
     Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place,
     Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
@@ -47,7 +49,7 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use plan::{
-    ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup, ViewOrder,
+    ChainSlot, DrawnArea, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup, ViewOrder,
 };
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;

@@ -26,6 +26,7 @@ mod light_cut_off;
 mod light_volumes;
 mod lighting;
 mod materials;
+mod multisampling;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -77,6 +78,7 @@ fn main() {
         (compute::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
         (materials::CASES, Needs::Adapter),
+        (multisampling::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),

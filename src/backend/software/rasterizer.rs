@@ -154,6 +154,10 @@ fn software_pass<R: Precision>(
         let message = String::from("the software backend has no stencil");
         return Err(BackendError::Validation { label: process, message });
     }
+    if request.plan.drawn_area(pass.process_index).multisampled {
+        let message = String::from("the software backend draws one sample a pixel");
+        return Err(BackendError::Validation { label: process, message });
+    }
     let attachments = attachments(request, pass, targets)?;
     attachments.check(&process)?;
     Ok(SoftwarePass { pass, process, draws, attachments })

@@ -162,6 +162,8 @@ pub(crate) fn new_read_back(
         Some("it is empty")
     } else if !(0..2).all(is_within) {
         Some("it is not within the target")
+    } else if found.texture.sample_count() > 1 {
+        Some("samples are resolved before they are read back")
     } else if format.has_depth() && format.has_stencil() {
         Some("depth with a stencil is not read back")
     } else if format.is_depth_stencil() && size != whole {

@@ -102,6 +102,34 @@ pub enum PlanError {
         /// The process.
         process: String,
     },
+    /// A target is to have several samples a pixel, or does, that cannot.
+    #[error("process {process:?} has several samples a pixel in target {target:?}, {problem}")]
+    Multisampling {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A process draws into, or tests, targets with different numbers of samples.
+    #[error("process {process:?} uses targets {:?} and {:?} in one pass, but only one of them has several samples a pixel", targets[0], targets[1])]
+    UnequalSamples {
+        /// The process.
+        process: String,
+        /// The targets.
+        targets: [String; 2],
+    },
+    /// A target is resolved that cannot be.
+    #[error("process {process:?} resolves target {target:?} {problem}")]
+    Resolve {
+        /// The process.
+        process: String,
+        /// The target with several samples a pixel.
+        target: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
     /// Two processes read materials of one type with values of different sizes.
     #[error("process {process:?} reads materials {material:?} of {second} bytes, another process of {first}")]
     ConflictingMaterials {

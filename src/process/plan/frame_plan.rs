@@ -10,13 +10,14 @@ use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::materials::{check_materials, materials_of};
 use super::order::{AddedProcess, order_constraints};
-use super::planned_target::{check_blending, check_stencil, drawn_size, targets_of};
+use super::planned_target::{check_blending, check_stencil, drawn_area, targets_of};
+use super::resource_names::{buffer_name, passed_on_resources, resource_name};
 use super::view_group::view_groups;
-use super::{ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
+use super::{ChainSlot, DrawnArea, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
 use crate::process::{
-    Access, BufferAccess, BufferLayout, Declaration, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters,
-    TargetSize, previous_name,
+    Access, BufferAccess, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
+    previous_name,
 };
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
@@ -34,7 +35,7 @@ pub struct FramePlan {
     attributes: Vec<DeclaredAttribute>,
     buffers: Vec<BufferLayout>,
     /// Of each process.
-    drawn_sizes: Vec<TargetSize>,
+    drawn_areas: Vec<DrawnArea>,
     dropped: Vec<String>,
     dot: String,
 }
@@ -144,7 +145,7 @@ impl FramePlan {
         targets.extend(placeholder);
         let (columns, materials) = (columns_of(&processes)?, materials_of(&processes)?);
         let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
-        let drawn_sizes = processes.iter().map(|planned| drawn_size(planned, &targets)).collect();
+        let drawn_areas = processes.iter().map(|planned| drawn_area(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
         Ok(Self {
@@ -157,7 +158,7 @@ impl FramePlan {
             materials,
             attributes,
             buffers,
-            drawn_sizes,
+            drawn_areas,
             dropped,
             dot,
         })
@@ -215,9 +216,9 @@ impl FramePlan {
         &self.targets
     }
 
-    /// The size of the targets that a process, by index, draws into; that of the picture if it draws into none.
-    pub fn drawn_size(&self, process: usize) -> TargetSize {
-        self.drawn_sizes[process]
+    /// The pixels of the targets that a process, by index, draws into; those of the picture if it draws into none.
+    pub fn drawn_area(&self, process: usize) -> DrawnArea {
+        self.drawn_areas[process]
     }
 
     /// The columns of objects that the processes read, each once.
@@ -285,40 +286,9 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Opti
         stored: false,
         layered: true,
         size: TargetSize::Picture,
+        multisampled: false,
         copy_of: None,
     })
-}
-
-/// A buffer's name in the graph.
-fn buffer_name(buffer: &str) -> String {
-    format!("buffer {buffer}")
-}
-
-/// The names of the targets and buffers that one process writes and another then uses, for an edge's label.
-fn passed_on_resources(before: &Declaration, after: &Declaration) -> String {
-    let mut names: Vec<_> = after
-        .accesses
-        .iter()
-        .filter_map(|(target, access)| {
-            let same_views = access.views(after.views) == before.views;
-            (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
-        })
-        .collect();
-    let changed = before.buffers.iter().filter(|(_, access)| *access == BufferAccess::Change).map(|(buffer, _)| buffer);
-    let used = changed.filter(|changed| after.buffers.iter().any(|(buffer, _)| buffer == *changed));
-    names.extend(used.map(|buffer| buffer.name));
-    // A process may test and sample the same target.
-    names.sort_unstable();
-    names.dedup();
-    names.join(", ")
-}
-
-/// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.
-fn resource_name(kind: ViewKind, target: &str) -> String {
-    match kind {
-        ViewKind::Main => target.to_owned(),
-        other => format!("{}: {target}", other.name()),
-    }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]

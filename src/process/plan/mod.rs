@@ -11,6 +11,7 @@ mod order;
 mod pass;
 mod planned_process;
 mod planned_target;
+mod resource_names;
 mod view_group;
 
 pub use chain::ChainSlot;
@@ -18,5 +19,5 @@ pub use error::{PlanError, ProcessError};
 pub use frame_plan::FramePlan;
 pub use pass::Pass;
 pub use planned_process::PlannedProcess;
-pub use planned_target::PlannedTarget;
+pub use planned_target::{DrawnArea, PlannedTarget};
 pub use view_group::{ViewGroup, ViewOrder};

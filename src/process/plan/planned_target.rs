@@ -19,8 +19,24 @@ pub struct PlannedTarget {
     pub layered: bool,
     /// Its size.
     pub size: TargetSize,
+    /// Whether it has [several samples a pixel](crate::process::Declare::multisampled).
+    pub multisampled: bool,
     /// The target whose content is copied here at the end of each frame; `None` for one that processes write.
     pub copy_of: Option<String>,
+}
+
+/// The pixels of the targets that a process draws into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawnArea {
+    /// Their size.
+    pub size: TargetSize,
+    /// Whether they have several samples each.
+    pub multisampled: bool,
+}
+
+impl DrawnArea {
+    /// The pixels of the picture, with a sample each.
+    pub const PICTURE: Self = Self { size: TargetSize::Picture, multisampled: false };
 }
 
 /// The targets of all processes, in the order in which they are first written, then the copies of those whose history is read.
@@ -61,12 +77,14 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
     let mut targets: Vec<PlannedTarget> = Vec::new();
     for planned in processes {
         check_sizes(planned)?;
+        check_multisampling(planned)?;
     }
     for (planned, name, access) in accesses(processes) {
         let Some(format) = access.format() else { continue };
         let views = planned.declaration.views;
         let layered = matches!(access, Access::ClearDepthLayer(_));
         let size = size_of(&planned.declaration, name);
+        let multisampled = planned.declaration.multisampled.contains(name);
         match targets.iter().find(|known| known.name == *name && known.views == views) {
             Some(known) if known.format != format => {
                 return Err(PlanError::ConflictingFormats {
@@ -78,13 +96,18 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
             Some(known) if known.layered != layered => {
                 return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
             }
+            Some(known) if known.multisampled != multisampled => {
+                let problem = "which another process creates with another number of samples";
+                return Err(multisampling_error(planned, name, problem));
+            }
             Some(known) if known.size != size => {
                 return Err(PlanError::ConflictingSizes { target: name.clone(), first: known.size, second: size });
             }
             Some(_) => {}
             None => {
                 let (name, copy_of) = (name.clone(), None);
-                targets.push(PlannedTarget { name, views, format, stored: false, layered, size, copy_of });
+                let stored = false;
+                targets.push(PlannedTarget { name, views, format, stored, layered, size, multisampled, copy_of });
             }
         }
     }
@@ -115,22 +138,75 @@ fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
 }
 
 /// # Errors
-/// If a process draws into targets of different sizes, or tests depth of another size.
+/// If a target has several samples a pixel that cannot have them, or is resolved that cannot be.
+fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
+    let Declaration { accesses, multisampled, resolves, .. } = &planned.declaration;
+    let format_of = |target: &String| {
+        accesses.iter().find_map(|(name, access)| match access {
+            Access::ClearColor(format, _) | Access::ClearDepth(format) if name == target => Some(*format),
+            _ => None,
+        })
+    };
+    for target in multisampled {
+        let problem = match format_of(target) {
+            None => "which it does not clear, or clears in layers",
+            Some(format) if !format.can_be_multisampled() => "whose format cannot have several samples a pixel",
+            Some(_) => continue,
+        };
+        return Err(multisampling_error(planned, target, problem));
+    }
+    for (source, into) in resolves {
+        let is_drawn = accesses.iter().any(|(name, access)| name == source && access.is_color());
+        let problem = match accesses.iter().find(|(name, access)| name == into && access.format().is_some()) {
+            _ if !is_drawn => "without drawing into it as colour",
+            _ if resolves.iter().filter(|(other, _)| other == source).count() > 1 => "twice",
+            Some((_, Access::Resolve(format))) if format.can_be_resolved() => continue,
+            Some((_, Access::Resolve(_))) => "in a format that cannot be resolved",
+            _ => "into a target that it uses in another way",
+        };
+        return Err(PlanError::Resolve { process: planned.name.clone(), target: source.clone(), problem });
+    }
+    Ok(())
+}
+
+fn multisampling_error(planned: &PlannedProcess, target: &str, problem: &'static str) -> PlanError {
+    PlanError::Multisampling { process: planned.name.clone(), target: target.to_owned(), problem }
+}
+
+/// # Errors
+/// If a process draws into targets of different sizes or numbers of samples, tests depth of another, or resolves into another format.
 fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<(), PlanError> {
     let mut attached = attached_targets(planned, targets);
     let Some(first) = attached.next() else { return Ok(()) };
-    match attached.find(|other| other.size != first.size) {
-        None => Ok(()),
-        Some(other) => {
-            let (process, targets) = (planned.name.clone(), [first.name.clone(), other.name.clone()]);
-            Err(PlanError::UnequalSizes { process, targets })
+    for other in attached {
+        let (process, targets) = (planned.name.clone(), [first.name.clone(), other.name.clone()]);
+        if other.size != first.size {
+            return Err(PlanError::UnequalSizes { process, targets });
+        }
+        if other.multisampled != first.multisampled {
+            return Err(PlanError::UnequalSamples { process, targets });
         }
     }
+    let views = planned.declaration.views;
+    let found = |name: &String| targets.iter().find(|known| known.name == *name && known.views == views);
+    for (source, into) in &planned.declaration.resolves {
+        let Some((from, to)) = found(source).zip(found(into)) else { continue };
+        let problem = if !from.multisampled {
+            "which has one sample a pixel"
+        } else if (from.format, from.size, false) != (to.format, to.size, to.multisampled) {
+            "into one of another format or size, or with several samples a pixel"
+        } else {
+            continue;
+        };
+        return Err(PlanError::Resolve { process: planned.name.clone(), target: source.clone(), problem });
+    }
+    Ok(())
 }
 
-/// The size of the targets that a process draws into; that of the picture if it draws into none.
-pub(super) fn drawn_size(planned: &PlannedProcess, targets: &[PlannedTarget]) -> TargetSize {
-    attached_targets(planned, targets).next().map_or(TargetSize::Picture, |target| target.size)
+/// The pixels of the targets that a process draws into; those of the picture if it draws into none.
+pub(super) fn drawn_area(planned: &PlannedProcess, targets: &[PlannedTarget]) -> DrawnArea {
+    let area = |target: &PlannedTarget| DrawnArea { size: target.size, multisampled: target.multisampled };
+    attached_targets(planned, targets).next().map_or(DrawnArea::PICTURE, area)
 }
 
 /// # Errors
@@ -228,6 +304,9 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
         }
         let mut written = targets.iter().filter(|known| known.views == views && !known.layered);
         match written.find(|known| previous_name(&known.name) == *name) {
+            Some(source) if source.multisampled => {
+                return Err(multisampling_error(planned, &source.name, "which can have no history"));
+            }
             None => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
             Some(source) => {
                 let (name, copy_of) = (name.clone(), Some(source.name.clone()));

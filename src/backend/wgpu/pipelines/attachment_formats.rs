@@ -1,6 +1,6 @@
 //! The attachments of a process's passes, as its pipelines and bundles see them.
 
-use crate::backend::wgpu::resources::{SampledTarget, texture_format};
+use crate::backend::wgpu::resources::{SampledTarget, sample_count, texture_format};
 use crate::process::{
     Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Declaration, Format, FramePlan, Stencil,
     StencilOperation,
@@ -14,6 +14,8 @@ pub(super) struct AttachmentFormats {
     /// Whether each of the colours can be blended.
     pub(super) can_be_blended: Vec<bool>,
     pub(super) depth: Option<DepthAttachmentFormat>,
+    /// The number of samples of a pixel that is drawn.
+    pub(super) samples: u32,
     pub(super) sampled: Vec<SampledTarget>,
     /// Whether the shader writes each of the process's buffers.
     pub(super) writes_buffers: Vec<bool>,
@@ -48,14 +50,21 @@ impl AttachmentFormats {
         });
         let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
             Access::Sample | Access::SamplePrevious => {
-                Some(SampledTarget { format: format_of(declaration.views, target), layered: false })
+                let format = format_of(declaration.views, target);
+                let multisampled = planned(declaration.views, target).is_some_and(|planned| planned.multisampled);
+                Some(SampledTarget { format, layered: false, multisampled })
             }
-            Access::SampleLayers(views) => Some(SampledTarget { format: format_of(*views, target), layered: true }),
+            Access::SampleLayers(views) => {
+                Some(SampledTarget { format: format_of(*views, target), layered: true, multisampled: false })
+            }
             _ => None,
         });
         let writes_buffers = declaration.bound_buffers().map(|(_, writes)| writes);
         let (sampled, writes_buffers) = (sampled.collect(), writes_buffers.collect());
-        Self { colors, can_be_blended, depth, sampled, writes_buffers }
+        let drawn = declaration.colors().map(|(target, _)| target).chain(declaration.depth().map(|(target, _)| target));
+        let mut drawn = drawn.filter_map(|target| planned(declaration.views, target));
+        let samples = drawn.next().map_or(1, sample_count);
+        Self { colors, can_be_blended, depth, samples, sampled, writes_buffers }
     }
 }
 

@@ -192,7 +192,7 @@ impl ProcessPipelines {
             label: Some(label),
             color_formats: &self.attachments.colors,
             depth_stencil: self.attachments.depth.map(DepthAttachmentFormat::bundle_state),
-            sample_count: 1,
+            sample_count: self.attachments.samples,
             multiview: None,
         }
     }
@@ -279,7 +279,10 @@ impl ProcessPipelines {
                 let writes_depth = self.key.writes_depth && is_opaque;
                 depth.pipeline_state_of(writes_depth, self.depth_compare(depth), self.key.stencil)
             }),
-            multisample: wgpu::MultisampleState::default(),
+            multisample: wgpu::MultisampleState {
+                count: self.attachments.samples,
+                ..wgpu::MultisampleState::default()
+            },
             fragment: self.key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
                 module: &shader.module,
                 entry_point: Some(entry_point),

@@ -19,6 +19,10 @@ pub(crate) fn begin_pass<'a>(
     let pass = frame.pass(index);
     let Pass { process_index: process, view_index: view } = pass.pass;
     let declaration = &request.plan.processes()[process].declaration;
+    let resolved_into = |source: &str| {
+        let (_, into) = declaration.resolves.iter().find(|(other, _)| other == source)?;
+        Some(&frame.targets.find(view, into)?.view)
+    };
     let mut colors = [const { None }; MAX_COLOR_ATTACHMENTS];
     let mut count = 0;
     for (color, (name, clear)) in colors.iter_mut().zip(declaration.colors()) {
@@ -26,7 +30,7 @@ pub(crate) fn begin_pass<'a>(
         *color = frame.targets.find(view, name).map(|target| wgpu::RenderPassColorAttachment {
             view: &target.view,
             depth_slice: None,
-            resolve_target: None,
+            resolve_target: resolved_into(name).filter(|_| segment.is_last),
             ops: wgpu::Operations { load: load_op(clear, frame.background), store: wgpu::StoreOp::Store },
         });
         count += 1;

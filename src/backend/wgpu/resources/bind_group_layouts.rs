@@ -53,6 +53,8 @@ pub(crate) struct SampledTarget {
     pub(crate) format: Format,
     /// Whether it is the texture array that all views of a kind share.
     pub(crate) layered: bool,
+    /// Whether it has several samples a pixel.
+    pub(crate) multisampled: bool,
 }
 
 /// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples, then its buffers, each with
@@ -76,11 +78,12 @@ pub(crate) fn process_layout(
         } else if sampled.format.is_integer() {
             wgpu::TextureSampleType::Uint
         } else {
-            wgpu::TextureSampleType::Float { filterable: sampled.format.is_filterable() }
+            wgpu::TextureSampleType::Float { filterable: sampled.format.is_filterable() && !sampled.multisampled }
         };
         let view_dimension =
             if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
-        let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        let multisampled = sampled.multisampled;
+        let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
         entries.push(entry(binding, fragment, texture));
     }
     for (binding, writes) in (1 + samples.len() as u32..).zip(writes_buffers) {

@@ -35,10 +35,8 @@ impl ImportedTarget {
         planned: &PlannedTarget,
         [width, height]: [u32; 2],
     ) -> Result<(), BackendError> {
-        if planned.layered || planned.copy_of.is_some() {
-            return Err(
-                self.refused("all views share that target, or it is a history, which only the crate's own can be")
-            );
+        if planned.layered || planned.copy_of.is_some() || planned.multisampled {
+            return Err(self.refused("that target is shared by views, a history, or has several samples a pixel"));
         }
         let (size, samples) = (self.texture.size(), self.texture.sample_count());
         if size != (wgpu::Extent3d { width, height, depth_or_array_layers: 1 }) {

@@ -38,6 +38,6 @@ pub(crate) use mirrored_buffer::MirroredBuffer;
 pub(crate) use object_buffer::{ObjectBuffer, shares_memory};
 pub(crate) use storage_buffers::StorageBuffers;
 pub(crate) use subdivided_mesh::SubdividedMesh;
-pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
+pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets, sample_count};
 pub(crate) use upload_queue::UploadQueue;
 pub(crate) use vertex_layout::{vertex_attributes, vertex_stride};

@@ -81,7 +81,7 @@ impl WgpuTargets {
         textures.fold((0, 0), |(count, bytes), (planned, texture)| {
             let size = texture.size();
             let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
-            (count + 1, bytes + pixels * planned.format.bytes() as u64)
+            (count + 1, bytes + pixels * planned.format.bytes() as u64 * u64::from(texture.sample_count()))
         })
     }
 }
@@ -250,6 +250,12 @@ impl TargetCache {
     }
 }
 
+/// The number of samples of a target's pixels.
+pub(crate) fn sample_count(planned: &PlannedTarget) -> u32 {
+    // The only number beside 1 that every device has.
+    if planned.multisampled { 4 } else { 1 }
+}
+
 /// A view to draw into, and one that shaders sample.
 fn new_views(
     texture: &wgpu::Texture,
@@ -284,15 +290,14 @@ fn new_texture(
             return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
         }
     }
-    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
-        | wgpu::TextureUsages::TEXTURE_BINDING
-        | wgpu::TextureUsages::COPY_SRC
-        | wgpu::TextureUsages::COPY_DST;
+    let sampled = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+    let copied = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
+    let usage = if planned.multisampled { sampled } else { sampled | copied };
     Ok(device.create_texture(&wgpu::TextureDescriptor {
         label: Some(&planned.name),
         size,
         mip_level_count: 1,
-        sample_count: 1,
+        sample_count: sample_count(planned),
         dimension: wgpu::TextureDimension::D2,
         format: texture_format(planned.format),
         usage: if planned.stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },

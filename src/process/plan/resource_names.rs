@@ -1,0 +1,36 @@
+//! The names of targets and buffers in the graph of processes.
+
+use crate::process::{BufferAccess, Declaration};
+use crate::scene::ViewKind;
+
+/// A buffer's name in the graph.
+pub(super) fn buffer_name(buffer: &str) -> String {
+    format!("buffer {buffer}")
+}
+
+/// The names of the targets and buffers that one process writes and another then uses, for an edge's label.
+pub(super) fn passed_on_resources(before: &Declaration, after: &Declaration) -> String {
+    let mut names: Vec<_> = after
+        .accesses
+        .iter()
+        .filter_map(|(target, access)| {
+            let same_views = access.views(after.views) == before.views;
+            (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
+        })
+        .collect();
+    let changed = before.buffers.iter().filter(|(_, access)| *access == BufferAccess::Change).map(|(buffer, _)| buffer);
+    let used = changed.filter(|changed| after.buffers.iter().any(|(buffer, _)| buffer == *changed));
+    names.extend(used.map(|buffer| buffer.name));
+    // A process may test and sample the same target.
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+/// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.
+pub(super) fn resource_name(kind: ViewKind, target: &str) -> String {
+    match kind {
+        ViewKind::Main => target.to_owned(),
+        other => format!("{}: {target}", other.name()),
+    }
+}
