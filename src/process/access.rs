@@ -27,7 +27,7 @@ pub enum Access {
     MatchDepth,
     /// Read by the shader.
     Sample,
-    /// Read by the shader: what another target held at the end of the frame before. The name is that of [`previous_name`].
+    /// Read by the shader: what another target held at the end of the frame before. The name is that of [`previous_name`](super::previous_name).
     SamplePrevious,
     /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
