@@ -32,7 +32,7 @@ pub(crate) use growing_buffer::{
 };
 pub(crate) use imported_target::ImportedTarget;
 pub(crate) use light_meshes::LightMeshes;
-pub(crate) use material_cache::{MaterialCache, MaterialSnapshot};
+pub(crate) use material_cache::{MaterialCache, MaterialSnapshot, MaterialTextures};
 pub(crate) use mesh_cache::{MeshCache, MeshSnapshot, attribute_of};
 pub(crate) use mirrored_buffer::MirroredBuffer;
 pub(crate) use object_buffer::{ObjectBuffer, shares_memory};
