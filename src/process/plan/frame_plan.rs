@@ -10,7 +10,7 @@ use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::materials::{check_materials, materials_of};
 use super::order::{AddedProcess, order_constraints};
-use super::planned_target::{check_blending, check_stencil, drawn_area, targets_of};
+use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
 use super::resource_names::{buffer_name, passed_on_resources, resource_name};
 use super::view_group::view_groups;
 use super::{ChainSlot, DrawnArea, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
@@ -35,7 +35,7 @@ pub struct FramePlan {
     attributes: Vec<DeclaredAttribute>,
     buffers: Vec<BufferLayout>,
     /// Of each process.
-    drawn_areas: Vec<DrawnArea>,
+    attachments: Vec<Attachments>,
     dropped: Vec<String>,
     dot: String,
 }
@@ -145,7 +145,7 @@ impl FramePlan {
         targets.extend(placeholder);
         let (columns, materials) = (columns_of(&processes)?, materials_of(&processes)?);
         let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
-        let drawn_areas = processes.iter().map(|planned| drawn_area(planned, &targets)).collect();
+        let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
         Ok(Self {
@@ -158,7 +158,7 @@ impl FramePlan {
             materials,
             attributes,
             buffers,
-            drawn_areas,
+            attachments,
             dropped,
             dot,
         })
@@ -197,13 +197,13 @@ impl FramePlan {
     /// # Errors
     /// If a process panics, or its draws do not fit its declaration or its targets.
     pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
-        let checked = |planned: &'a PlannedProcess| {
+        let checked = |(planned, attachments): (&'a PlannedProcess, &'a Attachments)| {
             let draws = planned.draws()?;
-            check_blending(planned, &draws, &self.targets)?;
-            check_stencil(planned, &draws, &self.targets)?;
+            check_blending(planned, &draws, attachments)?;
+            check_stencil(planned, &draws, attachments)?;
             Ok(draws)
         };
-        self.processes.iter().map(checked).collect()
+        self.processes.iter().zip(&self.attachments).map(checked).collect()
     }
 
     /// Whether any process draws in views of this kind.
@@ -218,7 +218,7 @@ impl FramePlan {
 
     /// The pixels of the targets that a process, by index, draws into; those of the picture if it draws into none.
     pub fn drawn_area(&self, process: usize) -> DrawnArea {
-        self.drawn_areas[process]
+        self.attachments[process].area
     }
 
     /// The columns of objects that the processes read, each once.

@@ -203,10 +203,30 @@ fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Res
     Ok(())
 }
 
-/// The pixels of the targets that a process draws into; those of the picture if it draws into none.
-pub(super) fn drawn_area(planned: &PlannedProcess, targets: &[PlannedTarget]) -> DrawnArea {
-    let area = |target: &PlannedTarget| DrawnArea { size: target.size, multisampled: target.multisampled };
-    attached_targets(planned, targets).next().map_or(DrawnArea::PICTURE, area)
+/// What a process draws into, as what it draws has to fit it.
+pub(super) struct Attachments {
+    /// The pixels; those of the picture if it draws into no target.
+    pub(super) area: DrawnArea,
+    /// The number of colour targets.
+    colors: usize,
+    /// The colour targets that cannot be blended, by index.
+    unblendable: Vec<(usize, String, Format)>,
+    has_stencil: bool,
+}
+
+impl Attachments {
+    pub(super) fn new(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Self {
+        let attached = || attached_targets(planned, targets);
+        let area = |target: &PlannedTarget| DrawnArea { size: target.size, multisampled: target.multisampled };
+        let colors = attached().filter(|target| !target.format.is_depth_stencil()).enumerate();
+        let unblendable = colors.filter(|(_, target)| !target.format.can_be_blended());
+        Self {
+            area: attached().next().map_or(DrawnArea::PICTURE, area),
+            colors: planned.declaration.colors().count(),
+            unblendable: unblendable.map(|(index, target)| (index, target.name.clone(), target.format)).collect(),
+            has_stencil: attached().any(|target| target.format.has_stencil()),
+        }
+    }
 }
 
 /// # Errors
@@ -215,7 +235,7 @@ pub(super) fn drawn_area(planned: &PlannedProcess, targets: &[PlannedTarget]) ->
 pub(super) fn check_blending(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
-    targets: &[PlannedTarget],
+    attachments: &Attachments,
 ) -> Result<(), ProcessError> {
     let blends = match draws {
         Draws::FullScreen(full_screen) => full_screen.blend != Blend::None,
@@ -224,17 +244,13 @@ pub(super) fn check_blending(
         _ => false,
     };
     let process = || planned.name.clone();
-    let equations = draws.blend_equations();
-    let count = planned.declaration.colors().count();
-    if !equations.is_empty() && equations.len() != count {
-        return Err(ProcessError::BlendEquations { process: process(), equations: equations.len(), targets: count });
+    let (equations, targets) = (draws.blend_equations(), attachments.colors);
+    if !equations.is_empty() && equations.len() != targets {
+        return Err(ProcessError::BlendEquations { process: process(), equations: equations.len(), targets });
     }
-    let colors = attached_targets(planned, targets).filter(|target| !target.format.is_depth_stencil());
-    for (index, target) in colors.enumerate() {
-        let blends = equations.get(index).map_or(blends, |equation| *equation != BlendEquation::REPLACE);
-        if blends && !target.format.can_be_blended() {
-            let (target, format) = (target.name.clone(), target.format);
-            return Err(ProcessError::CannotBlend { process: process(), target, format });
+    for (index, target, format) in &attachments.unblendable {
+        if equations.get(*index).map_or(blends, |equation| *equation != BlendEquation::REPLACE) {
+            return Err(ProcessError::CannotBlend { process: process(), target: target.clone(), format: *format });
         }
     }
     Ok(())
@@ -245,13 +261,12 @@ pub(super) fn check_blending(
 pub(super) fn check_stencil(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
-    targets: &[PlannedTarget],
+    attachments: &Attachments,
 ) -> Result<(), ProcessError> {
     let access = planned.declaration.depth().map(|(_, access)| access);
     let declares_test = matches!(access, Some(Access::MarkStencil | Access::TestStencil));
-    let has_stencil = attached_targets(planned, targets).any(|target| target.format.has_stencil());
     let problem = match draws.stencil() {
-        Some(_) if !has_stencil => "but has no depth target with one",
+        Some(_) if !attachments.has_stencil => "but has no depth target with one",
         Some(stencil) if stencil.writes() && !access.is_some_and(Access::writes) => {
             "and writes it, but declares only that it tests depth"
         }

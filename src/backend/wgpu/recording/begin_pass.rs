@@ -49,7 +49,7 @@ pub(crate) fn begin_pass<'a>(
             stencil_ops: writes_stencil.then_some(wgpu::Operations { load: stencil, store }),
         })
     });
-    let mut render_pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(&pass.label),
         color_attachments: &colors[..count],
         depth_stencil_attachment: depth,
@@ -57,11 +57,19 @@ pub(crate) fn begin_pass<'a>(
             .timed_pass_index
             .and_then(|timed_pass| frame.buffers.timestamps()?.writes_of_segment(timed_pass, segment)),
         ..wgpu::RenderPassDescriptor::default()
-    });
-    if let Some(stencil) = request.draws[process].stencil() {
+    })
+}
+
+/// Sets what the process's stencil test compares with, if it has one.
+pub(crate) fn set_stencil_reference(
+    render_pass: &mut wgpu::RenderPass<'_>,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+) {
+    if let Some(stencil) = request.draws[frame.pass(index).pass.process_index].stencil() {
         render_pass.set_stencil_reference(u32::from(stencil.reference));
     }
-    render_pass
 }
 
 fn load_op(clear: Option<ClearColor>, background: [f64; 3]) -> wgpu::LoadOp<wgpu::Color> {

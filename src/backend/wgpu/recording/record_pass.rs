@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::batch_recorder::BatchRecorder;
-use super::begin_pass::begin_pass;
+use super::begin_pass::{begin_pass, set_stencil_reference};
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::frame::{IndirectArguments, WgpuFrame, WgpuPassState};
@@ -36,6 +36,7 @@ pub(crate) fn record_batches(
     let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
     let batches = first..end.min(list.batches.len());
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
+    set_stencil_reference(&mut render_pass, frame, request, index);
     if batches.is_empty() {
         return Ok(());
     }
@@ -69,6 +70,7 @@ pub(crate) fn replay_bundles<'a>(
     let pass = frame.pass(index).pass;
     let pipelines = frame.pipelines(pass).variants();
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
+    set_stencil_reference(&mut render_pass, frame, request, index);
     // wgpu gives the device the reference only with a pipeline that tests it, and does not look for one in bundles.
     if let Some(pipeline) = pipelines.values().next().filter(|_| request.draws[pass.process_index].stencil().is_some())
     {
@@ -104,6 +106,7 @@ pub(crate) fn record_without_commands(
         partial_indices: None,
     };
     let mut render_pass = begin_pass(encoder, frame, request, index, PassSegment::WHOLE);
+    set_stencil_reference(&mut render_pass, frame, request, index);
     render_pass.set_pipeline(pipeline);
     recorder.set_bind_groups(&mut render_pass);
     match draws {

@@ -45,9 +45,9 @@ impl CachedBindGroup {
             let same_binding = |((number, bound), (other, resource)): (&(u32, BoundResource), (u32, _))| {
                 *number == other && bound.is(&resource)
             };
-            before.layout == *layout
-                && before.bound.len() == resources.clone().count()
-                && before.bound.iter().zip(resources.clone()).all(same_binding)
+            let mut bound = before.bound.iter();
+            let is_bound = |resource| bound.next().is_some_and(|bound| same_binding((bound, resource)));
+            before.layout == *layout && resources.clone().all(is_bound) && bound.next().is_none()
         };
         if let Some(before) = before.filter(is_same) {
             return Ok(Some(before));
