@@ -34,7 +34,8 @@ pub(crate) struct BufferPool {
 
 #[derive(Default)]
 struct FreeBuffers {
-    buffers: Vec<Buffers>,
+    #[expect(clippy::vec_box, reason = "they move in every frame, and are large")]
+    buffers: Vec<Box<Buffers>>,
     /// How often the pool was cleared. Buffers of an earlier generation do not return.
     generation: u64,
 }
@@ -63,7 +64,7 @@ impl BufferPool {
                 + buffers.materials.size()
                 + index_bytes(buffers)
         };
-        self.free.lock().buffers.iter().map(total).sum()
+        self.free.lock().buffers.iter().map(|buffers| total(buffers)).sum()
     }
 
     /// Drops all buffers, and those of frames in flight when these end, because a device error may have left them unusable.
@@ -88,7 +89,7 @@ impl BufferPool {
         Ok(FrameBuffers { buffers, pool: Arc::clone(self), generation, held_epoch: 0, objects_epoch: 0 })
     }
 
-    fn take_free(&self) -> (Buffers, u64) {
+    fn take_free(&self) -> (Box<Buffers>, u64) {
         let mut free = self.free.lock();
         // Those that were used last, because they hold the newest objects.
         let ready = free.buffers.iter().rposition(|buffers| buffers.objects.are_ready());
@@ -104,13 +105,13 @@ impl BufferPool {
             let unused = free.buffers.iter_mut().filter(|idle| idle.unused == Self::MAX_UNUSED_FRAMES);
             unused.for_each(|idle| idle.passes.iter_mut().for_each(WgpuPassState::clear_caches));
         }
-        (taken.unwrap_or_else(|| Buffers::new(self.maps_memory)), free.generation)
+        (taken.unwrap_or_else(|| Box::new(Buffers::new(self.maps_memory))), free.generation)
     }
 }
 
 /// A frame's buffers. They return to the pool when they are dropped.
 pub(crate) struct FrameBuffers {
-    buffers: Buffers,
+    buffers: Box<Buffers>,
     pool: Arc<BufferPool>,
     generation: u64,
     /// The epoch of the object table that the buffers held when the frame began; 0 for none.
@@ -125,7 +126,7 @@ impl Drop for FrameBuffers {
         self.buffers.subdivided.get_mut().clear();
         let mut free = self.pool.free.lock();
         if free.generation == self.generation {
-            free.buffers.push(mem::replace(&mut self.buffers, Buffers::new(false)));
+            free.buffers.push(mem::replace(&mut self.buffers, Box::new(Buffers::new(false))));
         }
     }
 }
@@ -143,7 +144,7 @@ impl FrameBuffers {
         materials: &MaterialSnapshot,
         request: &FrameRequest<'_>,
     ) -> Result<(), BackendError> {
-        let buffers = &mut self.buffers;
+        let buffers = &mut *self.buffers;
         // A frame that fails may have written some of its objects. Only its submission confirms that it wrote all.
         self.held_epoch = mem::take(&mut buffers.objects_epoch);
         self.objects_epoch = request.objects.epoch();
@@ -198,7 +199,7 @@ impl FrameBuffers {
         request: &FrameRequest<'_>,
         times_raw_passes: bool,
     ) -> Result<(), BackendError> {
-        let Buffers { timestamps, passes, .. } = &mut self.buffers;
+        let Buffers { timestamps, passes, .. } = &mut *self.buffers;
         let is_timed = |process: usize| times_raw_passes || !matches!(request.draws[process], Draws::Raw(_));
         let mut timed_pass_indices = 0..;
         for pass in passes.iter_mut() {
@@ -233,7 +234,7 @@ impl FrameBuffers {
 
     /// The passes, and what their bind groups bind.
     pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], PassResources<'_>) {
-        let Buffers { passes, parameters, objects, materials, bytes, .. } = &mut self.buffers;
+        let Buffers { passes, parameters, objects, materials, bytes, .. } = &mut *self.buffers;
         let materials_bind_group = materials.bind_group();
         (passes, PassResources { parameters: &parameters.on_device, objects, bytes, materials_bind_group })
     }
