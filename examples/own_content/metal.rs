@@ -26,7 +26,7 @@ pub struct Metal {
     pub roughness: f32,
 }
 
-/// The type of material.
+/// The material type of the rings.
 pub const METAL: MaterialType<Metal> = MaterialType::new("metal");
 
 /// The name of the process.

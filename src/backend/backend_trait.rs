@@ -77,6 +77,9 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device lacks room for the frame's resources, or refuses them.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
+    /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame alone.
+    fn discard_frame(&self) {}
+
     /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none.
     /// If it is the current one, nothing is uploaded.
     fn objects_epoch(&self, frame: &Self::Frame) -> u64 {

@@ -70,10 +70,12 @@ pub enum BackendError {
         /// The render process's name.
         process: String,
     },
-    /// A mesh [in the engine's own buffers](crate::scene::Mesh::on_device) has an attribute in a format that shaders read as another kind
+    /// A mesh [in the engine's own buffers](crate::scene::Mesh::from_buffers) has an attribute in a format that shaders read as another kind
     /// of number.
-    #[error("process {process:?} reads {attribute:?} as {expected}, but mesh `{mesh}` has it as {format}")]
-    AttributeFormat {
+    #[error(
+        "process {process:?} reads {attribute:?} as {expected}, but mesh `{mesh}`, or one with the same layout, has it as {format}"
+    )]
+    AttributeFormatMismatch {
         /// The process.
         process: String,
         /// The mesh, or another one with the same layout.
@@ -85,11 +87,17 @@ pub enum BackendError {
         /// The type of number in the shader.
         expected: &'static str,
     },
-    /// A mesh in buffers of a device, whose triangles the software backend cannot see.
-    #[error("mesh `{mesh}` is in buffers of a device, so the software backend cannot draw it")]
-    MeshOnDevice {
+    /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see.
+    #[error("mesh `{mesh}` is in wgpu buffers, which the software backend cannot draw")]
+    ImportedMesh {
         /// The mesh.
         mesh: String,
+    },
+    /// A render process draws into multisampled targets, and the software backend has none.
+    #[error("process {process:?} draws into multisampled targets, which the software backend does not support")]
+    Multisampling {
+        /// The render process's name.
+        process: String,
     },
     /// The CPU shader of a render process panicked.
     #[error("the CPU shader of process {process:?} panicked: {message}")]
@@ -110,9 +118,9 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
-    /// A texture cannot take the place of a view's target.
-    #[error("the texture that was imported as target {target:?} of view {view:?} cannot be it: {problem}")]
-    ImportedTarget {
+    /// A texture cannot be [imported](super::WgpuBackend::import_target) as a view's target.
+    #[error("cannot import a texture as target {target:?} of view {view:?}: {problem}")]
+    InvalidImport {
         /// The view's name.
         view: String,
         /// The name of the target.

@@ -25,7 +25,7 @@ pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use instance::instance;
 pub use render_command::RenderCommand;
-pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypes, Selection};
+pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypeFilter, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
 pub use splitters::Splitters;

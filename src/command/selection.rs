@@ -12,7 +12,7 @@ pub struct Selection {
     /// By material.
     pub materials: MaterialShare,
     /// By the type of the material.
-    pub material_types: MaterialTypes,
+    pub material_types: MaterialTypeFilter,
     /// By layer: objects that belong to one of these layers.
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
@@ -33,7 +33,7 @@ impl Selection {
         Self {
             blending,
             materials: MaterialShare::ALL,
-            material_types: MaterialTypes::Any,
+            material_types: MaterialTypeFilter::Any,
             layers: LayerMask::ALL,
             excluded_layers: LayerMask::NONE,
             order: DrawOrder::ByState,
@@ -45,14 +45,14 @@ impl Selection {
         Self { layers, ..self }
     }
 
-    /// Those of these objects whose material is of a type of the engine's own.
-    pub const fn of_material_type<T: Pod>(self, material: MaterialType<T>) -> Self {
-        Self { material_types: MaterialTypes::Only(material.layout()), ..self }
+    /// Those of these objects whose material has this [`MaterialType`].
+    pub const fn of_material_type<T: Pod>(self, material_type: MaterialType<T>) -> Self {
+        Self { material_types: MaterialTypeFilter::Only(material_type.layout()), ..self }
     }
 
-    /// Those of these objects whose material is of no type of the engine's own: those that the shipped processes draw.
+    /// Those of these objects whose material has no [`MaterialType`]: those that the shipped processes draw.
     pub const fn of_shipped_materials(self) -> Self {
-        Self { material_types: MaterialTypes::Shipped, ..self }
+        Self { material_types: MaterialTypeFilter::Shipped, ..self }
     }
 
     /// Those of these objects that belong to none of some layers.
@@ -65,7 +65,7 @@ impl Selection {
         Self { order, ..self }
     }
 
-    /// Whether it contains objects of any layer, and of any type of material, that blend like this and have the material in this slot.
+    /// Whether it contains objects of any layer, and of any material type, that blend like this and have the material in this slot.
     pub fn contains(self, blend: Blend, material: u32) -> bool {
         let blends = match self.blending {
             Blending::Opaque => blend == Blend::None,
@@ -117,7 +117,7 @@ impl DrawOrder {
     }
 }
 
-/// Objects by how they mix with the target's colour.
+/// Objects by how they blend with the target's colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Blending {
     /// Objects without blending.
@@ -129,26 +129,26 @@ pub enum Blending {
     Both,
 }
 
-/// Objects by the types of their materials.
+/// Objects by their material types.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum MaterialTypes {
+pub enum MaterialTypeFilter {
     /// All.
     #[default]
     Any,
-    /// Those without a [type of the engine's own](MaterialType).
+    /// Those without a [`MaterialType`].
     Shipped,
     /// Those of one type.
     Only(MaterialLayout),
 }
 
-impl MaterialTypes {
-    /// Whether it contains a type; `None` for materials without one.
+impl MaterialTypeFilter {
+    /// Whether it contains materials of a type; `None` stands for those without one.
     #[inline]
-    pub fn contain(self, material: Option<MaterialLayout>) -> bool {
+    pub fn contains(self, material_type: Option<MaterialLayout>) -> bool {
         match self {
             Self::Any => true,
-            Self::Shipped => material.is_none(),
-            Self::Only(only) => material == Some(only),
+            Self::Shipped => material_type.is_none(),
+            Self::Only(only) => material_type == Some(only),
         }
     }
 }

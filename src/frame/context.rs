@@ -9,7 +9,7 @@ use super::stage_clock::StageClock;
 use super::tables::FrameTables;
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
-use crate::process::DrawnArea;
+use crate::process::AttachmentExtent;
 use crate::scene::Projection;
 use crate::view::ObjectFilter;
 
@@ -61,8 +61,8 @@ impl<B: Backend> FrameContext<'_, B> {
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
             selection,
-            layers: (!filter.passes_all_layers()).then(|| objects.epoch()),
-            material_types: objects.material_types_version(),
+            layers: (!filter.ignores_layers()).then(|| objects.epoch()),
+            material_types: objects.material_types_revision(),
             instancing: self.instancing,
             order: if self.orders_by_bin(pass) {
                 OrderInputs::Bins { draws_changed_in: objects.draws_changed_in() }
@@ -105,9 +105,9 @@ impl<B: Backend> FrameContext<'_, B> {
     /// Whether a pass culls triangles of meshes with triangle culling.
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
         let process = self.request.passes[pass].process_index;
-        // The test is of the triangles of the mesh, and of the pixels of the picture.
-        let is_exact = self.request.draws[process].draws_plain_meshes()
-            && self.request.plan.drawn_area(process) == DrawnArea::PICTURE;
+        // Triangle culling tests undeformed triangles against the centres of the picture's pixels.
+        let is_exact = self.request.draws[process].allows_triangle_culling()
+            && self.request.plan.attachment_extent(process) == AttachmentExtent::PICTURE;
         self.culls_triangles && is_exact && self.request.views[self.view_index_of(pass)].can_cull_triangles()
     }
 

@@ -15,7 +15,7 @@ pub(super) struct ListInputs {
     pub(super) selection: Selection,
     /// The epoch of the object table, if the layers of objects decide which are drawn.
     pub(super) layers: Option<u64>,
-    /// Counts how often the types of materials changed.
+    /// Counts how often the type of a material changed.
     pub(super) material_types: u64,
     pub(super) instancing: bool,
     pub(super) order: OrderInputs,

@@ -1,7 +1,7 @@
 //! Which objects of a view may occlude others.
 
 use crate::command::{Blending, Selection};
-use crate::process::{Draws, FramePlan, Pass};
+use crate::process::{Access, Draws, FramePlan, Pass};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -10,7 +10,7 @@ use crate::view::RenderView;
 /// `None` where a hidden object could still be visible in the picture, so that no object may be removed:
 /// - in shadow maps, which show objects that are hidden from elsewhere;
 /// - where a pass changes the stencil of pixels that are hidden;
-/// - where a pass draws without testing the view's single depth target;
+/// - where a pass draws without testing the view's single depth target, or tests its stencil alone;
 /// - where an object is tested before all occluders are drawn, or after the depth is cleared again;
 /// - where occluders are drawn into different colour targets.
 pub(super) fn occluders(
@@ -31,10 +31,13 @@ pub(super) fn occluders(
     let (mut depth, mut colors, mut tests_only, mut occluders) = (None, Vec::new(), false, Vec::new());
     for pass in of_view() {
         let Some(selection) = draws[pass.process_index].selection() else { continue };
-        if draws[pass.process_index].changes_where_hidden() {
+        if draws[pass.process_index].writes_stencil_where_hidden() {
             return None;
         }
         let (target, access) = depth_of(pass)?;
+        if access == Access::TestStencil {
+            return None;
+        }
         if *depth.get_or_insert(target) != target {
             return None;
         }

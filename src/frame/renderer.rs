@@ -115,15 +115,18 @@ impl<B: Backend> Renderer<B> {
         let recorded = self.record_frame(&scene);
         match recorded {
             Ok(_) => self.tables.end_frame(),
-            Err(_) => self.tables.abandon_frame(),
+            Err(_) => {
+                self.tables.abandon_frame();
+                self.backend.discard_frame();
+            }
         }
         recorded
     }
 
     /// Compiles the shaders of frames of this scene, and of one that requires every process of the pipeline, and makes their pipelines for
-    /// this scene's meshes and materials. Without this call that happens in the first frames that need them, as it still does
-    /// for mirrored objects, for meshes in the engine's own buffers, and for pipelines between these two. Call it while the world is loaded, on any thread: it also finds what is
-    /// wrong with the engine's processes.
+    /// this scene's meshes and materials. Without this call that happens in the first frames that need them, as it still does for mirrored
+    /// objects, for meshes in the engine's own buffers, and for pipelines between these two. Call it while the world is loaded, on any
+    /// thread: it also finds what is wrong with the engine's processes.
     ///
     /// # Errors
     /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
@@ -158,7 +161,7 @@ impl<B: Backend> Renderer<B> {
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
-        plan.check_scene(&draws, scene, self.tables.objects.material_layouts())?;
+        plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
         self.tables.cullable_meshes.update(scene.assets);
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =

@@ -43,7 +43,7 @@ struct GraphKey {
 struct DrawsKey {
     selection: Option<Selection>,
     hides: bool,
-    changes_where_hidden: bool,
+    writes_stencil_where_hidden: bool,
 }
 
 /// The optional parts of a frame.
@@ -85,8 +85,8 @@ impl ViewKey {
 
 impl DrawsKey {
     fn new(draws: &Draws<'_>) -> Self {
-        let (hides, changes_where_hidden) = (draws.hides(), draws.changes_where_hidden());
-        Self { selection: draws.selection(), hides, changes_where_hidden }
+        let (hides, writes_stencil_where_hidden) = (draws.hides(), draws.writes_stencil_where_hidden());
+        Self { selection: draws.selection(), hides, writes_stencil_where_hidden }
     }
 }
 

@@ -31,7 +31,7 @@ pub enum Access {
     SamplePrevious,
     /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
-    /// Gets the means of another target's samples.
+    /// The target of a resolve: overwritten with the mean of a multisampled target's samples.
     Resolve(Format),
     /// Written by a raw pass.
     Write(Format),

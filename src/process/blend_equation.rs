@@ -2,14 +2,14 @@
 
 use crate::scene::Blend;
 
-/// How a drawn colour, the source, mixes with the colour that a target has, the destination: one equation for red, green and blue, one
+/// How a drawn colour, the source, blends with the colour that a target has, the destination: one equation for red, green and blue, one
 /// for alpha. A process has one for each of its colour targets where [`Blend`] is not enough.
 ///
 /// ```
 /// use drawloom::process::{BlendComponent, BlendEquation, BlendFactor};
 ///
 /// // The second target of weighted order-independent transparency: what remains visible through all surfaces.
-/// let revealage = BlendEquation::same_for_all_channels(BlendComponent::Sum {
+/// let revealage = BlendEquation::same_for_all_channels(BlendComponent::Add {
 ///     source: BlendFactor::Zero,
 ///     destination: BlendFactor::OneMinusSource,
 /// });
@@ -25,7 +25,7 @@ pub struct BlendEquation {
 }
 
 impl BlendEquation {
-    /// The source: nothing is mixed. The only equation for targets that [cannot be blended](super::Format::can_be_blended).
+    /// The source replaces the destination. The only equation for targets that [cannot be blended](super::Format::can_be_blended).
     pub const REPLACE: Self = Self::sum(BlendFactor::One, BlendFactor::Zero);
     /// Source + destination.
     pub const ADDITIVE: Self = Self::sum(BlendFactor::One, BlendFactor::One);
@@ -40,7 +40,7 @@ impl BlendEquation {
     }
 
     const fn sum(source: BlendFactor, destination: BlendFactor) -> Self {
-        Self::same_for_all_channels(BlendComponent::Sum { source, destination })
+        Self::same_for_all_channels(BlendComponent::Add { source, destination })
     }
 }
 
@@ -52,46 +52,46 @@ impl From<Blend> for BlendEquation {
             Blend::Alpha => {
                 let destination = BlendFactor::OneMinusSourceAlpha;
                 Self {
-                    color: BlendComponent::Sum { source: BlendFactor::SourceAlpha, destination },
-                    alpha: BlendComponent::Sum { source: one, destination },
+                    color: BlendComponent::Add { source: BlendFactor::SourceAlpha, destination },
+                    alpha: BlendComponent::Add { source: one, destination },
                 }
             }
             Blend::Additive => Self::ADDITIVE,
             Blend::Subtractive => {
-                Self::same_for_all_channels(BlendComponent::ReverseDifference { source: one, destination: one })
+                Self::same_for_all_channels(BlendComponent::ReverseSubtract { source: one, destination: one })
             }
         }
     }
 }
 
-/// How a channel of the source mixes with that of the destination.
+/// How a channel of the source blends with that of the destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BlendComponent {
-    /// Source × factor + destination × factor.
-    Sum {
+    /// Source × its factor + destination × its factor.
+    Add {
         /// The source's factor.
         source: BlendFactor,
         /// The destination's factor.
         destination: BlendFactor,
     },
-    /// Source × factor − destination × factor.
-    Difference {
+    /// Source × its factor − destination × its factor.
+    Subtract {
         /// The source's factor.
         source: BlendFactor,
         /// The destination's factor.
         destination: BlendFactor,
     },
-    /// Destination × factor − source × factor.
-    ReverseDifference {
+    /// Destination × its factor − source × its factor.
+    ReverseSubtract {
         /// The source's factor.
         source: BlendFactor,
         /// The destination's factor.
         destination: BlendFactor,
     },
-    /// The less of the two.
-    Minimum,
-    /// The greater of the two.
-    Maximum,
+    /// The smaller of source and destination, without factors.
+    Min,
+    /// The greater of source and destination, without factors.
+    Max,
 }
 
 /// What a channel is multiplied by.
@@ -103,18 +103,18 @@ pub enum BlendFactor {
     One,
     /// The same channel of the source.
     Source,
-    /// 1 less that.
+    /// 1 − the same channel of the source.
     OneMinusSource,
     /// The source's alpha.
     SourceAlpha,
-    /// 1 less that.
+    /// 1 − the source's alpha.
     OneMinusSourceAlpha,
     /// The same channel of the destination.
     Destination,
-    /// 1 less that.
+    /// 1 − the same channel of the destination.
     OneMinusDestination,
     /// The destination's alpha; 1 if it has none.
     DestinationAlpha,
-    /// 1 less that.
+    /// 1 − the destination's alpha.
     OneMinusDestinationAlpha,
 }

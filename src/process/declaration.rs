@@ -85,7 +85,7 @@ impl Declare {
         self.access(&previous_name(target), Access::SamplePrevious);
     }
 
-    /// Sets the size of a target that the process creates: that it clears, or overwrites in a raw pass. Without this call it has
+    /// Sets the size of a target that the process creates: that it clears, resolves into, or overwrites in a raw pass. Without this call it has
     /// the size of the view's picture. All targets that a process draws into, and the depth that it tests, have the same size.
     ///
     /// The prelude's `view.width`, `view.height` and `clip_of_pixel` are those of the picture: shaders that draw into targets of other
@@ -95,32 +95,36 @@ impl Declare {
         self.declaration.sizes.push((target.to_owned(), size));
     }
 
-    /// Gives a target that the process clears four samples a pixel, which every device has, so that edges are smooth. All targets that a
-    /// process draws into, and the depth that it tests, have the same number of samples. Shaders read one as
-    /// `texture_multisampled_2d`, or `texture_depth_multisampled_2d`, if it is not [resolved](Declare::resolves) first.
+    /// Makes a target multisampled, so that edges are smooth: four samples per pixel, the number that every device supports. The process
+    /// must clear the target, and not in layers. All targets that a process draws into, and the depth that it tests, must have the same
+    /// number of samples.
     ///
-    /// Triangle culling, which looks at the centres of pixels, leaves such a process out. The software backend refuses it.
+    /// A shader that [samples](Declare::samples) such a target declares a `texture_multisampled_2d<f32>` or a
+    /// `texture_depth_multisampled_2d`. What reads it as any other target reads the one that it is [resolved](Declare::resolves) into.
+    ///
+    /// Triangle culling is off for such a process, because it tests the centres of pixels. The software backend returns an error.
     ///
     /// ```
     /// use drawloom::process::{ClearColor, Declare, Format};
     ///
     /// fn declare(declare: &mut Declare) {
-    ///     declare.clears_color("samples", Format::Rgba16Float, ClearColor::Background);
-    ///     declare.clears_depth("depth of samples", Format::Depth32Float);
-    ///     declare.multisampled("samples");
-    ///     declare.multisampled("depth of samples");
-    ///     // What tone mapping samples: the mean of the four.
-    ///     declare.resolves("samples", "radiance", Format::Rgba16Float);
+    ///     declare.clears_color("multisampled colour", Format::Rgba16Float, ClearColor::Background);
+    ///     declare.clears_depth("multisampled depth", Format::Depth32Float);
+    ///     declare.multisampled("multisampled colour");
+    ///     declare.multisampled("multisampled depth");
+    ///     // Tone mapping samples the mean of the four.
+    ///     declare.resolves("multisampled colour", "radiance", Format::Rgba16Float);
     /// }
     /// ```
     pub fn multisampled(&mut self, target: &str) {
         self.declaration.multisampled.push(target.to_owned());
     }
 
-    /// Writes the mean of a colour target's samples into another target of the same format and size, once the process has drawn.
-    pub fn resolves(&mut self, target: &str, into: &str, format: Format) {
-        self.declaration.resolves.push((target.to_owned(), into.to_owned()));
-        self.access(into, Access::Resolve(format));
+    /// Creates the target `resolved`, and writes the mean of the samples of `multisampled` into it when the process has drawn into that. It
+    /// has the same size, and `format` must be the same. A process resolves a target at most once.
+    pub fn resolves(&mut self, multisampled: &str, resolved: &str, format: Format) {
+        self.declaration.resolves.push((multisampled.to_owned(), resolved.to_owned()));
+        self.access(resolved, Access::Resolve(format));
     }
 
     /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
@@ -187,14 +191,15 @@ impl Declare {
         self.declaration.columns.push(column.layout());
     }
 
-    /// Reads the values of materials of a [type of the engine's own](MaterialType) in the shader, at `@group(3)` behind the columns: the
+    /// Reads the values of materials of a [material type](MaterialType) in the shader, at `@group(3)` behind the columns: the
     /// first such type has the next binding, and so on. Each is an array with an element for each material of the scene, by
-    /// `Object.material`; those of other types are all zeros. If a material changes, its bytes are uploaded, and nothing else.
+    /// `Object.material`; those of other types are all zeros. If a material changes, only the blocks of
+    /// 1 KiB that its values are in are uploaded.
     ///
     /// For the number of storage buffers that a device needs, see [`Declare::reads_column`].
-    pub fn reads_materials<T: Pod>(&mut self, material: MaterialType<T>) {
-        if !self.declaration.materials.contains(&material.layout()) {
-            self.declaration.materials.push(material.layout());
+    pub fn reads_materials<T: Pod>(&mut self, material_type: MaterialType<T>) {
+        if !self.declaration.material_types.contains(&material_type.layout()) {
+            self.declaration.material_types.push(material_type.layout());
         }
     }
 
@@ -247,7 +252,8 @@ impl Declare {
         self.access(target, Access::Write(format));
     }
 
-    /// A raw pass reads and writes a target with its own commands.
+    /// A raw pass reads and writes a target with its own commands; as a storage texture too, if [`Format::can_be_stored`] and it is not
+    /// multisampled.
     pub fn changes(&mut self, target: &str) {
         self.access(target, Access::Change);
     }
@@ -313,14 +319,14 @@ pub struct Declaration {
     pub accesses: Vec<(String, Access)>,
     /// The sizes of targets that it creates, if they are not those of the pictures.
     pub sizes: Vec<(String, TargetSize)>,
-    /// The targets that it creates with several samples a pixel.
+    /// The targets that it makes multisampled.
     pub multisampled: Vec<String>,
-    /// The targets whose samples it resolves, each with the one that gets their means.
+    /// The multisampled targets that it resolves, each with the one that it is resolved into.
     pub resolves: Vec<(String, String)>,
     /// The data of objects that its shader reads, in the order of their bindings.
     pub columns: Vec<ColumnLayout>,
-    /// The types of materials whose values its shader reads, in the order of their bindings.
-    pub materials: Vec<MaterialLayout>,
+    /// The material types whose values its shader reads, in the order of their bindings.
+    pub material_types: Vec<MaterialLayout>,
     /// The attributes of vertices that its shader reads, in the order of their locations.
     pub attributes: Vec<DeclaredAttribute>,
     /// The buffers that it uses, and how, in the order declared.

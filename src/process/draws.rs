@@ -48,9 +48,10 @@ pub struct CommandDraws<'a> {
     pub deformation: Option<&'a str>,
     /// Which objects are drawn.
     pub selection: Selection,
-    /// Which sides of the objects are drawn.
-    pub culling: FaceCulling,
-    /// How the objects mix with each colour target, in the order declared; if empty, as their materials say.
+    /// Which faces of the objects are drawn.
+    pub face_culling: FaceCulling,
+    /// The blend equation of each colour target, in the order declared; if empty, each object's material decides. Another number of
+    /// equations is an [error](super::ProcessError::BlendEquationCount).
     pub blend_equations: Vec<BlendEquation>,
     /// Whether depth is written. Objects with a blending material write none, unless there are `blend_equations`.
     pub writes_depth: bool,
@@ -69,7 +70,7 @@ impl Default for CommandDraws<'_> {
             fragment: Some("fragment"),
             deformation: None,
             selection: Selection::OPAQUE,
-            culling: FaceCulling::ByMaterial,
+            face_culling: FaceCulling::ByMaterial,
             blend_equations: Vec::new(),
             writes_depth: true,
             stencil: None,
@@ -88,7 +89,7 @@ pub struct FullScreen<'a> {
     pub shader: &'a str,
     /// How it blends with the targets' content.
     pub blend: Blend,
-    /// How it mixes with each colour target, in the order declared; if empty, as `blend` says.
+    /// The blend equation of each colour target, in the order declared; if empty, `blend` decides.
     pub blend_equations: Vec<BlendEquation>,
     /// The stencil test; `None` for none.
     pub stencil: Option<Stencil>,
@@ -131,24 +132,30 @@ impl Draws<'_> {
         }
     }
 
-    /// Whether it draws objects that write depth in the shape of their meshes, and so hide what is behind them.
+    /// Whether it draws objects that write depth all over the shape of their meshes, and so hide what is behind them: opaque ones, neither
+    /// deformed nor inside out, and whatever the stencil.
     pub fn hides(&self) -> bool {
         let Self::Commands(draws) = self else { return false };
-        let is_opaque = draws.blend_equations.is_empty() && draws.culling != FaceCulling::Reversed;
-        draws.writes_depth && draws.deformation.is_none() && is_opaque
+        let writes_all = draws.writes_depth && draws.stencil.is_none_or(|stencil| stencil.always_passes());
+        let shows_fronts = draws.face_culling != FaceCulling::Reversed;
+        writes_all && shows_fronts && draws.deformation.is_none() && draws.blend_equations.is_empty()
     }
 
-    /// Whether objects that are hidden behind others change something: the stencil.
-    pub fn changes_where_hidden(&self) -> bool {
-        self.stencil().is_some_and(|stencil| stencil.writes() && stencil.on_depth_fail != StencilOperation::Keep)
+    /// Whether objects that are hidden behind others change the stencil, so that they must be drawn.
+    pub fn writes_stencil_where_hidden(&self) -> bool {
+        // The stencil test comes before the depth test.
+        self.stencil().is_some_and(|stencil| {
+            let changes = |operation| stencil.write_mask != 0 && operation != StencilOperation::Keep;
+            changes(stencil.on_depth_fail) || changes(stencil.on_fail) && !stencil.always_passes()
+        })
     }
 
-    /// Whether it draws the triangles of meshes where they are, and of each the sides that the material says.
-    pub fn draws_plain_meshes(&self) -> bool {
-        matches!(self, Self::Commands(CommandDraws { deformation: None, culling: FaceCulling::ByMaterial, .. }))
+    /// Whether triangle culling is exact for it: it does not deform objects, and culls faces as materials say.
+    pub fn allows_triangle_culling(&self) -> bool {
+        matches!(self, Self::Commands(CommandDraws { deformation: None, face_culling: FaceCulling::ByMaterial, .. }))
     }
 
-    /// How what is drawn mixes with each colour target; empty if materials, or the kind of draws, decide.
+    /// The blend equation of each colour target; empty if materials, or the kind of draws, decide.
     pub fn blend_equations(&self) -> &[BlendEquation] {
         match self {
             Self::Commands(commands) => &commands.blend_equations,

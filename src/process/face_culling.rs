@@ -1,22 +1,22 @@
-//! Which sides of objects a process draws.
+//! Which faces of objects a process draws.
 
 use crate::command::Cull;
 
-/// Which sides of objects a process draws, whatever their materials say.
+/// Which faces of objects a process draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum FaceCulling {
-    /// The front, and the back too if the material is double-sided.
+    /// Front faces; back faces too if the material is double-sided.
     #[default]
     ByMaterial,
-    /// What the material culls: the back. Double-sided objects are drawn from both sides. For outlines that are drawn as inflated hulls,
-    /// for thickness, and for shadow maps without a bias.
+    /// Back faces only. Of double-sided materials both are drawn. For outlines that are drawn as inverted hulls, for thickness, and for
+    /// shadow maps with less bias.
     Reversed,
-    /// Both.
+    /// Both faces: nothing is culled.
     Nothing,
 }
 
 impl FaceCulling {
-    /// What is culled of an object for which its material culls this.
+    /// The faces to cull of an object whose draw state culls these.
     pub fn applied_to(self, cull: Cull) -> Cull {
         match (self, cull) {
             (Self::ByMaterial, cull) => cull,

@@ -70,7 +70,7 @@ impl Format {
         !self.is_depth_stencil() && !matches!(self, Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
 
-    /// Whether a target can have [several samples a pixel](super::Declare::multisampled) on every adapter.
+    /// Whether a target can be [multisampled](super::Declare::multisampled) on every adapter.
     pub fn can_be_multisampled(self) -> bool {
         self.is_depth_stencil() || self.can_be_resolved()
     }

@@ -49,7 +49,8 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use plan::{
-    ChainSlot, DrawnArea, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup, ViewOrder,
+    AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
+    ViewOrder,
 };
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;

@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use wgpu::util::DeviceExt;
 
 use super::{BufferLayout, StorageBuffer};
-use crate::scene::{ColumnLayout, ObjectColumn, ViewKind};
+use crate::scene::{ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, ViewKind};
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
 ///
@@ -38,6 +38,7 @@ pub struct RawPassResources<'a> {
     /// all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
     pub bind_groups: [&'a wgpu::BindGroup; 2],
     pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<wgpu::BufferBinding<'a>>,
+    pub(crate) materials: &'a dyn Fn(MaterialLayout) -> Option<wgpu::BufferBinding<'a>>,
     pub(crate) buffers: &'a dyn Fn(BufferLayout) -> Option<&'a wgpu::Buffer>,
     pub(crate) textures: &'a dyn Fn(&str) -> Option<&'a wgpu::Texture>,
     pub(crate) layered: &'a dyn Fn(ViewKind, &str) -> Option<&'a wgpu::Texture>,
@@ -53,6 +54,11 @@ impl RawPassResources<'_> {
     /// The values of a column of objects; `None` if the process does not declare that it [reads](super::Declare::reads_column) it.
     pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Option<wgpu::BufferBinding<'_>> {
         (self.columns)(column.layout())
+    }
+
+    /// The values of a material type; `None` if the process does not declare that it [reads](super::Declare::reads_materials) them.
+    pub fn materials<T: Pod>(&self, material_type: MaterialType<T>) -> Option<wgpu::BufferBinding<'_>> {
+        (self.materials)(material_type.layout())
     }
 
     /// A buffer that processes share, with the usages `STORAGE`, `INDIRECT`, `COPY_SRC` and `COPY_DST`; `None` if the process does not

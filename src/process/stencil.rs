@@ -49,6 +49,11 @@ impl Stencil {
         }
     }
 
+    /// Whether the test passes for every stencil.
+    pub fn always_passes(&self) -> bool {
+        self.comparison == Comparison::Always
+    }
+
     /// Whether it may change the stencil.
     pub fn writes(&self) -> bool {
         let operations = [self.on_fail, self.on_depth_fail, self.on_pass];

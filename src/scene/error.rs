@@ -12,13 +12,13 @@ pub enum SceneError {
         /// Its name.
         mesh: String,
     },
-    /// A triangle list whose number of indices is not a multiple of 3.
-    #[error("mesh `{mesh}`: {indices} indices are not a multiple of 3")]
+    /// A triangle list whose number of indices, or of vertices if it has none, is not a multiple of 3.
+    #[error("mesh `{mesh}`: its triangle list has {corners} corners, which is not a multiple of 3")]
     PartialTriangle {
         /// Its name.
         mesh: String,
-        /// The number of indices.
-        indices: usize,
+        /// The number of indices or vertices.
+        corners: usize,
     },
     /// Values of a [vertex attribute](super::VertexAttribute) that a mesh cannot have.
     #[error("mesh `{mesh}`: its attribute {attribute:?} {problem}")]
@@ -30,9 +30,9 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: String,
     },
-    /// [Geometry on the device](super::Mesh::on_device) that no mesh can have.
+    /// [Buffers of the engine's own](super::Mesh::from_buffers) that no mesh can have.
     #[error("mesh `{mesh}`: {problem}")]
-    InvalidDeviceGeometry {
+    InvalidMeshBuffers {
         /// The name of the mesh.
         mesh: String,
         /// What is wrong with it.

@@ -22,7 +22,8 @@ pub struct Material {
     pub blend: Blend,
     /// Whether back faces are drawn too.
     pub double_sided: bool,
-    /// What the engine's own process reads of it, if it is of a [type of the engine's own](super::MaterialType).
+    /// Its values, if it has a [`MaterialType`](super::MaterialType): then the engine's own processes draw it, and of the other fields the
+    /// shipped ones use `blend`, `double_sided`, and what their shadow casters read.
     pub values: Option<MaterialValues>,
 }
 

@@ -1,16 +1,19 @@
-//! Materials of an engine's own.
+//! Material types: materials that an engine defines.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
 
 use bytemuck::Pod;
 
-/// A kind of material of the engine's own: a name, and a structure of what its shader reads of each material. Make it once, as a constant:
+/// A material type that an engine defines: a name, and the structure that shaders read of each material. Make it once, as a constant:
 /// [materials](super::Material::values) bring values for it, and a process [declares](crate::process::Declare::reads_materials) that its
-/// shader reads them and [selects](crate::command::Selection::of_material_type) the objects that have such a material. The shipped
-/// geometry buffer and transparency leave these objects to that process; they cast shadows like others.
+/// shader reads them and [selects](crate::command::Selection::of_material_type) the objects that have such a material.
 ///
-/// `T` has the layout of the structure in WGSL, padding included: a `vec3<f32>` begins at a multiple of 16 bytes.
+/// The shipped depth pre-pass, geometry buffer and transparency leave these objects to that process: without one they are not drawn.
+/// Opaque ones cast shadows like others.
+///
+/// `T` has the layout of the structure in WGSL, padding included: a `vec3<f32>` begins at a multiple of 16 bytes, and the size of `T` is
+/// a multiple of the greatest alignment of its fields.
 ///
 /// ```
 /// use drawloom::command::Selection;
@@ -99,7 +102,7 @@ impl<T: Pod> MaterialType<T> {
 
     /// Its name and the size of a material's values.
     pub const fn layout(self) -> MaterialLayout {
-        MaterialLayout { name: self.name, bytes: size_of::<T>() }
+        MaterialLayout { name: self.name, stride: size_of::<T>() }
     }
 
     /// The values of a material.
@@ -129,7 +132,7 @@ pub struct MaterialLayout {
     /// Its name.
     pub name: &'static str,
     /// The size of a material's values in bytes.
-    pub bytes: usize,
+    pub stride: usize,
 }
 
 /// The values of one material of a [`MaterialType`]: see [`MaterialType::values`].

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 #[cfg(feature = "wgpu")]
-use super::DeviceGeometry;
+use super::MeshBuffers;
 use super::vertex_attribute::MeshAttribute;
 use super::{AttributeFormat, AttributeLayout, AttributeValue, SceneError, VertexAttribute};
 
@@ -25,7 +25,7 @@ pub struct Mesh {
     culls_triangles: bool,
     /// If it is not in `vertices` and `indices`.
     #[cfg(feature = "wgpu")]
-    on_device: Option<Arc<DeviceGeometry>>,
+    buffers: Option<Arc<MeshBuffers>>,
 }
 
 impl Mesh {
@@ -55,45 +55,51 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A mesh in the engine's own buffers, within a box in object space, of which these are the lowest and the highest corner.
+    /// A mesh in the engine's own buffers. `bounding_box` is its minimum and maximum in object space, in metres: triangles outside of
+    /// it may be missing.
     ///
-    /// The CPU does not see its triangles. So it has no [`vertices`](Self::vertices), [`indices`](Self::indices) or
-    /// [`attribute`](Self::attribute), hides nothing from culling, is neither subdivided for paraboloids nor culled by triangle, and
-    /// the software backend refuses it. Batches of meshes with equal layouts share pipelines.
+    /// The CPU does not see its triangles. So it has no [`vertices`](Self::vertices), [`indices`](Self::indices),
+    /// [`attribute`](Self::attribute) or [`longest_edge`](Self::longest_edge), is never an occluder, is neither subdivided for
+    /// paraboloids nor culled by triangle, and the software backend refuses it. Batches of meshes with equal layouts share pipelines.
     ///
     /// # Errors
-    /// If it has no triangle, no positions, an attribute twice, a stream that does not fit its buffer, or the box is none.
+    /// If it has no triangle, no positions, an attribute twice or in a format that does not fit it, a buffer without the usage for it, a
+    /// stream that is misaligned or exceeds its buffer, or if the bounding box is inverted, not finite or too large.
     #[cfg(feature = "wgpu")]
-    pub fn on_device(
+    pub fn from_buffers(
         name: impl Into<String>,
         topology: Topology,
-        corners: [Vec3; 2],
-        geometry: DeviceGeometry,
+        bounding_box: [Vec3; 2],
+        buffers: MeshBuffers,
     ) -> Result<Self, SceneError> {
         let name = name.into();
-        check_corner_count(&name, topology, geometry.corners() as usize)?;
-        let [low, high] = corners;
+        check_corner_count(&name, topology, buffers.index_count() as usize)?;
+        let [low, high] = bounding_box;
         let is_box = low.is_finite() && high.is_finite() && low.cmple(high).all();
-        let problem = if is_box { geometry.problem() } else { Some(format!("its box from {low} to {high} is none")) };
+        let problem = if is_box {
+            buffers.problem(topology == Topology::TriangleStrip)
+        } else {
+            Some(format!("its bounding box from {low} to {high} is inverted or not finite"))
+        };
         if let Some(problem) = problem {
-            return Err(SceneError::InvalidDeviceGeometry { mesh: name, problem });
+            return Err(SceneError::InvalidMeshBuffers { mesh: name, problem });
         }
         let mut mesh = Self::from_valid_parts(name, topology, Vec::new(), Vec::new());
-        (mesh.bounds, mesh.corners) = (Bounds::around(corners.into_iter()), corners);
+        (mesh.bounds, mesh.corners) = (Bounds::around(bounding_box.into_iter()), bounding_box);
         if !mesh.bounds.is_valid() {
             return Err(SceneError::MeshTooLarge { mesh: mesh.name });
         }
-        mesh.on_device = Some(Arc::new(geometry));
+        mesh.buffers = Some(Arc::new(buffers));
         Ok(mesh)
     }
 
-    /// Its geometry, if that is in [the engine's own buffers](Self::on_device).
+    /// [The engine's own buffers](Self::from_buffers) that it is in, if it is.
     #[cfg(feature = "wgpu")]
-    pub fn device_geometry(&self) -> Option<&Arc<DeviceGeometry>> {
-        self.on_device.as_ref()
+    pub fn buffers(&self) -> Option<&Arc<MeshBuffers>> {
+        self.buffers.as_ref()
     }
 
-    /// Whether its triangles are known here, and not on a device alone.
+    /// Whether the CPU knows its triangles.
     pub(crate) fn has_triangles(&self) -> bool {
         !self.indices.is_empty()
     }
@@ -117,7 +123,7 @@ impl Mesh {
             longest_edge: 0.0,
             culls_triangles: false,
             #[cfg(feature = "wgpu")]
-            on_device: None,
+            buffers: None,
         };
         let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
         let edges = triangles.filter(has_distinct_corners).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
@@ -129,7 +135,8 @@ impl Mesh {
     /// Adds the values of an attribute, one for each vertex.
     ///
     /// # Errors
-    /// If there is not one value for each vertex, a value is not finite, or the mesh has the attribute already.
+    /// If there is not one value for each vertex, a value is not finite, the mesh has the attribute already, or is [in the engine's own
+    /// buffers](Self::from_buffers).
     pub fn with_attribute<T: AttributeValue>(
         mut self,
         attribute: VertexAttribute<T>,
@@ -139,7 +146,10 @@ impl Mesh {
         let refused =
             |problem: String| SceneError::InvalidAttribute { mesh: self.name.clone(), attribute: layout.name, problem };
         if !self.has_triangles() {
-            return Err(refused("belongs into a stream of the mesh, whose vertices are on the device".to_owned()));
+            return Err(refused(
+                "must be in one of the mesh's vertex streams, because its vertices are in the engine's buffers"
+                    .to_owned(),
+            ));
         }
         if values.len() != vertices {
             return Err(refused(format!("has {} values for {vertices} vertices", values.len())));
@@ -179,7 +189,7 @@ impl Mesh {
     /// a mesh: triangles that a shader would move into view may be missing.
     ///
     /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
-    /// triangles at most; further objects are drawn whole. So are meshes [on the device](Self::on_device).
+    /// triangles at most; further objects are drawn whole. So are meshes [in the engine's own buffers](Self::from_buffers).
     pub fn with_triangle_culling(mut self, enabled: bool) -> Self {
         let enabled = enabled && self.has_triangles();
         if enabled && self.topology == Topology::TriangleStrip {
@@ -234,14 +244,15 @@ impl Mesh {
     pub fn triangle_count(&self) -> usize {
         let corners = self.indices.len();
         #[cfg(feature = "wgpu")]
-        let corners = self.on_device.as_ref().map_or(corners, |geometry| geometry.corners() as usize);
+        let corners = self.buffers.as_ref().map_or(corners, |buffers| buffers.index_count() as usize);
         match self.topology {
             Topology::TriangleList => corners / 3,
             Topology::TriangleStrip => corners.saturating_sub(2),
         }
     }
 
-    /// The indices of each triangle's corners, counter-clockwise seen from its front; none of a mesh [on the device](Self::on_device).
+    /// The indices of each triangle's corners, counter-clockwise seen from its front; none of a mesh
+    /// [in the engine's own buffers](Self::from_buffers).
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.triangles_in(0..self.triangle_count())
     }
@@ -269,7 +280,7 @@ fn check_corner_count(mesh: &str, topology: Topology, corners: usize) -> Result<
         return Err(SceneError::EmptyMesh { mesh: mesh.to_owned() });
     }
     if topology == Topology::TriangleList && !corners.is_multiple_of(3) {
-        return Err(SceneError::PartialTriangle { mesh: mesh.to_owned(), indices: corners });
+        return Err(SceneError::PartialTriangle { mesh: mesh.to_owned(), corners });
     }
     Ok(())
 }
@@ -363,7 +374,7 @@ mod tests {
         let corners = vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0)];
         let make = |vertices, indices| Mesh::new("leaf", Topology::TriangleList, vertices, indices);
         assert!(matches!(make(corners.clone(), vec![]), Err(SceneError::EmptyMesh { mesh }) if mesh == "leaf"));
-        assert!(matches!(make(corners.clone(), vec![0, 1, 2, 0]), Err(SceneError::PartialTriangle { indices: 4, .. })));
+        assert!(matches!(make(corners.clone(), vec![0, 1, 2, 0]), Err(SceneError::PartialTriangle { corners: 4, .. })));
         let outside = make(corners.clone(), vec![0, 1, 3]);
         assert!(matches!(outside, Err(SceneError::IndexOutOfRange { index: 3, vertices: 3, .. })));
         let broken = vec![corners[0], corners[1], corner(f32::NAN, 0.0, 0.0)];

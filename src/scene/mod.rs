@@ -7,7 +7,7 @@ mod assets;
 mod camera;
 mod changes;
 #[cfg(feature = "wgpu")]
-mod device_geometry;
+mod mesh_buffers;
 mod error;
 mod layer_mask;
 mod light;
@@ -27,16 +27,16 @@ mod vertex_attribute;
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
 pub use changes::Changes;
-#[cfg(feature = "wgpu")]
-pub use device_geometry::{DeviceGeometry, IndexStream, StreamAttribute, StreamLayout, VertexStream};
-#[cfg(feature = "wgpu")]
-pub(crate) use device_geometry::{NORMAL, NumberKind, POSITION, UV};
 pub use error::SceneError;
 pub use layer_mask::LayerMask;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use material_type::{MaterialLayout, MaterialType, MaterialValues};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
+#[cfg(feature = "wgpu")]
+pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, VertexStream};
+#[cfg(feature = "wgpu")]
+pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
 pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;

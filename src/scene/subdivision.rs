@@ -23,8 +23,8 @@ impl Mesh {
     /// [`longest_edge`](Self::longest_edge) of the result is then still above `longest`. A `longest` that is NaN or not
     /// positive cannot be reached, and subdivides up to the limit.
     ///
-    /// A mesh on the device stays as it is. Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result
-    /// is a single degenerate triangle.
+    /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result is a single
+    /// degenerate triangle. A mesh [in the engine's own buffers](Self::from_buffers) stays as it is.
     ///
     /// ```
     /// use drawloom::scene::{Mesh, Topology, Vertex};

@@ -15,12 +15,12 @@ pub(super) struct DrawStates {
     meshes: Vec<Option<MeshEntry>>,
     /// With the states of objects with triangle lists, as they are and mirrored.
     materials: Vec<Option<(Handle<Material>, [DrawState; 2])>>,
-    /// The types of materials; empty if none has one.
+    /// The type of each material, by slot; empty if none has one.
     types: Vec<Option<MaterialLayout>>,
     /// Each type once.
     layouts: Vec<MaterialLayout>,
     /// Counts how often `types` changed.
-    types_version: u64,
+    types_revision: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +73,7 @@ impl DrawStates {
         if types == self.types {
             return;
         }
-        self.types_version += 1;
+        self.types_revision += 1;
         self.layouts.clear();
         for layout in types.iter().copied().flatten() {
             if !self.layouts.contains(&layout) {
@@ -83,19 +83,19 @@ impl DrawStates {
         self.types = types;
     }
 
-    /// The types of materials by slot; empty if none has one.
+    /// The type of each material, by slot; empty if none has one.
     pub(super) fn types(&self) -> &[Option<MaterialLayout>] {
         &self.types
     }
 
-    /// The types of materials, each once.
+    /// The material types, each once.
     pub(super) fn layouts(&self) -> &[MaterialLayout] {
         &self.layouts
     }
 
-    /// Counts how often the types of materials changed.
-    pub(super) fn types_version(&self) -> u64 {
-        self.types_version
+    /// Counts how often the type of a material changed.
+    pub(super) fn types_revision(&self) -> u64 {
+        self.types_revision
     }
 
     /// The state of an object; `None` if a handle is stale.
@@ -122,7 +122,7 @@ pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec
     let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();
     topologies.retain(|topology| assets.meshes.iter().any(|(_, mesh)| mesh.topology() == *topology));
     for (handle, Material { double_sided, blend, values, .. }) in assets.materials.iter() {
-        let is_of_type = selection.material_types.contain(values.as_ref().map(MaterialValues::layout));
+        let is_of_type = selection.material_types.contains(values.as_ref().map(MaterialValues::layout));
         if is_of_type && selection.contains(*blend, handle.index()) {
             let [state, _] = states_of(*double_sided, *blend);
             states.extend(topologies.iter().map(|topology| state.with_topology(*topology)));

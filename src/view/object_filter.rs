@@ -1,11 +1,11 @@
-//! Which objects a process draws by their layers and the types of their materials.
+//! Which objects a process draws by their layers and material types.
 
 use super::{ObjectTable, set_bits};
-use crate::command::{MaterialTypes, Selection};
+use crate::command::{MaterialTypeFilter, Selection};
 use crate::handle::Handle;
 use crate::scene::{LayerMask, Material, MaterialLayout, SceneRef};
 
-/// Which objects a process draws by their layers and the types of their materials.
+/// Which objects a process draws by their layers and material types.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectFilter<'a> {
     /// Of each object; empty if all have the same answer.
@@ -16,7 +16,7 @@ pub(crate) struct ObjectFilter<'a> {
     materials: &'a [Handle<Material>],
     /// Of each material, by slot; empty if all have the same answer.
     types: &'a [Option<MaterialLayout>],
-    drawn_types: MaterialTypes,
+    drawn_types: MaterialTypeFilter,
 }
 
 impl<'a> ObjectFilter<'a> {
@@ -29,19 +29,19 @@ impl<'a> ObjectFilter<'a> {
             drawn,
             excluded,
             materials: scene.materials,
-            types: if drawn_types == MaterialTypes::Any { &[] } else { table.material_types() },
+            types: if drawn_types == MaterialTypeFilter::Any { &[] } else { table.material_type_of_slots() },
             drawn_types,
         }
     }
 
     /// Whether it lets all objects pass.
     pub(crate) fn passes_all(&self) -> bool {
-        self.passes_all_layers() && self.types.is_empty() && self.drawn_types.contain(None)
+        self.ignores_layers() && self.types.is_empty() && self.drawn_types.contains(None)
     }
 
-    /// Whether it lets objects of all layers pass.
-    pub(crate) fn passes_all_layers(&self) -> bool {
-        self.layers.is_empty() && self.passes_every_layer()
+    /// Whether layers do not decide.
+    pub(crate) fn ignores_layers(&self) -> bool {
+        self.layers.is_empty() && self.passes_object_in_all_layers()
     }
 
     /// Whether it lets an object pass.
@@ -58,21 +58,21 @@ impl<'a> ObjectFilter<'a> {
                 let is_excluded = self.excluded == LayerMask::ALL || layers.intersects(self.excluded);
                 is_drawn && !is_excluded
             }
-            None => self.passes_every_layer(),
+            None => self.passes_object_in_all_layers(),
         }
     }
 
     #[inline]
     fn passes_type(&self, object: usize) -> bool {
         if self.types.is_empty() {
-            return self.drawn_types.contain(None);
+            return self.drawn_types.contains(None);
         }
         let material = self.materials[object].index() as usize;
-        self.drawn_types.contain(self.types.get(material).copied().flatten())
+        self.drawn_types.contains(self.types.get(material).copied().flatten())
     }
 
-    /// Whether it lets objects that belong to all layers pass.
-    fn passes_every_layer(&self) -> bool {
+    /// Whether it lets an object that belongs to all layers pass.
+    fn passes_object_in_all_layers(&self) -> bool {
         self.drawn != LayerMask::NONE && self.excluded == LayerMask::NONE
     }
 

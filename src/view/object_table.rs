@@ -121,19 +121,19 @@ impl ObjectTable {
         }
     }
 
-    /// The types of materials by slot; empty if none has one.
-    pub(crate) fn material_types(&self) -> &[Option<MaterialLayout>] {
+    /// The type of each material, by slot; empty if none has one.
+    pub(crate) fn material_type_of_slots(&self) -> &[Option<MaterialLayout>] {
         self.draw_states.types()
     }
 
-    /// The types of the scene's materials, each once.
-    pub(crate) fn material_layouts(&self) -> &[MaterialLayout] {
+    /// The scene's material types, each once.
+    pub(crate) fn material_types(&self) -> &[MaterialLayout] {
         self.draw_states.layouts()
     }
 
-    /// Counts how often the types of materials changed.
-    pub(crate) fn material_types_version(&self) -> u64 {
-        self.draw_states.types_version()
+    /// Counts how often the type of a material changed.
+    pub(crate) fn material_types_revision(&self) -> u64 {
+        self.draw_states.types_revision()
     }
 
     /// Ends a frame that succeeded: the next one describes the objects that change until then. Without this call it describes all.

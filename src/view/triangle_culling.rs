@@ -19,7 +19,9 @@ impl RenderView {
     /// is far larger than its distance, is culled only if all its corners are beyond one side of the picture. Positions
     /// are those of camera-relative transforms.
     ///
-    /// An object that cannot be drawn has no triangles.
+    /// An object that cannot be drawn has no triangles, and one whose mesh is
+    /// [in the engine's own buffers](crate::scene::Mesh::from_buffers) none that are known here: then `remaining` stays as it is, although
+    /// the object may be visible.
     ///
     /// # Panics
     /// If `object` is not in the scene.

@@ -379,7 +379,9 @@ fn materials_of_another_size_are_named() {
         let values = Some(Reading::<2>::METAL.values([1; 2]));
         let other = scene.add(Material { values, ..Material::default() }).unwrap();
         let error = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err().to_string();
-        assert_eq!(error, "process \"four\" knows materials \"metal\" of 16 bytes, but the scene has some of 8");
+        let expected =
+            "process \"four\" knows the material type \"metal\" with 16 bytes for each material, but the scene has 8";
+        assert_eq!(error, expected);
         scene.remove(other).unwrap();
         scene.remove(fitting).unwrap();
         renderer.record(scene.as_scene_ref()).map(drop).unwrap();
@@ -388,7 +390,7 @@ fn materials_of_another_size_are_named() {
     let error = builder.build(Arc::new(Scheduler::new(1).unwrap())).map(drop).unwrap_err();
     let is_named = matches!(
         &error,
-        BuildError::Plan(PlanError::ConflictingMaterials { process, material: "metal", first: 16, second: 8 })
+        BuildError::Plan(PlanError::ConflictingMaterialTypes { process, material_type: "metal", first: 16, second: 8 })
             if process == "two"
     );
     assert!(is_named, "{error}");

@@ -1,8 +1,8 @@
 //! Textures of the engine's own in the place of targets.
 
 use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, WgpuBackend};
-use drawloom::process::{Deferred, Format, ToneMapping};
-use drawloom::scene::Scene;
+use drawloom::process::{Deferred, Format, GeometryFormats, ToneMapping};
+use drawloom::scene::{Scene, SceneRef};
 use drawloom::{FrameError, Recorded, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
@@ -19,6 +19,10 @@ pub const CASES: &[Case] = &[
     ("a_texture_without_srgb_is_drawn_into_as_srgb", srgb),
     ("frames_keep_their_bundles_while_imported_textures_alternate", alternating),
     ("an_imported_texture_that_does_not_fit_is_named", misfits),
+    ("a_depth_target_with_a_stencil_can_be_imported", depth_with_stencil),
+    ("of_cameras_of_one_name_the_first_draws_into_the_import", same_name),
+    ("an_import_is_dropped_when_its_frame_fails", failed_frame),
+    ("an_import_that_cannot_be_read_back_is_named", unreadable),
     ("an_imported_texture_of_another_device_is_an_error", another_device),
 ];
 
@@ -186,6 +190,69 @@ fn misfits() -> Result<(), Failed> {
         expect(draw(&mut fixture, &scene)? == expected, || format!("the frame after {part:?} differs"))?;
     }
     Ok(())
+}
+
+fn depth_with_stencil() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let format = Format::Depth32FloatStencil8;
+    let deferred = Deferred::to_picture().formats(GeometryFormats { depth: format, ..GeometryFormats::default() });
+    let mut fixture = Fixture::on(Some(crate::strategies::device()?), 2, |builder| builder.deferred(deferred))?;
+    let scene = field(60);
+    let expected = draw(&mut fixture, &scene)?;
+    let depth = texture(&device, scene.cameras[0].size, TextureFormat::Depth32FloatStencil8, USAGE);
+    fixture.renderer.backend().import_target("front", "depth", depth.clone());
+    let recorded = fixture.record(&scene)?;
+    let submission = fixture.submit(recorded)?;
+    expect(submission.texture(0, "depth") == Some(&depth), || "it is not drawn into".into())?;
+    expect(submission.read(0, "picture")? == expected[0], || "the picture differs".into())
+}
+
+fn same_name() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let (mut scene, mut fixture) = (field(60), fixture()?);
+    let expected = draw(&mut fixture, &scene)?;
+    let name = scene.cameras[0].name.clone();
+    scene.cameras[1].name = name.clone();
+    let surface = texture(&device, scene.cameras[0].size, TextureFormat::Rgba8UnormSrgb, USAGE);
+    fixture.renderer.backend().import_target(name, "picture", surface.clone());
+    let recorded = fixture.record(&scene)?;
+    let submission = fixture.submit(recorded)?;
+    expect(submission.texture(0, "picture") == Some(&surface), || "the first does not draw into it".into())?;
+    for (view, expected) in expected.iter().enumerate() {
+        expect(submission.read(view, "picture")? == *expected, || format!("view {view} differs"))?;
+    }
+    Ok(())
+}
+
+/// A frame without cameras fails before the device is asked for anything.
+fn failed_frame() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let (scene, mut fixture) = (field(60), fixture()?);
+    let expected = draw(&mut fixture, &scene)?;
+    let surface = texture(&device, scene.cameras[0].size, TextureFormat::Rgba8UnormSrgb, USAGE);
+    fixture.renderer.backend().import_target("front", "picture", surface.clone());
+    let without_cameras = SceneRef { cameras: &[], ..scene.as_scene_ref() };
+    expect(fixture.renderer.record(without_cameras).is_err(), || "a frame without cameras is recorded".into())?;
+    let recorded = fixture.record(&scene)?;
+    let submission = fixture.submit(recorded)?;
+    expect(submission.texture(0, "picture") != Some(&surface), || "the next frame draws into it".into())?;
+    expect(submission.read(0, "picture")? == expected[0], || "the next frame differs".into())
+}
+
+fn unreadable() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let (scene, mut fixture) = (field(60), fixture()?);
+    let expected = draw(&mut fixture, &scene)?;
+    let usage = TextureUsages::RENDER_ATTACHMENT;
+    let surface = texture(&device, scene.cameras[0].size, TextureFormat::Rgba8UnormSrgb, usage);
+    fixture.renderer.backend().import_target("front", "picture", surface);
+    let mut recorded = fixture.record(&scene)?;
+    let refused = recorded.read_back(0, "picture", [0, 0], [1, 1]).err().map(|error| error.to_string());
+    expect(refused.is_some_and(|error| error.contains("without the usage COPY_SRC")), || "it is read back".into())?;
+    let submission = fixture.submit(recorded)?;
+    let refused = submission.read(0, "picture").err().map(|error| error.to_string()).unwrap_or_default();
+    expect(refused.contains("without the usage COPY_SRC"), || format!("{refused:?}"))?;
+    expect(submission.read(1, "picture")? == expected[1], || "the other view differs".into())
 }
 
 fn another_device() -> Result<(), Failed> {

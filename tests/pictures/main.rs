@@ -12,7 +12,7 @@ mod columns;
 mod deformation;
 mod determinism;
 mod compute;
-mod device_meshes;
+mod imported_meshes;
 mod device_times;
 mod devices;
 mod extremes;
@@ -104,7 +104,7 @@ fn main() {
         (target_formats::CASES, Needs::Adapter),
         (transforms::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),
-        (device_meshes::CASES, Needs::Adapter),
+        (imported_meshes::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),
     ];

@@ -1,32 +1,35 @@
-//! Materials that change, and materials of the engine's own.
+//! Materials that change, and material types.
 
+use std::error::Error;
 use std::sync::{Arc, LazyLock};
 
-use drawloom::Renderer;
 use drawloom::backend::{Backend, EncodingStrategy, RecordingStrategy, SoftwareBackend, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    BlendEquation, CommandDraws, CpuShader, Declare, Draws, GeometryBuffer, GeometryFormats, ObjectCpuShader,
-    ObjectPixel, PassInputs, Place, RenderProcess, ShaderObject, ShaderResource, Transparency, VARYINGS, VertexInput,
-    VertexOutput,
+    BlendEquation, CommandDraws, CpuShader, Declare, Deferred, Draws, GeometryBuffer, GeometryFormats, ObjectCpuShader,
+    ObjectPixel, PassInputs, Place, RawPass, RawPassResources, RenderProcess, ShaderObject, ShaderResource,
+    Transparency, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{LayerMask, Material, MaterialType, MaterialValues, RenderObject, Scene, SceneRef, Texture};
 use drawloom::task::Scheduler;
+use drawloom::{Renderer, RendererBuilder, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
+use parking_lot::Mutex;
 
 use crate::Case;
 use crate::fixture::Fixture;
 use crate::strategies::{counts, drawn_by_a_new_renderer, expect, fixture_of, pictures, small_maps};
 
 pub const CASES: &[Case] = &[
-    ("a_material_that_changes_uploads_its_bytes_and_nothing_else", changing),
-    ("types_of_materials_are_drawn_like_layers_with_bytes", types),
+    ("a_material_that_changes_uploads_the_block_that_it_is_in", changing),
+    ("material_types_are_drawn_like_layers_with_bytes", types),
     ("draw_lists_follow_materials_that_change_their_type", changing_types),
-    ("values_that_change_are_uploaded_and_nothing_else", changing_values),
+    ("values_that_change_upload_the_block_that_they_are_in", changing_values),
+    ("raw_passes_get_the_material_types_that_they_read", in_raw_pass),
     ("the_software_backend_draws_the_engines_own_materials", on_software),
 ];
 
@@ -40,7 +43,7 @@ fn many_materials() -> Result<Scene, Failed> {
 }
 
 fn changing() -> Result<(), Failed> {
-    // A device alone: the device is done with a frame when its picture is read, so all frames have the same buffers.
+    // A device of its own: reading the picture waits for the frame, so every frame reuses the same buffers.
     let (device, queue) = adapter::device()?;
     let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles)?;
     let mut fixture = fixture_of(backend.encoding_strategy(EncodingStrategy::PerPass))?;
@@ -243,8 +246,12 @@ fn set_types(scene: &mut Scene, values_of: impl Fn(usize) -> Option<MaterialValu
 }
 
 fn typed_fixture() -> Result<Fixture, Failed> {
+    typed_fixture_of(small_maps())
+}
+
+fn typed_fixture_of(deferred: Deferred) -> Result<Fixture, Failed> {
     let [flat, striped] = Colored::of_types();
-    Fixture::with(2, |builder| builder.deferred(small_maps()).process(flat).process(striped))
+    Fixture::with(2, |builder| builder.deferred(deferred).process(flat).process(striped))
 }
 
 fn types() -> Result<(), Failed> {
@@ -269,6 +276,8 @@ fn types() -> Result<(), Failed> {
     let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
     let expected = fixture.submit(recorded)?.read(0, "picture")?;
     expect(found == expected, || "they differ".into())?;
+    let after_pre_pass = typed_fixture_of(small_maps().depth_pre_pass(true))?.draw(&typed()?)?;
+    expect(after_pre_pass == expected, || "after a depth pre-pass they differ".into())?;
     expect(found != Fixture::with(2, |builder| builder.deferred(small_maps()))?.draw(&scene)?, || {
         "no type is seen".into()
     })
@@ -295,6 +304,50 @@ impl<P: RenderProcess> RenderProcess for Excluding<P> {
             other => other,
         }
     }
+}
+
+/// A raw pass that notes the sizes of the values that it gets: of a type that it reads, and of one that it does not read.
+#[derive(Default)]
+struct Noting(Mutex<Vec<Option<u64>>>);
+
+impl RenderProcess for &'static Noting {
+    fn name(&self) -> &str {
+        "noting"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.reads_materials(STRIPED);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Raw(*self)
+    }
+}
+
+impl RawPass for Noting {
+    fn encode(
+        &self,
+        _: &mut wgpu::CommandEncoder,
+        resources: &RawPassResources<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        let size = |values: Option<wgpu::BufferBinding<'_>>| values.and_then(|values| Some(values.size?.get()));
+        *self.0.lock() = vec![size(resources.materials(STRIPED)), size(resources.materials(FLAT))];
+        Ok(())
+    }
+}
+
+fn in_raw_pass() -> Result<(), Failed> {
+    let noting: &'static Noting = Box::leak(Box::default());
+    let [flat, striped] = Colored::of_types();
+    let process = |builder: RendererBuilder<WgpuBackend>| {
+        builder.deferred(small_maps()).process(flat).process(striped).process(noting)
+    };
+    let scene = typed()?;
+    Fixture::with(2, process)?.draw(&scene)?;
+    let expected = scene.assets().iter::<Material>().count() * size_of::<[[f32; 4]; 2]>();
+    let found = noting.0.lock().clone();
+    expect(found == [Some(expected as u64), None], || format!("{found:?}, and not {expected}"))
 }
 
 fn changing_types() -> Result<(), Failed> {

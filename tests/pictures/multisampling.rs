@@ -1,5 +1,6 @@
-//! Targets with several samples a pixel.
+//! Multisampled targets.
 
+use std::error::Error;
 use std::sync::Arc;
 
 use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
@@ -7,13 +8,14 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     BlendEquation, ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, FullScreen, ObjectCpuShader,
-    ObjectPixel, PassInputs, RenderProcess, ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    ObjectPixel, PassInputs, RawPass, RawPassResources, RenderProcess, ShaderObject, VARYINGS, VertexInput,
+    VertexOutput,
 };
 use drawloom::quality::Quality;
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{Camera, Material, Projection, RenderObject, Scene, Topology};
 use drawloom::task::Scheduler;
-use drawloom::{BuildError, Renderer};
+use drawloom::{BuildError, Renderer, wgpu};
 use drawloom_testing::scenes::{as_list, culled, field, sized, square, with_meshes};
 use libtest_mimic::Failed;
 
@@ -27,7 +29,9 @@ pub const CASES: &[Case] = &[
     ("every_strategy_draws_the_same_samples", every_strategy),
     ("culling_leaves_what_covers_a_sample_but_no_centre", between_centres),
     ("targets_that_cannot_be_multisampled_or_resolved_are_named", misdeclared),
-    ("the_software_backend_names_processes_with_several_samples", on_software),
+    ("a_raw_pass_may_change_a_multisampled_target", raw),
+    ("an_import_in_the_place_of_a_resolved_target_is_drawn_into", imported),
+    ("the_software_backend_names_processes_with_multisampled_targets", on_software),
 ];
 
 /// Draws all objects in the colour of their index.
@@ -44,11 +48,11 @@ impl RenderProcess for Numbered {
     fn declare(&self, declare: &mut Declare) {
         let (black, format) = (ClearColor::Value([0.0, 0.0, 0.0, 1.0]), Format::Rgba8Unorm);
         if self.multisampled {
-            declare.clears_color("samples", format, black);
-            declare.clears_depth("depth of samples", Format::Depth32Float);
-            declare.multisampled("samples");
-            declare.multisampled("depth of samples");
-            declare.resolves("samples", "numbers", format);
+            declare.clears_color("multisampled colour", format, black);
+            declare.clears_depth("multisampled depth", Format::Depth32Float);
+            declare.multisampled("multisampled colour");
+            declare.multisampled("multisampled depth");
+            declare.resolves("multisampled colour", "numbers", format);
         } else {
             declare.clears_color("numbers", format, black);
             declare.clears_depth("depth of numbers", Format::Depth32Float);
@@ -104,8 +108,8 @@ impl RenderProcess for Mean {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.samples("samples");
-        declare.samples("depth of samples");
+        declare.samples("multisampled colour");
+        declare.samples("multisampled depth");
         declare.clears_color("mean", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
         declare.clears_color("covered", Format::R8Unorm, ClearColor::Value([0.0; 4]));
     }
@@ -271,20 +275,92 @@ impl RenderProcess for Declaring {
     }
 }
 
+/// A raw pass that clears the multisampled colour to green.
+struct Green;
+
+impl RenderProcess for Green {
+    fn name(&self) -> &str {
+        "green"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.changes("multisampled colour");
+        declare.before("mean");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Raw(self)
+    }
+}
+
+impl RawPass for Green {
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &RawPassResources<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        let target = resources.target("multisampled colour").ok_or("it is declared")?;
+        let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::GREEN), store: wgpu::StoreOp::Store };
+        let attachment = wgpu::RenderPassColorAttachment { view: &view, depth_slice: None, resolve_target: None, ops };
+        let color_attachments = [Some(attachment)];
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &color_attachments,
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        Ok(())
+    }
+}
+
+fn raw() -> Result<(), Failed> {
+    let numbered = Numbered { multisampled: true };
+    let mut fixture =
+        Fixture::with(2, |builder| builder.process(numbered).process(Green).process(Mean).output("mean"))?;
+    let [mean] = read(&mut fixture, &in_meters(DVec3::ZERO)?, ["mean"])?;
+    let is_green = mean.bytes.chunks_exact(4).all(|pixel| pixel == [0, 255, 0, 255]);
+    expect(is_green, || "it is not green".into())
+}
+
+fn imported() -> Result<(), Failed> {
+    let scene = in_meters(DVec3::ZERO)?;
+    let mut fixture = fixture(true, Quality::balanced())?;
+    let [expected] = read(&mut fixture, &scene, ["numbers"])?;
+    let texture = |usage| {
+        fixture.renderer.backend().device().create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: 16, height: 16, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage,
+            view_formats: &[],
+        })
+    };
+    let (copied, drawn) = (wgpu::TextureUsages::COPY_SRC, wgpu::TextureUsages::RENDER_ATTACHMENT);
+    let [fits, misfits] = [texture(copied | drawn), texture(copied)];
+    fixture.renderer.backend().import_target("plan", "numbers", misfits);
+    let refused = fixture.renderer.record(scene.as_scene_ref()).err().map(|error| error.to_string());
+    expect(refused.is_some_and(|error| error.contains("lacks the usage")), || "the misfit is taken".into())?;
+    fixture.renderer.backend().import_target("plan", "numbers", fits);
+    let [found] = read(&mut fixture, &scene, ["numbers"])?;
+    expect(found == expected, || "it differs".into())
+}
+
 fn misdeclared() -> Result<(), Failed> {
     const FORMAT: Format = Format::Rgba8Unorm;
     fn clears(declare: &mut Declare, target: &str) {
         declare.clears_color(target, FORMAT, ClearColor::Background);
     }
     type Case = (fn(&mut Declare), &'static str);
-    let cases: [Case; 10] = [
-        (|declare| declare.multisampled("other"), "which it does not clear"),
+    let cases: [Case; 11] = [
+        (|declare| declare.multisampled("other"), "it does not clear it"),
         (
             |declare| {
                 declare.clears_color("one", Format::R32Float, ClearColor::Background);
                 declare.multisampled("one");
             },
-            "whose format cannot",
+            "multisamples its format",
         ),
         (
             |declare| {
@@ -307,7 +383,7 @@ fn misdeclared() -> Result<(), Failed> {
                 clears(declare, "one");
                 declare.resolves("one", "two", FORMAT);
             },
-            "which has one sample a pixel",
+            "it is not multisampled",
         ),
         (
             |declare| {
@@ -315,7 +391,7 @@ fn misdeclared() -> Result<(), Failed> {
                 declare.multisampled("one");
                 declare.resolves("one", "two", Format::Rgba16Float);
             },
-            "into one of another format or size",
+            "has another format or size",
         ),
         (
             |declare| {
@@ -324,7 +400,7 @@ fn misdeclared() -> Result<(), Failed> {
                 declare.resolves("one", "two", FORMAT);
                 declare.size("two", drawloom::process::TargetSize::Divided(2));
             },
-            "into one of another format or size",
+            "has another format or size",
         ),
         (
             |declare| {
@@ -333,7 +409,17 @@ fn misdeclared() -> Result<(), Failed> {
                 declare.resolves("one", "two", FORMAT);
                 declare.resolves("one", "three", FORMAT);
             },
-            "twice",
+            "resolves it twice",
+        ),
+        (
+            |declare| {
+                for target in ["one", "other"] {
+                    clears(declare, target);
+                    declare.multisampled(target);
+                    declare.resolves(target, "two", FORMAT);
+                }
+            },
+            "another one into the same target",
         ),
         (
             |declare| {
@@ -341,14 +427,14 @@ fn misdeclared() -> Result<(), Failed> {
                 declare.multisampled("one");
                 declare.resolves("other", "two", FORMAT);
             },
-            "without drawing into it",
+            "does not draw into it",
         ),
         (
             |declare| {
                 clears(declare, "one");
                 declare.resolves("one", "two", Format::R32Uint);
             },
-            "cannot be resolved",
+            "resolves its format",
         ),
     ];
     for (declare, part) in cases {
@@ -370,5 +456,5 @@ fn on_software() -> Result<(), Failed> {
     let builder = builder.process(Numbered { multisampled: true }).output("numbers");
     let (mut renderer, _) = builder.build(scheduler)?;
     let message = renderer.record(field(3).as_scene_ref()).err().map(|error| error.to_string()).unwrap_or_default();
-    expect(message.contains("numbered") && message.contains("one sample a pixel"), || format!("{message:?}"))
+    expect(message.contains("numbered") && message.contains("multisampled targets"), || format!("{message:?}"))
 }

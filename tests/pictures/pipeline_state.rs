@@ -219,13 +219,13 @@ fn covering_cube() -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Equations, each with what it makes of a source and a destination: of a channel, whose index is third, of both.
-type Mixed = fn([f64; 4], [f64; 4], usize) -> f64;
+/// What a blend equation makes of a source and a destination, in the channel of this index.
+type Blended = fn([f64; 4], [f64; 4], usize) -> f64;
 
-fn equations_and_results() -> Vec<(BlendEquation, Mixed)> {
+fn equations_and_results() -> Vec<(BlendEquation, Blended)> {
     use BlendFactor::*;
     let all = BlendEquation::same_for_all_channels;
-    let sum = |source, destination| all(BlendComponent::Sum { source, destination });
+    let sum = |source, destination| all(BlendComponent::Add { source, destination });
     vec![
         (BlendEquation::REPLACE, |s, _, c| s[c]),
         (BlendEquation::MULTIPLY, |s, d, c| s[c] * d[c]),
@@ -237,21 +237,21 @@ fn equations_and_results() -> Vec<(BlendEquation, Mixed)> {
         (sum(SourceAlpha, OneMinusSource), |s, d, c| s[c] * s[3] + d[c] * (1.0 - s[c])),
         (sum(OneMinusSourceAlpha, DestinationAlpha), |s, d, c| s[c] * (1.0 - s[3]) + d[c] * d[3]),
         (sum(OneMinusDestination, OneMinusDestinationAlpha), |s, d, c| s[c] * (1.0 - d[c]) + d[c] * (1.0 - d[3])),
-        (all(BlendComponent::Difference { source: Destination, destination: SourceAlpha }), |s, d, c| {
+        (all(BlendComponent::Subtract { source: Destination, destination: SourceAlpha }), |s, d, c| {
             s[c] * d[c] - d[c] * s[3]
         }),
-        (all(BlendComponent::ReverseDifference { source: Destination, destination: SourceAlpha }), |s, d, c| {
+        (all(BlendComponent::ReverseSubtract { source: Destination, destination: SourceAlpha }), |s, d, c| {
             d[c] * s[3] - s[c] * d[c]
         }),
-        (all(BlendComponent::Minimum), |s, d, c| s[c].min(d[c])),
-        (all(BlendComponent::Maximum), |s, d, c| s[c].max(d[c])),
-        (BlendEquation { color: BlendComponent::Maximum, ..BlendEquation::ADDITIVE }, |s, d, c| {
+        (all(BlendComponent::Min), |s, d, c| s[c].min(d[c])),
+        (all(BlendComponent::Max), |s, d, c| s[c].max(d[c])),
+        (BlendEquation { color: BlendComponent::Max, ..BlendEquation::ADDITIVE }, |s, d, c| {
             if c == 3 { s[c] + d[c] } else { s[c].max(d[c]) }
         }),
     ]
 }
 
-fn expect(picture: &Picture, mixed: Mixed, of: &str) -> Result<(), Failed> {
+fn expect(picture: &Picture, mixed: Blended, of: &str) -> Result<(), Failed> {
     let expected: Vec<_> = (0..4).map(|channel| mixed(SOURCE, DESTINATION, channel)).collect();
     for pixel in picture.bytes.chunks_exact(8) {
         let found: Vec<_> =
@@ -293,7 +293,7 @@ fn equations() -> Result<(), Failed> {
 /// Draws all objects in the colour of their index, over everything.
 #[derive(Clone)]
 struct Numbered {
-    culling: FaceCulling,
+    face_culling: FaceCulling,
     blend_equations: Vec<BlendEquation>,
 }
 
@@ -327,7 +327,7 @@ impl RenderProcess for Numbered {
                 }
             ",
             selection: Selection::ALL,
-            culling: self.culling,
+            face_culling: self.face_culling,
             blend_equations: self.blend_equations.clone(),
             ..CommandDraws::default()
         })
@@ -373,7 +373,7 @@ fn flipped(mesh: &Mesh) -> Mesh {
 }
 
 fn reversed() -> Result<(), Failed> {
-    let by = |culling| Numbered { culling, blend_equations: vec![BlendEquation::REPLACE] };
+    let by = |face_culling| Numbered { face_culling, blend_equations: vec![BlendEquation::REPLACE] };
     let expected = numbers(&with_meshes(lists(), flipped), &by(FaceCulling::ByMaterial))?;
     if expected == numbers(&lists(), &by(FaceCulling::ByMaterial))? {
         return Err("the winding changes nothing".into());
@@ -390,7 +390,7 @@ fn reversed() -> Result<(), Failed> {
 }
 
 fn without_culling() -> Result<(), Failed> {
-    let by = |culling| Numbered { culling, blend_equations: Vec::new() };
+    let by = |face_culling| Numbered { face_culling, blend_equations: Vec::new() };
     let mut double_sided = lists();
     let materials: Vec<_> =
         double_sided.assets().iter::<Material>().map(|(handle, one)| (handle, one.clone())).collect();
@@ -418,10 +418,9 @@ fn depth_of_blended_objects() -> Result<(), Failed> {
         let object = RenderObject::new(mesh, glass, DVec3::new(0.0, 0.0, z));
         scene.add_object(RenderObject { scale: Vec3::new(1.0, 1.0, 0.1), ..object })?;
     }
-    let numbered = |blend_equations| Numbered { culling: FaceCulling::ByMaterial, blend_equations };
+    let numbered = |blend_equations| Numbered { face_culling: FaceCulling::ByMaterial, blend_equations };
     let sum_of = |pictures: &[Picture]| pictures[0].bytes.iter().map(|byte| u64::from(*byte)).sum::<u64>();
-    // Blended objects are drawn back to front, so the nearer one would be added to the farther one: only its depth keeps that away
-    // from a frame in which the farther one comes second.
+    // Front to back, so that the depth of the nearer pane hides the farther one. Back to front would draw both.
     let front_to_back = FrontToBack(numbered(vec![BlendEquation::ADDITIVE]));
     let [by_wgpu, by_software] = [
         on_wgpu(&scene, ["numbers"], |builder| builder.process(front_to_back.clone()).output("numbers"))?,

@@ -18,14 +18,16 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::Fixture;
-use crate::strategies::{device, strategies};
+use crate::strategies::{device, expect, strategies};
 
 pub const CASES: &[Case] = &[
     ("a_stencil_alone_marks_all_pixels_of_objects", alone),
     ("a_stencil_beside_depth_marks_visible_pixels", beside_depth),
     ("every_strategy_tests_the_same_stencil", every_strategy),
     ("operations_and_masks_are_those_of_the_device", operations),
-    ("hidden_objects_are_marked_where_depth_fails", where_depth_fails),
+    ("hidden_objects_are_marked_where_a_test_fails", hidden_objects),
+    ("a_process_that_tests_the_stencil_alone_draws_hidden_objects", through_walls),
+    ("objects_that_the_stencil_test_leaves_out_hide_nothing", masked),
     ("a_process_that_has_no_stencil_is_named", without),
 ];
 
@@ -256,32 +258,137 @@ fn operations() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A cube behind a wall, which occlusion culling removes unless somebody sees where it is.
-fn where_depth_fails() -> Result<(), Failed> {
+/// A cube in the layer [`MARKED`], behind a wall that is in another: occlusion culling removes the cube.
+fn cube_behind_wall() -> Result<(Scene, [LayerMask; 2]), Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 0.0, 12.0), DVec3::ZERO), [160, 90])];
     let (mesh, stone) = (scene.add(cube())?, scene.add(Material::default())?);
     let wall = RenderObject::new(mesh, stone, DVec3::ZERO);
     scene.add_object(RenderObject { scale: Vec3::new(6.0, 4.0, 0.5), ..wall })?;
     scene.add_object(RenderObject::new(mesh, stone, DVec3::new(0.0, 0.0, -6.0)))?;
-    let layers = [LayerMask::layer(0), MARKED];
-    let hidden =
-        Stencil { on_depth_fail: StencilOperation::Replace, on_pass: StencilOperation::Keep, ..Stencil::mark(3) };
-    let white_of = |occlusion| -> Result<Picture, Failed> {
+    Ok((scene, [LayerMask::layer(0), MARKED]))
+}
+
+fn hidden_objects() -> Result<(), Failed> {
+    let (scene, layers) = cube_behind_wall()?;
+    let white_of = |stencil, occlusion| -> Result<Picture, Failed> {
         let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
         let quality = Quality { occlusion, ..Quality::balanced() };
-        let mark = Mark { stencil: hidden, ..Mark::BESIDE_DEPTH };
+        let mark = Mark { stencil, ..Mark::BESIDE_DEPTH };
         let mut fixture = Fixture::with(2, |builder| {
             builder.deferred(pipeline()).process(mark).process(white).output("white").quality(quality)
         })?;
         let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
         Ok(fixture.submit(recorded)?.read(0, "white")?)
     };
-    let expected = white_of(None)?;
-    if !expected.bytes.contains(&255) {
-        return Err("nothing is marked".into());
+    let (keep, replace) = (StencilOperation::Keep, StencilOperation::Replace);
+    let where_depth_fails = Stencil { on_depth_fail: replace, on_pass: keep, ..Stencil::mark(3) };
+    // The stencil test comes before the depth test.
+    let where_stencil_fails =
+        Stencil { comparison: Comparison::Never, on_fail: replace, on_pass: keep, ..Stencil::mark(3) };
+    for stencil in [where_depth_fails, where_stencil_fails] {
+        let expected = white_of(stencil, None)?;
+        expect(expected.bytes.contains(&255), || format!("{stencil:?}: nothing is marked"))?;
+        expect(white_of(stencil, Some(16))? == expected, || format!("{stencil:?}: occlusion culling changes it"))?;
     }
-    if white_of(Some(16))? == expected { Ok(()) } else { Err("occlusion culling changes the stencil".into()) }
+    Ok(())
+}
+
+/// Draws objects in white wherever the stencil is 0, whatever the depth.
+struct ThroughWalls;
+
+impl RenderProcess for ThroughWalls {
+    fn name(&self) -> &str {
+        "through walls"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("white", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.tests_stencil("depth");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: COVERED,
+            selection: Selection::OPAQUE.in_layers(MARKED),
+            writes_depth: false,
+            stencil: Some(Stencil::test(Comparison::Equal, 0)),
+            ..CommandDraws::default()
+        })
+    }
+}
+
+fn through_walls() -> Result<(), Failed> {
+    let (scene, layers) = cube_behind_wall()?;
+    let draw = |occlusion| -> Result<Picture, Failed> {
+        let quality = Quality { occlusion, ..Quality::balanced() };
+        let mut fixture = Fixture::with(2, |builder| {
+            builder.deferred(pipeline()).process(ThroughWalls).output("white").quality(quality)
+        })?;
+        let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
+        Ok(fixture.submit(recorded)?.read(0, "white")?)
+    };
+    let expected = draw(None)?;
+    expect(expected.bytes.contains(&255), || "nothing is seen through the wall".into())?;
+    expect(draw(Some(16))? == expected, || "occlusion culling removes it".into())
+}
+
+/// Draws the depth of objects where the stencil is 3, which is nowhere.
+struct Masked;
+
+impl RenderProcess for Masked {
+    fn name(&self) -> &str {
+        "masked"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("white", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.clears_depth("own depth", Format::Depth32FloatStencil8);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let stencil = Some(Stencil::test(Comparison::Equal, 3));
+        Draws::Commands(CommandDraws {
+            shader: COVERED,
+            selection: Selection::OPAQUE.not_in_layers(MARKED),
+            stencil,
+            ..CommandDraws::default()
+        })
+    }
+}
+
+/// Draws the marked objects behind them.
+struct Behind;
+
+impl RenderProcess for Behind {
+    fn name(&self) -> &str {
+        "behind"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.draws_over("white");
+        declare.draws_depth("own depth");
+        declare.after("masked");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let selection = Selection::OPAQUE.in_layers(MARKED);
+        Draws::Commands(CommandDraws { shader: COVERED, selection, ..CommandDraws::default() })
+    }
+}
+
+fn masked() -> Result<(), Failed> {
+    let (scene, layers) = cube_behind_wall()?;
+    let draw = |occlusion| -> Result<Picture, Failed> {
+        let quality = Quality { occlusion, ..Quality::balanced() };
+        let mut fixture =
+            Fixture::with(2, |builder| builder.process(Masked).process(Behind).output("white").quality(quality))?;
+        let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
+        Ok(fixture.submit(recorded)?.read(0, "white")?)
+    };
+    let expected = draw(None)?;
+    expect(expected.bytes.contains(&255), || "the cube is not seen".into())?;
+    expect(draw(Some(16))? == expected, || "an object that the stencil test leaves out hides it".into())
 }
 
 fn without() -> Result<(), Failed> {

@@ -180,7 +180,7 @@ impl<R: Precision> TileAttachments<'_, R> {
         }
     }
 
-    /// Draws a pixel of the tile into the colour targets. Those that have no equation of their own are blended with.
+    /// Draws a pixel of the tile into the colour targets. `blend` applies to those without a blend equation.
     #[inline]
     pub(super) fn draw(&mut self, pixel: [usize; 2], blend: Blend, colors: &[Vector4<R>]) {
         for ((numbers, target), &color) in self.colors.iter_mut().zip(self.color_attachments).zip(colors) {

@@ -82,7 +82,7 @@ impl<R: Precision> TypedFrame<R> {
             columns: ShaderColumns { columns: &self.columns },
         };
         let outcome = match &pass.draws {
-            SoftwareDraws::Objects { shader, culling, depth, attributes } => {
+            SoftwareDraws::Objects { shader, face_culling, depth, attributes } => {
                 let subdivided = self.subdivided.lock();
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
@@ -93,9 +93,9 @@ impl<R: Precision> TypedFrame<R> {
                 };
                 let chunks = setup_chunks(commands, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
-                let (shader, culling, depth) = (&**shader, *culling, *depth);
+                let (shader, face_culling, depth) = (&**shader, *face_culling, *depth);
                 let (chunks, object_of) = (&chunks, &object_of);
-                ObjectPass { context, shader, attributes, culling, depth, chunks, object_of }.draw()
+                ObjectPass { context, shader, attributes, face_culling, depth, chunks, object_of }.draw()
             }
             SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &**shader, *blend),
             SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &**shader, lights.clone()),

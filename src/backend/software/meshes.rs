@@ -30,7 +30,7 @@ impl MeshCache {
             return Ok(Arc::clone(&self.meshes));
         }
         if let Some((_, mesh)) = assets.iter::<Mesh>().find(|(_, mesh)| !mesh.has_triangles()) {
-            return Err(BackendError::MeshOnDevice { mesh: mesh.name().to_owned() });
+            return Err(BackendError::ImportedMesh { mesh: mesh.name().to_owned() });
         }
         let mut before = std::mem::take(&mut self.kept);
         if (self.assets.0, self.assets.2) != (wanted.0, wanted.2) {

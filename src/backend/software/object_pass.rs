@@ -19,7 +19,7 @@ pub(super) struct ObjectPass<'a, R: Precision> {
     /// The attributes of vertices that the process reads.
     pub(super) attributes: &'a [DeclaredAttribute],
     /// Which sides of the objects are drawn.
-    pub(super) culling: FaceCulling,
+    pub(super) face_culling: FaceCulling,
     /// Which objects occlude what is behind them.
     pub(super) depth: DepthWrites,
     /// One job sets up the triangles of a chunk.
@@ -51,7 +51,7 @@ impl<R: Precision> ObjectPass<'_, R> {
         executor.for_each(open.tiles.len(), |tile| open.tiles[tile].lock().clear(attachments.depth.as_ref()))?;
         for chunks in chunks.chunks(CHUNKS_IN_MEMORY) {
             let set_up = |chunk: usize| -> TriangleSetup<R, V> {
-                let drawn = (&*chunks[chunk], self.culling);
+                let drawn = (&*chunks[chunk], self.face_culling);
                 TriangleSetup::new(*shader, self.attributes, &inputs, &open.tiling, drawn, object_of)
             };
             let setups = executor.map(chunks.len(), set_up)?;

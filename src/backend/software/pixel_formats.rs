@@ -10,7 +10,7 @@ use crate::backend::mip_generation::srgb_to_linear;
 use crate::process::{BlendComponent, BlendEquation, BlendFactor, Format};
 use crate::raster::Vector4;
 
-/// Mixes a colour with the one in the target, and converts the result to the format.
+/// Blends a colour with the one in the target, and converts the result to the format.
 ///
 /// In formats from 0 to 1, colours are clamped before and after blending, as Vulkan and D3D specify. NaN becomes 0.
 pub(super) fn blended<R: Precision>(
@@ -29,21 +29,21 @@ pub(super) fn blended<R: Precision>(
             (source[channel] * factor_of(of_source), destination[channel] * factor_of(of_destination))
         };
         match component {
-            BlendComponent::Sum { source, destination } => {
+            BlendComponent::Add { source, destination } => {
                 let (source, destination) = products(source, destination);
                 source + destination
             }
-            BlendComponent::Difference { source, destination } => {
+            BlendComponent::Subtract { source, destination } => {
                 let (source, destination) = products(source, destination);
                 source - destination
             }
-            BlendComponent::ReverseDifference { source, destination } => {
+            BlendComponent::ReverseSubtract { source, destination } => {
                 let (source, destination) = products(source, destination);
                 destination - source
             }
-            BlendComponent::Minimum if destination[channel] < source[channel] => destination[channel],
-            BlendComponent::Maximum if destination[channel] > source[channel] => destination[channel],
-            BlendComponent::Minimum | BlendComponent::Maximum => source[channel],
+            BlendComponent::Min if destination[channel] < source[channel] => destination[channel],
+            BlendComponent::Max if destination[channel] > source[channel] => destination[channel],
+            BlendComponent::Min | BlendComponent::Max => source[channel],
         }
     };
     let component_of = |channel: usize| if channel == 3 { equation.alpha } else { equation.color };

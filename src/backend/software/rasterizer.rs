@@ -136,7 +136,7 @@ fn software_pass<R: Precision>(
             } else {
                 DepthWrites::Always
             };
-            SoftwareDraws::Objects { shader: Arc::clone(shader), culling: draws.culling, depth, attributes }
+            SoftwareDraws::Objects { shader: Arc::clone(shader), face_culling: draws.face_culling, depth, attributes }
         }
         (Draws::FullScreen(draws), TypedCpuShader::FullScreen(shader)) => {
             SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
@@ -154,9 +154,8 @@ fn software_pass<R: Precision>(
         let message = String::from("the software backend has no stencil");
         return Err(BackendError::Validation { label: process, message });
     }
-    if request.plan.drawn_area(pass.process_index).multisampled {
-        let message = String::from("the software backend draws one sample a pixel");
-        return Err(BackendError::Validation { label: process, message });
+    if request.plan.attachment_extent(pass.process_index).multisampled {
+        return Err(BackendError::Multisampling { process });
     }
     let attachments = attachments(request, pass, targets)?;
     attachments.check(&process)?;

@@ -21,7 +21,7 @@ pub(super) struct SoftwarePass<R: Precision> {
 pub(super) enum SoftwareDraws<R: Precision> {
     Objects {
         shader: Arc<dyn ObjectCpuShader<R>>,
-        culling: FaceCulling,
+        face_culling: FaceCulling,
         depth: DepthWrites,
         attributes: Vec<DeclaredAttribute>,
     },

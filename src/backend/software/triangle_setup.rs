@@ -105,7 +105,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
         attributes: &[DeclaredAttribute],
         pass: &PassInputs<'_, R>,
         tiling: &Tiling,
-        (chunk, culling): (&[TriangleRange], FaceCulling),
+        (chunk, face_culling): (&[TriangleRange], FaceCulling),
         object_of: impl Fn(u32) -> Option<ShaderObject<R>>,
     ) -> Self {
         let mut setup = Self { triangles: Vec::new(), states: Vec::new(), bins: Vec::new(), unbinned: Vec::new() };
@@ -114,7 +114,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
             let Some(object) = object_of(range.object) else { continue };
             let state =
                 TriangleState { material: object.material, blend: range.batch.state.blend(), object: object.index };
-            let culled = culled_winding(culling.applied_to(range.batch.state.cull()));
+            let culled = culled_winding(face_culling.applied_to(range.batch.state.cull()));
             let mut cache = PostTransformCache::new(shader, pass, &object, &range.mesh, attributes);
             range.each_triangle(|indices| {
                 let corners = indices.map(|index| cache.vertex(index));

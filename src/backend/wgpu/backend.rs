@@ -153,13 +153,17 @@ impl WgpuBackend {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
     }
 
-    /// Has the next frame that is recorded draw into a texture of the engine's instead of a target of the view with this name, such as
-    /// that of a window's surface instead of the picture. The view is that of the camera with this name.
+    /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for example into a
+    /// surface's texture instead of `"picture"`. Of several cameras of that name, it is the first one that has such a target.
     ///
-    /// The texture has the target's size and format, but for the sRGB encoding: the texture of a surface whose format has none is drawn
-    /// into as sRGB if the surface is configured with that among its `view_formats`. It has the usages that the frame's processes need:
-    /// `RENDER_ATTACHMENT` if they draw into it, `TEXTURE_BINDING` if they sample it, `COPY_SRC` if they read its history. If it does not
-    /// fit, the frame returns an error. Frames after the next one draw into the crate's own target again.
+    /// The texture must be a 2D texture with one layer and one sample per pixel, of the target's size. Its format must be the target's,
+    /// or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must contain the target's. Its usages
+    /// must include `RENDER_ATTACHMENT` if processes draw into it, `TEXTURE_BINDING` if they sample it, and `COPY_SRC` if they read its
+    /// history or it is read back. Targets that are multisampled, drawn in layers or the history of another one cannot be imported. If
+    /// something does not fit, the frame returns [`BackendError::InvalidImport`].
+    ///
+    /// A second import of the same target replaces the first. Frames after the next one draw into the crate's own target again, also if
+    /// that one fails.
     ///
     /// ```no_run
     /// # use drawloom::{Renderer, Submitter, backend::WgpuBackend, scene::SceneRef, wgpu};

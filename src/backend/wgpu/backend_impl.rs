@@ -1,5 +1,6 @@
 //! The [`Backend`] implementation.
 
+use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -50,7 +51,15 @@ impl Backend for WgpuBackend {
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
-        self.begin_frame(request).inspect_err(|_| self.clear())
+        let imports = mem::take(&mut *self.imports.lock());
+        // Nothing has changed yet, so a texture that does not fit leaves everything as it is.
+        let imports: Result<Vec<_>, _> =
+            imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
+        self.begin_frame(request, &imports?).inspect_err(|_| self.clear())
+    }
+
+    fn discard_frame(&self) {
+        self.imports.lock().clear();
     }
 
     fn objects_epoch(&self, frame: &WgpuFrame) -> u64 {

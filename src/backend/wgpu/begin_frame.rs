@@ -1,6 +1,5 @@
 //! The beginning of a frame: uploads, cached resources, and the strategy of each pass.
 
-use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -8,7 +7,7 @@ use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{BundleKey, WgpuFrame};
 use super::pass_bind_groups::update_bind_groups;
-use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh};
+use super::resources::{LightMeshes, ResolvedImport, StorageBuffers, SubdividedMesh};
 use super::strategy::RecordingStrategy;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -20,11 +19,13 @@ impl WgpuBackend {
     ///
     /// # Errors
     /// If the device lacks room, or refuses a resource.
-    pub(super) fn begin_frame(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
+    pub(super) fn begin_frame(
+        &self,
+        request: &FrameRequest<'_>,
+        imports: &[ResolvedImport<'_>],
+    ) -> Result<WgpuFrame, BackendError> {
         let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
-        // They are of this frame, even if it fails.
-        let imports = mem::take(&mut *self.imports.lock());
         self.check_device()?;
         let quality = request.quality;
         let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
@@ -35,12 +36,12 @@ impl WgpuBackend {
         }
         let (meshes, materials) = with_error_scope(&self.device, "meshes, materials and textures", || {
             let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, vertices)?;
-            let types = plan.materials();
+            let types = plan.material_types();
             let mut materials = self.materials.lock();
             Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))
         })
         .flatten()?;
-        let update = || self.targets.lock().update(&self.device, plan, views, &imports);
+        let update = || self.targets.lock().update(&self.device, plan, views, imports);
         let targets = with_error_scope(&self.device, "targets", update)??;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;

@@ -39,7 +39,8 @@ pub(super) fn update_bind_groups(
     let columns = declaration.columns.iter().filter_map(|column| resources.objects.column(*column));
     let draws = &request.draws[process];
     let mut bytes = resources.bytes.of_process(process);
-    let materials: Vec<_> = bytes.by_ref().take(declaration.materials.len()).map(BindingResource::Buffer).collect();
+    let materials: Vec<_> =
+        bytes.by_ref().take(declaration.material_types.len()).map(BindingResource::Buffer).collect();
     let own = draws.resources().iter().filter_map(move |resource| match resource {
         ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) => bytes.next().map(BindingResource::Buffer),
         ShaderResource::Buffer(buffer) => Some(BindingResource::Buffer(buffer.as_entire_buffer_binding())),

@@ -146,7 +146,7 @@ impl ReadBackCopy {
 /// A read-back of a rectangle of a view's target, and the copy that its frame makes for it.
 ///
 /// # Errors
-/// If there is no such target, the rectangle is empty or not in it, or is a part of a depth target.
+/// If there is no such target, it cannot be copied from, or the rectangle is empty, not in it, or a part of a depth target.
 pub(crate) fn new_read_back(
     device: &wgpu::Device,
     targets: &WgpuTargets,
@@ -163,7 +163,9 @@ pub(crate) fn new_read_back(
     } else if !(0..2).all(is_within) {
         Some("it is not within the target")
     } else if found.texture.sample_count() > 1 {
-        Some("samples are resolved before they are read back")
+        Some("it is multisampled: resolve it, and read the resolved target")
+    } else if !found.texture.usage().contains(wgpu::TextureUsages::COPY_SRC) {
+        Some("it is an imported texture without the usage COPY_SRC")
     } else if format.has_depth() && format.has_stencil() {
         Some("depth with a stencil is not read back")
     } else if format.is_depth_stencil() && size != whole {

@@ -3,9 +3,10 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
+use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
 
-/// Draws the depth of every opaque object into `depth` before the geometry buffer, which then stores each pixel once
+/// Draws the depth of every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType) into `depth` before the geometry buffer, which then stores each pixel once
 /// instead of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more
 /// than vertices.
 ///
@@ -33,7 +34,9 @@ impl RenderProcess for DepthPrePass {
 
     fn draws(&self) -> Draws<'_> {
         let shader = include_str!("depth_pre_pass/depth_pre_pass.wgsl");
-        Draws::Commands(CommandDraws { shader, fragment: None, ..CommandDraws::default() })
+        // The geometry buffer draws the same objects, so each pixel that has depth gets a surface.
+        let selection = Selection::OPAQUE.of_shipped_materials();
+        Draws::Commands(CommandDraws { shader, fragment: None, selection, ..CommandDraws::default() })
     }
 
     #[cfg(feature = "software")]

@@ -30,7 +30,7 @@ pub struct GeometryBuffer {
 }
 
 impl GeometryBuffer {
-    /// Draws every opaque object whose material is of no [type of the engine's own](crate::scene::MaterialType).
+    /// Draws every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType).
     pub fn new(formats: GeometryFormats) -> Self {
         Self::of_share(formats, MaterialShare::ALL)
     }

@@ -11,7 +11,8 @@ use crate::scene::ViewKind;
 use crate::view::ShadowMaps;
 
 /// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with
-/// alpha, additive or subtractive blending (M listing 10.1).
+/// alpha, additive or subtractive blending (M listing 10.1). It leaves out those whose material has a
+/// [`MaterialType`](crate::scene::MaterialType).
 ///
 /// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and
 /// adds their emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result

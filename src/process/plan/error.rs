@@ -102,8 +102,8 @@ pub enum PlanError {
         /// The process.
         process: String,
     },
-    /// A target is to have several samples a pixel, or does, that cannot.
-    #[error("process {process:?} has several samples a pixel in target {target:?}, {problem}")]
+    /// A target that cannot be multisampled is declared so, or is used as no multisampled target can be.
+    #[error("process {process:?} cannot use target {target:?} as a multisampled one: {problem}")]
     Multisampling {
         /// The process.
         process: String,
@@ -113,30 +113,32 @@ pub enum PlanError {
         problem: &'static str,
     },
     /// A process draws into, or tests, targets with different numbers of samples.
-    #[error("process {process:?} uses targets {:?} and {:?} in one pass, but only one of them has several samples a pixel", targets[0], targets[1])]
+    #[error("process {process:?} uses targets {:?} and {:?} in one pass, but only one of them is multisampled", targets[0], targets[1])]
     UnequalSamples {
         /// The process.
         process: String,
         /// The targets.
         targets: [String; 2],
     },
-    /// A target is resolved that cannot be.
-    #[error("process {process:?} resolves target {target:?} {problem}")]
+    /// A resolve that no pass can do.
+    #[error("process {process:?} cannot resolve target {target:?}: {problem}")]
     Resolve {
         /// The process.
         process: String,
-        /// The target with several samples a pixel.
+        /// The target that it resolves.
         target: String,
         /// What is wrong.
         problem: &'static str,
     },
-    /// Two processes read materials of one type with values of different sizes.
-    #[error("process {process:?} reads materials {material:?} of {second} bytes, another process of {first}")]
-    ConflictingMaterials {
+    /// Two processes read material types of one name with values of different sizes.
+    #[error(
+        "process {process:?} reads {second} bytes of the material type {material_type:?} for each material, another process {first}"
+    )]
+    ConflictingMaterialTypes {
         /// The second process.
         process: String,
-        /// The type of material.
-        material: &'static str,
+        /// The material type.
+        material_type: &'static str,
         /// The size of the values that the first process reads, in bytes.
         first: usize,
         /// The same of the second process.
@@ -233,12 +235,14 @@ pub enum ProcessError {
         column: &'static str,
     },
     /// The values of the scene's materials of a type have another size than those that the process declares or selects.
-    #[error("process {process:?} knows materials {material:?} of {declared} bytes, but the scene has some of {found}")]
-    MaterialSize {
+    #[error(
+        "process {process:?} knows the material type {material_type:?} with {declared} bytes for each material, but the scene has {found}"
+    )]
+    MaterialTypeSize {
         /// The process.
         process: String,
-        /// The type of material.
-        material: &'static str,
+        /// The material type.
+        material_type: &'static str,
         /// The size that the process knows, in bytes.
         declared: usize,
         /// The size of the scene's, in bytes.
@@ -270,7 +274,7 @@ pub enum ProcessError {
     },
     /// A process has blend equations for another number of colour targets than it draws into.
     #[error("process {process:?} has {equations} blend equations for {targets} colour targets")]
-    BlendEquations {
+    BlendEquationCount {
         /// The process.
         process: String,
         /// The number of equations.

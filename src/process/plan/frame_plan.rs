@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::attributes::attributes_of;
 use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
-use super::materials::{check_materials, materials_of};
+use super::material_types::{check_material_types, material_types_of};
 use super::order::{AddedProcess, order_constraints};
 use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
 use super::resource_names::{buffer_name, passed_on_resources, resource_name};
 use super::view_group::view_groups;
-use super::{ChainSlot, DrawnArea, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
+use super::{AttachmentExtent, ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
 use crate::graph::FrameGraph;
 use crate::process::{
     Access, BufferAccess, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
@@ -31,7 +31,7 @@ pub struct FramePlan {
     view_groups: Vec<ViewGroup>,
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
-    materials: Vec<MaterialLayout>,
+    material_types: Vec<MaterialLayout>,
     attributes: Vec<DeclaredAttribute>,
     buffers: Vec<BufferLayout>,
     /// Of each process.
@@ -143,7 +143,7 @@ impl FramePlan {
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
-        let (columns, materials) = (columns_of(&processes)?, materials_of(&processes)?);
+        let (columns, material_types) = (columns_of(&processes)?, material_types_of(&processes)?);
         let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
         let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
@@ -155,7 +155,7 @@ impl FramePlan {
             view_groups,
             targets,
             columns,
-            materials,
+            material_types,
             attributes,
             buffers,
             attachments,
@@ -217,8 +217,8 @@ impl FramePlan {
     }
 
     /// The pixels of the targets that a process, by index, draws into; those of the picture if it draws into none.
-    pub fn drawn_area(&self, process: usize) -> DrawnArea {
-        self.attachments[process].area
+    pub fn attachment_extent(&self, process: usize) -> AttachmentExtent {
+        self.attachments[process].extent
     }
 
     /// The columns of objects that the processes read, each once.
@@ -226,9 +226,9 @@ impl FramePlan {
         &self.columns
     }
 
-    /// The types of materials of the engine's own that the processes read, each once.
-    pub fn materials(&self) -> &[MaterialLayout] {
-        &self.materials
+    /// The material types that the processes read, each once.
+    pub fn material_types(&self) -> &[MaterialLayout] {
+        &self.material_types
     }
 
     /// The attributes of vertices that the processes read, each once.
@@ -242,15 +242,15 @@ impl FramePlan {
     }
 
     /// # Errors
-    /// If a scene with these types of materials lacks what the processes read, select or order by, or has it in another size.
+    /// If a scene with these material types lacks what the processes read, select or order by, or has it in another size.
     pub(crate) fn check_scene(
         &self,
         draws: &[Draws<'_>],
         scene: &SceneRef<'_>,
-        materials: &[MaterialLayout],
+        material_types: &[MaterialLayout],
     ) -> Result<(), ProcessError> {
         check_columns(&self.processes, draws, scene)?;
-        check_materials(&self.processes, draws, materials)
+        check_material_types(&self.processes, draws, material_types)
     }
 
     /// The names of the processes that were dropped because no output depends on them.

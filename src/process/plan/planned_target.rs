@@ -19,23 +19,23 @@ pub struct PlannedTarget {
     pub layered: bool,
     /// Its size.
     pub size: TargetSize,
-    /// Whether it has [several samples a pixel](crate::process::Declare::multisampled).
+    /// Whether it is [multisampled](crate::process::Declare::multisampled).
     pub multisampled: bool,
     /// The target whose content is copied here at the end of each frame; `None` for one that processes write.
     pub copy_of: Option<String>,
 }
 
-/// The pixels of the targets that a process draws into.
+/// The size and the number of samples that all targets of a process share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DrawnArea {
+pub struct AttachmentExtent {
     /// Their size.
     pub size: TargetSize,
-    /// Whether they have several samples each.
+    /// Whether they are [multisampled](crate::process::Declare::multisampled).
     pub multisampled: bool,
 }
 
-impl DrawnArea {
-    /// The pixels of the picture, with a sample each.
+impl AttachmentExtent {
+    /// The size of the picture, one sample per pixel.
     pub const PICTURE: Self = Self { size: TargetSize::Picture, multisampled: false };
 }
 
@@ -43,7 +43,8 @@ impl DrawnArea {
 ///
 /// # Errors
 /// If processes disagree about a target's format, layers or size, use depth as colour or colour as depth, draw into targets of
-/// different sizes, or read the history of a target that is not written or is drawn in layers.
+/// different sizes or numbers of samples, resolve one that cannot be resolved, or read the history of a target that is not written, is
+/// multisampled or is drawn in layers.
 pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut targets = written_targets(processes)?;
     for (planned, name, access) in accesses(processes) {
@@ -52,7 +53,8 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
             continue;
         };
         let process = || planned.name.clone();
-        known.stored |= matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored();
+        known.stored |=
+            matches!(access, Access::Write(_) | Access::Change) && known.format.can_be_stored() && !known.multisampled;
         if access.is_depth() && !known.format.is_depth_stencil() || access.is_color() && known.format.is_depth_stencil()
         {
             return Err(PlanError::WrongFormat { process: process(), target: name.clone(), format: known.format });
@@ -97,7 +99,7 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
                 return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
             }
             Some(known) if known.multisampled != multisampled => {
-                let problem = "which another process creates with another number of samples";
+                let problem = "another process creates it with another number of samples";
                 return Err(multisampling_error(planned, name, problem));
             }
             Some(known) if known.size != size => {
@@ -138,7 +140,7 @@ fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
 }
 
 /// # Errors
-/// If a target has several samples a pixel that cannot have them, or is resolved that cannot be.
+/// If a target is multisampled, or resolved, that cannot be.
 fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
     let Declaration { accesses, multisampled, resolves, .. } = &planned.declaration;
     let format_of = |target: &String| {
@@ -149,8 +151,8 @@ fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
     };
     for target in multisampled {
         let problem = match format_of(target) {
-            None => "which it does not clear, or clears in layers",
-            Some(format) if !format.can_be_multisampled() => "whose format cannot have several samples a pixel",
+            None => "it does not clear it, or clears it in layers",
+            Some(format) if !format.can_be_multisampled() => "not every device multisamples its format",
             Some(_) => continue,
         };
         return Err(multisampling_error(planned, target, problem));
@@ -158,11 +160,14 @@ fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
     for (source, into) in resolves {
         let is_drawn = accesses.iter().any(|(name, access)| name == source && access.is_color());
         let problem = match accesses.iter().find(|(name, access)| name == into && access.format().is_some()) {
-            _ if !is_drawn => "without drawing into it as colour",
-            _ if resolves.iter().filter(|(other, _)| other == source).count() > 1 => "twice",
+            _ if !is_drawn => "it does not draw into it as colour",
+            _ if resolves.iter().filter(|(other, _)| other == source).count() > 1 => "it resolves it twice",
+            _ if resolves.iter().filter(|(_, other)| other == into).count() > 1 => {
+                "it resolves another one into the same target"
+            }
             Some((_, Access::Resolve(format))) if format.can_be_resolved() => continue,
-            Some((_, Access::Resolve(_))) => "in a format that cannot be resolved",
-            _ => "into a target that it uses in another way",
+            Some((_, Access::Resolve(_))) => "not every device resolves its format",
+            _ => "it uses the resolved target in another way too",
         };
         return Err(PlanError::Resolve { process: planned.name.clone(), target: source.clone(), problem });
     }
@@ -192,9 +197,9 @@ fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Res
     for (source, into) in &planned.declaration.resolves {
         let Some((from, to)) = found(source).zip(found(into)) else { continue };
         let problem = if !from.multisampled {
-            "which has one sample a pixel"
+            "it is not multisampled"
         } else if (from.format, from.size, false) != (to.format, to.size, to.multisampled) {
-            "into one of another format or size, or with several samples a pixel"
+            "the resolved target has another format or size, or is multisampled"
         } else {
             continue;
         };
@@ -203,10 +208,10 @@ fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Res
     Ok(())
 }
 
-/// What a process draws into, as what it draws has to fit it.
+/// What the checks of blending and of the stencil need to know of the targets that a process draws into.
 pub(super) struct Attachments {
-    /// The pixels; those of the picture if it draws into no target.
-    pub(super) area: DrawnArea,
+    /// Their extent; that of the picture if it draws into no target.
+    pub(super) extent: AttachmentExtent,
     /// The number of colour targets.
     colors: usize,
     /// The colour targets that cannot be blended, by index.
@@ -217,11 +222,11 @@ pub(super) struct Attachments {
 impl Attachments {
     pub(super) fn new(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Self {
         let attached = || attached_targets(planned, targets);
-        let area = |target: &PlannedTarget| DrawnArea { size: target.size, multisampled: target.multisampled };
+        let extent = |target: &PlannedTarget| AttachmentExtent { size: target.size, multisampled: target.multisampled };
         let colors = attached().filter(|target| !target.format.is_depth_stencil()).enumerate();
         let unblendable = colors.filter(|(_, target)| !target.format.can_be_blended());
         Self {
-            area: attached().next().map_or(DrawnArea::PICTURE, area),
+            extent: attached().next().map_or(AttachmentExtent::PICTURE, extent),
             colors: planned.declaration.colors().count(),
             unblendable: unblendable.map(|(index, target)| (index, target.name.clone(), target.format)).collect(),
             has_stencil: attached().any(|target| target.format.has_stencil()),
@@ -230,8 +235,8 @@ impl Attachments {
 }
 
 /// # Errors
-/// If a target that cannot be blended is blended with, or there are blend equations for another number of targets. Objects that have no
-/// equations have materials of all kinds, and those that blend are drawn there as if they did not.
+/// If a process blends with a target that cannot be blended, or has blend equations for another number of targets. Objects without
+/// equations are exempt: where the target cannot be blended, their materials' blending is ignored.
 pub(super) fn check_blending(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
@@ -246,7 +251,7 @@ pub(super) fn check_blending(
     let process = || planned.name.clone();
     let (equations, targets) = (draws.blend_equations(), attachments.colors);
     if !equations.is_empty() && equations.len() != targets {
-        return Err(ProcessError::BlendEquations { process: process(), equations: equations.len(), targets });
+        return Err(ProcessError::BlendEquationCount { process: process(), equations: equations.len(), targets });
     }
     for (index, target, format) in &attachments.unblendable {
         if equations.get(*index).map_or(blends, |equation| *equation != BlendEquation::REPLACE) {
@@ -320,7 +325,7 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
         let mut written = targets.iter().filter(|known| known.views == views && !known.layered);
         match written.find(|known| previous_name(&known.name) == *name) {
             Some(source) if source.multisampled => {
-                return Err(multisampling_error(planned, &source.name, "which can have no history"));
+                return Err(multisampling_error(planned, &source.name, "a multisampled target has no history"));
             }
             None => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
             Some(source) => {

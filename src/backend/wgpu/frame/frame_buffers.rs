@@ -249,6 +249,11 @@ impl FrameBuffers {
         &self.buffers.objects
     }
 
+    /// The bytes of the engine's own that each process reads.
+    pub(crate) fn resource_bytes(&self) -> &ResourceBytes {
+        &self.buffers.bytes
+    }
+
     /// `@group(1)`; `None` before the frame begins.
     pub(crate) fn materials_bind_group(&self) -> Option<&wgpu::BindGroup> {
         self.buffers.materials.bind_group()
@@ -419,7 +424,7 @@ fn bytes_of_process<'a>(
     planned: &'a PlannedProcess,
     draws: &'a Draws<'_>,
 ) -> impl Iterator<Item = &'a [u8]> {
-    let of_materials = planned.declaration.materials.iter().filter_map(|layout| materials.values(*layout));
+    let of_materials = planned.declaration.material_types.iter().filter_map(|layout| materials.values(*layout));
     of_materials.chain(draws.resources().iter().filter_map(ShaderResource::bytes))
 }
 

@@ -105,13 +105,13 @@ fn blend_component(component: BlendComponent) -> wgpu::BlendComponent {
     use wgpu::BlendOperation;
     let one = BlendFactor::One;
     let (source, destination, operation) = match component {
-        BlendComponent::Sum { source, destination } => (source, destination, BlendOperation::Add),
-        BlendComponent::Difference { source, destination } => (source, destination, BlendOperation::Subtract),
-        BlendComponent::ReverseDifference { source, destination } => {
+        BlendComponent::Add { source, destination } => (source, destination, BlendOperation::Add),
+        BlendComponent::Subtract { source, destination } => (source, destination, BlendOperation::Subtract),
+        BlendComponent::ReverseSubtract { source, destination } => {
             (source, destination, BlendOperation::ReverseSubtract)
         }
-        BlendComponent::Minimum => (one, one, BlendOperation::Min),
-        BlendComponent::Maximum => (one, one, BlendOperation::Max),
+        BlendComponent::Min => (one, one, BlendOperation::Min),
+        BlendComponent::Max => (one, one, BlendOperation::Max),
     };
     let [src_factor, dst_factor] = [source, destination].map(blend_factor);
     wgpu::BlendComponent { src_factor, dst_factor, operation }

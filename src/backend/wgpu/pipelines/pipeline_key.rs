@@ -16,7 +16,7 @@ pub(crate) struct PipelineKey<'a> {
     pub(crate) fragment: Option<Cow<'a, str>>,
     pub(crate) parameter_bytes: usize,
     pub(crate) writes_depth: bool,
-    pub(crate) culling: FaceCulling,
+    pub(crate) face_culling: FaceCulling,
     /// Of each colour target; empty if the state decides.
     pub(crate) blend_equations: Cow<'a, [BlendEquation]>,
     pub(crate) stencil: Option<Stencil>,
@@ -50,7 +50,7 @@ impl<'a> PipelineKey<'a> {
             let (shader, fragment) = (Cow::Borrowed(shader), fragment.map(Cow::Borrowed));
             // The reference is state of the pass.
             let (deformation, stencil) = (None, draws.stencil().map(|stencil| Stencil { reference: 0, ..stencil }));
-            let (culling, blend_equations) = (FaceCulling::ByMaterial, Cow::Borrowed(draws.blend_equations()));
+            let (face_culling, blend_equations) = (FaceCulling::ByMaterial, Cow::Borrowed(draws.blend_equations()));
             Self {
                 shader,
                 deformation,
@@ -58,7 +58,7 @@ impl<'a> PipelineKey<'a> {
                 fragment,
                 parameter_bytes,
                 writes_depth,
-                culling,
+                face_culling,
                 blend_equations,
                 stencil,
                 state,
@@ -68,7 +68,7 @@ impl<'a> PipelineKey<'a> {
         match draws {
             Draws::Commands(draws) => {
                 let key = with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth);
-                Self { deformation: draws.deformation.map(Cow::Borrowed), culling: draws.culling, ..key }
+                Self { deformation: draws.deformation.map(Cow::Borrowed), face_culling: draws.face_culling, ..key }
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
@@ -94,9 +94,9 @@ impl<'a> PipelineKey<'a> {
     }
 
     /// What goes before the process's own WGSL, which reads these attributes.
-    pub(crate) fn prelude(&self, attributes: &[AttributeLayout]) -> String {
+    pub(crate) fn prelude(&self, attributes: impl Iterator<Item = AttributeLayout>) -> String {
         let is_absolute = self.transforms == TransformPrecision::Absolute;
-        let prelude = prelude_with(attributes, self.deformation.is_some());
+        let prelude = prelude_with(&attributes.collect::<Vec<_>>(), self.deformation.is_some());
         format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{prelude}\n")
     }
 

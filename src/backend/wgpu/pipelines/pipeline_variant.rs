@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::backend::wgpu::resources::{DeviceLayout, MeshSnapshot};
+use crate::backend::wgpu::resources::{MeshSnapshot, VertexStreamLayouts};
 use crate::command::{Batch, DrawState};
 
 /// What distinguishes the pipelines of a process: the draw state, and where vertices are.
@@ -10,7 +10,7 @@ use crate::command::{Batch, DrawState};
 pub(crate) struct PipelineVariant {
     pub(crate) state: DrawState,
     /// `None` for meshes in the crate's arenas.
-    pub(crate) layout: Option<Arc<DeviceLayout>>,
+    pub(crate) layout: Option<Arc<VertexStreamLayouts>>,
 }
 
 impl PipelineVariant {
@@ -21,7 +21,7 @@ impl PipelineVariant {
 
     /// The one that draws a batch.
     pub(crate) fn of_batch(meshes: &MeshSnapshot, batch: &Batch) -> Self {
-        let layout = meshes.device_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
+        let layout = meshes.imported_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
         Self { layout, ..Self::of_arenas(batch.state) }
     }
 }

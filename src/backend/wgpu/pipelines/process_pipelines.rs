@@ -1,21 +1,23 @@
 //! The pipelines of a render process, one for each draw state.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
 use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
 use super::pipeline_variant::PipelineVariant;
-use super::vertex_buffers::VertexBuffers;
+use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, binding_type, engine_layout, process_layout};
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::Cull;
-use crate::process::{Access, Declaration, Draws, FramePlan, PlannedProcess, Primitive};
+use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
-use crate::scene::{AttributeLayout, Blend, Topology};
+use crate::scene::{Blend, Topology};
 use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
@@ -28,9 +30,11 @@ pub(crate) struct ProcessPipelines {
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
     pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
     /// The attributes of vertices that it reads.
-    attributes: Vec<AttributeLayout>,
-    /// How many columns and types of materials it reads.
-    arrays: usize,
+    attributes: Vec<DeclaredAttribute>,
+    /// The [values](attribute_defaults) that they have in meshes that lack them; made for the first imported mesh.
+    attribute_defaults: OnceLock<wgpu::Buffer>,
+    /// The number of columns and material types that it reads.
+    array_count: usize,
     /// What it says about its resources.
     resources: Vec<wgpu::BindingType>,
     features: wgpu::Features,
@@ -64,18 +68,23 @@ impl ProcessPipelines {
         let name = planned.name.as_str();
         let key = PipelineKey::new(draws, quality).into_owned();
         let attachments = AttachmentFormats::new(plan, &planned.declaration);
-        let arrays = array_count(&planned.declaration);
-        let attributes: Vec<_> = attributes_of(&planned.declaration).collect();
+        let array_count = array_count(&planned.declaration);
+        let attributes = planned.declaration.attributes.clone();
         let is_compute = key.vertices == VertexSource::Compute;
         let AttachmentFormats { sampled, writes_buffers, .. } = &attachments;
         let process_layout = process_layout(device, key.parameter_bytes, sampled, writes_buffers, is_compute);
         let features = device.features();
         let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
-        let engine_layout = engine_layout(device, arrays, &resources, is_compute);
+        let engine_layout = engine_layout(device, array_count, &resources, is_compute);
         let shader = if key.vertices == VertexSource::None {
             None
         } else {
-            let module = compile_shader(device, name, &key.prelude(&attributes), &key.own_shaders())?;
+            let module = compile_shader(
+                device,
+                name,
+                &key.prelude(attributes.iter().map(|attribute| attribute.layout)),
+                &key.own_shaders(),
+            )?;
             let own = [process_layout.as_ref(), engine_layout.as_ref()];
             let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
             let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
@@ -95,7 +104,8 @@ impl ProcessPipelines {
             process_layout,
             engine_layout,
             attributes,
-            arrays,
+            attribute_defaults: OnceLock::new(),
+            array_count,
             resources,
             features,
             shader,
@@ -123,8 +133,8 @@ impl ProcessPipelines {
     /// Whether these pipelines still fit what a process of this plan declares.
     fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
-            && self.arrays == array_count(&planned.declaration)
-            && attributes_of(&planned.declaration).eq(self.attributes.iter().copied())
+            && self.array_count == array_count(&planned.declaration)
+            && self.attributes == planned.declaration.attributes
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
     }
 
@@ -207,8 +217,13 @@ impl ProcessPipelines {
     }
 
     /// The attributes of vertices that it reads, in the order of their buffers.
-    pub(crate) fn attributes(&self) -> &[AttributeLayout] {
+    pub(crate) fn attributes(&self) -> &[DeclaredAttribute] {
         &self.attributes
+    }
+
+    /// The values of attributes that imported meshes lack; `None` before there is a pipeline for such a mesh.
+    pub(crate) fn attribute_defaults(&self) -> Option<&wgpu::Buffer> {
+        self.attribute_defaults.get()
     }
 
     /// The process's name.
@@ -236,7 +251,16 @@ impl ProcessPipelines {
         };
         let targets: Vec<_> = colors.iter().zip(can_be_blended).enumerate().map(target).collect();
         let buffers = match &variant.layout {
-            Some(layout) => VertexBuffers::of_device_meshes(layout, &self.attributes, &self.name)?,
+            Some(layout) => {
+                self.attribute_defaults.get_or_init(|| {
+                    device.create_buffer_init(&BufferInitDescriptor {
+                        label: Some("defaults of attributes"),
+                        contents: &attribute_defaults(&self.attributes),
+                        usage: wgpu::BufferUsages::VERTEX,
+                    })
+                });
+                VertexBuffers::of_imported_meshes(layout, &self.attributes, &self.name)?
+            }
             None => VertexBuffers::new(self.key.vertices, &self.attributes),
         };
         let entry_point = match self.key.vertices {
@@ -266,7 +290,7 @@ impl ProcessPipelines {
                 topology,
                 strip_index_format,
                 front_face: wgpu::FrontFace::Ccw,
-                cull_mode: match self.key.culling.applied_to(state.cull()) {
+                cull_mode: match self.key.face_culling.applied_to(state.cull()) {
                     Cull::Back => Some(wgpu::Face::Back),
                     Cull::Front => Some(wgpu::Face::Front),
                     Cull::Nothing => None,
@@ -275,8 +299,8 @@ impl ProcessPipelines {
             },
             depth_stencil: self.attachments.depth.map(|depth| {
                 // A blended surface must not hide what is drawn after it, unless the process says so.
-                let is_opaque = !equations.is_empty() || state.blend() == Blend::None;
-                let writes_depth = self.key.writes_depth && is_opaque;
+                let may_write_depth = !equations.is_empty() || state.blend() == Blend::None;
+                let writes_depth = self.key.writes_depth && may_write_depth;
                 depth.pipeline_state_of(writes_depth, self.depth_compare(depth), self.key.stencil)
             }),
             multisample: wgpu::MultisampleState {
@@ -324,11 +348,7 @@ fn compute_pipeline(device: &wgpu::Device, shader: &CompiledShader) -> wgpu::Com
 }
 
 fn array_count(declaration: &Declaration) -> usize {
-    declaration.columns.len() + declaration.materials.len()
-}
-
-fn attributes_of(declaration: &Declaration) -> impl Iterator<Item = AttributeLayout> {
-    declaration.attributes.iter().map(|declared| declared.layout)
+    declaration.columns.len() + declaration.material_types.len()
 }
 
 fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {

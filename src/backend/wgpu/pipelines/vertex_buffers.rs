@@ -2,9 +2,11 @@
 
 use super::pipeline_key::VertexSource;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{DeviceLayout, VertexSlot, vertex_attributes, vertex_format, vertex_stride};
-use crate::process::FIRST_OWN_LOCATION;
-use crate::scene::{AttributeFormat, AttributeLayout, NORMAL, NumberKind, POSITION, StreamAttribute, UV};
+use crate::backend::wgpu::resources::{
+    VertexSlot, VertexStreamLayouts, vertex_attributes, vertex_format, vertex_stride,
+};
+use crate::process::{DeclaredAttribute, FIRST_OWN_LOCATION};
+use crate::scene::{AttributeFormat, NORMAL, NumberKind, POSITION, StreamAttribute, UV};
 
 /// The vertex buffers of a pipeline, each with its attributes, in the order of their slots.
 pub(super) struct VertexBuffers(Vec<VertexBuffer>);
@@ -17,7 +19,7 @@ struct VertexBuffer {
 
 impl VertexBuffers {
     /// Those of meshes in the crate's arenas, or of shaders that need no mesh.
-    pub(super) fn new(source: VertexSource, own: &[AttributeLayout]) -> Self {
+    pub(super) fn new(source: VertexSource, own: &[DeclaredAttribute]) -> Self {
         let shipped = match source {
             VertexSource::Meshes(format) => {
                 VertexBuffer { stride: vertex_stride(format), attributes: vertex_attributes(format).to_vec() }
@@ -28,14 +30,15 @@ impl VertexBuffers {
             }
             _ => return Self(Vec::new()),
         };
-        let own = (FIRST_OWN_LOCATION..).zip(own).map(|(shader_location, layout)| VertexBuffer {
-            stride: layout.format.bytes() as u64,
-            attributes: vec![wgpu::VertexAttribute {
-                format: vertex_format(layout.format),
-                offset: 0,
-                shader_location,
-            }],
-        });
+        let own =
+            (FIRST_OWN_LOCATION..).zip(own).map(|(shader_location, DeclaredAttribute { layout, .. })| VertexBuffer {
+                stride: layout.format.bytes() as u64,
+                attributes: vec![wgpu::VertexAttribute {
+                    format: vertex_format(layout.format),
+                    offset: 0,
+                    shader_location,
+                }],
+            });
         Self(std::iter::once(shipped).chain(own).collect())
     }
 
@@ -43,22 +46,26 @@ impl VertexBuffers {
     ///
     /// # Errors
     /// If an attribute is not of the kind of number that the process's shader reads.
-    pub(super) fn of_device_meshes(
-        layout: &DeviceLayout,
-        own: &[AttributeLayout],
+    pub(super) fn of_imported_meshes(
+        layout: &VertexStreamLayouts,
+        own: &[DeclaredAttribute],
         process: &str,
     ) -> Result<Self, BackendError> {
         let shipped = [POSITION, NORMAL, UV].into_iter().map(|name| (name, AttributeFormat::Float32(4)));
-        let names = shipped.chain(own.iter().map(|attribute| (attribute.name, attribute.format)));
+        let names = shipped.chain(own.iter().map(|attribute| (attribute.layout.name, attribute.layout.format)));
         let locations: Vec<_> = (0..).zip(names).collect();
         let location_of = |name| locations.iter().find(|(_, (known, _))| *known == name);
         let mut buffers = Vec::new();
         for slot in layout.slots(own) {
             buffers.push(match slot {
-                VertexSlot::Default(name) => {
-                    let &(shader_location, (_, format)) = location_of(name).ok_or_else(unknown_attribute)?;
-                    let attribute = wgpu::VertexAttribute { format: vertex_format(format), offset: 0, shader_location };
-                    VertexBuffer { stride: 0, attributes: vec![attribute] }
+                VertexSlot::Defaults => {
+                    let missing = locations.iter().filter(|(_, (name, _))| layout.lacks(name));
+                    let attributes = missing.map(|&(shader_location, (_, format))| wgpu::VertexAttribute {
+                        format: vertex_format(format),
+                        offset: u64::from(shader_location) * DEFAULT_BYTES as u64,
+                        shader_location,
+                    });
+                    VertexBuffer { stride: 0, attributes: attributes.collect() }
                 }
                 VertexSlot::Stream(index) => {
                     let stream = &layout.streams[index];
@@ -104,9 +111,18 @@ fn check_kind(
     }
     let [process, mesh, name] = [process, mesh, name].map(str::to_owned);
     let format = format!("{:?}", attribute.format());
-    Err(BackendError::AttributeFormat { process, mesh, attribute: name, format, expected: as_wgsl })
+    Err(BackendError::AttributeFormatMismatch { process, mesh, attribute: name, format, expected: as_wgsl })
 }
 
-fn unknown_attribute() -> BackendError {
-    BackendError::BrokenRule { rule: "a default is that of an attribute that the process reads".to_owned() }
+/// The size of each element of [`attribute_defaults`]: that of the largest attribute.
+const DEFAULT_BYTES: usize = 16;
+
+/// The value of each attribute for meshes that lack it, by its location in the shader. Those of the shipped attributes are 0.
+pub(super) fn attribute_defaults(own: &[DeclaredAttribute]) -> Vec<u8> {
+    let mut bytes = vec![0; FIRST_OWN_LOCATION as usize * DEFAULT_BYTES];
+    for attribute in own {
+        bytes.extend_from_slice(&attribute.default);
+        bytes.resize(bytes.len().next_multiple_of(DEFAULT_BYTES), 0);
+    }
+    bytes
 }

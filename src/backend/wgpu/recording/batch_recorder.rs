@@ -47,7 +47,7 @@ impl<'a> BatchRecorder<'a> {
             encoder.set_pipeline(pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?);
             let end = start + run.len();
             if variant.layout.is_some() {
-                self.draw_device_meshes(encoder, run)?;
+                self.draw_imported_meshes(encoder, run)?;
                 self.set_arenas(encoder)?;
             } else if run[0].state.subdivision_level() > 0 {
                 self.draw_subdivided(encoder, run)?;
@@ -120,8 +120,8 @@ impl<'a> BatchRecorder<'a> {
             let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
             let mesh = &mesh.geometry;
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
-            for (slot, layout) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
-                encoder.set_vertex_buffer(slot, Some(attribute_of(&mesh.attributes, *layout)?.slice(..)));
+            for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+                encoder.set_vertex_buffer(slot, Some(attribute_of(&mesh.attributes, attribute.layout)?.slice(..)));
             }
             encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             encoder.draw_indexed(0..mesh.index_count, 0, batch.first..batch.first + batch.count);
@@ -130,16 +130,18 @@ impl<'a> BatchRecorder<'a> {
     }
 
     /// Draws meshes in the engine's own buffers.
-    fn draw_device_meshes(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
-        let attributes = self.frame.pipelines(self.pass.pass).attributes();
-        let meshes = &self.frame.meshes.device_meshes;
+    fn draw_imported_meshes(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
+        let pipelines = self.frame.pipelines(self.pass.pass);
+        let defaults = pipelines.attribute_defaults();
+        let defaults = defaults.ok_or_else(|| broken_rule("attributes have defaults before they are drawn"))?;
+        let meshes = &self.frame.meshes.imported_meshes;
         for batch in run {
             let mesh = meshes.get(batch.mesh).ok_or_else(missing_mesh_error)?;
-            meshes.set_buffers(encoder, mesh, attributes)?;
+            mesh.set_buffers(encoder, pipelines.attributes(), defaults);
             let instances = batch.first..batch.first + batch.count;
-            match &mesh.geometry.indices {
+            match &mesh.buffers.indices {
                 Some(indices) => encoder.draw_indexed(0..indices.count, 0, instances),
-                None => encoder.draw(0..mesh.geometry.vertices, instances),
+                None => encoder.draw(0..mesh.buffers.vertex_count, instances),
             }
         }
         Ok(())
@@ -158,8 +160,8 @@ impl<'a> BatchRecorder<'a> {
     fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) -> Result<(), BackendError> {
         let meshes = &self.frame.meshes;
         encoder.set_vertex_buffer(0, Some(meshes.vertices.slice(..)));
-        for (slot, layout) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
-            encoder.set_vertex_buffer(slot, Some(meshes.attribute(*layout)?.slice(..)));
+        for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+            encoder.set_vertex_buffer(slot, Some(meshes.attribute(attribute.layout)?.slice(..)));
         }
         self.set_index_arena(encoder);
         Ok(())

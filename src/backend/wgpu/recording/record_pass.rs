@@ -150,6 +150,10 @@ pub(crate) fn encode_raw(
     let size = request.views[pass.view_index].camera.size;
     let declaration = &request.plan.processes()[pass.process_index].declaration;
     let columns = |column| frame.buffers.objects().column(column).filter(|_| declaration.columns.contains(&column));
+    let materials = |material_type| {
+        let index = declaration.material_types.iter().position(|declared| *declared == material_type)?;
+        frame.buffers.resource_bytes().of_process(pass.process_index).nth(index)
+    };
     let is_declared = |buffer| declaration.buffers.iter().any(|(declared, _)| *declared == buffer);
     let buffers = |buffer| frame.storage_buffers.find(buffer).filter(|_| is_declared(buffer));
     let of_frame = frame.pass(index).frame_bind_group.as_ref();
@@ -163,6 +167,7 @@ pub(crate) fn encode_raw(
         bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
         bind_groups: [of_frame, of_materials],
         columns: &columns,
+        materials: &materials,
         buffers: &buffers,
         textures: &textures,
         layered: &layered,

@@ -70,11 +70,6 @@ impl AttributeArenas {
         self.attributes.iter().map(upload).collect()
     }
 
-    /// The attributes that processes have read so far.
-    pub(crate) fn required(&self) -> &[DeclaredAttribute] {
-        &self.attributes
-    }
-
     pub(crate) fn buffers(&self) -> &AttributeBuffers {
         &self.buffers
     }

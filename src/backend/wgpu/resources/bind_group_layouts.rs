@@ -53,7 +53,7 @@ pub(crate) struct SampledTarget {
     pub(crate) format: Format,
     /// Whether it is the texture array that all views of a kind share.
     pub(crate) layered: bool,
-    /// Whether it has several samples a pixel.
+    /// Whether it is multisampled.
     pub(crate) multisampled: bool,
 }
 

@@ -3,6 +3,7 @@
 use super::bind_group_layouts::texture_format;
 use crate::backend::BackendError;
 use crate::process::{Access, FramePlan, PlannedTarget};
+use crate::view::RenderView;
 
 /// A texture of the engine's own that takes the place of a view's target in one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,24 +20,46 @@ impl ImportedTarget {
         (self.view.as_str(), self.target.as_str()) == (view, target)
     }
 
-    /// What is missing or wrong.
-    pub(super) fn refused(&self, problem: impl Into<String>) -> BackendError {
+    /// The target that the texture takes the place of: that of the first view with the name that has such a target.
+    ///
+    /// # Errors
+    /// If there is none, or the texture does not fit.
+    pub(crate) fn resolve<'a>(
+        &self,
+        plan: &'a FramePlan,
+        views: &[RenderView],
+    ) -> Result<ResolvedImport<'a>, BackendError> {
+        let mut named = views.iter().enumerate().filter(|(_, view)| view.name() == self.view).peekable();
+        if named.peek().is_none() {
+            return Err(self.refused("there is no such view"));
+        }
+        let target_in = |view: &RenderView| {
+            let mut targets = plan.targets().iter().filter(|planned| planned.views == view.kind());
+            targets.find(|planned| planned.name == self.target)
+        };
+        let found = named.find_map(|(index, view)| Some((index, view, target_in(view)?)));
+        let (view_index, view, planned) = found.ok_or_else(|| self.refused("the view has no such target"))?;
+        self.check(plan, planned, planned.size.in_view(view.camera.size))?;
+        Ok(ResolvedImport { view_index, planned, texture: self.texture.clone() })
+    }
+
+    fn refused(&self, problem: impl Into<String>) -> BackendError {
         let (view, target) = (self.view.clone(), self.target.clone());
-        BackendError::ImportedTarget { view, target, problem: problem.into() }
+        BackendError::InvalidImport { view, target, problem: problem.into() }
     }
 
     /// Checks that a view's target can be this texture.
     ///
     /// # Errors
     /// If it differs in what the frame needs of it.
-    pub(super) fn check(
-        &self,
-        plan: &FramePlan,
-        planned: &PlannedTarget,
-        [width, height]: [u32; 2],
-    ) -> Result<(), BackendError> {
-        if planned.layered || planned.copy_of.is_some() || planned.multisampled {
-            return Err(self.refused("that target is shared by views, a history, or has several samples a pixel"));
+    fn check(&self, plan: &FramePlan, planned: &PlannedTarget, [width, height]: [u32; 2]) -> Result<(), BackendError> {
+        let unfit = [
+            (planned.layered, "all views of its kind share it"),
+            (planned.copy_of.is_some(), "it is the history of another one"),
+            (planned.multisampled, "it is multisampled"),
+        ];
+        if let Some((_, reason)) = unfit.into_iter().find(|(is_unfit, _)| *is_unfit) {
+            return Err(self.refused(format!("that target cannot be imported, because {reason}")));
         }
         let (size, samples) = (self.texture.size(), self.texture.sample_count());
         if size != (wgpu::Extent3d { width, height, depth_or_array_layers: 1 }) {
@@ -50,10 +73,12 @@ impl ImportedTarget {
         if found.remove_srgb_suffix() != needed.remove_srgb_suffix() {
             return Err(self.refused(format!("the texture has the format {found:?}, and the target {needed:?}")));
         }
-        if self.texture.dimension() != wgpu::TextureDimension::D2 || samples != 1 {
-            return Err(
-                self.refused(format!("the texture is not a plain 2D texture: it has {samples} samples a pixel"))
-            );
+        let dimension = self.texture.dimension();
+        if dimension != wgpu::TextureDimension::D2 {
+            return Err(self.refused(format!("the texture is {dimension:?}, and the target D2")));
+        }
+        if samples != 1 {
+            return Err(self.refused(format!("the texture has {samples} samples per pixel, and the target 1")));
         }
         let missing = needed_usages(plan, planned) - self.texture.usage();
         if missing.is_empty() {
@@ -61,14 +86,21 @@ impl ImportedTarget {
         }
         Err(self.refused(format!("the texture lacks the usage {missing:?}, which the frame's processes need")))
     }
+}
 
+/// An imported texture, and the target that it takes the place of.
+pub(crate) struct ResolvedImport<'a> {
+    pub(super) view_index: usize,
+    pub(super) planned: &'a PlannedTarget,
+    pub(super) texture: wgpu::Texture,
+}
+
+impl ResolvedImport<'_> {
     /// The view of the texture that has the target's format.
-    pub(super) fn view_descriptor(planned: &PlannedTarget) -> wgpu::TextureViewDescriptor<'static> {
-        wgpu::TextureViewDescriptor {
-            format: Some(texture_format(planned.format)),
-            mip_level_count: Some(1),
-            ..wgpu::TextureViewDescriptor::default()
-        }
+    pub(super) fn view_descriptor(&self) -> wgpu::TextureViewDescriptor<'static> {
+        // A view of one aspect of depth and stencil has a format of its own.
+        let format = Some(self.planned.format).filter(|format| !format.is_depth_stencil()).map(texture_format);
+        wgpu::TextureViewDescriptor { format, mip_level_count: Some(1), ..wgpu::TextureViewDescriptor::default() }
     }
 }
 
@@ -80,6 +112,7 @@ fn needed_usages(plan: &FramePlan, planned: &PlannedTarget) -> wgpu::TextureUsag
         for (_, access) in accesses.filter(|(target, _)| *target == planned.name) {
             usages |= match access {
                 Access::Sample => wgpu::TextureUsages::TEXTURE_BINDING,
+                Access::Resolve(_) => wgpu::TextureUsages::RENDER_ATTACHMENT,
                 access if access.is_color() || access.is_depth() => wgpu::TextureUsages::RENDER_ATTACHMENT,
                 // wgpu checks what the commands of raw passes need.
                 _ => wgpu::TextureUsages::empty(),

@@ -14,7 +14,7 @@ pub(crate) struct MaterialSnapshot {
     /// A [`GpuMaterial`] for each slot.
     pub(crate) materials: Arc<[u8]>,
     pub(crate) textures: Arc<MaterialTextures>,
-    /// The values of each type of the engine's own that processes read: an element for each slot.
+    /// The values of each material type that processes read: an element for each slot.
     pub(crate) values: Vec<(MaterialLayout, Arc<[u8]>)>,
 }
 
@@ -111,10 +111,10 @@ impl MaterialCache {
 
 /// The values of a type, for each slot; all zeros for materials of another type.
 fn values_of(assets: &Assets, layout: MaterialLayout) -> Arc<[u8]> {
-    let mut bytes = vec![0; assets.materials.slot_count().max(1) * layout.bytes];
+    let mut bytes = vec![0; assets.materials.slot_count().max(1) * layout.stride];
     for (handle, material) in assets.iter::<Material>() {
         if let Some(values) = material.values.as_ref().filter(|values| values.layout() == layout) {
-            bytes[handle.index() as usize * layout.bytes..][..layout.bytes].copy_from_slice(values.bytes());
+            bytes[handle.index() as usize * layout.stride..][..layout.stride].copy_from_slice(values.bytes());
         }
     }
     bytes.into()

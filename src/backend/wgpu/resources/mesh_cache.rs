@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::arena::Arena;
 use super::attribute_arenas::{AttributeArenas, AttributeBuffers};
-use super::device_meshes::DeviceMeshes;
+use super::imported_meshes::ImportedMeshes;
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::{vertex_stride, with_vertex_bytes};
 use crate::backend::BackendError;
@@ -22,8 +22,8 @@ pub(crate) struct MeshSnapshot {
     attributes: AttributeBuffers,
     /// By mesh slot.
     meshes: Vec<Option<MeshRange>>,
-    /// Those that are not in the arenas.
-    pub(crate) device_meshes: DeviceMeshes,
+    /// Those that are not in the arenas, but in buffers of the engine's own.
+    pub(crate) imported_meshes: ImportedMeshes,
 }
 
 impl MeshSnapshot {
@@ -39,7 +39,7 @@ impl MeshSnapshot {
     /// Whether one pipeline of each process draws both batches.
     pub(crate) fn share_pipeline(&self, one: &Batch, other: &Batch) -> bool {
         one.state == other.state
-            && (self.device_meshes.is_empty() || self.device_meshes.have_equal_layouts(one.mesh, other.mesh))
+            && (self.imported_meshes.is_empty() || self.imported_meshes.have_equal_layouts(one.mesh, other.mesh))
     }
 
     /// The values of an attribute of all meshes in the arenas.
@@ -80,7 +80,7 @@ pub(crate) struct MeshCache {
     indices: Arena,
     attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
-    device_meshes: DeviceMeshes,
+    imported_meshes: ImportedMeshes,
     /// Identity and revision of the snapshot's meshes.
     current: Option<(u64, u64)>,
     snapshot: Option<Arc<MeshSnapshot>>,
@@ -94,7 +94,7 @@ impl Default for MeshCache {
             indices: Arena::new("indices", wgpu::BufferUsages::INDEX),
             attributes: AttributeArenas::default(),
             meshes: Vec::new(),
-            device_meshes: DeviceMeshes::default(),
+            imported_meshes: ImportedMeshes::default(),
             current: None,
             snapshot: None,
         }
@@ -156,7 +156,7 @@ impl MeshCache {
         self.current = None;
         self.update_meshes(device, uploads, assets)?;
         let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
-        self.device_meshes = self.device_meshes.updated(device, uploads, meshes, self.attributes.required())?;
+        self.imported_meshes = self.imported_meshes.updated(device, meshes)?;
         let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
             return Err(broken_rule("arenas have buffers"));
         };
@@ -165,7 +165,7 @@ impl MeshCache {
             indices: indices.clone(),
             attributes: self.attributes.buffers().clone(),
             meshes: self.meshes.clone(),
-            device_meshes: self.device_meshes.clone(),
+            imported_meshes: self.imported_meshes.clone(),
         });
         self.current = Some(requested);
         self.snapshot = Some(Arc::clone(&snapshot));

@@ -4,7 +4,7 @@ mod arena;
 mod attribute_arenas;
 mod bind_group_layouts;
 mod cached_bind_group;
-mod device_meshes;
+mod imported_meshes;
 mod gpu_material;
 mod growing_buffer;
 mod imported_target;
@@ -26,11 +26,11 @@ pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
-pub(crate) use device_meshes::{DeviceLayout, VertexSlot};
 pub(crate) use growing_buffer::{
     ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,
 };
-pub(crate) use imported_target::ImportedTarget;
+pub(crate) use imported_meshes::{VertexSlot, VertexStreamLayouts};
+pub(crate) use imported_target::{ImportedTarget, ResolvedImport};
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use material_cache::{MaterialCache, MaterialSnapshot, MaterialTextures};
 pub(crate) use mesh_cache::{MeshCache, MeshSnapshot, attribute_of};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::bind_group_layouts::texture_format;
-use super::imported_target::ImportedTarget;
+use super::imported_target::ResolvedImport;
 use crate::backend::BackendError;
 use crate::process::{Format, FramePlan, PlannedTarget};
 use crate::scene::ViewKind;
@@ -94,8 +94,8 @@ pub(crate) struct TargetCache {
     /// The key of the current targets, beside the views' names: the plan's identity, and kind, size and layer of each view.
     plan: Option<u64>,
     views: Vec<(ViewKind, [u32; 2], u32)>,
-    /// The targets that are not among the current ones, because textures of the engine's took their place: views and names.
-    imported: Vec<(String, String)>,
+    /// The targets that are not among the current ones because they were imported: the view's index, and the name.
+    imported: Vec<(usize, String)>,
 }
 
 impl TargetCache {
@@ -103,14 +103,13 @@ impl TargetCache {
     ///
     /// # Errors
     /// - If a picture is larger than the device allows.
-    /// - If an imported texture does not fit, or is of a target that there is not.
     /// - If more views share a target than a texture can have layers.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
         plan: &FramePlan,
         views: &[RenderView],
-        imports: &[ImportedTarget],
+        imports: &[ResolvedImport<'_>],
     ) -> Result<Arc<WgpuTargets>, BackendError> {
         self.update_own(device, plan, views, imports)?;
         if imports.is_empty() {
@@ -118,16 +117,11 @@ impl TargetCache {
         }
         let mut with_imports = WgpuTargets::clone(&self.current);
         for import in imports {
-            let index = views.iter().position(|view| view.name() == import.view);
-            let index = index.ok_or_else(|| import.refused("there is no such view"))?;
-            let (view, own) = (&views[index], &mut with_imports.views[index].1);
-            let mut planned = plan.targets().iter().filter(|planned| planned.views == view.kind());
-            let planned = planned.find(|planned| planned.name == import.target);
-            let planned = planned.ok_or_else(|| import.refused("the view has no such target"))?;
-            import.check(plan, planned, planned.size.in_view(view.camera.size))?;
-            let texture = import.texture.clone();
-            let (view, sampled) = new_views(&texture, planned.format, &ImportedTarget::view_descriptor(planned));
-            own.push(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 });
+            let ResolvedImport { view_index, planned, texture } = import;
+            let (planned, texture) = (Arc::new(PlannedTarget::clone(planned)), texture.clone());
+            let (view, sampled) = new_views(&texture, planned.format, &import.view_descriptor());
+            let (_, targets) = &mut with_imports.views[*view_index];
+            targets.push(ViewTarget { planned, texture, view, sampled, layer: 0 });
         }
         Ok(Arc::new(with_imports))
     }
@@ -142,13 +136,13 @@ impl TargetCache {
         device: &wgpu::Device,
         plan: &FramePlan,
         views: &[RenderView],
-        imports: &[ImportedTarget],
+        imports: &[ResolvedImport<'_>],
     ) -> Result<(), BackendError> {
         let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
         let names = self.current.views.iter().map(|(name, _)| name.as_str());
         let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
-        let imported = || imports.iter().map(|import| (import.view.as_str(), import.target.as_str()));
-        let known = self.imported.iter().map(|(view, target)| (view.as_str(), target.as_str()));
+        let imported = || imports.iter().map(|import| (import.view_index, import.planned.name.as_str()));
+        let known = self.imported.iter().map(|(view, target)| (*view, target.as_str()));
         if self.plan == Some(plan.identity()) && are_same_views && known.eq(imported()) {
             return Ok(());
         }
@@ -159,8 +153,7 @@ impl TargetCache {
             next.layered.push(self.layered_target(device, planned, views)?);
         }
         for (index, view) in views.iter().enumerate() {
-            let is_own =
-                |planned: &&PlannedTarget| !imports.iter().any(|import| import.is_of(view.name(), &planned.name));
+            let is_own = |planned: &&PlannedTarget| !imported().any(|import| import == (index, planned.name.as_str()));
             let planned = plan.targets().iter().filter(|planned| planned.views == view.kind()).filter(is_own);
             let targets = planned.map(|planned| {
                 if !planned.layered {
@@ -177,7 +170,7 @@ impl TargetCache {
         self.plan = Some(plan.identity());
         self.views.clear();
         self.views.extend(requested());
-        self.imported = imported().map(|(view, target)| (view.to_owned(), target.to_owned())).collect();
+        self.imported = imported().map(|(view, target)| (view, target.to_owned())).collect();
         Ok(())
     }
 

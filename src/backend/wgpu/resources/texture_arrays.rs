@@ -21,6 +21,8 @@ impl TextureLocation {
 #[derive(Default)]
 pub(crate) struct TextureArrays {
     arrays: [TextureArray; ARRAY_SIDES.len()],
+    /// Of each texture, by slot.
+    locations: Vec<Option<TextureLocation>>,
     identity: u64,
 }
 
@@ -59,14 +61,18 @@ impl TextureArrays {
             }
             array.update(device, uploads, side, &textures, max_layers);
         }
+        self.locations.clear();
+        self.locations.resize(assets.textures.slot_count(), None);
+        for (index, array) in (0..).zip(&self.arrays) {
+            for &(slot, _, layer) in &array.layers {
+                self.locations[slot as usize] = Some(TextureLocation { array: index, layer });
+            }
+        }
     }
 
     /// The location of the texture in a slot; `None` if it was rejected.
     pub(crate) fn location(&self, slot: u32) -> Option<TextureLocation> {
-        self.arrays.iter().zip(0..).find_map(|(array, index)| {
-            let (_, _, layer) = array.layers.iter().find(|(other, ..)| *other == slot)?;
-            Some(TextureLocation { array: index, layer: *layer })
-        })
+        self.locations.get(slot as usize).copied().flatten()
     }
 
     /// A view of each array; an empty array is a single pixel.

@@ -1,8 +1,8 @@
-//! Geometry in an engine's own buffers on the device.
+//! Meshes in an engine's own buffers on the device.
 
 use super::{AttributeValue, VertexAttribute};
 
-/// The vertices, and the indices if there are any, of a [mesh](super::Mesh::on_device) in buffers that the engine owns: nothing is kept
+/// The vertices, and the indices if there are any, of a [mesh](super::Mesh::from_buffers) in buffers that the engine owns: nothing is kept
 /// twice. The mesh keeps the buffers alive. Their content is the engine's: what it writes before a frame is submitted is drawn.
 ///
 /// Vertices are interleaved in one stream, or in several: a stream has some of the attributes of each vertex. Shaders read attributes by
@@ -11,7 +11,7 @@ use super::{AttributeValue, VertexAttribute};
 /// ```no_run
 /// use drawloom::glam::Vec3;
 /// use drawloom::scene::{
-///     DeviceGeometry, IndexStream, Mesh, StreamAttribute, StreamLayout, Topology, VertexAttribute, VertexStream,
+///     MeshBuffers, IndexBuffer, Mesh, StreamAttribute, StreamLayout, Topology, VertexAttribute, VertexStream,
 /// };
 /// use drawloom::wgpu;
 ///
@@ -26,22 +26,22 @@ use super::{AttributeValue, VertexAttribute};
 ///         StreamAttribute::of(TANGENT, wgpu::VertexFormat::Snorm8x4, 20),
 ///     ];
 ///     let layout = StreamLayout { stride: 24, attributes };
-///     let geometry = DeviceGeometry {
+///     let buffers = MeshBuffers {
 ///         streams: vec![VertexStream { buffer: buffer.clone(), offset: 0, layout }],
-///         vertices: 1_000,
-///         indices: Some(IndexStream { buffer, offset: 24_000, format: wgpu::IndexFormat::Uint16, count: 5_400 }),
+///         vertex_count: 1_000,
+///         indices: Some(IndexBuffer { buffer, offset: 24_000, format: wgpu::IndexFormat::Uint16, count: 5_400 }),
 ///     };
-///     Mesh::on_device("rock", Topology::TriangleList, [Vec3::splat(-2.0), Vec3::splat(2.0)], geometry)
+///     Mesh::from_buffers("rock", Topology::TriangleList, [Vec3::splat(-2.0), Vec3::splat(2.0)], buffers)
 /// }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct DeviceGeometry {
+pub struct MeshBuffers {
     /// Where the attributes of vertices are.
     pub streams: Vec<VertexStream>,
     /// The number of vertices.
-    pub vertices: u32,
+    pub vertex_count: u32,
     /// The indices; `None` for a mesh whose vertices form triangles as they are.
-    pub indices: Option<IndexStream>,
+    pub indices: Option<IndexBuffer>,
 }
 
 /// Some attributes of all vertices of a mesh, in a buffer with the usage `VERTEX`.
@@ -64,7 +64,8 @@ pub struct StreamLayout {
     pub attributes: Vec<StreamAttribute>,
 }
 
-/// An attribute in a stream.
+/// An attribute in a stream. Its offset is in bytes from the beginning of the vertex: a multiple of 4, or of the size of the format if
+/// that is less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct StreamAttribute {
     /// Its name: that of a [`VertexAttribute`], or "position", "normal" or "uv".
@@ -74,18 +75,19 @@ pub struct StreamAttribute {
 }
 
 impl StreamAttribute {
-    /// The position in object space, in metres, at an offset in bytes from the beginning of the vertex. Every mesh has it. The format has
-    /// three or four numbers that shaders read as `f32`.
+    /// The position in object space, in metres. Every mesh must have it. The format must have three or four components that shaders read
+    /// as `f32`.
     pub const fn position(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: POSITION, format, offset }
     }
 
-    /// The normal in object space, of any length. A mesh without normals has those of its triangles.
+    /// The normal in object space, of any length, in a format as that of [positions](Self::position). A mesh without normals has those of
+    /// its triangles.
     pub const fn normal(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: NORMAL, format, offset }
     }
 
-    /// Texture coordinates. Those of a mesh without them are 0.
+    /// Texture coordinates, in a format of two or more components that shaders read as `f32`. Those of a mesh without them are 0.
     pub const fn uv(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: UV, format, offset }
     }
@@ -109,6 +111,41 @@ impl StreamAttribute {
     /// Its offset from the beginning of the vertex, in bytes.
     pub fn offset(&self) -> u64 {
         self.offset
+    }
+
+    /// The number of components.
+    fn component_count(&self) -> u32 {
+        use wgpu::VertexFormat as Format;
+        match self.format {
+            Format::Uint8
+            | Format::Sint8
+            | Format::Unorm8
+            | Format::Snorm8
+            | Format::Uint16
+            | Format::Sint16
+            | Format::Unorm16
+            | Format::Snorm16
+            | Format::Float16
+            | Format::Uint32
+            | Format::Sint32
+            | Format::Float32
+            | Format::Float64 => 1,
+            Format::Uint8x2
+            | Format::Sint8x2
+            | Format::Unorm8x2
+            | Format::Snorm8x2
+            | Format::Uint16x2
+            | Format::Sint16x2
+            | Format::Unorm16x2
+            | Format::Snorm16x2
+            | Format::Float16x2
+            | Format::Uint32x2
+            | Format::Sint32x2
+            | Format::Float32x2
+            | Format::Float64x2 => 2,
+            Format::Uint32x3 | Format::Sint32x3 | Format::Float32x3 | Format::Float64x3 => 3,
+            _ => 4,
+        }
     }
 
     /// The kind of number that shaders read.
@@ -148,10 +185,10 @@ pub(crate) enum NumberKind {
     Double,
 }
 
-/// The indices of a mesh, in a buffer with the usage `INDEX`. Each is less than the number of vertices: what a device draws otherwise is
-/// its own affair, within the buffer.
+/// The indices of a mesh, in a buffer with the usage `INDEX`. Each must be less than the number of vertices. Drawloom cannot check that;
+/// what is drawn otherwise depends on the device, which reads nothing outside of the buffers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct IndexStream {
+pub struct IndexBuffer {
     /// The buffer.
     pub buffer: wgpu::Buffer,
     /// Where the first index begins, in bytes: a multiple of the size of an index.
@@ -162,21 +199,24 @@ pub struct IndexStream {
     pub count: u32,
 }
 
+/// The 16-bit index that devices do not take for one of a vertex, in strips.
+const RESTART_INDEX: u32 = 0xFFFF;
+
 pub(crate) const POSITION: &str = "position";
 pub(crate) const NORMAL: &str = "normal";
 pub(crate) const UV: &str = "uv";
 
-impl DeviceGeometry {
-    /// The number of corners of triangles.
-    pub fn corners(&self) -> u32 {
-        self.indices.as_ref().map_or(self.vertices, |indices| indices.count)
+impl MeshBuffers {
+    /// The number of indices, or of vertices if there are no indices.
+    pub fn index_count(&self) -> u32 {
+        self.indices.as_ref().map_or(self.vertex_count, |indices| indices.count)
     }
 
-    /// What is wrong with it; `None` if nothing is.
-    pub(super) fn problem(&self) -> Option<String> {
+    /// What is wrong with it as a list of triangles, or as a strip; `None` if nothing is.
+    pub(super) fn problem(&self, forms_strip: bool) -> Option<String> {
         let mut names: Vec<&str> = Vec::new();
         for (index, stream) in self.streams.iter().enumerate() {
-            if let Some(problem) = stream.problem(self.vertices) {
+            if let Some(problem) = stream.problem(self.vertex_count) {
                 return Some(format!("stream {index} {problem}"));
             }
             for attribute in &stream.layout.attributes {
@@ -185,15 +225,30 @@ impl DeviceGeometry {
                     return Some(format!("attribute {name:?} is there twice"));
                 }
                 names.push(name);
-                if [POSITION, NORMAL, UV].contains(&name) && attribute.number_kind() != NumberKind::Float {
+                let needed = match name {
+                    POSITION | NORMAL => 3,
+                    UV => 2,
+                    _ => continue,
+                };
+                if attribute.number_kind() != NumberKind::Float {
                     return Some(format!("attribute {name:?} has {format:?}, which shaders do not read as f32"));
+                }
+                if attribute.component_count() < needed {
+                    return Some(format!("attribute {name:?} has {format:?}, but needs {needed} components"));
                 }
             }
         }
         if !names.contains(&POSITION) {
             return Some("it has no positions".to_owned());
         }
-        self.indices.as_ref()?.problem().map(|problem| format!("its index stream {problem}"))
+        let indices = self.indices.as_ref()?;
+        if forms_strip && indices.format == wgpu::IndexFormat::Uint16 && self.vertex_count > RESTART_INDEX {
+            let count = self.vertex_count;
+            return Some(format!(
+                "it has {count} vertices, but in a strip with 16-bit indices the index {RESTART_INDEX} begins another strip"
+            ));
+        }
+        indices.problem().map(|problem| format!("its index buffer {problem}"))
     }
 }
 
@@ -211,8 +266,9 @@ impl VertexStream {
         }
         for StreamAttribute { name, format, offset } in attributes {
             if !offset.is_multiple_of(format.size().min(4)) {
+                let alignment = format.size().min(4);
                 return Some(format!(
-                    "has attribute {name:?} at byte {offset} of a vertex, which {format:?} cannot be at"
+                    "has attribute {name:?} at byte {offset} of a vertex, which is not a multiple of {alignment}"
                 ));
             }
             if offset.saturating_add(format.size()) > *stride {
@@ -228,7 +284,7 @@ impl VertexStream {
     }
 }
 
-impl IndexStream {
+impl IndexBuffer {
     fn problem(&self) -> Option<String> {
         let Self { buffer, offset, format, count } = self;
         let bytes = format.byte_size() as u64;

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
 use drawloom::glam::Vec3;
-use drawloom::process::Deferred;
+use drawloom::process::{ClearColor, CommandDraws, Declare, Deferred, Draws, RenderProcess};
 use drawloom::quality::{Quality, VertexFormat};
 use drawloom::scene::{
-    DeviceGeometry, IndexStream, Material, Mesh, RenderObject, Scene, SceneError, StreamAttribute, StreamLayout,
-    Topology, Vertex, VertexAttribute, VertexStream,
+    IndexBuffer, Material, Mesh, MeshBuffers, RenderObject, Scene, SceneError, StreamAttribute, StreamLayout, Topology,
+    Vertex, VertexAttribute, VertexStream,
 };
 use drawloom::task::Scheduler;
 use drawloom::wgpu::util::DeviceExt;
@@ -22,46 +22,53 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::attributes::{COLOR, Colored, SHADE, STRENGTH, with_colors};
 use crate::fixture::Fixture;
-use crate::strategies::{device, strategies};
+use crate::strategies::{device, expect, strategies};
 
 pub const CASES: &[Case] = &[
     ("a_mesh_in_the_engines_buffers_looks_like_one_in_the_arenas", same_picture),
     ("every_strategy_draws_meshes_in_the_engines_buffers", every_strategy),
-    ("meshes_in_the_engines_buffers_come_and_go", coming_and_going),
+    ("meshes_in_the_engines_buffers_come_and_go", replacing_meshes),
     ("without_normals_a_mesh_in_the_engines_buffers_is_flat", without_normals),
     ("another_layout_costs_a_pipeline_of_each_process", pipelines),
-    ("geometry_that_no_mesh_can_have_is_named", invalid),
+    ("buffers_that_no_mesh_can_have_are_named", invalid),
     ("an_attribute_in_a_format_of_another_kind_is_named", another_kind),
     ("buffers_of_another_device_are_named", another_device),
     ("a_frame_in_flight_whose_mesh_is_destroyed_is_an_error", destroyed),
-    ("the_software_backend_names_meshes_on_a_device", on_software),
+    ("a_mesh_that_exceeds_the_devices_limits_is_named", too_large),
+    ("a_mesh_of_positions_needs_two_vertex_buffers", few_vertex_buffers),
+    ("the_software_backend_names_meshes_in_buffers", on_software),
 ];
 
 /// How a mesh lies in an engine's buffers.
 #[derive(Clone, Copy, Debug)]
-enum Storage {
+enum BufferLayout {
     /// One buffer has everything: interleaved vertices with gaps behind some other bytes, then 16-bit indices.
     Interleaved,
     /// A stream for positions, one for the rest, and 32-bit indices.
-    Apart,
+    SeparateStreams,
     /// A vertex for each corner of each triangle.
     WithoutIndices,
-    /// As interleaved, but with the defaults of the engine's own attributes.
+    /// Interleaved, without the custom attributes: shaders read their defaults.
     WithoutColors,
 }
 
-const STORAGES: [Storage; 4] = [Storage::Interleaved, Storage::Apart, Storage::WithoutIndices, Storage::WithoutColors];
+const BUFFER_LAYOUTS: [BufferLayout; 4] = [
+    BufferLayout::Interleaved,
+    BufferLayout::SeparateStreams,
+    BufferLayout::WithoutIndices,
+    BufferLayout::WithoutColors,
+];
 
 /// The colour's bytes, and `Uint16x2`, of which the shader reads the first number.
 const COLOR_AND_STRENGTH: [[u8; 4]; 2] = [[255, 128, 64, 255], [80, 0, 7, 0]];
 
-fn on_device(device: &wgpu::Device, mesh: &Mesh, storage: Storage) -> Result<Mesh, SceneError> {
+fn imported(device: &wgpu::Device, mesh: &Mesh, layout: BufferLayout) -> Result<Mesh, SceneError> {
     let buffer = |bytes: &[u8], usage| {
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents: bytes, usage })
     };
     let (vertices, indices) = (mesh.vertices(), mesh.indices());
-    let (topology, geometry) = match storage {
-        Storage::Interleaved | Storage::WithoutColors => {
+    let (topology, geometry) = match layout {
+        BufferLayout::Interleaved | BufferLayout::WithoutColors => {
             let mut bytes = vec![9; 64];
             for vertex in vertices {
                 bytes.extend_from_slice(bytemuck::bytes_of(&vertex.uv));
@@ -83,33 +90,33 @@ fn on_device(device: &wgpu::Device, mesh: &Mesh, storage: Storage) -> Result<Mes
                 StreamAttribute::normal(Format::Float32x3, 32),
             ];
             let is_own = |attribute: &StreamAttribute| ["colour", "strength"].contains(&attribute.name());
-            let has_colors = matches!(storage, Storage::Interleaved);
+            let has_colors = matches!(layout, BufferLayout::Interleaved);
             let attributes = attributes.into_iter().filter(|attribute| has_colors || !is_own(attribute)).collect();
             let layout = StreamLayout { stride: 52, attributes };
             let count = indices.len() as u32;
-            let indices = IndexStream { buffer: buffer.clone(), offset: start, format: IndexFormat::Uint16, count };
+            let indices = IndexBuffer { buffer: buffer.clone(), offset: start, format: IndexFormat::Uint16, count };
             let streams = vec![VertexStream { buffer, offset: 64, layout }];
-            let vertices = vertices.len() as u32;
-            (mesh.topology(), DeviceGeometry { streams, vertices, indices: Some(indices) })
+            let vertex_count = vertices.len() as u32;
+            (mesh.topology(), MeshBuffers { streams, vertex_count, indices: Some(indices) })
         }
-        Storage::Apart => {
+        BufferLayout::SeparateStreams => {
             let count = indices.len() as u32;
             let indices = buffer(bytemuck::cast_slice(indices), BufferUsages::INDEX);
-            let indices = IndexStream { buffer: indices, offset: 0, format: IndexFormat::Uint32, count };
-            let streams = streams_apart(vertices, buffer);
-            let vertices = vertices.len() as u32;
-            (mesh.topology(), DeviceGeometry { streams, vertices, indices: Some(indices) })
+            let indices = IndexBuffer { buffer: indices, offset: 0, format: IndexFormat::Uint32, count };
+            let streams = separate_streams(vertices, buffer);
+            let vertex_count = vertices.len() as u32;
+            (mesh.topology(), MeshBuffers { streams, vertex_count, indices: Some(indices) })
         }
-        Storage::WithoutIndices => {
+        BufferLayout::WithoutIndices => {
             let corners: Vec<_> = mesh.triangles().flatten().map(|corner| vertices[corner as usize]).collect();
-            let streams = streams_apart(&corners, buffer);
-            (Topology::TriangleList, DeviceGeometry { streams, vertices: corners.len() as u32, indices: None })
+            let streams = separate_streams(&corners, buffer);
+            (Topology::TriangleList, MeshBuffers { streams, vertex_count: corners.len() as u32, indices: None })
         }
     };
-    Mesh::on_device(mesh.name(), topology, mesh.corners(), geometry)
+    Mesh::from_buffers(mesh.name(), topology, mesh.corners(), geometry)
 }
 
-fn streams_apart(vertices: &[Vertex], buffer: impl Fn(&[u8], BufferUsages) -> wgpu::Buffer) -> Vec<VertexStream> {
+fn separate_streams(vertices: &[Vertex], buffer: impl Fn(&[u8], BufferUsages) -> wgpu::Buffer) -> Vec<VertexStream> {
     let positions: Vec<_> = vertices.iter().map(|vertex| vertex.position).collect();
     let rest: Vec<_> = vertices.iter().map(|vertex| (vertex.uv, vertex.normal)).collect();
     let rest: Vec<u8> =
@@ -132,7 +139,7 @@ fn streams_apart(vertices: &[Vertex], buffer: impl Fn(&[u8], BufferUsages) -> wg
     ]
 }
 
-/// The meshes of a scene in the arenas, with the colours that those of [`on_device`] have, and others.
+/// The meshes of a scene in the arenas, with the colours that those of [`imported`] have, and others.
 fn colored(scene: Scene) -> Scene {
     with_meshes(scene, |mesh| {
         let (count, plain) = (mesh.vertices().len(), mesh.clone());
@@ -164,27 +171,27 @@ fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
 }
 
 /// The scene with meshes in the engine's buffers, from the `first` one on.
-fn moved_to_device(scene: Scene, storage: Storage, first: usize) -> Result<Scene, Failed> {
+fn moved_to_device(scene: Scene, layout: BufferLayout, first: usize) -> Result<Scene, Failed> {
     let (device, _) = device()?;
     let number = std::cell::Cell::new(0);
     Ok(with_meshes(scene, |mesh| {
         number.set(number.get() + 1);
-        if number.get() <= first { mesh.clone() } else { on_device(&device, mesh, storage).unwrap() }
+        if number.get() <= first { mesh.clone() } else { imported(&device, mesh, layout).unwrap() }
     }))
 }
 
 fn same_picture() -> Result<(), Failed> {
-    for storage in STORAGES {
+    for layout in BUFFER_LAYOUTS {
         let mut arenas = field(300);
-        if let Storage::Interleaved = storage {
+        if let BufferLayout::Interleaved = layout {
             arenas = colored(arenas);
         }
         let expected = pictures(&mut fixture()?, &arenas)?;
         for first in [0, 1, 2] {
-            let scene = moved_to_device(with_meshes(field(300), Mesh::clone), storage, first)?;
+            let scene = moved_to_device(with_meshes(field(300), Mesh::clone), layout, first)?;
             // Meshes that are not moved keep the colours of the others.
-            let scene = if first > 0 && matches!(storage, Storage::Interleaved) {
-                with_meshes(scene, |mesh| match mesh.device_geometry() {
+            let scene = if first > 0 && matches!(layout, BufferLayout::Interleaved) {
+                with_meshes(scene, |mesh| match mesh.buffers() {
                     Some(_) => mesh.clone(),
                     None => {
                         let count = mesh.vertices().len();
@@ -197,7 +204,7 @@ fn same_picture() -> Result<(), Failed> {
                 scene
             };
             if pictures(&mut fixture()?, &scene)? != expected {
-                return Err(format!("{storage:?} from mesh {first} on differs").into());
+                return Err(format!("{layout:?} from mesh {first} on differs").into());
             }
         }
     }
@@ -205,7 +212,7 @@ fn same_picture() -> Result<(), Failed> {
 }
 
 /// Every mesh three times, so that there are several layouts of each state. The first of the three is in the arenas.
-fn with_copies(storages: Option<[Storage; 2]>) -> Result<Scene, Failed> {
+fn with_copies(layouts: Option<[BufferLayout; 2]>) -> Result<Scene, Failed> {
     let (device, _) = device()?;
     let mut scene = field(90);
     let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
@@ -213,9 +220,9 @@ fn with_copies(storages: Option<[Storage; 2]>) -> Result<Scene, Failed> {
     for (handle, mesh) in &meshes {
         let mut of_mesh = vec![*handle];
         for copy in 0..2 {
-            let copied = match storages {
+            let copied = match layouts {
                 None => mesh.clone(),
-                Some(storages) => on_device(&device, mesh, storages[copy])?,
+                Some(layouts) => imported(&device, mesh, layouts[copy])?,
             };
             of_mesh.push(scene.add(copied)?);
         }
@@ -231,7 +238,7 @@ fn with_copies(storages: Option<[Storage; 2]>) -> Result<Scene, Failed> {
 
 fn every_strategy() -> Result<(), Failed> {
     let expected = pictures(&mut fixture()?, &with_copies(None)?)?;
-    let scene = with_copies(Some([Storage::Apart, Storage::WithoutColors]))?;
+    let scene = with_copies(Some([BufferLayout::SeparateStreams, BufferLayout::WithoutColors]))?;
     for (recording, encoding) in strategies()? {
         let (device, queue) = device()?;
         let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
@@ -245,7 +252,7 @@ fn every_strategy() -> Result<(), Failed> {
     Ok(())
 }
 
-fn coming_and_going() -> Result<(), Failed> {
+fn replacing_meshes() -> Result<(), Failed> {
     let (device, _) = device()?;
     let mut scene = field(60);
     let handles: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
@@ -254,7 +261,7 @@ fn coming_and_going() -> Result<(), Failed> {
         let (handle, mesh) = &handles[step % handles.len()];
         let is_moved = step / handles.len() % 2 == 0;
         let mesh = match is_moved {
-            true => on_device(&device, mesh, STORAGES[step % 2 + step / 6])?,
+            true => imported(&device, mesh, BUFFER_LAYOUTS[step % 2 + step / 6])?,
             false => with_colors(mesh.clone(), 0.1 * step as f32)?,
         };
         scene.replace(*handle, mesh)?;
@@ -273,10 +280,10 @@ fn without_normals() -> Result<(), Failed> {
     };
     let expected = pictures(&mut fixture()?, &with_meshes(field(100), flat))?;
     let only_positions = |mesh: &Mesh| {
-        let moved = on_device(&device, mesh, Storage::Apart).unwrap();
-        let geometry = DeviceGeometry::clone(moved.device_geometry().unwrap());
+        let moved = imported(&device, mesh, BufferLayout::SeparateStreams).unwrap();
+        let geometry = MeshBuffers::clone(moved.buffers().unwrap());
         let streams = geometry.streams[2..].to_vec();
-        Mesh::on_device(mesh.name(), mesh.topology(), mesh.corners(), DeviceGeometry { streams, ..geometry }).unwrap()
+        Mesh::from_buffers(mesh.name(), mesh.topology(), mesh.corners(), MeshBuffers { streams, ..geometry }).unwrap()
     };
     if pictures(&mut fixture()?, &with_meshes(field(100), only_positions))? == expected {
         Ok(())
@@ -294,12 +301,11 @@ fn pipelines() -> Result<(), Failed> {
     };
     let (device, _) = device()?;
     // Only lists of one material, so that there is one state.
-    let scene = |storages: &[Storage]| -> Result<Scene, Failed> {
+    let scene = |layouts: &[BufferLayout]| -> Result<Scene, Failed> {
         let mut scene = field(0);
         let material = scene.add(Material::default())?;
         let cube = drawloom_testing::scenes::cube();
-        for mesh in std::iter::once(Ok(cube.clone())).chain(storages.iter().map(|one| on_device(&device, &cube, *one)))
-        {
+        for mesh in std::iter::once(Ok(cube.clone())).chain(layouts.iter().map(|one| imported(&device, &cube, *one))) {
             let mesh = scene.add(mesh?)?;
             scene.add_object(RenderObject::new(mesh, material, drawloom::glam::DVec3::ZERO))?;
         }
@@ -307,22 +313,22 @@ fn pipelines() -> Result<(), Failed> {
     };
     let counts = [
         count(&scene(&[])?)?,
-        count(&scene(&[Storage::Apart])?)?,
-        count(&scene(&[Storage::Apart, Storage::Apart, Storage::WithoutIndices])?)?,
-        count(&scene(&[Storage::Apart, Storage::Interleaved])?)?,
+        count(&scene(&[BufferLayout::SeparateStreams])?)?,
+        count(&scene(&[BufferLayout::SeparateStreams, BufferLayout::SeparateStreams, BufferLayout::WithoutIndices])?)?,
+        count(&scene(&[BufferLayout::SeparateStreams, BufferLayout::Interleaved])?)?,
     ];
     if counts == [1, 2, 2, 3] { Ok(()) } else { Err(format!("{counts:?} pipelines").into()) }
 }
 
 fn invalid() -> Result<(), Failed> {
     let (device, _) = device()?;
-    let valid = on_device(&device, &drawloom_testing::scenes::cube(), Storage::Interleaved)?;
+    let valid = imported(&device, &drawloom_testing::scenes::cube(), BufferLayout::Interleaved)?;
     let corners = [Vec3::splat(-1.0), Vec3::splat(1.0)];
     let usage = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
     };
-    type Break = fn(&mut DeviceGeometry);
-    let broken: [(&str, Break); 12] = [
+    type Break = fn(&mut MeshBuffers);
+    let broken: [(&str, Break); 15] = [
         ("no positions", |geometry| _ = geometry.streams[0].layout.attributes.remove(1)),
         ("\"normal\" is there twice", |geometry| {
             geometry.streams[0].layout.attributes.push(StreamAttribute::normal(Format::Float32x3, 0));
@@ -330,21 +336,30 @@ fn invalid() -> Result<(), Failed> {
         ("\"position\" has Uint32x3", |geometry| {
             geometry.streams[0].layout.attributes[1] = StreamAttribute::position(Format::Uint32x3, 12);
         }),
+        ("\"position\" has Float32x2, but needs 3", |buffers| {
+            buffers.streams[0].layout.attributes[1] = StreamAttribute::position(Format::Float32x2, 12);
+        }),
+        ("\"normal\" has Snorm16x2, but needs 3", |buffers| {
+            buffers.streams[0].layout.attributes[4] = StreamAttribute::normal(Format::Snorm16x2, 32);
+        }),
+        ("\"uv\" has Float32, but needs 2", |buffers| {
+            buffers.streams[0].layout.attributes[0] = StreamAttribute::uv(Format::Float32, 0);
+        }),
         ("stride of 50 bytes", |geometry| geometry.streams[0].layout.stride = 50),
         ("stride of 0 bytes", |geometry| geometry.streams[0].layout.stride = 0),
         ("begins at byte 66", |geometry| geometry.streams[0].offset = 66),
         ("up to byte 44 of vertices that have 40", |geometry| geometry.streams[0].layout.stride = 40),
-        ("\"uv\" at byte 2", |geometry| {
+        ("\"uv\" at byte 2 of a vertex, which is not a multiple of 4", |geometry| {
             geometry.streams[0].layout.attributes[0] = StreamAttribute::uv(Format::Float32x2, 2);
         }),
-        ("for 1000 vertices", |geometry| geometry.vertices = 1000),
-        ("index stream ends at byte", |geometry| geometry.indices.as_mut().unwrap().count = 999),
-        ("index stream begins at byte 3", |geometry| geometry.indices.as_mut().unwrap().offset = 3),
+        ("for 1000 vertices", |buffers| buffers.vertex_count = 1000),
+        ("index buffer ends at byte", |geometry| geometry.indices.as_mut().unwrap().count = 999),
+        ("index buffer begins at byte 3", |geometry| geometry.indices.as_mut().unwrap().offset = 3),
         ("18446744073709551615", |geometry| geometry.streams[0].offset = u64::MAX - 3),
     ];
-    let geometry = || DeviceGeometry::clone(valid.device_geometry().unwrap());
+    let geometry = || MeshBuffers::clone(valid.buffers().unwrap());
     let error_of = |geometry, corners| {
-        let mesh = Mesh::on_device("rock", Topology::TriangleList, corners, geometry);
+        let mesh = Mesh::from_buffers("rock", Topology::TriangleList, corners, geometry);
         mesh.err().map(|error| error.to_string()).unwrap_or_default()
     };
     let mut found: Vec<(String, &str)> = broken
@@ -361,14 +376,28 @@ fn invalid() -> Result<(), Failed> {
     without_index_usage.indices.as_mut().unwrap().buffer = usage(BufferUsages::VERTEX);
     let mut partial = geometry();
     partial.indices.as_mut().unwrap().count = 4;
+    let restart = |vertex_count| {
+        let mut long = geometry();
+        long.streams[0].buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 52 * 70_000,
+            usage: BufferUsages::VERTEX,
+            mapped_at_creation: false,
+        });
+        long.vertex_count = vertex_count;
+        Mesh::from_buffers("rock", Topology::TriangleStrip, corners, long)
+    };
+    restart(65_535)?;
     let mut empty = geometry();
-    (empty.indices, empty.vertices) = (None, 0);
+    (empty.indices, empty.vertex_count) = (None, 0);
+    let begins_strip = restart(65_536).err().map(|error| error.to_string()).unwrap_or_default();
+    found.push((begins_strip, "index 65535 begins another strip"));
     found.push((error_of(without_vertex_usage, corners), "without the usage VERTEX"));
     found.push((error_of(without_index_usage, corners), "without the usage INDEX"));
     found.push((error_of(partial, corners), "not a multiple of 3"));
     found.push((error_of(empty, corners), "no triangle"));
-    found.push((error_of(geometry(), [Vec3::ONE, Vec3::ZERO]), "is none"));
-    found.push((error_of(geometry(), [Vec3::NAN, Vec3::ZERO]), "is none"));
+    found.push((error_of(geometry(), [Vec3::ONE, Vec3::ZERO]), "is inverted or not finite"));
+    found.push((error_of(geometry(), [Vec3::NAN, Vec3::ZERO]), "is inverted or not finite"));
     found.push((error_of(geometry(), [Vec3::splat(-3e38), Vec3::splat(3e38)]), "too large"));
     for (error, part) in found {
         if !error.contains("`rock`") || !error.contains(part) {
@@ -376,22 +405,24 @@ fn invalid() -> Result<(), Failed> {
         }
     }
     let late = valid.with_attribute(SHADE, &[[0; 4]; 24]).err().map(|error| error.to_string()).unwrap_or_default();
-    if late.contains("belongs into a stream") { Ok(()) } else { Err(late.into()) }
+    if late.contains("must be in one of the mesh's vertex streams") { Ok(()) } else { Err(late.into()) }
 }
 
 fn another_kind() -> Result<(), Failed> {
     let (device, _) = device()?;
-    let moved = on_device(&device, &drawloom_testing::scenes::cube(), Storage::Interleaved)?;
+    let moved = imported(&device, &drawloom_testing::scenes::cube(), BufferLayout::Interleaved)?;
     let with_color = |format| {
-        let mut geometry = DeviceGeometry::clone(moved.device_geometry().unwrap());
+        let mut geometry = MeshBuffers::clone(moved.buffers().unwrap());
         geometry.streams[0].layout.attributes[2] = StreamAttribute::of(COLOR, format, 24);
-        Mesh::on_device("rock", Topology::TriangleList, moved.corners(), geometry).unwrap()
+        Mesh::from_buffers("rock", Topology::TriangleList, moved.corners(), geometry).unwrap()
     };
     let mut fixture = fixture()?;
     let expected = pictures(&mut fixture, &with_meshes(field(30), |_| with_color(Format::Unorm8x4)))?;
     let refused = fixture.renderer.record(with_meshes(field(30), |_| with_color(Format::Uint8x4)).as_scene_ref()).err();
     let message = refused.and_then(|error| Some(error.source()?.to_string())).unwrap_or_default();
-    if message != "process \"coloured\" reads \"colour\" as f32, but mesh `rock` has it as Uint8x4" {
+    if message
+        != "process \"coloured\" reads \"colour\" as f32, but mesh `rock`, or one with the same layout, has it as Uint8x4"
+    {
         return Err(message.into());
     }
     let next = pictures(&mut fixture, &with_meshes(field(30), |_| with_color(Format::Unorm8x4)))?;
@@ -401,8 +432,9 @@ fn another_kind() -> Result<(), Failed> {
 fn another_device() -> Result<(), Failed> {
     let [(device, queue), (other, _)] = adapter::two_devices()?;
     let mut fixture = fixture_of(WgpuBackend::new(device.clone(), queue)?)?;
-    let moved_to =
-        |device: &wgpu::Device| with_meshes(field(30), |mesh| on_device(device, mesh, Storage::Apart).unwrap());
+    let moved_to = |device: &wgpu::Device| {
+        with_meshes(field(30), |mesh| imported(device, mesh, BufferLayout::SeparateStreams).unwrap())
+    };
     let expected = pictures(&mut fixture, &moved_to(&device))?;
     let refused = fixture.renderer.record(moved_to(&other).as_scene_ref()).err();
     let message = refused.map(|error| error.to_string()).unwrap_or_default();
@@ -412,15 +444,114 @@ fn another_device() -> Result<(), Failed> {
     if pictures(&mut fixture, &moved_to(&device))? == expected { Ok(()) } else { Err("the next frame differs".into()) }
 }
 
+fn too_large() -> Result<(), Failed> {
+    let (device, _) = device()?;
+    let moved = imported(&device, &drawloom_testing::scenes::cube(), BufferLayout::SeparateStreams)?;
+    let limits = device.limits();
+    let mut wide = MeshBuffers::clone(moved.buffers().unwrap());
+    let stride = u64::from(limits.max_vertex_buffer_array_stride) + 4;
+    wide.streams[0].layout.stride = stride;
+    (wide.vertex_count, wide.indices) = (3, None);
+    let size = stride * 3;
+    let usage = BufferUsages::VERTEX;
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
+    wide.streams.iter_mut().for_each(|stream| stream.buffer = buffer.clone());
+    let mut many = MeshBuffers::clone(moved.buffers().unwrap());
+    many.streams.extend(vec![many.streams[1].clone(); limits.max_vertex_buffers as usize]);
+    let (stream_count, stride) = (format!("it has {} streams", many.streams.len()), format!("of {stride} bytes"));
+    let mut fixture = fixture()?;
+    let expected = pictures(&mut fixture, &field(30))?;
+    for (buffers, part) in [(wide, stride), (many, stream_count)] {
+        let mesh = Mesh::from_buffers("rock", Topology::TriangleList, moved.corners(), buffers)?;
+        let refused = fixture.renderer.record(with_meshes(field(30), |_| mesh.clone()).as_scene_ref()).err();
+        let message = refused.map(|error| error.to_string()).unwrap_or_default();
+        expect(message.contains("`rock`") && message.contains(&part), || format!("{message:?} lacks {part:?}"))?;
+        expect(pictures(&mut fixture, &field(30))? == expected, || "the next frame differs".into())?;
+    }
+    Ok(())
+}
+
+/// Reads seven attributes, which meshes in the arenas have in eight vertex buffers, and draws one of them as a colour.
+struct Seven;
+
+const SEVEN: [VertexAttribute<[f32; 3]>; 7] = [
+    VertexAttribute::new("first"),
+    VertexAttribute::new("second"),
+    VertexAttribute::new("third"),
+    VertexAttribute::new("fourth"),
+    VertexAttribute::new("fifth"),
+    VertexAttribute::new("sixth"),
+    VertexAttribute::new("seventh"),
+];
+
+impl RenderProcess for Seven {
+    fn name(&self) -> &str {
+        "seven"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("coloured", drawloom::process::Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.clears_depth("own depth", drawloom::process::Format::Depth32Float);
+        for (index, attribute) in (0..).zip(SEVEN) {
+            declare.reads_attribute(attribute, [0.125 * index as f32, 0.5, 1.0]);
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            struct Corner {
+                @builtin(position) clip: vec4<f32>,
+                @location(0) color: vec3<f32>,
+            }
+
+            @vertex
+            fn vertex(in: VertexInput) -> Corner {
+                let color = vec3<f32>(in.first.x, in.fifth.x, in.seventh.x) + vec3<f32>(in.uv, in.normal.z) * 0.1;
+                return Corner(clip_position(relative_position(drawn_object(in.instance), in.position)), color);
+            }
+
+            @fragment
+            fn fragment(in: Corner) -> @location(0) vec4<f32> {
+                return vec4<f32>(in.color, 1.0);
+            }
+        ";
+        Draws::Commands(CommandDraws { shader, ..CommandDraws::default() })
+    }
+}
+
+fn few_vertex_buffers() -> Result<(), Failed> {
+    let (device, queue) = adapter::device_with_limits(wgpu::Limits::default())?;
+    let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue)?).process(Seven).output("coloured");
+    let (renderer, submitter) = builder.quality(quality()).build(Arc::new(Scheduler::new(2)?))?;
+    let mut fixture = Fixture { renderer, submitter };
+    // As meshes in the arenas with normals and texture coordinates of 0.
+    let bare = |mesh: &Mesh| {
+        let vertices = mesh.vertices().iter().map(|vertex| Vertex { normal: [0.0; 3], uv: [0.0; 2], ..*vertex });
+        Mesh::new(mesh.name(), mesh.topology(), vertices.collect(), mesh.indices().to_vec()).unwrap()
+    };
+    let mut draw = |scene: &Scene| -> Result<Picture, Failed> {
+        let recorded = fixture.record(scene)?;
+        Ok(fixture.submit(recorded)?.read(0, "coloured")?)
+    };
+    let expected = draw(&with_meshes(field(60), bare))?;
+    let found = draw(&with_meshes(field(60), |mesh| {
+        let moved = imported(&device, mesh, BufferLayout::SeparateStreams).unwrap();
+        let mut buffers = MeshBuffers::clone(moved.buffers().unwrap());
+        buffers.streams.drain(..2);
+        Mesh::from_buffers(mesh.name(), mesh.topology(), mesh.corners(), buffers).unwrap()
+    }))?;
+    expect(found == expected, || "it differs".into())
+}
+
 fn destroyed() -> Result<(), Failed> {
     let (device, queue) = adapter::device()?;
     let mut fixture = fixture_of(WgpuBackend::new(device.clone(), queue)?)?;
-    let moved = || with_meshes(field(30), |mesh| on_device(&device, mesh, Storage::Apart).unwrap());
+    let moved = || with_meshes(field(30), |mesh| imported(&device, mesh, BufferLayout::SeparateStreams).unwrap());
     let expected = pictures(&mut fixture, &moved())?;
     let scene = moved();
     let recorded = fixture.record(&scene)?;
     for (_, mesh) in scene.assets().iter::<Mesh>() {
-        mesh.device_geometry().ok_or("it is on the device")?.streams[0].buffer.destroy();
+        mesh.buffers().ok_or("it is in buffers")?.streams[0].buffer.destroy();
     }
     let refused = fixture.submitter.submit(recorded).err().map(|error| error.to_string()).unwrap_or_default();
     if !refused.contains("destroyed") {
@@ -433,9 +564,9 @@ fn on_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
     let (mut renderer, _) = builder.build(scheduler)?;
-    let refused = renderer.record(moved_to_device(field(30), Storage::Apart, 2)?.as_scene_ref()).err();
+    let refused = renderer.record(moved_to_device(field(30), BufferLayout::SeparateStreams, 2)?.as_scene_ref()).err();
     let message = refused.map(|error| error.to_string()).unwrap_or_default();
-    if !message.contains("mesh `square` is in buffers of a device") {
+    if !message.contains("mesh `square` is in wgpu buffers") {
         return Err(message.into());
     }
     Ok(renderer.record(field(30).as_scene_ref()).map(drop)?)

@@ -1,0 +1,201 @@
+//! Imported meshes: those in an engine's own buffers.
+
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use wgpu::util::RenderEncoder;
+
+use crate::backend::BackendError;
+use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
+use crate::process::DeclaredAttribute;
+use crate::scene::{Mesh, MeshBuffers, NORMAL, POSITION, StreamLayout, Topology, UV};
+
+/// What pipelines know of an imported mesh. Meshes with equal layouts share pipelines.
+#[derive(Debug)]
+pub(crate) struct VertexStreamLayouts {
+    pub(crate) streams: Vec<StreamLayout>,
+    /// Of strips, whose pipelines know it.
+    pub(crate) strip_index_format: Option<wgpu::IndexFormat>,
+    /// The name of a mesh with this layout, for errors.
+    pub(crate) mesh: String,
+}
+
+impl PartialEq for VertexStreamLayouts {
+    fn eq(&self, other: &Self) -> bool {
+        self.strip_index_format == other.strip_index_format && self.streams == other.streams
+    }
+}
+
+impl Eq for VertexStreamLayouts {}
+
+impl Hash for VertexStreamLayouts {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        self.strip_index_format.hash(hasher);
+        self.streams.hash(hasher);
+    }
+}
+
+/// Where a vertex buffer of a pipeline comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum VertexSlot {
+    /// A stream of the mesh, by index.
+    Stream(usize),
+    /// The defaults of all attributes that the mesh lacks. All vertices have the same: the stride is 0.
+    Defaults,
+}
+
+impl VertexStreamLayouts {
+    fn new(mesh: &Mesh, buffers: &MeshBuffers) -> Self {
+        let indices = buffers.indices.as_ref().filter(|_| mesh.topology() == Topology::TriangleStrip);
+        Self {
+            streams: buffers.streams.iter().map(|stream| stream.layout.clone()).collect(),
+            strip_index_format: indices.map(|indices| indices.format),
+            mesh: mesh.name().to_owned(),
+        }
+    }
+
+    /// The vertex buffers of a pipeline whose shader reads these attributes beside those of every vertex: in this order.
+    pub(crate) fn slots<'a>(&'a self, attributes: &'a [DeclaredAttribute]) -> impl Iterator<Item = VertexSlot> + 'a {
+        let names = || [POSITION, NORMAL, UV].into_iter().chain(attributes.iter().map(|own| own.layout.name));
+        let is_in = |stream: &StreamLayout, name| stream.attributes.iter().any(|attribute| attribute.name() == name);
+        let is_read = move |(_, stream): &(usize, &StreamLayout)| names().any(|name| is_in(stream, name));
+        let streams = self.streams.iter().enumerate().filter(is_read).map(|(index, _)| VertexSlot::Stream(index));
+        let lacks_any = names().any(|name| self.lacks(name));
+        streams.chain(lacks_any.then_some(VertexSlot::Defaults))
+    }
+
+    /// Whether no stream has the attribute.
+    pub(crate) fn lacks(&self, attribute: &str) -> bool {
+        let has = |stream: &StreamLayout| stream.attributes.iter().any(|known| known.name() == attribute);
+        !self.streams.iter().any(has)
+    }
+}
+
+/// A mesh in an engine's own buffers, with what pipelines know of it.
+#[derive(Clone)]
+pub(crate) struct ImportedMesh {
+    pub(crate) layout: Arc<VertexStreamLayouts>,
+    pub(crate) buffers: Arc<MeshBuffers>,
+}
+
+/// The imported meshes by slot.
+#[derive(Clone, Default)]
+pub(crate) struct ImportedMeshes {
+    meshes: HashMap<u32, ImportedMesh>,
+}
+
+impl ImportedMeshes {
+    /// The imported meshes among `meshes`. Unchanged ones keep their entries; the buffers of new ones are checked to be of this device.
+    ///
+    /// # Errors
+    /// If a buffer is not one of this device, or the mesh exceeds a limit of the device.
+    pub(crate) fn updated<'a>(
+        &self,
+        device: &wgpu::Device,
+        meshes: impl Iterator<Item = (u32, &'a Mesh)>,
+    ) -> Result<Self, BackendError> {
+        let mut updated = Self::default();
+        for (slot, mesh) in meshes {
+            let Some(buffers) = mesh.buffers() else { continue };
+            let known = self.meshes.get(&slot).filter(|known| Arc::ptr_eq(&known.buffers, buffers));
+            let mesh = match known {
+                Some(known) => known.clone(),
+                None => {
+                    check_limits(device, mesh.name(), buffers)?;
+                    check_device(device, mesh.name(), buffers)?;
+                    let layout = VertexStreamLayouts::new(mesh, buffers);
+                    let mut others = self.meshes.values().chain(updated.meshes.values());
+                    let same = others.find(|other| *other.layout == layout).map(|other| Arc::clone(&other.layout));
+                    ImportedMesh { layout: same.unwrap_or_else(|| Arc::new(layout)), buffers: Arc::clone(buffers) }
+                }
+            };
+            updated.meshes.insert(slot, mesh);
+        }
+        Ok(updated)
+    }
+
+    /// Whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.meshes.is_empty()
+    }
+
+    /// The mesh in a slot; `None` if that is in the arenas.
+    pub(crate) fn get(&self, slot: u32) -> Option<&ImportedMesh> {
+        self.meshes.get(&slot)
+    }
+
+    /// Whether the meshes in two slots have equal layouts. Two meshes in the arenas always have.
+    pub(crate) fn have_equal_layouts(&self, one: u32, other: u32) -> bool {
+        match (self.get(one), self.get(other)) {
+            (None, None) => true,
+            (Some(one), Some(other)) => Arc::ptr_eq(&one.layout, &other.layout),
+            _ => false,
+        }
+    }
+}
+
+impl ImportedMesh {
+    /// Sets its buffers, for a pipeline that reads these attributes and has these defaults of them.
+    pub(crate) fn set_buffers<'a>(
+        &'a self,
+        encoder: &mut impl RenderEncoder<'a>,
+        attributes: &[DeclaredAttribute],
+        defaults: &'a wgpu::Buffer,
+    ) {
+        for (slot, source) in (0..).zip(self.layout.slots(attributes)) {
+            let slice = match source {
+                VertexSlot::Stream(index) => {
+                    let stream = &self.buffers.streams[index];
+                    stream.buffer.slice(stream.offset..)
+                }
+                VertexSlot::Defaults => defaults.slice(..),
+            };
+            encoder.set_vertex_buffer(slot, Some(slice));
+        }
+        if let Some(indices) = &self.buffers.indices {
+            encoder.set_index_buffer(indices.buffer.slice(indices.offset..), indices.format);
+        }
+    }
+}
+
+/// Checks that pipelines of this device can read the streams of a mesh.
+///
+/// # Errors
+/// If there are too many, or a vertex of one has too many bytes.
+fn check_limits(device: &wgpu::Device, mesh: &str, buffers: &MeshBuffers) -> Result<(), BackendError> {
+    let limits = device.limits();
+    let refused = |problem: String| BackendError::Validation { label: format!("mesh `{mesh}`"), message: problem };
+    let (streams, most) = (buffers.streams.len(), limits.max_vertex_buffers as usize);
+    if streams > most {
+        return Err(refused(format!("it has {streams} streams, and the device allows {most} vertex buffers")));
+    }
+    let most = u64::from(limits.max_vertex_buffer_array_stride);
+    match buffers.streams.iter().map(|stream| stream.layout.stride).find(|stride| *stride > most) {
+        Some(stride) => Err(refused(format!("it has vertices of {stride} bytes, and the device allows {most}"))),
+        None => Ok(()),
+    }
+}
+
+/// Checks that buffers belong to `device`: wgpu checks that only when a command uses them.
+///
+/// # Errors
+/// If one does not.
+fn check_device(device: &wgpu::Device, mesh: &str, buffers: &MeshBuffers) -> Result<(), BackendError> {
+    let label = format!("the buffers of mesh `{mesh}`");
+    let check = || {
+        let mut encoder = device.create_render_bundle_encoder(&wgpu::RenderBundleEncoderDescriptor {
+            color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
+            sample_count: 1,
+            ..wgpu::RenderBundleEncoderDescriptor::default()
+        });
+        for stream in &buffers.streams {
+            encoder.set_vertex_buffer(0, Some(stream.buffer.slice(..)));
+        }
+        if let Some(indices) = &buffers.indices {
+            encoder.set_index_buffer(indices.buffer.slice(..), indices.format);
+        }
+        encoder.finish(&wgpu::RenderBundleDescriptor::default())
+    };
+    with_error_scope(device, &label, || catch_wgpu_panic(&label, check)).flatten().map(|_| ())
+}
