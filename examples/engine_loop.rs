@@ -156,16 +156,12 @@ impl World {
         self.time += STEP.as_secs_f64();
         let time = self.time;
         let rows = self.positions.chunks_mut(40).zip(self.orientations.chunks_mut(40)).enumerate();
-        scheduler.scope(|scope| {
-            for (row, (positions, orientations)) in rows {
-                scope.spawn(move |_, _| {
-                    for (column, (position, orientation)) in positions.iter_mut().zip(orientations).enumerate() {
-                        let (x, z) = (column as f64 - 19.5, row as f64 - 19.5);
-                        let height = (x.hypot(z) * 0.6 - time * 3.0).sin();
-                        *position = DVec3::new(x * 0.8, height, z * 0.8);
-                        *orientation = Quat::from_rotation_y((time + height) as f32);
-                    }
-                });
+        scheduler.parallel_for_each(rows, |(row, (positions, orientations)), _| {
+            for (column, (position, orientation)) in positions.iter_mut().zip(orientations).enumerate() {
+                let (x, z) = (column as f64 - 19.5, row as f64 - 19.5);
+                let height = (x.hypot(z) * 0.6 - time * 3.0).sin();
+                *position = DVec3::new(x * 0.8, height, z * 0.8);
+                *orientation = Quat::from_rotation_y((time + height) as f32);
             }
         })
     }

@@ -15,9 +15,9 @@
 //! ```
 //!
 //! A [`Scheduler`] owns the threads. Jobs in a [`Scope`] borrow from the caller, and can spawn more jobs.
-//! [`Scheduler::parallel_for`] runs a loop over a range. Every job gets the [`Worker`] that it runs on, whose index an engine can
-//! use for data that it keeps for each worker. A graph of jobs with an order between them is a
-//! [`Schedule`](crate::graph::Schedule).
+//! [`Scheduler::parallel_for`] runs a loop over a range, and [`Scheduler::parallel_for_each`] one over chunks that it may change. Every
+//! job gets the [`Worker`] that it runs on, whose index an engine can use for data that it keeps for each worker. A graph of jobs with
+//! an order between them is a [`Schedule`](crate::graph::Schedule).
 //!
 //! # A loop
 //!
@@ -146,7 +146,7 @@
 //!
 //! | call | blocks until | meanwhile, the thread |
 //! | --- | --- | --- |
-//! | [`Scheduler::scope`], [`Scheduler::parallel_for`], [`Schedule::run`](crate::graph::Schedule::run), from outside | calls of other threads from outside have returned | sleeps |
+//! | [`Scheduler::scope`], [`Scheduler::parallel_for`], [`Scheduler::parallel_for_each`], [`Schedule::run`](crate::graph::Schedule::run), from outside | calls of other threads from outside have returned | sleeps |
 //! | | all jobs of the call have run | runs jobs of the frame, sleeps if there are none |
 //! | the same in a job | all jobs of the call have run | runs jobs of the call, sleeps if there are none |
 //! | [`BackgroundJob::wait`] | the job has run | runs that job if no thread has begun it, and otherwise sleeps |

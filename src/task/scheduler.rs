@@ -15,7 +15,7 @@ use super::scope::{self, Scope};
 use super::shared::Shared;
 use super::sleep::{self, WakeFor};
 use super::worker::Worker;
-use crate::sync::{Arc, Instant, thread};
+use crate::sync::{Arc, Instant, Mutex, thread};
 use crate::timeline::Timeline;
 use crate::unwind::{JobPanic, catch, discard};
 
@@ -107,6 +107,40 @@ impl Scheduler {
         }
         let parallel_loop = ParallelLoop::new(length, chunk, body);
         self.with_worker(|worker| parallel_loop.run(worker))
+    }
+
+    /// Calls `body` with each item of an iterator once, on as many workers as there is work for: with chunks of a slice that it may
+    /// change, or with those of several slices at once. Returns when all calls have returned.
+    ///
+    /// Workers take the items one after the other, in the iterator's order, and one at a time takes: give an item some microseconds of
+    /// work. Apart from that it is as [`parallel_for`](Self::parallel_for) with a chunk of 1.
+    ///
+    /// ```
+    /// # use drawloom::task::Scheduler;
+    /// let scheduler = Scheduler::with_available_parallelism()?;
+    /// let (mut heights, speeds) = (vec![9.0_f32; 10_000], vec![0.5_f32; 10_000]);
+    /// let chunks = heights.chunks_mut(1_000).zip(speeds.chunks(1_000));
+    /// scheduler.parallel_for_each(chunks, |(heights, speeds), _worker| {
+    ///     heights.iter_mut().zip(speeds).for_each(|(height, speed)| *height -= speed);
+    /// })?;
+    /// assert!(heights.iter().all(|height| *height == 8.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Returns the first [`JobPanic`] if `body` or the iterator panicked. Items that had not been taken by then are skipped.
+    pub fn parallel_for_each<I: ExactSizeIterator + Send>(
+        &self,
+        items: I,
+        body: impl Fn(I::Item, &Worker) + Sync,
+    ) -> Result<(), JobPanic> {
+        let (length, items) = (items.len(), Mutex::new(items));
+        self.parallel_for(length, 1, |_, worker| {
+            let taken = items.lock().next();
+            if let Some(item) = taken {
+                body(item, worker);
+            }
+        })
     }
 
     /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a

@@ -3,6 +3,7 @@
 mod background;
 mod callbacks;
 mod foreign_jobs;
+mod loops;
 mod panics;
 mod pools;
 mod stress;
