@@ -1,0 +1,44 @@
+//! What the command line says.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+
+/// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F11 is full screen, V switches vertical
+/// synchronisation, N opens another window, Escape closes the window.
+#[derive(Debug, Parser)]
+pub struct Options {
+    /// How many cubes move.
+    #[arg(long, default_value_t = 1_000, value_name = "N")]
+    pub objects: usize,
+    /// How many windows open.
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub windows: u8,
+    /// Width and height of a window, in logical pixels.
+    #[arg(long, default_value = "960x540", value_name = "WIDTHxHEIGHT", value_parser = parse_size)]
+    pub size: [u32; 2],
+    /// Draws as fast as possible, instead of once for each picture of the display.
+    #[arg(long)]
+    pub no_vsync: bool,
+    /// Ends after so many frames, of a 60th of a second each.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// Writes the first window's last picture.
+    #[arg(long, value_name = "FILE.png", requires = "frames")]
+    pub screenshot: Option<PathBuf>,
+    /// The world does not move.
+    #[arg(long)]
+    pub still: bool,
+    /// Draws into a texture and converts it, as for a surface whose formats the renderer does not draw into.
+    #[arg(long)]
+    pub convert: bool,
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').ok_or("a size is, for example, 960x540")?;
+    let side = |side: &str| match side.parse() {
+        Ok(pixels @ 1..=16_384) => Ok(pixels),
+        _ => Err(format!("{side:?} is not a number of pixels from 1 to 16384")),
+    };
+    Ok([side(width)?, side(height)?])
+}
