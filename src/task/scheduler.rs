@@ -135,7 +135,8 @@ impl Scheduler {
         body: impl Fn(I::Item, &Worker) + Sync,
     ) -> Result<(), JobPanic> {
         let (length, items) = (items.len(), Mutex::new(items));
-        self.parallel_for(length, 1, |_, worker| {
+        // It moves in, so that a panic of what it drops is caught too.
+        self.parallel_for(length, 1, move |_, worker| {
             let taken = items.lock().next();
             if let Some(item) = taken {
                 body(item, worker);

@@ -78,3 +78,22 @@ fn an_iterator_that_is_shorter_than_it_says_ends_the_loop() {
     assert_eq!(scheduler(2).parallel_for_each(Misleading(4), visit), Ok(()));
     assert_eq!(visited.into_inner(), 4);
 }
+
+/// Panics when it is dropped.
+struct Fragile;
+
+impl Drop for Fragile {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            panic!("in a destructor");
+        }
+    }
+}
+
+#[test]
+fn a_panic_in_the_destructor_of_the_body_is_an_error() {
+    let (scheduler, fragile) = (scheduler(2), Fragile);
+    let outcome = scheduler.parallel_for_each(0..3, move |_, _| _ = &fragile);
+    assert_eq!(outcome.err().map(|panic| panic.message.contains("in a destructor")), Some(true));
+    assert_intact(&scheduler);
+}
