@@ -1,12 +1,17 @@
 //! The engine: its windows, its world, and the loop of frames.
 
 use std::error::Error;
+use std::f64::consts::TAU;
 use std::mem;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::Picture;
+use drawloom::backend::{Picture, WgpuBackend};
+use drawloom::glam::DVec3;
 use drawloom::process::Format;
+use drawloom::task::{JobPanic, Scheduler};
+use drawloom::{Recorded, SubmitError};
+use drawloom_egui::Inspector;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
@@ -14,10 +19,12 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::KeyCode;
 use winit::window::{Window, WindowId};
 
+use crate::fly_camera::FlyCamera;
 use crate::frame_pacing::FramePacing;
 use crate::graphics::Graphics;
 use crate::options::Options;
-use crate::view_window::{ViewWindow, pressed_key};
+use crate::view_window::ViewWindow;
+use crate::window_surface::{SurfaceFrame, WindowSurface};
 use crate::world::World;
 
 /// The engine: its windows, its world, and the loop of frames.
@@ -27,15 +34,15 @@ pub struct Engine {
     /// `None` until the first window is open.
     graphics: Option<Graphics>,
     windows: Vec<ViewWindow>,
-    /// How many windows were opened so far.
-    opened: usize,
+    windows_opened: usize,
     vsync: bool,
     frames: u64,
     pacing: FramePacing,
+    inspector: Inspector,
     last_update: Option<Instant>,
     next_check: Instant,
     screenshot: Option<Picture>,
-    /// How many textures and buffers there were after the windows.
+    /// The numbers of textures and buffers that are left when all windows are closed.
     resources: [usize; 2],
     /// What ended the loop, unless the user did.
     error: Option<Box<dyn Error>>,
@@ -53,16 +60,17 @@ impl Engine {
     /// An engine without windows.
     ///
     /// # Errors
-    /// If the world has more objects than a scene can have.
+    /// If a mesh or a material of the world is refused.
     pub fn new(options: Options) -> Result<Self, Box<dyn Error>> {
         Ok(Self {
-            world: World::new(options.objects)?,
+            world: World::new(options.objects as usize)?,
             graphics: None,
             windows: Vec::new(),
-            opened: 0,
+            windows_opened: 0,
             vsync: !options.no_vsync,
             frames: 0,
             pacing: FramePacing::default(),
+            inspector: Inspector::new(options.inspector),
             last_update: None,
             next_check: Instant::now(),
             screenshot: None,
@@ -94,33 +102,37 @@ impl Engine {
     }
 
     fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<(), Box<dyn Error>> {
-        if self.windows.len() == Self::MAX_WINDOWS {
-            return Ok(());
-        }
         let [width, height] = self.options.size;
         let attributes =
             Window::default_attributes().with_title("Drawloom").with_inner_size(LogicalSize::new(width, height));
         let window = Arc::new(event_loop.create_window(attributes)?);
-        let (graphics, surface) = match self.graphics.take() {
+        let (graphics, surface) = match &mut self.graphics {
             Some(graphics) => {
                 let surface = graphics.instance.create_surface(Arc::clone(&window))?;
-                (self.graphics.insert(graphics), surface)
+                (graphics, surface)
             }
-            None => {
+            none => {
                 let (graphics, surface) = Graphics::new(event_loop.owned_display_handle(), &window)?;
-                (self.graphics.insert(graphics), surface)
+                (none.insert(graphics), surface)
             }
         };
-        self.opened += 1;
-        let view = (self.opened, self.world.radius());
-        let mut opened = ViewWindow::new(graphics, (window, surface), view, self.options.convert)?;
-        opened.surface.set_vsync(self.vsync);
-        opened.request_redraw();
-        self.windows.push(opened);
+        let mut surface = WindowSurface::new(graphics, Arc::clone(&window), surface, self.options.convert)?;
+        surface.set_vsync(self.vsync);
+        self.windows_opened += 1;
+        let name = format!("window {}", self.windows_opened);
+        // Each looks at the middle from another side.
+        let (direction, radius) = (TAU * (0.13 + 0.22 * self.windows_opened as f64), self.world.radius());
+        let position = DVec3::new(direction.sin() * radius, radius * 0.45, direction.cos() * radius) * 1.25;
+        let mut window = ViewWindow::new(name, window, surface, FlyCamera::looking_at(position, DVec3::ZERO));
+        if self.inspector.is_open() && self.windows.is_empty() {
+            window.show_overlay(graphics);
+        }
+        window.request_redraw();
+        self.windows.push(window);
         Ok(())
     }
 
-    /// Draws a frame into all windows that can be seen.
+    /// Draws a frame into all windows that are due.
     fn draw_frame(&mut self, event_loop: &ActiveEventLoop) -> Result<(), Box<dyn Error>> {
         let Some(graphics) = &mut self.graphics else { return Ok(()) };
         let step = if self.options.frames.is_some() {
@@ -133,143 +145,174 @@ impl Engine {
 
         // Each window is a view, and its surface's texture is what that view draws into.
         let (mut cameras, mut frames) = (Vec::new(), Vec::new());
-        for window in self.windows.iter_mut().filter(|window| window.is_visible()) {
+        for window in self.windows.iter_mut().filter(|window| window.is_due()) {
             window.update(step);
-            let Some(frame) = window.surface.acquire(graphics)? else {
-                window.hide();
-                continue;
-            };
-            graphics.renderer.backend().import_target(window.name(), "picture", frame.target().clone());
-            cameras.push(window.camera());
-            frames.push((&window.surface, frame));
+            if let Some(frame) = window.surface.acquire(graphics)? {
+                graphics.renderer.backend().import_target(window.name(), "picture", frame.target().clone());
+                cameras.push(window.camera());
+                frames.push((window, frame));
+            }
         }
         let Some(first) = cameras.first() else { return Ok(()) };
 
         // The world is lent until the frame is recorded, on all workers.
         let mut recorded = graphics.renderer.record(self.world.as_scene_ref(&cameras))?;
+        self.inspector.add_frame(&graphics.renderer, &recorded);
         self.frames += 1;
         let is_last = self.options.frames == Some(self.frames);
-        let read_back = if is_last && self.options.screenshot.is_some() {
-            Some(recorded.read_back(0, "picture", [0, 0], first.size)?)
-        } else {
-            None
-        };
+        let takes_screenshot = is_last && self.options.screenshot.is_some();
+        let read_back =
+            if takes_screenshot { Some(recorded.read_back(0, "picture", [0, 0], first.size)?) } else { None };
 
-        // This thread, the device thread, submits and presents the frame, while workers update the world for the next one.
-        let Graphics { scheduler, submitter, .. } = &*graphics;
-        let (world, mut updated) = (&mut self.world, Ok(()));
-        let submitted = scheduler.scope(|scope| {
-            if !self.options.still {
-                scope.spawn(|_, _| updated = world.update(scheduler, step));
-            }
-            let submitted = submitter.submit(recorded);
-            for (surface, frame) in frames.drain(..).filter(|_| submitted.is_ok()) {
-                surface.present(graphics, frame);
-            }
-            submitted
+        let world = (!self.options.still).then_some(&mut self.world);
+        submit_and_update(graphics, recorded, frames, &mut self.inspector, |scheduler| match world {
+            Some(world) => world.update(scheduler, step),
+            None => Ok(()),
         })?;
-        updated?;
-        submitted?;
         self.pacing.add_frame(Instant::now());
+        // Its own button closes it too.
+        if !self.inspector.is_open() {
+            self.windows.iter_mut().for_each(ViewWindow::hide_overlay);
+        }
         if let Some(read_back) = read_back {
             self.screenshot = Some(read_back.read()?);
         }
         if is_last {
             event_loop.exit();
         }
+        self.windows.iter_mut().filter(|window| window.is_visible()).for_each(ViewWindow::request_redraw);
         Ok(())
     }
 
-    fn press(&mut self, event_loop: &ActiveEventLoop, index: usize, key: KeyCode) -> Result<(), Box<dyn Error>> {
+    fn press(&mut self, event_loop: &ActiveEventLoop, index: usize, key: KeyCode) {
         match key {
             KeyCode::Escape => self.close(event_loop, index),
+            KeyCode::F1 => self.toggle_inspector(index),
             KeyCode::F11 => self.windows[index].toggle_fullscreen(),
-            KeyCode::KeyN => self.open_window(event_loop)?,
+            KeyCode::KeyN if self.windows.len() == Self::MAX_WINDOWS => {
+                tracing::warn!("there are {} windows, and no more are opened", Self::MAX_WINDOWS);
+            }
+            KeyCode::KeyN => {
+                if let Err(error) = self.open_window(event_loop) {
+                    tracing::error!("no other window can be opened: {error}");
+                }
+            }
             KeyCode::KeyV => {
                 self.vsync = !self.vsync;
                 self.windows.iter_mut().for_each(|window| window.surface.set_vsync(self.vsync));
             }
             _ => {}
         }
-        Ok(())
+    }
+
+    /// Shows the inspector in a window, and in no other, or nowhere.
+    fn toggle_inspector(&mut self, index: usize) {
+        let Some(graphics) = &mut self.graphics else { return };
+        let was_here = self.windows[index].has_overlay();
+        self.windows.iter_mut().for_each(ViewWindow::hide_overlay);
+        if was_here {
+            self.inspector.close(&mut graphics.renderer);
+        } else {
+            self.inspector.open();
+            self.windows[index].show_overlay(graphics);
+        }
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop, index: usize) {
-        self.windows.remove(index);
+        let closed = self.windows.remove(index);
+        if let Some(graphics) = &mut self.graphics
+            && closed.has_overlay()
+        {
+            self.inspector.close(&mut graphics.renderer);
+        }
         if self.windows.is_empty() {
             event_loop.exit();
         }
     }
 
-    fn window_event_or_error(
-        &mut self,
-        event_loop: &ActiveEventLoop,
-        id: WindowId,
-        event: &WindowEvent,
-    ) -> Result<(), Box<dyn Error>> {
-        let Some(index) = self.windows.iter().position(|window| window.id() == id) else { return Ok(()) };
-        self.windows[index].handle(event);
-        match event {
-            // The first window that can be seen sets the pace, and all are drawn in one frame.
-            WindowEvent::RedrawRequested => {
-                let leader = self.windows.iter().position(ViewWindow::is_visible);
-                if leader == Some(index) { self.draw_frame(event_loop) } else { Ok(()) }
-            }
-            WindowEvent::CloseRequested => {
-                self.close(event_loop, index);
-                Ok(())
-            }
-            event => pressed_key(event).map_or(Ok(()), |key| self.press(event_loop, index, key)),
-        }
-    }
-
-    fn check(&mut self) {
-        self.windows.iter_mut().for_each(ViewWindow::check_visibility);
+    fn update_titles_and_visibility(&mut self) {
         let vsync = if self.vsync { "on" } else { "off" };
         let text = format!("{} cubes, {}, vsync {vsync}", self.options.objects, pacing_text(&self.pacing));
-        self.windows.iter().for_each(|window| window.set_title(&text));
-    }
-
-    fn end_with(&mut self, event_loop: &ActiveEventLoop, result: Result<(), Box<dyn Error>>) {
-        if let Err(error) = result {
-            self.error.get_or_insert(error);
-            event_loop.exit();
+        for window in &mut self.windows {
+            window.set_title(&text);
+            window.check_visibility();
+            if window.is_visible() && !window.is_due() {
+                window.request_redraw();
+            }
         }
     }
+
+    fn end_with(&mut self, event_loop: &ActiveEventLoop, error: Box<dyn Error>) {
+        self.error.get_or_insert(error);
+        event_loop.exit();
+    }
+}
+
+/// Submits and presents a frame on this thread, the device thread, while workers update the world for the next one.
+fn submit_and_update(
+    graphics: &mut Graphics,
+    recorded: Recorded<WgpuBackend>,
+    frames: Vec<(&mut ViewWindow, SurfaceFrame)>,
+    inspector: &mut Inspector,
+    update: impl FnOnce(&Scheduler) -> Result<(), JobPanic> + Send,
+) -> Result<(), Box<dyn Error>> {
+    let Graphics { scheduler, submitter, renderer, device, queue, .. } = graphics;
+    let mut updated = Ok(());
+    let submitted = scheduler.scope(|scope| {
+        scope.spawn(|_, _| {
+            // What the inspector shows in the lane of this thread.
+            let _span = scheduler.timeline().span("update");
+            updated = update(scheduler);
+        });
+        submitter.submit(recorded)?;
+        for (window, frame) in frames {
+            window.present(device, queue, frame, |ui| inspector.show(ui.ctx(), renderer));
+        }
+        Ok::<_, SubmitError>(())
+    })?;
+    updated?;
+    Ok(submitted?)
 }
 
 impl ApplicationHandler for Engine {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        while self.opened < usize::from(self.options.windows) && self.error.is_none() {
-            let opened = self.open_window(event_loop);
-            self.end_with(event_loop, opened);
+        while self.windows_opened < usize::from(self.options.windows) {
+            if let Err(error) = self.open_window(event_loop) {
+                return self.end_with(event_loop, error);
+            }
         }
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
-        if !event_loop.exiting() {
-            let result = self.window_event_or_error(event_loop, id, &event);
-            self.end_with(event_loop, result);
+        let Some(index) = self.windows.iter().position(|window| window.id() == id) else { return };
+        let key = self.windows[index].handle(&event);
+        match (event, key) {
+            (WindowEvent::CloseRequested, _) => self.close(event_loop, index),
+            (_, Some(key)) => self.press(event_loop, index, key),
+            _ => {}
         }
     }
 
+    /// All events of this turn of the loop were handled.
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if event_loop.exiting() {
+            return;
+        }
+        if self.windows.iter().any(ViewWindow::is_due)
+            && let Err(error) = self.draw_frame(event_loop)
+        {
+            return self.end_with(event_loop, error);
+        }
         let now = Instant::now();
         if now >= self.next_check {
             self.next_check = now + Self::CHECK_INTERVAL;
-            self.check();
+            self.update_titles_and_visibility();
         }
-        match self.windows.iter().find(|window| window.is_visible()) {
-            Some(window) => {
-                window.request_redraw();
-                event_loop.set_control_flow(ControlFlow::Wait);
-            }
-            None => {
-                self.pacing.pause();
-                self.last_update = None;
-                event_loop.set_control_flow(ControlFlow::WaitUntil(self.next_check));
-            }
+        if !self.windows.iter().any(ViewWindow::is_visible) {
+            self.pacing.pause();
+            self.last_update = None;
         }
+        event_loop.set_control_flow(ControlFlow::WaitUntil(self.next_check));
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {

@@ -41,12 +41,13 @@ impl FlyCamera {
         Quat::from_euler(EulerRot::YXZ, self.yaw, self.pitch, 0.0).normalize()
     }
 
-    /// A key went down or up.
-    pub fn set_key(&mut self, key: KeyCode, is_held: bool) {
+    /// A key went down or up. Returns whether it went down and was up before: keys that are held repeat.
+    pub fn set_key(&mut self, key: KeyCode, is_held: bool) -> bool {
         if is_held {
-            self.held.insert(key);
+            self.held.insert(key)
         } else {
             self.held.remove(&key);
+            false
         }
     }
 
@@ -70,7 +71,7 @@ impl FlyCamera {
         self.drag = None;
     }
 
-    /// Flies for a while.
+    /// Flies on by so much time.
     pub fn update(&mut self, elapsed: Duration) {
         let axis = |forth, back| f32::from(self.held.contains(&forth)) - f32::from(self.held.contains(&back));
         let direction =

@@ -11,12 +11,12 @@ pub struct FramePacing {
 }
 
 impl FramePacing {
-    const WINDOW: usize = 120;
+    const CAPACITY: usize = 120;
 
     /// A frame was presented.
     pub fn add_frame(&mut self, now: Instant) {
         if let Some(last) = self.last.replace(now) {
-            if self.intervals.len() == Self::WINDOW {
+            if self.intervals.len() == Self::CAPACITY {
                 self.intervals.pop_front();
             }
             self.intervals.push_back(now - last);
@@ -55,7 +55,7 @@ mod tests {
         pacing.pause();
         add(&mut pacing, 9_000);
         assert_eq!(pacing.median_and_longest(), Some([median, longest]));
-        (0..FramePacing::WINDOW).for_each(|_| add(&mut pacing, 16));
+        (0..FramePacing::CAPACITY).for_each(|_| add(&mut pacing, 16));
         assert_eq!(pacing.median_and_longest(), Some([Duration::from_millis(16); 2]));
     }
 }

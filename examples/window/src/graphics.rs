@@ -19,7 +19,7 @@ pub struct Graphics {
     /// For the engine's own jobs and for Drawloom's.
     pub scheduler: Arc<Scheduler>,
     pub renderer: Renderer<WgpuBackend>,
-    /// Frames are submitted on the thread that made it: the one of the windows.
+    /// Only the thread that created it, which is the one of the event loop, submits frames.
     pub submitter: Submitter<WgpuBackend>,
     /// The format of the pictures: sRGB.
     pub format: wgpu::TextureFormat,
@@ -46,17 +46,17 @@ impl Graphics {
             required_limits: adapter.limits(),
             ..wgpu::DeviceDescriptor::default()
         }))?;
+        // Without these, an error of the device ends the program with a panic.
+        device.on_uncaptured_error(Arc::new(|error| tracing::error!("{error}")));
+        device
+            .set_device_lost_callback(|reason, message| tracing::error!("the device is lost ({reason:?}): {message}"));
         // The first format of the surface that the renderer can draw, so that nothing is converted.
-        let formats = surface.get_capabilities(&adapter).formats;
-        let has_red_first = |format: &&wgpu::TextureFormat| match format.remove_srgb_suffix() {
-            wgpu::TextureFormat::Bgra8Unorm => Some(false),
-            wgpu::TextureFormat::Rgba8Unorm => Some(true),
-            _ => None,
-        };
-        let (format, picture_format) = if formats.iter().find_map(|format| has_red_first(&format)) == Some(false) {
-            (wgpu::TextureFormat::Bgra8UnormSrgb, Format::Bgra8Srgb)
-        } else {
-            (wgpu::TextureFormat::Rgba8UnormSrgb, Format::Rgba8Srgb)
+        let formats = surface.get_capabilities(&adapter).formats.into_iter().map(|format| format.remove_srgb_suffix());
+        let eight_bits = [wgpu::TextureFormat::Bgra8Unorm, wgpu::TextureFormat::Rgba8Unorm];
+        let first = formats.into_iter().find(|format| eight_bits.contains(format));
+        let (format, picture_format) = match first {
+            Some(wgpu::TextureFormat::Bgra8Unorm) => (wgpu::TextureFormat::Bgra8UnormSrgb, Format::Bgra8Srgb),
+            _ => (wgpu::TextureFormat::Rgba8UnormSrgb, Format::Rgba8Srgb),
         };
         let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
         let tone_mapping = ToneMapping { format: picture_format, ..ToneMapping::new(1.2) };

@@ -3,8 +3,8 @@
 //!
 //!     cargo run --release -p window
 //!
-//! W, A, S and D fly, Q and E sink and rise, Shift flies faster, and a drag with the mouse looks around. F11 is full screen,
-//! V switches vertical synchronisation, N opens another window, Escape closes the window.
+//! W, A, S and D fly, Q and E sink and rise, Shift flies faster, and a drag with the mouse looks around. F1 shows the
+//! inspector, F11 is full screen, V switches vertical synchronisation, N opens another window, Escape closes one.
 
 mod engine;
 mod fly_camera;
@@ -27,17 +27,10 @@ use engine::Engine;
 use options::Options;
 
 fn main() -> ExitCode {
+    let options = Options::parse();
     // What Drawloom and wgpu warn of.
     tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(io::stderr).init();
-    let event_loop = match EventLoop::new() {
-        Ok(event_loop) => event_loop,
-        Err(error) => {
-            eprintln!("no window can be opened here: {error}");
-            eprintln!("Without a display, a virtual one does: xvfb-run cargo run --release -p window");
-            return ExitCode::from(2);
-        }
-    };
-    match run(event_loop) {
+    match run(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -46,8 +39,14 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(event_loop: EventLoop<()>) -> Result<(), Box<dyn Error>> {
-    let mut engine = Engine::new(Options::parse())?;
+fn run(options: Options) -> Result<(), Box<dyn Error>> {
+    let event_loop = EventLoop::new().map_err(|error| {
+        format!(
+            "no window can be opened here: {error}\n\
+             Without a display, a virtual one does: xvfb-run cargo run --release -p window"
+        )
+    })?;
+    let mut engine = Engine::new(options)?;
     event_loop.run_app(&mut engine)?;
     engine.finish()
 }

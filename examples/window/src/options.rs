@@ -4,28 +4,32 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
-/// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F11 is full screen, V switches vertical
-/// synchronisation, N opens another window, Escape closes the window.
+/// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F1 shows the inspector, F11 is full
+/// screen, V switches vertical synchronisation, N opens another window, Escape closes one.
 #[derive(Debug, Parser)]
 pub struct Options {
     /// How many cubes move.
-    #[arg(long, default_value_t = 1_000, value_name = "N")]
-    pub objects: usize,
+    #[arg(long, default_value_t = 1_000, value_name = "N", value_parser = clap::value_parser!(u32).range(..=1_000_000))]
+    pub objects: u32,
     /// How many windows open.
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     pub windows: u8,
     /// Width and height of a window, in logical pixels.
     #[arg(long, default_value = "960x540", value_name = "WIDTHxHEIGHT", value_parser = parse_size)]
     pub size: [u32; 2],
-    /// Draws as fast as possible, instead of once for each picture of the display.
+    /// Draws as fast as possible, instead of once for each refresh of the display.
     #[arg(long)]
     pub no_vsync: bool,
     /// Ends after so many frames, of a 60th of a second each.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
     /// Writes the first window's last picture.
-    #[arg(long, value_name = "FILE.png", requires = "frames")]
+    #[arg(long, value_name = "FILE.png", requires = "frames", conflicts_with = "inspector")]
     pub screenshot: Option<PathBuf>,
+    /// Shows the inspector over the first window: where the time of frames goes, and what each setting costs.
+    #[arg(long)]
+    pub inspector: bool,
+
     /// The world does not move.
     #[arg(long)]
     pub still: bool,

@@ -1,20 +1,19 @@
 //! A window, and the view of the world in it.
 
-use std::error::Error;
-use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::glam::{DVec2, DVec3};
 use drawloom::scene::Camera;
 use drawloom::wgpu;
+use drawloom_egui::Overlay;
 use winit::event::{ElementState, MouseButton, WindowEvent};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::fly_camera::FlyCamera;
 use crate::graphics::Graphics;
-use crate::window_surface::WindowSurface;
+use crate::window_surface::{SurfaceFrame, WindowSurface};
 
 /// A window, and the view of the world in it.
 pub struct ViewWindow {
@@ -23,32 +22,17 @@ pub struct ViewWindow {
     window: Arc<Window>,
     pub surface: WindowSurface,
     camera: FlyCamera,
+    /// egui, while it is shown in this window.
+    overlay: Option<Overlay>,
+    /// The system asked for a picture. It asks no window that nobody can see, where it knows.
+    is_due: bool,
     is_occluded: bool,
     is_minimized: bool,
 }
 
 impl ViewWindow {
-    /// The `number`-th window, with a camera that looks at the middle of a world of this radius, in metres.
-    ///
-    /// # Errors
-    /// If the device cannot present in it.
-    pub fn new(
-        graphics: &Graphics,
-        (window, surface): (Arc<Window>, wgpu::Surface<'static>),
-        (number, radius): (usize, f64),
-        converts: bool,
-    ) -> Result<Self, Box<dyn Error>> {
-        // Each looks from another side.
-        let direction = TAU * (0.13 + 0.22 * number as f64);
-        let position = DVec3::new(direction.sin() * radius, radius * 0.45, direction.cos() * radius) * 1.25;
-        Ok(Self {
-            name: format!("window {number}"),
-            surface: WindowSurface::new(graphics, Arc::clone(&window), surface, converts)?,
-            window,
-            camera: FlyCamera::looking_at(position, DVec3::ZERO),
-            is_occluded: false,
-            is_minimized: false,
-        })
+    pub fn new(name: String, window: Arc<Window>, surface: WindowSurface, camera: FlyCamera) -> Self {
+        Self { name, window, surface, camera, overlay: None, is_due: false, is_occluded: false, is_minimized: false }
     }
 
     /// The name of its view.
@@ -60,7 +44,7 @@ impl ViewWindow {
         self.window.id()
     }
 
-    /// Its view, if a frame is drawn into its surface.
+    /// The camera of its view, whose picture has the size of the surface.
     pub fn camera(&self) -> Camera {
         Camera {
             position: self.camera.position,
@@ -70,28 +54,30 @@ impl ViewWindow {
         }
     }
 
-    /// Flies for a while.
+    /// Flies on by so much time.
     pub fn update(&mut self, elapsed: Duration) {
         self.camera.update(elapsed);
     }
 
     /// Whether somebody can see it, as far as the system tells.
     pub fn is_visible(&self) -> bool {
-        !self.is_occluded && !self.is_minimized
+        !self.is_occluded && !self.is_minimized && self.surface.has_pixels()
+    }
+
+    /// Whether a picture is to be drawn for it now.
+    pub fn is_due(&self) -> bool {
+        self.is_due && self.is_visible()
+    }
+
+    /// Asks the system to say when the next picture is due.
+    pub fn request_redraw(&mut self) {
+        self.is_due = false;
+        self.window.request_redraw();
     }
 
     /// Asks the system whether the window is minimised: not every system sends an event for it.
     pub fn check_visibility(&mut self) {
         self.is_minimized = self.window.is_minimized() == Some(true);
-    }
-
-    /// There was nothing to draw into, so the window counts as hidden until the next check.
-    pub fn hide(&mut self) {
-        self.is_minimized = true;
-    }
-
-    pub fn request_redraw(&self) {
-        self.window.request_redraw();
     }
 
     pub fn set_title(&self, text: &str) {
@@ -103,19 +89,51 @@ impl ViewWindow {
         self.window.set_fullscreen(is_window.then_some(Fullscreen::Borderless(None)));
     }
 
-    /// What happens to the window and its camera.
-    pub fn handle(&mut self, event: &WindowEvent) {
+    /// Shows egui over the picture.
+    pub fn show_overlay(&mut self, graphics: &Graphics) {
+        self.overlay = Some(Overlay::new(&self.window, &graphics.device, self.surface.overlay_format));
+    }
+
+    pub fn hide_overlay(&mut self) {
+        self.overlay = None;
+    }
+
+    pub fn has_overlay(&self) -> bool {
+        self.overlay.is_some()
+    }
+
+    /// Presents a picture that was drawn, with the user interface over it where egui is shown.
+    pub fn present(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        frame: SurfaceFrame,
+        interface: impl FnMut(&mut egui::Ui),
+    ) {
+        let (window, overlay) = (&self.window, &mut self.overlay);
+        self.surface.present(device, queue, frame, |texture| {
+            if let Some(overlay) = overlay {
+                overlay.draw(window, device, queue, texture, interface);
+            }
+        });
+    }
+
+    /// What happens to the window and its camera. Returns the key that goes down, unless egui uses it.
+    pub fn handle(&mut self, event: &WindowEvent) -> Option<KeyCode> {
+        let is_used = self.overlay.as_mut().is_some_and(|overlay| overlay.handle(&self.window, event));
         match event {
-            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.surface.resize(),
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.surface.mark_outdated(),
+            WindowEvent::RedrawRequested => self.is_due = true,
             WindowEvent::Occluded(is_occluded) => self.is_occluded = *is_occluded,
             WindowEvent::Focused(false) => self.camera.release_all(),
-            WindowEvent::KeyboardInput { event, .. } => {
-                if let PhysicalKey::Code(key) = event.physical_key {
-                    self.camera.set_key(key, event.state.is_pressed());
-                }
+            WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
+                let PhysicalKey::Code(key) = event.physical_key else { return None };
+                let is_pressed = event.state.is_pressed() && !is_used;
+                // A window that gets the focus hears of the keys that are held as if they went down.
+                return Some(key).filter(|&key| self.camera.set_key(key, is_pressed) && !is_synthetic);
             }
             WindowEvent::MouseInput { button: MouseButton::Left | MouseButton::Right, state, .. } => {
-                self.camera.set_dragging(*state == ElementState::Pressed);
+                self.camera.set_dragging(*state == ElementState::Pressed && !is_used);
             }
             WindowEvent::CursorMoved { position, .. } => {
                 let position = position.to_logical::<f64>(self.window.scale_factor());
@@ -123,14 +141,6 @@ impl ViewWindow {
             }
             _ => {}
         }
-    }
-}
-
-/// The key that an event presses, unless it repeats, or was held when the window got the focus.
-pub fn pressed_key(event: &WindowEvent) -> Option<KeyCode> {
-    let WindowEvent::KeyboardInput { event, is_synthetic: false, .. } = event else { return None };
-    match event.physical_key {
-        PhysicalKey::Code(key) if event.state.is_pressed() && !event.repeat => Some(key),
-        _ => None,
+        None
     }
 }

@@ -14,6 +14,10 @@ pub struct WindowSurface {
     window: Arc<Window>,
     surface: wgpu::Surface<'static>,
     configuration: wgpu::SurfaceConfiguration,
+    /// The format in which egui is drawn over the picture: without sRGB, where the device allows.
+    pub overlay_format: wgpu::TextureFormat,
+    /// The largest width and height of a texture.
+    max_side: u32,
     /// The window has another size, or other settings, since the surface was configured.
     is_outdated: bool,
     /// `None` where pictures are drawn straight into the surface's textures.
@@ -46,40 +50,38 @@ impl WindowSurface {
         converts: bool,
     ) -> Result<Self, Box<dyn Error>> {
         let capabilities = surface.get_capabilities(&graphics.adapter);
-        let same_bytes =
-            |format: &&wgpu::TextureFormat| format.remove_srgb_suffix() == graphics.format.remove_srgb_suffix();
-        let exact = capabilities.formats.iter().find(|format| **format == graphics.format);
-        let format = exact.or_else(|| capabilities.formats.iter().find(same_bytes));
-        let has_views =
+        let has_view_formats =
             graphics.adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::SURFACE_VIEW_FORMATS);
-        let is_drawn = format.is_some_and(|format| *format == graphics.format || has_views) && !converts;
-        let format = *format.or(capabilities.formats.first()).ok_or("the device cannot present in this window")?;
-        // A screenshot is a copy of the texture, where that is allowed.
-        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | capabilities.usages & wgpu::TextureUsages::COPY_SRC;
-        let mut view_formats = vec![graphics.format];
-        view_formats.retain(|view| is_drawn && *view != format);
-        let is_linear = matches!(format, wgpu::TextureFormat::Rgba16Float) || format.is_srgb();
-        let conversion = Conversion {
-            blitter: TextureBlitter::new(&graphics.device, format),
-            read_as: if is_linear { graphics.format } else { graphics.format.remove_srgb_suffix() },
+        let formats = SurfaceFormats::choose(&capabilities.formats, has_view_formats, graphics.format)
+            .ok_or("the device cannot present in this window")?;
+        let new_conversion = || Conversion {
+            blitter: TextureBlitter::new(&graphics.device, formats.surface),
+            read_as: if formats.is_linear() { graphics.format } else { graphics.format.remove_srgb_suffix() },
             picture: None,
         };
+        let mut view_formats = vec![graphics.format, formats.overlay];
+        view_formats.retain(|view| {
+            *view != formats.surface && view.remove_srgb_suffix() == formats.surface.remove_srgb_suffix()
+        });
         Ok(Self {
             window,
             surface,
             configuration: wgpu::SurfaceConfiguration {
-                usage,
-                format,
+                // A screenshot is a copy of the texture, where that is allowed.
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | (capabilities.usages & wgpu::TextureUsages::COPY_SRC),
+                format: formats.surface,
                 color_space: wgpu::SurfaceColorSpace::Auto,
                 width: 0,
                 height: 0,
                 present_mode: wgpu::PresentMode::AutoVsync,
                 desired_maximum_frame_latency: 2,
                 alpha_mode: wgpu::CompositeAlphaMode::Auto,
-                view_formats,
+                view_formats: if has_view_formats { view_formats } else { Vec::new() },
             },
+            overlay_format: formats.overlay,
+            max_side: graphics.device.limits().max_texture_dimension_2d,
             is_outdated: true,
-            conversion: (!is_drawn).then_some(conversion),
+            conversion: (converts || !formats.is_direct).then(new_conversion),
         })
     }
 
@@ -88,7 +90,7 @@ impl WindowSurface {
         [self.configuration.width, self.configuration.height]
     }
 
-    /// Presents once for each picture of the display, or as soon as possible.
+    /// Presents once for each refresh of the display, or as soon as possible.
     pub fn set_vsync(&mut self, vsync: bool) {
         self.configuration.present_mode =
             if vsync { wgpu::PresentMode::AutoVsync } else { wgpu::PresentMode::AutoNoVsync };
@@ -96,20 +98,30 @@ impl WindowSurface {
     }
 
     /// The window has another size or scale factor.
-    pub fn resize(&mut self) {
+    pub fn mark_outdated(&mut self) {
         self.is_outdated = true;
     }
 
-    /// The next texture; `None` while there is nothing to draw into, as of a minimised window.
+    /// Whether the window has pixels: not on every system does a minimised one.
+    pub fn has_pixels(&self) -> bool {
+        let size = self.window.inner_size();
+        size.width > 0 && size.height > 0
+    }
+
+    /// The next texture; `None` if there is none this time.
     ///
     /// # Errors
     /// If the device refuses, or the surface stays lost.
     pub fn acquire(&mut self, graphics: &Graphics) -> Result<Option<SurfaceFrame>, Box<dyn Error>> {
-        let mut problem = "outdated";
+        let mut is_lost = false;
         for _ in 0..3 {
-            if self.is_outdated && !self.configure(graphics) {
+            if !self.has_pixels() {
                 return Ok(None);
             }
+            if self.is_outdated {
+                self.configure(&graphics.device);
+            }
+            is_lost = false;
             match self.surface.get_current_texture() {
                 wgpu::CurrentSurfaceTexture::Success(texture) => return Ok(Some(self.frame(graphics, texture))),
                 wgpu::CurrentSurfaceTexture::Suboptimal(texture) => {
@@ -117,20 +129,29 @@ impl WindowSurface {
                     return Ok(Some(self.frame(graphics, texture)));
                 }
                 wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => return Ok(None),
-                wgpu::CurrentSurfaceTexture::Outdated => problem = "outdated",
+                wgpu::CurrentSurfaceTexture::Outdated => {}
                 wgpu::CurrentSurfaceTexture::Lost => {
-                    problem = "lost";
+                    is_lost = true;
                     self.surface = graphics.instance.create_surface(Arc::clone(&self.window))?;
                 }
-                wgpu::CurrentSurfaceTexture::Validation => return Err("the device refused a surface's texture".into()),
+                wgpu::CurrentSurfaceTexture::Validation => {
+                    return Err("the device is lost, or refuses the window's texture".into());
+                }
             }
             self.is_outdated = true;
         }
-        Err(format!("the window's surface stays {problem}").into())
+        // A window that is being resized is often outdated again.
+        if is_lost { Err("the window's surface stays lost".into()) } else { Ok(None) }
     }
 
-    /// Presents a picture that was drawn.
-    pub fn present(&self, graphics: &Graphics, frame: SurfaceFrame) {
+    /// Presents a picture that was drawn, after `draw_over` has drawn over it.
+    pub fn present(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        frame: SurfaceFrame,
+        draw_over: impl FnOnce(&wgpu::Texture),
+    ) {
         if let Some((conversion, picture)) = self.conversion.as_ref().zip(frame.converted) {
             let source = picture.create_view(&wgpu::TextureViewDescriptor {
                 format: Some(conversion.read_as),
@@ -138,24 +159,22 @@ impl WindowSurface {
                 ..wgpu::TextureViewDescriptor::default()
             });
             let target = frame.surface_texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
-            let mut encoder = graphics.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            conversion.blitter.copy(&graphics.device, &mut encoder, &source, &target);
-            graphics.queue.submit([encoder.finish()]);
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            conversion.blitter.copy(device, &mut encoder, &source, &target);
+            queue.submit([encoder.finish()]);
         }
+        draw_over(&frame.surface_texture.texture);
         self.window.pre_present_notify();
-        graphics.queue.present(frame.surface_texture);
+        queue.present(frame.surface_texture);
     }
 
-    /// Configures the surface for the window's size. Returns false if the window has no pixels.
-    fn configure(&mut self, graphics: &Graphics) -> bool {
+    /// Configures the surface for the window's size, as far as the device has textures of that size.
+    fn configure(&mut self, device: &wgpu::Device) {
         let size = self.window.inner_size();
-        if size.width == 0 || size.height == 0 {
-            return false;
-        }
-        (self.configuration.width, self.configuration.height) = (size.width, size.height);
-        self.surface.configure(&graphics.device, &self.configuration);
+        (self.configuration.width, self.configuration.height) =
+            (size.width.min(self.max_side), size.height.min(self.max_side));
+        self.surface.configure(device, &self.configuration);
         self.is_outdated = false;
-        true
     }
 
     fn frame(&mut self, graphics: &Graphics, surface_texture: wgpu::SurfaceTexture) -> SurfaceFrame {
@@ -166,6 +185,42 @@ impl WindowSurface {
             conversion.picture.insert(picture).clone()
         });
         SurfaceFrame { surface_texture, converted }
+    }
+}
+
+/// The formats in which a surface's texture is made and drawn into.
+#[derive(Debug, PartialEq)]
+struct SurfaceFormats {
+    surface: wgpu::TextureFormat,
+    /// The one of egui, which wants one without sRGB.
+    overlay: wgpu::TextureFormat,
+    /// Whether the renderer draws into the texture, in its own format.
+    is_direct: bool,
+}
+
+impl SurfaceFormats {
+    /// The best of the formats that a surface offers, for a renderer that draws in `drawn`; `None` if there is none.
+    ///
+    /// | the surface offers | texture | renderer |
+    /// | --- | --- | --- |
+    /// | `drawn` | `drawn` | draws into it |
+    /// | the same without sRGB, and views of other formats | that | draws into a view of it |
+    /// | others | the first | draws into a texture of its own, which is converted |
+    fn choose(offered: &[wgpu::TextureFormat], has_view_formats: bool, drawn: wgpu::TextureFormat) -> Option<Self> {
+        let same_bytes = |format: &&wgpu::TextureFormat| format.remove_srgb_suffix() == drawn.remove_srgb_suffix();
+        let exact = offered.iter().find(|format| **format == drawn);
+        let surface = *exact.or_else(|| offered.iter().find(same_bytes)).or(offered.first())?;
+        let is_direct = surface == drawn || (has_view_formats && same_bytes(&&surface));
+        Some(Self {
+            surface,
+            overlay: if has_view_formats { surface.remove_srgb_suffix() } else { surface },
+            is_direct,
+        })
+    }
+
+    /// Whether what is written counts as linear, so that it must not be sRGB encoded yet.
+    fn is_linear(&self) -> bool {
+        self.surface == wgpu::TextureFormat::Rgba16Float || self.surface.is_srgb()
     }
 }
 
@@ -189,4 +244,25 @@ fn new_picture(graphics: &Graphics, size: wgpu::Extent3d) -> wgpu::Texture {
             | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[graphics.format.remove_srgb_suffix()],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Unorm, Rgba16Float};
+
+    use super::*;
+
+    #[test]
+    fn pictures_are_drawn_into_the_surface_where_formats_allow() {
+        let choose = |offered: &[_], has_view_formats| {
+            let formats = SurfaceFormats::choose(offered, has_view_formats, Bgra8UnormSrgb).unwrap();
+            (formats.surface, formats.overlay, formats.is_direct)
+        };
+        assert_eq!(choose(&[Bgra8Unorm, Bgra8UnormSrgb], true), (Bgra8UnormSrgb, Bgra8Unorm, true));
+        assert_eq!(choose(&[Bgra8Unorm, Bgra8UnormSrgb], false), (Bgra8UnormSrgb, Bgra8UnormSrgb, true));
+        assert_eq!(choose(&[Rgba8Unorm, Bgra8Unorm], true), (Bgra8Unorm, Bgra8Unorm, true));
+        assert_eq!(choose(&[Rgba8Unorm, Bgra8Unorm], false), (Bgra8Unorm, Bgra8Unorm, false));
+        assert_eq!(choose(&[Rgba16Float, Rgba8Unorm], true), (Rgba16Float, Rgba16Float, false));
+        assert_eq!(SurfaceFormats::choose(&[], true, Bgra8UnormSrgb), None);
+    }
 }

@@ -27,10 +27,10 @@ impl World {
     /// Metres from cube to cube.
     const SPACING: f64 = 0.8;
 
-    /// So many cubes over a floor.
+    /// A number of cubes over a floor.
     ///
     /// # Errors
-    /// If there are more than a scene can have.
+    /// If a mesh or a material is refused.
     pub fn new(cubes: usize) -> Result<Self, SceneError> {
         let mut assets = Assets::default();
         let cube = cube()?;
@@ -99,7 +99,7 @@ impl World {
         }
     }
 
-    /// Simulates a while, as jobs on all workers.
+    /// Moves the waves on by `elapsed`, as jobs on all workers.
     ///
     /// # Errors
     /// If a job panics.

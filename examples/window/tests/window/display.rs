@@ -5,7 +5,9 @@ use std::process::{Child, Command, Stdio};
 
 use libtest_mimic::Failed;
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, Window};
+use x11rb::protocol::xproto::{
+    ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, InputFocus, Window,
+};
 use x11rb::rust_connection::RustConnection;
 use x11rb::wrapper::ConnectionExt as _;
 
@@ -26,6 +28,22 @@ pub struct Picture {
     pub size: [u32; 2],
     /// Red, green, blue.
     pub pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    /// Whether it is more than a background.
+    pub fn is_drawn(&self) -> bool {
+        let mut colors = self.pixels.clone();
+        colors.sort_unstable();
+        colors.dedup();
+        colors.len() > 100
+    }
+
+    /// The share of pixels that it has in common with another picture of its size.
+    pub fn share_equal_to(&self, other: &Self) -> f64 {
+        let equal = self.pixels.iter().zip(&other.pixels).filter(|(own, other)| own == other).count();
+        equal as f64 / self.pixels.len() as f64
+    }
 }
 
 impl Display {
@@ -108,6 +126,12 @@ impl Display {
 
     pub fn focus(&self, window: Window) -> Result<(), Failed> {
         self.xdotool(&["windowactivate", "--sync", &window.to_string()])
+    }
+
+    /// No window has the focus.
+    pub fn take_focus_away(&self) -> Result<(), Failed> {
+        self.connection.set_input_focus(InputFocus::NONE, x11rb::NONE, x11rb::CURRENT_TIME)?;
+        Ok(self.connection.sync()?)
     }
 
     pub fn point_at(&self, window: Window, [x, y]: [u32; 2]) -> Result<(), Failed> {

@@ -44,12 +44,7 @@ impl<'a> Program<'a> {
 
     /// What a window shows when it is more than a background.
     pub fn wait_for_picture(&self, number: usize) -> Result<Picture, Failed> {
-        self.wait_until(number, |picture| {
-            let mut colors = picture.pixels.clone();
-            colors.sort_unstable();
-            colors.dedup();
-            colors.len() > 100
-        })
+        self.wait_until(number, Picture::is_drawn)
     }
 
     pub fn wait_until_shown(&self, number: usize, expected: &Picture) -> Result<(), Failed> {
@@ -96,7 +91,10 @@ impl<'a> Program<'a> {
 pub fn command(display: &Display, arguments: &[&str]) -> Command {
     let [width, height] = SIZE;
     let mut command = Command::new(env!("CARGO_BIN_EXE_window"));
-    command.args(["--size", &format!("{width}x{height}")]).args(arguments);
+    if !arguments.contains(&"--size") {
+        command.args(["--size", &format!("{width}x{height}")]);
+    }
+    command.args(arguments);
     command.env("DISPLAY", &display.name).env("WINIT_X11_SCALE_FACTOR", display.scale_factor);
     command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
     command
@@ -131,7 +129,7 @@ pub fn wait_for<T>(what: &str, mut find: impl FnMut() -> Result<Option<T>, Faile
     }
 }
 
-/// Neither Drawloom nor wgpu had something to say. winit does, where a desktop's services are missing.
+/// Fails on a warning or an error. Those of winit are excepted: it warns where a desktop's services are missing.
 fn check_messages(errors: &str) -> Result<(), Failed> {
     let is_message = |line: &&str| {
         !line.contains(" winit::") && ["WARN", "ERROR", "panicked"].iter().any(|word| line.contains(word))

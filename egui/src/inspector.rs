@@ -1,0 +1,142 @@
+//! The window that shows frames.
+
+use drawloom::backend::Backend;
+use drawloom::{Recorded, Renderer};
+use egui::{Context, ScrollArea, Ui, Window};
+
+use crate::choices;
+use crate::frame_history::FrameHistory;
+use crate::graph::GraphView;
+use crate::quality::QualityPanel;
+use crate::timeline::TimelinePanel;
+use crate::views;
+use crate::warnings::WarningList;
+
+/// A window that shows the frames of a [`Renderer`] as they are drawn, and changes its quality.
+///
+/// While it is open, it records the scheduler's [timeline](drawloom::timeline), and takes out the
+/// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took.
+pub struct Inspector {
+    is_open: bool,
+    /// Whether the inspector switched the timeline on, and so switches it off.
+    started_timeline: bool,
+    tab: Tab,
+    history: FrameHistory,
+    timeline: TimelinePanel,
+    graph: GraphView,
+    quality: QualityPanel,
+    warnings: WarningList,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tab {
+    Timeline,
+    Graph,
+    Choices,
+    Quality,
+    Views,
+    Warnings,
+}
+
+impl Tab {
+    const ALL: [(Self, &str); 6] = [
+        (Self::Timeline, "Timeline"),
+        (Self::Graph, "Frame graph"),
+        (Self::Choices, "Choices"),
+        (Self::Quality, "Quality"),
+        (Self::Views, "Views"),
+        (Self::Warnings, "Warnings"),
+    ];
+}
+
+/// An inspector that is open.
+impl Default for Inspector {
+    fn default() -> Self {
+        Self::new(true)
+    }
+}
+
+impl Inspector {
+    /// An inspector that is open, or not yet.
+    pub fn new(is_open: bool) -> Self {
+        Self {
+            is_open,
+            started_timeline: false,
+            tab: Tab::Timeline,
+            history: FrameHistory::default(),
+            timeline: TimelinePanel::default(),
+            graph: GraphView::default(),
+            quality: QualityPanel::default(),
+            warnings: WarningList::default(),
+        }
+    }
+
+    /// Whether it is shown.
+    pub fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Shows it from the next frame on.
+    pub fn open(&mut self) {
+        self.is_open = true;
+    }
+
+    /// Hides it, as its close button does. A measurement ends, and so does the recording of the timeline, if the inspector began it.
+    pub fn close<B: Backend>(&mut self, renderer: &mut Renderer<B>) {
+        self.is_open = false;
+        self.quality.cancel_measurement(renderer);
+        if self.started_timeline {
+            renderer.scheduler().timeline().stop();
+            self.started_timeline = false;
+        }
+    }
+
+    /// Adds a frame that was just recorded. Call it once for each, whether the inspector is open or not.
+    pub fn add_frame<B: Backend>(&mut self, renderer: &Renderer<B>, recorded: &Recorded<B>) {
+        if !self.is_open {
+            return;
+        }
+        let timeline = renderer.scheduler().timeline();
+        if !timeline.is_on() {
+            timeline.start();
+            self.started_timeline = true;
+        }
+        self.history.add_log(timeline.take());
+        self.history.add_statistics(recorded.frame_number(), recorded.statistics());
+        self.warnings.add_frame(recorded.statistics());
+        self.quality.add_frame(recorded.statistics());
+    }
+
+    /// Shows the window, if it is open. Call it once a frame. A quality that is chosen in it holds from the next frame on.
+    pub fn show<B: Backend>(&mut self, context: &Context, renderer: &mut Renderer<B>) {
+        let mut is_open = self.is_open;
+        let window = Window::new("Drawloom").open(&mut is_open).default_size([760.0, 400.0]);
+        window.show(context, |ui| self.show_in(ui, renderer));
+        if self.is_open && !is_open {
+            self.close(renderer);
+        }
+    }
+
+    /// Shows what the window contains in an area of the engine's own.
+    pub fn show_in<B: Backend>(&mut self, ui: &mut Ui, renderer: &mut Renderer<B>) {
+        // A measurement goes on while another tab is open.
+        self.quality.update(renderer);
+        ui.horizontal(|ui| {
+            for (tab, name) in Tab::ALL {
+                let count = if tab == Tab::Warnings { self.warnings.len() } else { 0 };
+                let text = if count == 0 { name.to_owned() } else { format!("{name} ({count})") };
+                ui.selectable_value(&mut self.tab, tab, text);
+            }
+        });
+        ui.separator();
+        let scroll = ScrollArea::both().auto_shrink(false);
+        match self.tab {
+            Tab::Timeline => self.timeline.show(ui, &mut self.history),
+            Tab::Graph => self.graph.show(ui, self.history.shown()),
+            Tab::Choices => _ = scroll.show(ui, |ui| choices::show(ui, self.history.latest_statistics())),
+            Tab::Quality => _ = scroll.show(ui, |ui| self.quality.show(ui, renderer)),
+            Tab::Views => _ = scroll.show(ui, |ui| views::show(ui, &self.history)),
+            Tab::Warnings => _ = scroll.show(ui, |ui| self.warnings.show(ui)),
+        }
+    }
+}

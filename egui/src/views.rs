@@ -1,0 +1,58 @@
+//! What each view draws, and what that costs.
+
+use egui::{Grid, Ui};
+
+use crate::frame_history::FrameHistory;
+
+const COLUMNS: [(&str, &str); 9] = [
+    ("view", "The camera's name."),
+    ("kind", "What the view is for."),
+    ("thread time", "The time of all workers in its stages, in the frame that the timeline shows."),
+    ("visible", "Objects that it sees."),
+    ("occluded", "Objects in its frustum that others hide."),
+    ("lights", "Lights that reach it."),
+    ("commands", "Draws of single objects, over all its processes."),
+    ("batches", "Instanced draws that they are merged into."),
+    ("bundles", "Bundles that the batches fill."),
+];
+
+/// Shows the views of the shown frame.
+pub fn show(ui: &mut Ui, history: &FrameHistory) {
+    let shown = history.shown();
+    let statistics = shown.and_then(|shown| shown.statistics.as_ref()).or(history.latest_statistics());
+    let Some(statistics) = statistics else {
+        ui.weak("No frame yet.");
+        return;
+    };
+    Grid::new("views").striped(true).num_columns(COLUMNS.len()).show(ui, |ui| {
+        for (name, explanation) in COLUMNS {
+            ui.weak(name).on_hover_text(explanation);
+        }
+        ui.end_row();
+        for view in &statistics.views {
+            ui.label(&view.name);
+            ui.label(format!("{:?}", view.kind).to_lowercase());
+            let time = shown.map(|shown| shown.view_time(&view.name));
+            ui.label(time.map_or_else(String::new, |time| format!("{:.0} µs", time.as_secs_f64() * 1e6)));
+            for count in [view.visible, view.occluded, view.lights, view.commands, view.batches, view.bundles] {
+                ui.label(count.to_string());
+            }
+            ui.end_row();
+        }
+    });
+    ui.add_space(8.0);
+    ui.label(format!(
+        "{} objects, {} lights, {} bytes uploaded",
+        statistics.objects, statistics.lights, statistics.uploaded
+    ));
+    let stages = &statistics.stages;
+    let times = [
+        ("visibility", stages.visibility),
+        ("fill", stages.fill),
+        ("sort", stages.sort),
+        ("instance", stages.instance),
+        ("record", stages.record),
+    ];
+    let texts = times.map(|(name, time)| format!("{name} {:.0} µs", time.as_secs_f64() * 1e6));
+    ui.label(texts.join(", ")).on_hover_text("The thread time of each group of stages, over all views.");
+}

@@ -1,0 +1,65 @@
+//! What frames left out, or could not draw as requested.
+
+use drawloom::FrameStatistics;
+use drawloom::view::Rejection;
+use egui::{Grid, Ui};
+
+/// The warnings of all frames since the list was cleared, one for each reason.
+#[derive(Debug, Default)]
+pub struct WarningList {
+    entries: Vec<Entry>,
+    frames: u64,
+}
+
+#[derive(Debug)]
+struct Entry {
+    rejection: Rejection,
+    /// The number of the latest frame with it, counted by the list.
+    frame: u64,
+}
+
+impl WarningList {
+    /// Adds the warnings of a frame.
+    pub fn add_frame(&mut self, statistics: &FrameStatistics) {
+        self.frames += 1;
+        for &rejection in &statistics.rejections {
+            let entry = Entry { rejection, frame: self.frames };
+            match self.entries.iter_mut().find(|entry| entry.rejection.reason == rejection.reason) {
+                Some(known) => *known = entry,
+                None => self.entries.push(entry),
+            }
+        }
+    }
+
+    /// The number of reasons.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Shows the list.
+    pub fn show(&mut self, ui: &mut Ui) {
+        if self.entries.is_empty() {
+            ui.label("Everything was drawn as requested.");
+            return;
+        }
+        Grid::new("warnings").striped(true).num_columns(4).show(ui, |ui| {
+            ["not drawn as requested", "how many", "the first", "last seen"]
+                .into_iter()
+                .for_each(|name| _ = ui.weak(name));
+            ui.end_row();
+            for Entry { rejection, frame } in &self.entries {
+                ui.label(rejection.reason.name());
+                ui.label(rejection.count.to_string());
+                ui.label(format!("number {}", rejection.first));
+                ui.label(match self.frames - frame {
+                    0 => "in the latest frame".to_owned(),
+                    ago => format!("{ago} frames ago"),
+                });
+                ui.end_row();
+            }
+        });
+        if ui.button("Clear").clicked() {
+            self.entries.clear();
+        }
+    }
+}
