@@ -1,0 +1,51 @@
+//! Skins: the joints that move the vertices of a mesh.
+
+use drawloom::glam::{DAffine3, DMat4, DVec4};
+
+use crate::accessors::Accessors;
+use crate::error::Problem;
+
+/// The joints of a skin.
+#[derive(Debug)]
+pub(crate) struct Skin {
+    /// Each joint: its node, and from the mesh as it was modelled to the joint.
+    pub(crate) joints: Vec<(usize, DAffine3)>,
+}
+
+impl Skin {
+    /// # Errors
+    /// If it has no joints, or fewer matrices than joints, or one that is not affine and finite.
+    pub(crate) fn read(accessors: &Accessors<'_>, skin: &gltf::Skin<'_>) -> Result<Self, Problem> {
+        let element = format!("skin {}", skin.index());
+        let nodes: Vec<_> = skin.joints().map(|joint| joint.index()).collect();
+        if nodes.is_empty() {
+            return Err(Problem::invalid(element, "has no joints"));
+        }
+        let Some(accessor) = skin.inverse_bind_matrices() else {
+            return Ok(Self { joints: nodes.into_iter().map(|node| (node, DAffine3::IDENTITY)).collect() });
+        };
+        let purpose = format!("the inverse bind matrices of {element}");
+        let matrices = accessors.floats::<16>(&accessor, &purpose)?;
+        if matrices.len() < nodes.len() {
+            return Err(Problem::UnequalCounts {
+                element,
+                what: "inverse bind matrices".to_owned(),
+                count: matrices.len(),
+                expected: nodes.len(),
+                expected_by: "joints".to_owned(),
+            });
+        }
+        let mut joints = Vec::new();
+        for (index, (node, matrix)) in nodes.into_iter().zip(matrices).enumerate() {
+            let matrix = DMat4::from_cols_array(&matrix.map(f64::from));
+            if !matrix.row(3).abs_diff_eq(DVec4::W, 1e-4) {
+                return Err(Problem::invalid(
+                    element,
+                    format!("has an inverse bind matrix {index} that is not affine"),
+                ));
+            }
+            joints.push((node, DAffine3::from_mat4(matrix)));
+        }
+        Ok(Self { joints })
+    }
+}

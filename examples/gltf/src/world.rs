@@ -1,0 +1,48 @@
+//! A loaded scene, as the engine keeps it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use drawloom::scene::{Bounds, ColumnValues, Scene, SceneRef};
+
+use crate::attributes::{POSE, Pose};
+use crate::surfaces::SurfaceKind;
+use crate::texture_arrays::TextureArrays;
+
+/// A loaded scene: what Drawloom draws, and what the loader left out of the file.
+#[derive(Debug)]
+pub struct World {
+    pub(crate) scene: Scene,
+    /// Of each object, in its pose.
+    pub(crate) bounds: Vec<Bounds>,
+    /// Of each object; zeros if it has none.
+    pub(crate) poses: Vec<Pose>,
+    pub(crate) palette: Arc<[u8]>,
+    pub(crate) morphs: Arc<[u8]>,
+    pub(crate) textures: TextureArrays,
+    /// Which surfaces there are, and whether they are deformed.
+    pub(crate) surfaces: BTreeSet<(SurfaceKind, bool)>,
+    /// What the loader left out of the file, in sentences.
+    pub warnings: Vec<String>,
+    /// The names of the file's animations; `animation 2` for one without a name.
+    pub animations: Vec<String>,
+    /// How many cameras the scene has.
+    pub cameras: usize,
+}
+
+impl World {
+    /// How many objects there are: one for each primitive of each node.
+    pub fn object_count(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// The engine's own data of objects.
+    pub fn columns(&self) -> [ColumnValues<'_>; 1] {
+        [POSE.values(&self.poses)]
+    }
+
+    /// The scene as a frame reads it.
+    pub fn as_scene_ref<'a>(&'a self, columns: &'a [ColumnValues<'a>]) -> SceneRef<'a> {
+        SceneRef { columns, bounds: &self.bounds, ..self.scene.as_scene_ref() }
+    }
+}
