@@ -65,7 +65,7 @@ pub(crate) fn framing_camera(center: DVec3, radius: f64, size: [u32; 2]) -> Came
     const FIELD_OF_VIEW: f64 = 0.8;
     let narrowest = (size[0] as f64 / size[1] as f64).min(1.0);
     let half_angle = ((FIELD_OF_VIEW / 2.0).tan() * narrowest).atan();
-    let distance = radius / half_angle.sin();
+    let distance = 1.1 * radius / half_angle.sin();
     let position = center + DVec3::new(0.35, 0.3, 1.0).normalize() * distance;
     let projection = Projection::Perspective { field_of_view: FIELD_OF_VIEW as f32 };
     let near = ((distance - radius) * 0.1).max(distance * 1e-3) as f32;

@@ -12,7 +12,7 @@ pub struct LoadError {
     pub file: PathBuf,
     /// What is wrong with it.
     #[source]
-    pub problem: Problem,
+    pub problem: Box<Problem>,
 }
 
 /// What is wrong with a file. Elements are named as glTF numbers them, such as `accessor 3`.

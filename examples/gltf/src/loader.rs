@@ -1,6 +1,7 @@
 //! The loader: from a file to a world.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 
 use drawloom::glam::DAffine3;
@@ -13,7 +14,7 @@ use crate::animations::{duration, pose_at};
 use crate::document::Source;
 use crate::error::{LoadError, Problem};
 use crate::images::Decoding;
-use crate::materials::{Surface, read_material};
+use crate::materials::{Surface, material_name, read_material};
 use crate::nodes::Nodes;
 use crate::primitives::{Primitive, read_primitive};
 use crate::skins::Skin;
@@ -45,7 +46,8 @@ pub fn load(
     scheduler: &Scheduler,
     progress: &ProgressBar,
 ) -> Result<World, LoadError> {
-    read(path, options, scheduler, progress).map_err(|problem| LoadError { file: path.to_owned(), problem })
+    read(path, options, scheduler, progress)
+        .map_err(|problem| LoadError { file: path.to_owned(), problem: problem.into() })
 }
 
 /// What is read of a file before the world is built of it.
@@ -124,9 +126,8 @@ fn materials_of(
     let mut materials = BTreeMap::new();
     for (_, mesh) in meshes_of(document, of_scene) {
         for material in mesh.primitives().map(|primitive| primitive.material()) {
-            if !materials.contains_key(&material.index()) {
-                let surface = read_material(&material, uses, warnings)?;
-                materials.insert(material.index(), (crate::materials::material_name(&material), surface));
+            if let Entry::Vacant(entry) = materials.entry(material.index()) {
+                entry.insert((material_name(&material), read_material(&material, uses, warnings)?));
             }
         }
     }

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use drawloom::glam::{Mat4, Vec3};
+use drawloom::glam::{DVec3, Mat4, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Bounds, Material, Mesh, RenderObject, Scene};
+use drawloom::scene::{Bounds, Material, Mesh, RenderObject, Scene, SceneRef};
 
 use crate::animations::target_count;
 use crate::attributes::{DEFORMED, Pose, RIGID};
@@ -142,8 +142,7 @@ impl<'a> WorldBuilder<'a> {
                 return Err(Problem::IndexOutOfRange { element, index: index as u64, count, what: "cameras" });
             }
             (None, None) => {
-                let scene = drawloom::scene::SceneRef { bounds: &self.bounds, ..self.scene.as_scene_ref() };
-                let (center, radius) = scene.bounding_sphere();
+                let (center, radius) = self.bounding_sphere();
                 framing_camera(center, radius, size)
             }
         };
@@ -172,6 +171,19 @@ impl<'a> WorldBuilder<'a> {
             animations: self.parts.document.animations().map(name).collect(),
             cameras: self.cameras,
         }
+    }
+
+    /// Centre and radius of a sphere around all objects.
+    fn bounding_sphere(&self) -> (DVec3, f64) {
+        let scene = SceneRef { bounds: &self.bounds, ..self.scene.as_scene_ref() };
+        let (center, _) = scene.bounding_sphere();
+        let reach = |object: usize| {
+            let (bounds, scale) = (scene.bounds[object], scene.scales[object]);
+            let of_object = scene.positions[object] + (scene.orientations[object] * (bounds.center * scale)).as_dvec3();
+            of_object.distance(center) + f64::from(bounds.radius * scale.abs().max_element())
+        };
+        let radius = (0..scene.object_count()).map(reach).fold(0.0, f64::max);
+        (center, if radius > 0.0 { radius } else { 1.0 })
     }
 
     fn nodes(&self) -> impl Iterator<Item = gltf::Node<'a>> + use<'a> {

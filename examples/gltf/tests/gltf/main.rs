@@ -1,24 +1,31 @@
-//! Loading and drawing of small generated glTF files.
+//! Loading and drawing of small glTF files, which the tests generate.
+//!
+//! Without an adapter, the cases that draw are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
+//! The files and the pictures stay in `target/tmp/gltf`, to look at.
+
+mod appearance;
+mod fixture;
 mod generate;
+mod malformed;
+mod malformed_elements;
+mod moving;
 mod oracle;
+mod program;
+mod sources;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+type Case = (&'static str, fn() -> Result<(), Failed>);
+
 fn main() {
-    use generate::deforming as f;
-    use generate::static_scenes as s;
-    let d = std::path::PathBuf::from(std::env::args().nth(1).unwrap());
-    for (n, b) in [
-        ("square", s::textured_square()),
-        ("grid", s::metallic_roughness_grid()),
-        ("alpha", s::alpha_modes()),
-        ("lights", s::lights_and_cameras()),
-        ("tree", s::hierarchy(false)),
-        ("flat", s::hierarchy(true)),
-        ("tube", f::bending_tube(None)),
-        ("tubeflat", f::bending_tube(Some(1.5))),
-        ("morph", f::morphing_sphere(None)),
-        ("morphflat", f::morphing_sphere(Some(1.5))),
-        ("inter", f::interpolations(None)),
-        ("interflat", f::interpolations(Some(1.5))),
-    ] {
-        std::fs::write(d.join(format!("{n}.glb")), b.glb()).unwrap();
+    let no_adapter = fixture::device().is_none();
+    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let mut trials = Vec::new();
+    let of_adapter = [moving::CASES, appearance::CASES, sources::CASES, program::CASES];
+    for &(name, case) in of_adapter.into_iter().flatten() {
+        trials.push(Trial::test(name, case).with_ignored_flag(no_adapter && !required));
     }
+    trials
+        .extend(malformed::CASES.iter().chain(malformed_elements::CASES).map(|&(name, case)| Trial::test(name, case)));
+    libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }

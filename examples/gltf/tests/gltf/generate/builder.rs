@@ -126,6 +126,12 @@ impl Builder {
         self.light(light, [0.0; 3], [0.0, 0.0, 0.0, 1.0]);
     }
 
+    /// A light from the upper right, behind the camera.
+    pub fn slanted_sun(&mut self) {
+        let light = json!({"type": "directional", "intensity": 3.0});
+        self.light(light, [0.0; 3], [-0.3, 0.2, 0.0, 0.932_737_9]);
+    }
+
     /// As a `.glb`.
     pub fn glb(&self) -> Vec<u8> {
         let mut json = self.json.clone();

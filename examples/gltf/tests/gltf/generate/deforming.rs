@@ -52,7 +52,7 @@ pub fn bending_tube(time: Option<f64>) -> Builder {
         None => add_skinned(&mut builder, &shape, material),
     }
     builder.camera_at([0.0, 0.0, 6.0]);
-    builder.light(json!({"type": "directional", "intensity": 3.0}), [0.0; 3], [-0.3, 0.2, 0.0, 0.9327379053]);
+    builder.slanted_sun();
     builder
 }
 
@@ -148,7 +148,7 @@ pub fn morphing_sphere(time: Option<f64>) -> Builder {
         }
     }
     builder.camera_at([0.0, 0.0, 5.0]);
-    builder.light(json!({"type": "directional", "intensity": 3.0}), [0.0; 3], [-0.3, 0.2, 0.0, 0.9327379053]);
+    builder.slanted_sun();
     builder
 }
 
@@ -212,7 +212,7 @@ pub fn interpolations(time: Option<f64>) -> Builder {
         builder.push("animations", json!({"name": "move", "samplers": samplers, "channels": channels}));
     }
     builder.camera_at([0.0, 0.2, 6.0]);
-    builder.light(json!({"type": "directional", "intensity": 3.0}), [0.0; 3], [-0.3, 0.2, 0.0, 0.9327379053]);
+    builder.slanted_sun();
     builder
 }
 

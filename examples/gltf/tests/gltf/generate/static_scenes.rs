@@ -184,6 +184,6 @@ pub fn hierarchy(is_flat: bool) -> Builder {
         builder.root(json!({"mesh": mesh}));
     }
     builder.camera_at([0.0, 0.5, 7.0]);
-    builder.light(json!({"type": "directional", "intensity": 3.0}), [0.0; 3], [-0.3, 0.2, 0.0, 0.9327379053]);
+    builder.slanted_sun();
     builder
 }

@@ -1,0 +1,253 @@
+//! Scenes with one element that is malformed: each is an error that names the element.
+
+use std::fs;
+
+use libtest_mimic::Failed;
+use serde_json::{Value, json};
+
+use crate::fixture::{AT_REST, expect, folder, load_bytes, load_file};
+use crate::generate::builder::Builder;
+use crate::generate::deforming::{bending_tube, morphing_sphere};
+use crate::generate::static_scenes::{lights_and_cameras, textured_square};
+use gltf_scene::LoadOptions;
+
+pub const CASES: &[crate::Case] = &[("what_is_wrong_is_named", named)];
+
+type Malformed = (fn() -> Builder, fn(&mut Builder), &'static str);
+
+/// A scene, how it is changed, and what the error says.
+const CHANGES: &[Malformed] = &[
+    (
+        textured_square,
+        |it| it.json["accessors"][0]["count"] = json!(5),
+        "accessor 0 is out of range: it ends at byte 60 of buffer view 1, which has 48",
+    ),
+    (textured_square, |it| it.json["accessors"][0]["byteOffset"] = json!(u64::MAX / 2), "accessor 0 is out of range"),
+    (
+        textured_square,
+        |it| it.json["accessors"][0]["count"] = json!(1_u64 << 60),
+        "accessor 0, with what is read before it, has",
+    ),
+    (
+        textured_square,
+        |it| {
+            it.json["accessors"][0].as_object_mut().map(|accessor| accessor.remove("bufferView"));
+            it.json["accessors"][0]["count"] = json!(1_u64 << 40);
+        },
+        "bytes; 2147483648 are accepted",
+    ),
+    (
+        textured_square,
+        |it| it.json["accessors"][0]["type"] = json!("VEC2"),
+        "accessor 0 is a vector of 2 of F32, but the positions of mesh 0 primitive 0 is of 3 components",
+    ),
+    (
+        textured_square,
+        |it| it.json["accessors"][3]["componentType"] = json!(5126),
+        "accessor 3 is a scalar of F32, but the indices of mesh 0 primitive 0 is of unsigned integers",
+    ),
+    (
+        textured_square,
+        |it| it.json["accessors"][0]["componentType"] = json!(7),
+        "accessors[0].componentType is invalid",
+    ),
+    (
+        textured_square,
+        |it| it.json["accessors"][1]["count"] = json!(3),
+        "normals of mesh 0 primitive 0 has 3 values, but 4 vertices",
+    ),
+    (textured_square, |it| it.json["bufferViews"][1]["byteLength"] = json!(99_999), "buffer view 1 is out of range"),
+    (
+        textured_square,
+        |it| it.json["bufferViews"][1]["byteStride"] = json!(4),
+        "accessor 0 has elements of 12 bytes, 4 bytes apart",
+    ),
+    (
+        textured_square,
+        |it| it.json["bufferViews"][1]["buffer"] = json!(3),
+        "bufferViews[1].buffer is an index that is out of range",
+    ),
+    (
+        textured_square,
+        |it| set_float(it, 1, 4, f32::NAN),
+        "the positions of mesh 0 primitive 0 (accessor 0) is not finite at index 1",
+    ),
+    (textured_square, |it| set_word(it, 4, 2, 77), "mesh 0 primitive 0 has the index 77 of 4 vertices"),
+    (textured_square, |it| it.json["accessors"][3]["count"] = json!(5), "has 5 corners, which are no whole triangles"),
+    (textured_square, |it| it.json["nodes"][0]["children"] = json!([0]), "node 0 is its own ancestor"),
+    (
+        textured_square,
+        |it| {
+            it.json["nodes"][0]["children"] = json!([1]);
+            it.json["nodes"][1]["children"] = json!([0]);
+        },
+        "node 0 is its own ancestor",
+    ),
+    (
+        textured_square,
+        |it| {
+            it.json["nodes"][0]["children"] = json!([2]);
+            it.json["nodes"][1]["children"] = json!([2]);
+        },
+        "node 2 is a child twice",
+    ),
+    (
+        textured_square,
+        |it| it.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(9),
+        "mesh 0 has the index 9 of 4 accessors",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["children"] = json!([9]),
+        "nodes[0].children[0] is an index that is out of range",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["translation"] = json!([1e39, 0, 0]),
+        "node 0 has a transform that is not finite",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["translation"] = json!([1e12, 0, 0]),
+        "node 0 has a transform that is more than 4e9 m",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["rotation"] = json!([0, 0, 0, 0]),
+        "node 0 has a transform that has a rotation of length 0",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["matrix"] = json!([1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]),
+        "node 0 has a transform that is not affine",
+    ),
+    (
+        textured_square,
+        |it| it.json["nodes"][0]["scale"] = json!([1e38, 1, 1]),
+        "node 0 has a transform that is not finite in the world",
+    ),
+    (
+        textured_square,
+        |it| it.json["materials"][0]["pbrMetallicRoughness"]["metallicFactor"] = json!(-1),
+        "material 0 has a negative factor",
+    ),
+    (
+        textured_square,
+        |it| it.json["materials"][0]["emissiveFactor"] = json!([1e39, 0, 0]),
+        "material 0 has a factor that is not finite",
+    ),
+    (textured_square, |it| it.json["images"][0] = json!({}), "image 0 has neither a URI nor a buffer view"),
+    (textured_square, |it| it.json["images"][0] = json!({"uri": "none.png"}), "none.png cannot be read"),
+    (textured_square, |it| it.json["images"][0]["bufferView"] = json!(1), "image 0 cannot be decoded"),
+    (textured_square, |it| it.binary[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]), "image 0 "),
+    (textured_square, |it| it.json["cameras"][0]["perspective"]["yfov"] = json!(7), "camera 0 has a field of view"),
+    (
+        textured_square,
+        |it| it.json["cameras"][0]["perspective"]["zfar"] = json!(0.01),
+        "camera 0 has planes that are not 0 < near < far",
+    ),
+    (
+        textured_square,
+        |it| it.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
+        "it requires the extension KHR_draco_mesh_compression",
+    ),
+    (lights_and_cameras, |it| light(it, 0)["intensity"] = json!(-1), "light 0 has a colour or an intensity"),
+    (lights_and_cameras, |it| light(it, 0)["range"] = json!(0), "light 0 has a range"),
+    (lights_and_cameras, |it| light(it, 1)["spot"]["innerConeAngle"] = json!(0.5), "light 1 has a cone whose angles"),
+    (
+        lights_and_cameras,
+        |it| {
+            light(it, 1).as_object_mut().map(|light| light.remove("spot"));
+        },
+        "spot is missing",
+    ),
+    (bending_tube_at_rest, |it| set_joint(it, 2, 3), "mesh 0 primitive 0 has the index 3 of 3 joints of its skin"),
+    (
+        bending_tube_at_rest,
+        |it| it.json["accessors"][6]["count"] = json!(2),
+        "skin 0 has 2 inverse bind matrices, but 3 joints",
+    ),
+    (bending_tube_at_rest, |it| it.json["skins"][0]["joints"] = json!([]), "skin 0 has no joints"),
+    (bending_tube_at_rest, |it| set_first_float(it, 5, -1.0), "mesh 0 primitive 0 has a negative weight at vertex 0"),
+    (
+        bending_tube_at_rest,
+        |it| set_first_float(it, 7, 5.0),
+        "channel 0 of animation 0 has no times, or ones that do not increase",
+    ),
+    (
+        bending_tube_at_rest,
+        |it| it.json["accessors"][8]["count"] = json!(2),
+        "channel 0 of animation 0 has 8 numbers, but 12 for 3 times",
+    ),
+    (
+        bending_tube_at_rest,
+        |it| it.json["animations"][0]["channels"][0]["target"]["path"] = json!("weights"),
+        "animates morph weights of node 2, which has none",
+    ),
+    (
+        morphing_sphere_at_rest,
+        |it| it.json["meshes"][0]["weights"] = json!([1]),
+        "node 0 has 1 morph weights, but 2 morph targets",
+    ),
+    (
+        morphing_sphere_at_rest,
+        |it| it.json["accessors"][0]["count"] = json!(7),
+        "positions of morph target 0 of mesh 0 primitive 0 has 7 values",
+    ),
+];
+
+fn bending_tube_at_rest() -> Builder {
+    bending_tube(None)
+}
+
+fn morphing_sphere_at_rest() -> Builder {
+    let mut builder = morphing_sphere(None);
+    builder.json.as_object_mut().map(|json| json.remove("animations"));
+    builder
+}
+
+fn light(it: &mut Builder, index: usize) -> &mut Value {
+    &mut it.json["extensions"]["KHR_lights_punctual"]["lights"][index]
+}
+
+/// Changes a number of four bytes in a buffer view.
+fn set_word(it: &mut Builder, view: usize, index: usize, word: u32) {
+    let offset = it.json["bufferViews"][view]["byteOffset"].as_u64().unwrap_or(0) as usize;
+    it.binary[offset + index * 4..][..4].copy_from_slice(&word.to_le_bytes());
+}
+
+fn set_float(it: &mut Builder, view: usize, index: usize, number: f32) {
+    set_word(it, view, index, number.to_bits());
+}
+
+/// Changes the first number of an accessor.
+fn set_first_float(it: &mut Builder, accessor: usize, number: f32) {
+    let view = it.json["accessors"][accessor]["bufferView"].as_u64().unwrap_or(0) as usize;
+    set_float(it, view, 0, number);
+}
+
+/// Changes a joint of the first vertex.
+fn set_joint(it: &mut Builder, index: usize, joint: u8) {
+    let view = it.json["accessors"][4]["bufferView"].as_u64().unwrap_or(0) as usize;
+    let offset = it.json["bufferViews"][view]["byteOffset"].as_u64().unwrap_or(0) as usize;
+    it.binary[offset + index] = joint;
+}
+
+fn named() -> Result<(), Failed> {
+    let mut problems = Vec::new();
+    for (number, (scene, change, expected)) in CHANGES.iter().enumerate() {
+        let mut builder = scene();
+        load_bytes("malformed", &builder.glb(), &MOVING)?;
+        change(&mut builder);
+        let path = folder("malformed").join("scene.glb");
+        fs::write(&path, builder.glb())?;
+        match load_file(&path, &MOVING).map_err(|error| error.to_string()) {
+            Err(error) if error.contains(expected) && error.starts_with(&path.display().to_string()) => {}
+            Err(error) => problems.push(format!("{number}: {error}, not {expected:?}")),
+            Ok(_) => problems.push(format!("{number}: it is loaded, but {expected:?}")),
+        }
+    }
+    expect(problems.is_empty(), || problems.join("\n"))
+}
+
+const MOVING: LoadOptions = LoadOptions { time: Some(0.5), ..AT_REST };
