@@ -27,6 +27,7 @@
 //!
 //! Where to begin:
 //!
+//! - `guide`, with the feature `wgpu`: from a plain wgpu renderer to Drawloom in seven steps, and what it is not for.
 //! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
@@ -93,6 +94,8 @@ pub mod backend;
 mod frame;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "wgpu")]
+pub mod guide;
 
 pub use backend::ViewQueue;
 pub use bytemuck;

@@ -147,7 +147,7 @@ pub const KNOBS: &[Knob] = &[
         ],
     },
     Knob {
-        name: "edges in point lights' maps",
+        name: "edges in paraboloid maps",
         explanation: "Error: straight edges of large triangles bend in a paraboloid. Cost: triangles that are subdivided until their edges \
             are seen under this angle.",
         settings: &[

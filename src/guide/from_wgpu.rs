@@ -1,0 +1,325 @@
+//! From a plain wgpu renderer to Drawloom, in seven steps.
+//!
+//! The renderer that we begin with is the usual one: a device, a window, and a loop that writes the transforms of all objects into a
+//! buffer, opens a render pass, and draws one object after the other. It spends its frame on one thread. Each step below compiles and
+//! runs by itself, and leaves the rest of the engine as it is.
+//!
+//! # 1. Give Drawloom the device
+//!
+//! The engine keeps its device and its queue: [`WgpuBackend`] gets handles to them, and uses them beside the engine. It requires the
+//! features [`WgpuBackend::REQUIRED_FEATURES`], and gains from [`WgpuBackend::optional_features`]. The [`Scheduler`] starts the threads.
+//! It runs the engine's own jobs too, so nobody starts a second set of threads that compete with these.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use drawloom::Renderer;
+//! use drawloom::backend::WgpuBackend;
+//! use drawloom::process::Deferred;
+//! use drawloom::task::Scheduler;
+//!
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! let backend = WgpuBackend::new(device.clone(), queue.clone())?;
+//! let (mut renderer, submitter) =
+//!     Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The renderer records, on all workers. The submitter submits, on one thread: it cannot be sent to another.
+//!
+//! # 2. Turn vertex buffers and bind groups into assets
+//!
+//! A mesh is vertices and indices; a material is what the shipped pipeline shades. Drawloom uploads them when a frame first draws them,
+//! and objects name them by handles of 8 bytes.
+//!
+//! ```
+//! use drawloom::glam::Vec3;
+//! use drawloom::scene::{Assets, Material, Mesh, Topology, Vertex};
+//!
+//! let mut assets = Assets::default();
+//! let corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+//! let vertices = corners.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0, 0.0] });
+//! let triangle = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2])?;
+//! let bounds = triangle.bounds();
+//! let triangle = assets.add(triangle)?;
+//! let red = Material { name: "red".into(), diffuse: Vec3::new(0.8, 0.1, 0.1), ..Material::default() };
+//! let red = assets.add(red)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Vertices that are in the engine's own buffers can stay there: see [`Mesh::from_buffers`]. Textures that are on the
+//! device, buffers and samplers go to shaders of the engine's own, as a [`ShaderResource`].
+//!
+//! # 3. Lend the objects
+//!
+//! The loop over objects goes. In its place the engine lends its arrays, one for each property, as a [`SceneRef`]: nothing is copied,
+//! and the loan ends when [`Renderer::record`] returns. A view, a draw list and a pass are made for each camera.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use drawloom::Renderer;
+//! # use drawloom::backend::WgpuBackend;
+//! # use drawloom::process::Deferred;
+//! # use drawloom::scene::{Assets, Material, Mesh, Topology, Vertex};
+//! # use drawloom::task::Scheduler;
+//! use drawloom::glam::{DVec3, Quat, Vec3};
+//! use drawloom::scene::{Camera, Changes, Light, SceneRef};
+//!
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! # let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
+//! # let mut assets = Assets::default();
+//! # let vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+//! # let triangle = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2])?;
+//! # let bounds = triangle.bounds();
+//! # let (triangle, red) = (assets.add(triangle)?, assets.add(Material::default())?);
+//! // Columns of the engine's world: a struct of arrays, or an archetype of its entity-component system.
+//! let positions: Vec<_> = (0..1_000).map(|index| DVec3::new(f64::from(index), 0.0, -10.0)).collect();
+//! let orientations = vec![Quat::IDENTITY; 1_000];
+//! let scales = vec![Vec3::ONE; 1_000];
+//! let (bounds, meshes, materials) = (vec![bounds; 1_000], vec![triangle; 1_000], vec![red; 1_000]);
+//! let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: false };
+//! let camera = Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO);
+//!
+//! let recorded = renderer.record(SceneRef {
+//!     positions: &positions,
+//!     orientations: &orientations,
+//!     scales: &scales,
+//!     bounds: &bounds,
+//!     meshes: &meshes,
+//!     materials: &materials,
+//!     layers: &[],
+//!     columns: &[],
+//!     changes: Changes::Unknown,
+//!     assets: &assets,
+//!     lights: &[sun],
+//!     cameras: &[camera],
+//!     ambient: Vec3::splat(0.1),
+//!     background: Vec3::ZERO,
+//! })?;
+//! println!("{} objects are visible", recorded.statistics().views[0].visible);
+//! let submitted = submitter.submit(recorded)?;
+//! assert!(submitted.submission.texture(0, "picture").is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! An engine that has no such arrays begins with [`Scene`], which owns them.
+//!
+//! # 4. Draw into the window
+//!
+//! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own:
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use drawloom::{Renderer, wgpu};
+//! # use drawloom::backend::WgpuBackend;
+//! # use drawloom::glam::DVec3;
+//! # use drawloom::process::Deferred;
+//! # use drawloom::scene::{Camera, Scene};
+//! # use drawloom::task::Scheduler;
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! # let backend = WgpuBackend::new(device.clone(), queue)?;
+//! # let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+//! # let mut world = Scene::new();
+//! # world.cameras.push(Camera { size: [320, 200], ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) });
+//! # let surface_texture = device.create_texture(&wgpu::TextureDescriptor {
+//! #     label: None, size: wgpu::Extent3d { width: 320, height: 200, depth_or_array_layers: 1 }, mip_level_count: 1, sample_count: 1,
+//! #     dimension: wgpu::TextureDimension::D2, format: wgpu::TextureFormat::Rgba8UnormSrgb,
+//! #     usage: wgpu::TextureUsages::RENDER_ATTACHMENT, view_formats: &[],
+//! # });
+//! // The texture of `surface.get_current_texture()`, which has the size of the camera named "main".
+//! renderer.backend().import_target("main", "picture", surface_texture.clone());
+//! let recorded = renderer.record(world.as_scene_ref())?;
+//! submitter.submit(recorded)?;
+//! // Then `queue.present(surface_texture)`.
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The last step of post-processing decides the picture's format: [`ToneMapping::format`]. `examples/window` has the whole of it:
+//! formats, resizes, several windows, lost surfaces.
+//!
+//! # 5. Bring the shaders
+//!
+//! A shader of the engine's becomes a [`RenderProcess`]: it declares what it reads and writes, and so where in the frame it is. A
+//! process over objects draws Drawloom's commands, culled, sorted and merged; one over the screen needs no geometry:
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use drawloom::Renderer;
+//! # use drawloom::backend::WgpuBackend;
+//! # use drawloom::glam::DVec3;
+//! # use drawloom::scene::{Camera, Scene};
+//! # use drawloom::task::Scheduler;
+//! use drawloom::process::{Declare, Deferred, Draws, FullScreen, Place, RenderProcess};
+//! use drawloom::scene::Blend;
+//!
+//! /// A glow at the horizon, added to what the lights leave.
+//! struct Horizon;
+//!
+//! impl RenderProcess for Horizon {
+//!     fn name(&self) -> &str {
+//!         "horizon"
+//!     }
+//!
+//!     fn declare(&self, declare: &mut Declare) {
+//!         declare.at(Place::AfterTransparency);
+//!         declare.draws_over("radiance");
+//!     }
+//!
+//!     fn draws(&self) -> Draws<'_> {
+//!         let shader = "
+//!             @fragment
+//!             fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+//!                 return vec4<f32>(vec3<f32>(0.4, 0.2, 0.1) * exp(-8.0 * abs(in.clip.y)), 0.0);
+//!             }
+//!         ";
+//!         Draws::FullScreen(FullScreen { shader, blend: Blend::Additive, ..FullScreen::default() })
+//!     }
+//! }
+//!
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! # let backend = WgpuBackend::new(device, queue)?;
+//! let (mut renderer, submitter) =
+//!     Renderer::builder(backend).deferred(Deferred::to_picture()).process(Horizon).build(scheduler)?;
+//! # let mut world = Scene::new();
+//! # world.cameras.push(Camera::looking_at("main", DVec3::Z, DVec3::ZERO));
+//! # submitter.submit(renderer.record(world.as_scene_ref())?)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `examples/own_content` has shaders that read data of objects, vertices and materials, move vertices, compute, and count.
+//!
+//! # 6. Keep a pass of your own
+//!
+//! What Drawloom has no words for, as a library that encodes its own passes, gets the encoder in a [`RawPass`], at its place in the
+//! frame, on a worker:
+//!
+//! ```
+//! # use std::error::Error;
+//! # use std::sync::Arc;
+//! # use drawloom::{Renderer, wgpu};
+//! # use drawloom::backend::WgpuBackend;
+//! # use drawloom::glam::DVec3;
+//! # use drawloom::scene::{Camera, Scene};
+//! # use drawloom::task::Scheduler;
+//! use drawloom::process::{Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess};
+//!
+//! /// Copies the picture into a texture of the engine's: a thumbnail of a saved game, for example.
+//! struct Thumbnail(wgpu::Texture);
+//!
+//! impl RenderProcess for Thumbnail {
+//!     fn name(&self) -> &str {
+//!         "thumbnail"
+//!     }
+//!
+//!     fn declare(&self, declare: &mut Declare) {
+//!         declare.reads("picture");
+//!         // Nothing in the frame reads what it writes.
+//!         declare.keep();
+//!     }
+//!
+//!     fn draws(&self) -> Draws<'_> {
+//!         Draws::Raw(self)
+//!     }
+//! }
+//!
+//! impl RawPass for Thumbnail {
+//!     fn encode(
+//!         &self,
+//!         encoder: &mut wgpu::CommandEncoder,
+//!         resources: &RawPassResources<'_>,
+//!     ) -> Result<(), Box<dyn Error + Send + Sync>> {
+//!         let picture = resources.target("picture").ok_or("there is no picture")?;
+//!         encoder.copy_texture_to_texture(picture.as_image_copy(), self.0.as_image_copy(), self.0.size());
+//!         Ok(())
+//!     }
+//! }
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! # let texture = device.create_texture(&wgpu::TextureDescriptor {
+//! #     label: None, size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 }, mip_level_count: 1, sample_count: 1,
+//! #     dimension: wgpu::TextureDimension::D2, format: wgpu::TextureFormat::Rgba8UnormSrgb,
+//! #     usage: wgpu::TextureUsages::COPY_DST, view_formats: &[],
+//! # });
+//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! # let backend = WgpuBackend::new(device, queue)?;
+//! # let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Thumbnail(texture)).build(scheduler)?;
+//! # let mut world = Scene::new();
+//! # world.cameras.push(Camera { size: [320, 200], ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) });
+//! # submitter.submit(renderer.record(world.as_scene_ref())?)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # 7. Overlap, and look
+//!
+//! The world is free from the end of `record` on. So the next update runs on the workers while this thread submits; and an engine that
+//! says what changed pays for that alone. The timeline shows whether it helps.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use drawloom::Renderer;
+//! # use drawloom::backend::WgpuBackend;
+//! # use drawloom::glam::{DVec3, Quat, Vec3};
+//! # use drawloom::process::Deferred;
+//! # use drawloom::scene::{Assets, Camera, Changes, Material, Mesh, SceneRef, Topology, Vertex};
+//! # use drawloom::task::Scheduler;
+//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
+//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! # let (mut renderer, submitter) =
+//! #     Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+//! # let mut assets = Assets::default();
+//! # let vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+//! # let triangle = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2])?;
+//! # let bounds = triangle.bounds();
+//! # let (triangle, red) = (assets.add(triangle)?, assets.add(Material::default())?);
+//! # let mut positions: Vec<_> = (0..1_000).map(|index| DVec3::new(f64::from(index), 0.0, -10.0)).collect();
+//! # let (orientations, scales) = (vec![Quat::IDENTITY; 1_000], vec![Vec3::ONE; 1_000]);
+//! # let (bounds, meshes, materials) = (vec![bounds; 1_000], vec![triangle; 1_000], vec![red; 1_000]);
+//! # let cameras = [Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO)];
+//! scheduler.timeline().start();
+//! for _frame in 0..10 {
+//!     let recorded = renderer.record(SceneRef {
+//!         positions: &positions,
+//!         // The first 100 objects move in every frame, and the others never.
+//!         changes: Changes::Ranges(&[0..100]),
+//!         // ... as in step 3.
+//! #         orientations: &orientations, scales: &scales, bounds: &bounds, meshes: &meshes, materials: &materials,
+//! #         layers: &[], columns: &[], assets: &assets, lights: &[], cameras: &cameras, ambient: Vec3::ONE, background: Vec3::ZERO,
+//!     })?;
+//!     let (mut updated, moving) = (Ok(()), &mut positions[..100]);
+//!     let submitted = scheduler.scope(|scope| {
+//!         scope.spawn(|_, _| {
+//!             updated = scheduler.parallel_for_each(moving.chunks_mut(25), |chunk, _| {
+//!                 chunk.iter_mut().for_each(|position| position.y += 0.01);
+//!             });
+//!         });
+//!         submitter.submit(recorded)
+//!     })?;
+//!     submitted?;
+//!     updated?;
+//! }
+//! let log = scheduler.timeline().take();
+//! for frame in &log.frames {
+//!     let work: std::time::Duration = log.runs_of(frame.number).map(|run| run.work()).sum();
+//!     println!("frame {}: {work:?} of work in {:?}", frame.number, frame.ended - frame.began);
+//! }
+//! # assert_eq!(log.frames.len(), 10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! To see it rather than read it, add the inspector, `drawloom-egui`, or write a page with `report::write_page` (feature `report`).
+//!
+//! [`Mesh::from_buffers`]: crate::scene::Mesh::from_buffers
+//! [`RawPass`]: crate::process::RawPass
+//! [`RenderProcess`]: crate::process::RenderProcess
+//! [`Renderer::record`]: crate::Renderer::record
+//! [`Scene`]: crate::scene::Scene
+//! [`SceneRef`]: crate::scene::SceneRef
+//! [`Scheduler`]: crate::task::Scheduler
+//! [`ShaderResource`]: crate::process::ShaderResource
+//! [`ToneMapping::format`]: crate::process::ToneMapping::format
+//! [`WgpuBackend`]: crate::backend::WgpuBackend
+//! [`WgpuBackend::REQUIRED_FEATURES`]: crate::backend::WgpuBackend::REQUIRED_FEATURES
+//! [`WgpuBackend::optional_features`]: crate::backend::WgpuBackend::optional_features

@@ -1,0 +1,19 @@
+//! What Drawloom is not for, and what it does not do.
+//!
+//! - **Frames that wait for the device.** Drawloom makes the CPU part of a frame fast. If the device is busy all the time, the CPU part
+//!   is not what takes long: the inspector shows short frames far apart. Choose a cheaper [`Quality`](crate::quality::Quality), or another
+//!   pipeline.
+//! - **Few draws.** Below some hundred objects a plain loop on one thread is as fast. Drawloom then runs on one thread too, and costs
+//!   about the same.
+//! - **Culling and draws by the device itself.** Visibility is found on the CPU, where its jobs are many and cheap. Engines with millions
+//!   of objects that never leave the device's memory want a renderer that culls there.
+//! - **The web.** Threads are needed, and wgpu's native backends: Vulkan, Metal and DX12.
+//! - **A game engine.** There is no window, input, sound, physics, asset pipeline or scene file of its own. `examples/` shows how such
+//!   parts are joined to it.
+//! - **Physically based materials out of the box.** The shipped materials are diffuse, emissive and textured. `examples/gltf` has
+//!   metallic and rough ones as an engine's own material type.
+//! - **Ray tracing, global illumination, streaming of meshes and textures.** An engine can add passes for the first two. Meshes and
+//!   textures are uploaded within the frame that first draws them, which takes long for many at once.
+//! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how many frames it keeps.
+//! - **Cameras that see what other cameras drew.** A shadow map is read by other views; reflections and portals must be drawn
+//!   by frames or passes of the engine's.
