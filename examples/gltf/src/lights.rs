@@ -63,3 +63,11 @@ pub(crate) fn default_light() -> Light {
     let direction = Vec3::new(-0.4, -0.7, -0.6).normalize();
     Light::Directional { direction, illuminance: Vec3::splat(3.0), casts_shadow: true }
 }
+
+/// Whether the light cast a shadow, which it no longer does.
+pub(crate) fn leave_out_shadow(light: &mut Light) -> bool {
+    match light {
+        Light::Directional { casts_shadow, .. } | Light::Spot { casts_shadow, .. } => std::mem::take(casts_shadow),
+        _ => false,
+    }
+}

@@ -1,6 +1,6 @@
 //! The shapes of deformed objects: a palette of joints, morph targets, and how much each of them counts.
 
-use drawloom::glam::{DAffine3, DMat3, DQuat, DVec3, Mat4, Quat, Vec3};
+use drawloom::glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use drawloom::scene::Bounds;
 
 use crate::attributes::Pose;
@@ -113,10 +113,7 @@ impl Poses {
             vertex_count: mesh.vertices().len() as u32,
         };
         self.morphs.extend(weights.iter().take(targets.reach.len()));
-        let matrices: Vec<_> = matrices
-            .iter()
-            .map(|matrix| Mat4::from_cols_array(&drawloom::glam::DMat4::from(*matrix).as_mat4().to_cols_array()))
-            .collect();
+        let matrices: Vec<_> = matrices.iter().map(|matrix| DMat4::from(*matrix).as_mat4()).collect();
         let reach: Vec3 = targets.reach.iter().zip(weights).map(|(reach, weight)| *reach * weight.abs()).sum();
         let whole = [(0, mesh.corners())].into();
         // A vertex is in the convex hull of where its joints bring it.

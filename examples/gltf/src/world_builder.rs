@@ -11,7 +11,7 @@ use crate::animations::target_count;
 use crate::attributes::{DEFORMED, Pose, RIGID};
 use crate::cameras::{framing_camera, read_camera};
 use crate::error::Problem;
-use crate::lights::{default_light, read_light};
+use crate::lights::{default_light, leave_out_shadow, read_light};
 use crate::loader::Parts;
 use crate::poses::Poses;
 use crate::surfaces::SurfaceKind;
@@ -120,6 +120,13 @@ impl<'a> WorldBuilder<'a> {
                 self.scene.lights.extend(read_light(node.index(), &light, world, self.warnings)?);
             }
         }
+        let mut shadows = 0;
+        for light in &mut self.scene.lights {
+            shadows += usize::from(light.casts_shadow());
+            if shadows > MAX_SHADOWS && leave_out_shadow(light) {
+                self.warnings.add(format!("only the first {MAX_SHADOWS} directional lights and cones cast shadows"));
+            }
+        }
         let has_lights = self.nodes().any(|node| node.light().is_some());
         if has_lights {
             self.scene.ambient = Vec3::splat(0.05);
@@ -209,6 +216,9 @@ impl<'a> WorldBuilder<'a> {
         }
     }
 }
+
+/// The greatest number of lights that cast shadows: each has a shadow map.
+const MAX_SHADOWS: usize = 8;
 
 /// The greatest number of objects.
 const MAX_OBJECTS: usize = 1 << 21;

@@ -76,6 +76,9 @@ fn alpha() -> Result<(), Failed> {
     expect(green > 150 && red < 80 && blue < 80, || format!("around the hole it is {:?}", [red, green, blue]))?;
     let [red, green, _] = drawn.at(center(1.0) + 0.05, 0.5);
     expect(red > 150 && green > 60 && green < wall[1] - 20, || format!("the glass is {red}, {green}"))?;
+    // The sun shines straight ahead, so in perspective the shadow on the wall is nearer to the middle than the square.
+    let shadow = drawn.at(0.388, 0.5);
+    expect(shadow.iter().all(|channel| *channel < 110), || format!("the shadow is {shadow:?}"))?;
     // A single-sided square is not seen from behind, and neither is its shadow.
     expect_color(&drawn, [center(2.0), 0.5], wall)
 }
@@ -103,13 +106,17 @@ fn lights_and_camera() -> Result<(), Failed> {
 
 fn defaults() -> Result<(), Failed> {
     let mut builder = Builder::new();
-    let material = builder.push("materials", json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 1, 0, 1]}}));
+    let material = builder
+        .push("materials", json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0.3, 0, 1], "metallicFactor": 0}}));
     let mesh = builder.mesh(&sphere(24, 16), Some(material));
     // Somewhere, and large.
     builder.root(json!({"mesh": mesh, "translation": [1e4, -3e3, 50], "scale": [400, 400, 400]}));
     let drawn = draw_builder("defaults", &builder, &AT_REST)?;
     let [red, green, _] = drawn.at(0.5, 0.5);
     expect(green > 60 && red < green / 2, || format!("the middle is {red}, {green}"))?;
+    // It shines from the upper right.
+    let [lit, dark] = [drawn.at(0.6, 0.3)[1], drawn.at(0.4, 0.75)[1]];
+    expect(lit > dark + 15, || format!("the upper right is {lit}, and the lower left {dark}"))?;
     // It fills most of the height, and nothing of it is cut off.
     let is_green = |y: f32| drawn.at(0.5, y)[1] > 60;
     expect(is_green(0.15) && is_green(0.85) && !is_green(0.01) && !is_green(0.99), || "it is not framed".to_owned())

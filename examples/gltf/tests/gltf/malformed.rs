@@ -49,7 +49,7 @@ fn containers() -> Result<(), Failed> {
 }
 
 fn warnings() -> Result<(), Failed> {
-    let changes: [(Change, &str); 6] = [
+    let changes: [(Change, &str); 7] = [
         (
             |it| it.json["extensionsUsed"] = json!(["KHR_materials_sheen"]),
             "the extension KHR_materials_sheen is ignored",
@@ -68,6 +68,7 @@ fn warnings() -> Result<(), Failed> {
             "material 0 uses texture coordinates 3",
         ),
         (|it| it.json["scenes"][0]["nodes"] = json!([]), "the scene has nothing to draw"),
+        (|it| (0..8).for_each(|_| it.sun(1.0)), "only the first 8 directional lights and cones cast shadows"),
     ];
     for (change, expected) in changes {
         let mut builder = textured_square();

@@ -4,7 +4,7 @@ use libtest_mimic::Failed;
 
 use crate::fixture::{AT_REST, Drawn, draw_builder, expect};
 use crate::generate::builder::Builder;
-use crate::generate::deforming::{bending_tube, interpolations, morphing_sphere};
+use crate::generate::deforming::{bending_tube, interpolations, mirrored_tube, morphing_sphere};
 use crate::generate::static_scenes::hierarchy;
 use gltf_scene::LoadOptions;
 
@@ -16,7 +16,8 @@ pub const CASES: &[crate::Case] = &[
 ];
 
 fn joints() -> Result<(), Failed> {
-    moves_as("joints", bending_tube, &[0.0, 0.8, 1.5, 9.0])
+    moves_as("joints", bending_tube, &[0.0, 0.8, 1.5, 9.0])?;
+    moves_as("mirrored joints", mirrored_tube, &[0.0, 1.5])
 }
 
 fn morph_targets() -> Result<(), Failed> {

@@ -5,7 +5,7 @@ use std::fs;
 use libtest_mimic::Failed;
 use serde_json::json;
 
-use crate::fixture::{AT_REST, Drawn, draw_world, expect, folder, load_file};
+use crate::fixture::{AT_REST, Drawn, draw_world, expect, expect_color, folder, load_file};
 use crate::generate::builder::png;
 use crate::generate::static_scenes::{four_colors, textured_square};
 
@@ -36,7 +36,28 @@ fn files_and_uris() -> Result<(), Failed> {
 
     let encoded: String = builder.binary.iter().map(|byte| format!("%{byte:02x}")).collect();
     let in_uri = draw("uri.gltf", &builder.gltf(&format!("data:application/octet-stream,{encoded}")))?;
-    expect(in_uri.difference(&expected) == 0, || "a data URI makes another picture".to_owned())
+    expect(in_uri.difference(&expected) == 0, || "a data URI makes another picture".to_owned())?;
+    let encoded = format!("data:application/octet-stream;base64,{}", base64(&builder.binary));
+    let in_base64 = draw("base64.gltf", &builder.gltf(&encoded))?;
+    expect(in_base64.difference(&expected) == 0, || "base64 makes another picture".to_owned())?;
+
+    let rgb = image::DynamicImage::from(four_colors(64)).into_rgb8();
+    rgb.save_with_format(folder.join("colors.jpg"), image::ImageFormat::Jpeg)?;
+    beside.json["images"] = json!([{"uri": "./colors.jpg"}]);
+    let jpeg = draw("jpeg.gltf", &beside.gltf("parts%20and%20more/buffer.bin"))?;
+    expect_color(&jpeg, [0.42, 0.35], expected.at(0.42, 0.35))?;
+    expect_color(&jpeg, [0.58, 0.65], expected.at(0.58, 0.65))
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digits = |chunk: &[u8]| {
+        let byte = |index: usize| u32::from(chunk.get(index).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        let digit = |index: usize| char::from(DIGITS[(bits >> (18 - 6 * index) & 63) as usize]);
+        (0..4).map(|index| if index <= chunk.len() { digit(index) } else { '=' }).collect::<String>()
+    };
+    bytes.chunks(3).map(digits).collect()
 }
 
 fn compact() -> Result<(), Failed> {

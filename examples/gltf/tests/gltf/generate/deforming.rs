@@ -14,8 +14,9 @@ fn turn(joint: usize, time: f64) -> f64 {
 }
 
 /// A node that the tube's joints are below: turned, scaled and moved.
-fn armature() -> Value {
-    json!({"translation": [0.3, -1.6, 0.2], "rotation": [0.0, 0.3826834323650898, 0.0, 0.9238795325112867], "scale": [1.0, 1.1, 0.8]})
+fn armature(is_mirrored: bool) -> Value {
+    let x = if is_mirrored { -1.0 } else { 1.0 };
+    json!({"translation": [0.3, -1.6, 0.2], "rotation": [0.0, 0.3826834323650898, 0.0, 0.9238795325112867], "scale": [x, 1.1, 0.8]})
 }
 
 /// How much each of two joints moves a point at a height.
@@ -27,12 +28,21 @@ fn joint_weights(height: f32) -> [(usize, f32); 2] {
 
 /// A tube that three joints bend within two seconds. `time` is that of the vertices; `None` for joints and an animation.
 pub fn bending_tube(time: Option<f64>) -> Builder {
+    tube_scene(time, false)
+}
+
+/// The same below a node that mirrors it.
+pub fn mirrored_tube(time: Option<f64>) -> Builder {
+    tube_scene(time, true)
+}
+
+fn tube_scene(time: Option<f64>, is_mirrored: bool) -> Builder {
     let mut builder = Builder::new();
     let shape = tube(0.4, 3.0, 24, 30);
     let material = clay(&mut builder);
     match time {
         Some(time) => {
-            let mut world = matrix_of(&armature());
+            let mut world = matrix_of(&armature(is_mirrored));
             let mut joints = Vec::new();
             for joint in 0..3 {
                 let turned = json!({"translation": [0.0, if joint == 0 { 0.0 } else { 1.0 }, 0.0], "rotation": around_z(turn(joint, time))});
@@ -49,14 +59,14 @@ pub fn bending_tube(time: Option<f64>) -> Builder {
             };
             add_flat(&mut builder, &shape, &shape.positions.iter().map(blended).collect::<Vec<_>>(), material);
         }
-        None => add_skinned(&mut builder, &shape, material),
+        None => add_skinned(&mut builder, &shape, material, is_mirrored),
     }
     builder.camera_at([0.0, 0.0, 6.0]);
     builder.slanted_sun();
     builder
 }
 
-fn add_skinned(builder: &mut Builder, shape: &Shape, material: usize) {
+fn add_skinned(builder: &mut Builder, shape: &Shape, material: usize, is_mirrored: bool) {
     let mut primitive = builder.primitive(shape, Some(material));
     let used: Vec<_> = shape.positions.iter().map(|position| joint_weights(position[1])).collect();
     let joints: Vec<_> = used.iter().map(|[one, other]| [one.0 as u8, other.0 as u8, 0, 0]).collect();
@@ -68,7 +78,7 @@ fn add_skinned(builder: &mut Builder, shape: &Shape, material: usize) {
     let last = builder.push("nodes", json!({"translation": [0, 1, 0], "name": "last"}));
     let middle = builder.push("nodes", json!({"translation": [0, 1, 0], "children": [last]}));
     let first = builder.push("nodes", json!({"children": [middle]}));
-    let mut root = armature();
+    let mut root = armature(is_mirrored);
     root["children"] = json!([first]);
     builder.root(root);
     let binds = (0..3).map(|joint| {
