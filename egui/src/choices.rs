@@ -1,13 +1,14 @@
 //! What was chosen by measurement, and why.
 
-use drawloom::FrameStatistics;
 use drawloom::timeline::{Labels, TuningAlternative};
 use egui::{Grid, RichText, Ui};
 
+use crate::frame_history::FrameRecord;
+
 /// Shows the choices of a frame.
-pub fn show(ui: &mut Ui, statistics: Option<&FrameStatistics>) {
-    let Some(statistics) = statistics else {
-        ui.weak("No frame yet.");
+pub fn show(ui: &mut Ui, record: Option<&FrameRecord>) {
+    let Some(statistics) = record.and_then(|record| record.statistics.as_ref()) else {
+        ui.weak("No statistics of this frame.");
         return;
     };
     let tuning = &statistics.tuning;
@@ -23,7 +24,7 @@ pub fn show(ui: &mut Ui, statistics: Option<&FrameStatistics>) {
             ui.label(if choice.is_trial { text.italics() } else { text }).on_hover_text(if choice.is_trial {
                 "A trial: this frame has it only to measure it."
             } else {
-                "The least cost of those measured."
+                "Chosen by measured cost; a little less is no reason for a change."
             });
             let others = choice.alternatives.iter().enumerate().filter(|&(index, _)| index != choice.chosen);
             let others: Vec<_> = others.map(|(_, other)| cost(other, unit)).collect();
@@ -69,5 +70,9 @@ fn cost(alternative: &TuningAlternative, unit: &str) -> String {
 }
 
 fn nanoseconds(time: f32) -> String {
-    if time < 1e3 { format!("{time:.1} ns") } else { format!("{:.1} µs", time / 1e3) }
+    match time {
+        ..1e3 => format!("{time:.1} ns"),
+        ..1e6 => format!("{:.1} µs", time / 1e3),
+        _ => format!("{:.1} ms", time / 1e6),
+    }
 }

@@ -10,7 +10,7 @@ pub fn group_color(name: &str) -> Color32 {
     let mut hasher = DefaultHasher::new();
     name.hash(&mut hasher);
     let hash = hasher.finish();
-    // Two more bits than hues alone, as close hues look the same.
+    // In three shades, because close hues look the same.
     let (hue, shade) = ((hash % 360) as f32 / 360.0, (hash >> 32) % 3);
     Hsva::new(hue, 0.45 + 0.1 * shade as f32, 0.85 - 0.1 * shade as f32, 1.0).into()
 }

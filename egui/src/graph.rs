@@ -1,6 +1,7 @@
 //! The graph of a frame's stages.
 
 use std::collections::HashMap;
+use std::mem;
 use std::time::Duration;
 
 use drawloom::timeline::{Chunk, Graph, NodeInfo, Run};
@@ -27,7 +28,7 @@ impl Default for GraphView {
 impl GraphView {
     /// Shows the graph of a frame.
     pub fn show(&mut self, ui: &mut Ui, record: Option<&FrameRecord>) {
-        let Some(run) = record.and_then(FrameRecord::main_run) else {
+        let Some(run) = record.and_then(FrameRecord::stage_run) else {
             ui.weak("No frame yet.");
             return;
         };
@@ -95,13 +96,16 @@ fn layout(graph: &Graph, is_shown: impl Fn(usize) -> bool) -> HashMap<usize, [us
 
 /// What a node depends on, through nodes that are not shown too.
 fn shown_dependencies(graph: &Graph, cells: &HashMap<usize, [usize; 2]>, node: usize) -> Vec<usize> {
-    let mut found = Vec::new();
+    let (mut found, mut is_seen) = (Vec::new(), vec![false; graph.nodes.len()]);
     let mut open = graph.nodes[node].dependencies.clone();
     while let Some(dependency) = open.pop() {
-        if !cells.contains_key(&dependency) {
-            open.extend(&graph.nodes[dependency].dependencies);
-        } else if !found.contains(&dependency) {
+        if mem::replace(&mut is_seen[dependency], true) {
+            continue;
+        }
+        if cells.contains_key(&dependency) {
             found.push(dependency);
+        } else {
+            open.extend(&graph.nodes[dependency].dependencies);
         }
     }
     found

@@ -15,7 +15,8 @@ use crate::warnings::WarningList;
 /// A window that shows the frames of a [`Renderer`] as they are drawn, and changes its quality.
 ///
 /// While it is open, it records the scheduler's [timeline](drawloom::timeline), and takes out the
-/// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took.
+/// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took. An inspector belongs to
+/// one renderer. [Close](Self::close) it before it is dropped: a measurement that is not ended leaves its quality behind.
 pub struct Inspector {
     is_open: bool,
     /// Whether the inspector switched the timeline on, and so switches it off.
@@ -102,13 +103,20 @@ impl Inspector {
             self.started_timeline = true;
         }
         self.history.add_log(timeline.take());
-        self.history.add_statistics(recorded.frame_number(), recorded.statistics());
+        if let Some(number) = recorded.frame_number() {
+            self.history.add_statistics(number, recorded.statistics());
+        }
         self.warnings.add_frame(recorded.statistics());
         self.quality.add_frame(recorded.statistics());
     }
 
     /// Shows the window, if it is open. Call it once a frame. A quality that is chosen in it holds from the next frame on.
     pub fn show<B: Backend>(&mut self, context: &Context, renderer: &mut Renderer<B>) {
+        if !self.is_open {
+            return;
+        }
+        // A window that is collapsed does not show what is in it, and a measurement goes on.
+        self.update(context, renderer);
         let mut is_open = self.is_open;
         let window = Window::new("Drawloom").open(&mut is_open).default_size([760.0, 400.0]);
         window.show(context, |ui| self.show_in(ui, renderer));
@@ -119,8 +127,7 @@ impl Inspector {
 
     /// Shows what the window contains in an area of the engine's own.
     pub fn show_in<B: Backend>(&mut self, ui: &mut Ui, renderer: &mut Renderer<B>) {
-        // A measurement goes on while another tab is open.
-        self.quality.update(renderer);
+        self.update(ui.ctx(), renderer);
         ui.horizontal(|ui| {
             for (tab, name) in Tab::ALL {
                 let count = if tab == Tab::Warnings { self.warnings.len() } else { 0 };
@@ -133,10 +140,18 @@ impl Inspector {
         match self.tab {
             Tab::Timeline => self.timeline.show(ui, &mut self.history),
             Tab::Graph => self.graph.show(ui, self.history.shown()),
-            Tab::Choices => _ = scroll.show(ui, |ui| choices::show(ui, self.history.latest_statistics())),
+            Tab::Choices => _ = scroll.show(ui, |ui| choices::show(ui, self.history.shown())),
             Tab::Quality => _ = scroll.show(ui, |ui| self.quality.show(ui, renderer)),
             Tab::Views => _ = scroll.show(ui, |ui| views::show(ui, &self.history)),
             Tab::Warnings => _ = scroll.show(ui, |ui| self.warnings.show(ui)),
+        }
+    }
+
+    /// Sets the quality that a running measurement needs for the next frame.
+    fn update<B: Backend>(&mut self, context: &Context, renderer: &mut Renderer<B>) {
+        self.quality.update(renderer);
+        if self.quality.is_measuring() {
+            context.request_repaint();
         }
     }
 }

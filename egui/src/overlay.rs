@@ -17,8 +17,8 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// An overlay for a window, which it draws as textures of this format. egui's colours are meant for a format without sRGB: with
-    /// one, its shades look slightly different.
+    /// An overlay for a window, drawn into views of this format. egui's colours are meant for a format without sRGB: with sRGB, its
+    /// shades look slightly different.
     pub fn new(window: &Window, device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let side = device.limits().max_texture_dimension_2d as usize;
         let scale_factor = window.scale_factor() as f32;

@@ -7,7 +7,7 @@ use crate::frame_history::FrameHistory;
 const COLUMNS: [(&str, &str); 9] = [
     ("view", "The camera's name."),
     ("kind", "What the view is for."),
-    ("thread time", "The time of all workers in its stages, in the frame that the timeline shows."),
+    ("thread time", "The time of all workers in its stages, and in those of other views of its name."),
     ("visible", "Objects that it sees."),
     ("occluded", "Objects in its frustum that others hide."),
     ("lights", "Lights that reach it."),
@@ -18,10 +18,9 @@ const COLUMNS: [(&str, &str); 9] = [
 
 /// Shows the views of the shown frame.
 pub fn show(ui: &mut Ui, history: &FrameHistory) {
-    let shown = history.shown();
-    let statistics = shown.and_then(|shown| shown.statistics.as_ref()).or(history.latest_statistics());
-    let Some(statistics) = statistics else {
-        ui.weak("No frame yet.");
+    let shown = history.shown().and_then(|shown| Some((shown, shown.statistics.as_ref()?)));
+    let Some((record, statistics)) = shown else {
+        ui.weak("No statistics of this frame.");
         return;
     };
     Grid::new("views").striped(true).num_columns(COLUMNS.len()).show(ui, |ui| {
@@ -31,9 +30,8 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
         ui.end_row();
         for view in &statistics.views {
             ui.label(&view.name);
-            ui.label(format!("{:?}", view.kind).to_lowercase());
-            let time = shown.map(|shown| shown.view_time(&view.name));
-            ui.label(time.map_or_else(String::new, |time| format!("{:.0} µs", time.as_secs_f64() * 1e6)));
+            ui.label(view.kind.name());
+            ui.label(format!("{:.0} µs", record.view_time(&view.name).as_secs_f64() * 1e6));
             for count in [view.visible, view.occluded, view.lights, view.commands, view.batches, view.bundles] {
                 ui.label(count.to_string());
             }
@@ -42,7 +40,7 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
     });
     ui.add_space(8.0);
     ui.label(format!(
-        "{} objects, {} lights, {} bytes uploaded",
+        "objects: {}, lights: {}, bytes uploaded: {}",
         statistics.objects, statistics.lights, statistics.uploaded
     ));
     let stages = &statistics.stages;

@@ -50,7 +50,7 @@ impl WarningList {
             for Entry { rejection, frame } in &self.entries {
                 ui.label(rejection.reason.name());
                 ui.label(rejection.count.to_string());
-                ui.label(format!("number {}", rejection.first));
+                ui.label(format!("index {}", rejection.first));
                 ui.label(match self.frames - frame {
                     0 => "in the latest frame".to_owned(),
                     ago => format!("{ago} frames ago"),

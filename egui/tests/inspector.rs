@@ -25,6 +25,10 @@ struct Engine {
 
 impl Engine {
     fn new() -> Self {
+        Self::with_quality(Some(Quality::balanced()))
+    }
+
+    fn with_quality(quality: Option<Quality>) -> Self {
         let mut scene = Scene::new();
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let vertices = corners.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
@@ -37,7 +41,12 @@ impl Engine {
         scene.cameras.push(Camera::looking_at("left eye", DVec3::ZERO, DVec3::NEG_Z));
         scene.lights.push(Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true });
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let (renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::new()).build(scheduler).unwrap();
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::new());
+        let builder = match quality {
+            Some(quality) => builder.quality(quality),
+            None => builder,
+        };
+        let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { scene, renderer, submitter, inspector: Inspector::default() }
     }
 
@@ -106,7 +115,7 @@ fn views_are_listed_with_what_they_see() {
     click(&mut harness, "Views");
     assert_shown(
         &harness,
-        &["left eye", "main", "shadow of light 0", "shadow", "5", "5 objects, 1 lights, 0 bytes uploaded"],
+        &["left eye", "main", "shadow of light 0", "shadow", "5", "objects: 5, lights: 1, bytes uploaded: 0"],
     );
 }
 
@@ -130,6 +139,31 @@ fn a_value_changes_one_setting_and_one_that_does_not_fit_cannot_be_chosen() {
     assert_eq!(*harness.state().renderer.quality(), expected);
     choose(&mut harness, 2, "none");
     assert_eq!(*harness.state().renderer.quality(), expected);
+}
+
+#[test]
+fn a_pipeline_with_settings_of_its_own_keeps_them_until_one_is_chosen() {
+    let mut harness = harness(Engine::with_quality(None));
+    click(&mut harness, "Quality");
+    assert!(harness.query_by_label("Measure all prices").is_none());
+    assert!(!harness.state().renderer.pipeline_has_quality());
+    click(&mut harness, "balanced");
+    assert!(harness.state().renderer.pipeline_has_quality());
+    assert!(harness.query_by_label("Measure all prices").is_some());
+}
+
+#[test]
+fn a_measurement_goes_on_while_the_window_is_collapsed() {
+    let mut harness = harness(Engine::new());
+    click(&mut harness, "Quality");
+    harness.get_all_by_label("Measure").nth(7).unwrap().click();
+    harness.run_steps(2);
+    click(&mut harness, "Hide");
+    assert!(harness.query_by_label("Stop").is_none(), "it is not collapsed");
+    harness.run_steps(400);
+    click(&mut harness, "Show");
+    let is_price = |text: &String| text.starts_with("on ") && text.ends_with(" ms");
+    assert!(texts(&harness).iter().any(is_price));
 }
 
 /// Chooses a value of the `index`-th setting.
@@ -201,9 +235,12 @@ fn what_is_not_drawn_is_a_warning() {
     engine.scene.lights.push(Light::Point { position: DVec3::ZERO, intensity: Vec3::NAN, range: 1.0 });
     let mut harness = harness(engine);
     click(&mut harness, "Warnings (1)");
-    assert_shown(&harness, &["number 1", "in the latest frame"]);
+    assert_shown(&harness, &["index 1", "in the latest frame"]);
+    harness.state_mut().scene.lights.pop();
+    harness.run_steps(3);
+    assert_shown(&harness, &["Warnings (1)", "3 frames ago"]);
     click(&mut harness, "Clear");
-    assert!(harness.query_by_label_contains("Warnings (1)").is_some(), "the next frame has it again");
+    assert_shown(&harness, &["Warnings", "Everything was drawn as requested."]);
 }
 
 #[test]

@@ -271,6 +271,12 @@ impl<B: Backend> Renderer<B> {
         &self.quality
     }
 
+    /// Whether the deferred pipeline has the settings of the [quality](Self::quality): false until a quality is set, and after
+    /// [`set_deferred`](Self::set_deferred).
+    pub fn pipeline_has_quality(&self) -> bool {
+        self.pipeline_has_quality
+    }
+
     /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed. `None` where the
     /// process draws no commands in that view, or its picture was cached.
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {

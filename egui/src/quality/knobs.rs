@@ -11,8 +11,8 @@ pub struct Knob {
     pub name: &'static str,
     /// Its error and its cost.
     pub explanation: &'static str,
-    /// The names of its values, and what sets them.
-    pub settings: &'static [(&'static str, SetValue)],
+    /// Its values: their names, and what sets them.
+    pub values: &'static [(&'static str, SetValue)],
 }
 
 type SetValue = fn(&mut Quality);
@@ -20,10 +20,10 @@ type SetValue = fn(&mut Quality);
 impl Knob {
     /// The index of the value that a quality has; `None` if it has another one.
     pub fn chosen(&self, quality: &Quality) -> Option<usize> {
-        self.settings.iter().position(|(_, apply)| {
-            let mut with_setting = *quality;
-            apply(&mut with_setting);
-            with_setting == *quality
+        self.values.iter().position(|(_, apply)| {
+            let mut changed_quality = *quality;
+            apply(&mut changed_quality);
+            changed_quality == *quality
         })
     }
 }
@@ -38,7 +38,7 @@ pub const KNOBS: &[Knob] = &[
         name: "order of opaque objects",
         explanation: "Error: objects drawn back to front cost overdraw; the picture does not change. Cost: with bits, every visible \
             object is a command, and commands are sorted anew when something moves.",
-        settings: &[
+        values: &[
             ("unordered", |quality| quality.opaque_order = DepthKey::UNORDERED),
             ("10 bits", |quality| quality.opaque_order = logarithmic(10)),
             ("20 bits", |quality| quality.opaque_order = logarithmic(20)),
@@ -47,7 +47,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "order of blended objects",
         explanation: "Error: pairs drawn in the wrong order, which is visible. Cost: a pass of the radix sort for some nine bits.",
-        settings: &[
+        values: &[
             ("9 bits", |quality| quality.blended_order = logarithmic(9)),
             ("18 bits", |quality| quality.blended_order = logarithmic(18)),
             ("exact", |quality| quality.blended_order = DepthKey::EXACT),
@@ -56,7 +56,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "culling volume",
         explanation: "Error: invisible objects that are drawn. Cost: the test of each object in each view.",
-        settings: &[
+        values: &[
             ("none", |quality| quality.culling = CullingVolume::None),
             ("sphere", |quality| quality.culling = CullingVolume::Sphere),
             ("box", |quality| quality.culling = CullingVolume::Box),
@@ -66,7 +66,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "occlusion culling",
         explanation: "Error: hidden objects that are drawn. Cost: a coarse depth buffer for each view, of tiles of this size.",
-        settings: &[
+        values: &[
             ("off", |quality| quality.occlusion = None),
             ("16 pixels", |quality| quality.occlusion = Some(16)),
             ("8 pixels", |quality| quality.occlusion = Some(8)),
@@ -78,7 +78,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "normals",
         explanation: "Error: degrees. Cost: bytes a pixel of the geometry buffer, read for every light that reaches the pixel.",
-        settings: &[
+        values: &[
             ("octahedral, 8 bits", |quality| quality.normals = NormalFormat::Octahedral8),
             ("octahedral, 10 bits", |quality| quality.normals = NormalFormat::Octahedral10),
             ("octahedral, 16 bits", |quality| quality.normals = NormalFormat::Octahedral16),
@@ -88,7 +88,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "diffuse colours",
         explanation: "Error: steps of the colour. Cost: 4 or 8 bytes a pixel of the geometry buffer.",
-        settings: &[
+        values: &[
             ("sRGB, 8 bits", |quality| quality.diffuse = DiffuseFormat::Srgb8),
             ("half floats", |quality| quality.diffuse = DiffuseFormat::HalfFloat),
         ],
@@ -96,7 +96,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "vertices",
         explanation: "Error: degrees of the normal, and texels. Cost: 20 or 32 bytes a vertex.",
-        settings: &[
+        values: &[
             ("packed", |quality| quality.vertices = VertexFormat::Packed),
             ("full", |quality| quality.vertices = VertexFormat::Full),
         ],
@@ -104,12 +104,12 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "depth pre-pass",
         explanation: "Error: none, but where surfaces coincide. Cost: all vertices twice; it saves the shading of hidden pixels.",
-        settings: &[("off", |quality| quality.depth_pre_pass = false), ("on", |quality| quality.depth_pre_pass = true)],
+        values: &[("off", |quality| quality.depth_pre_pass = false), ("on", |quality| quality.depth_pre_pass = true)],
     },
     Knob {
         name: "size of shadow maps",
         explanation: "Error: blocky edges of shadows. Cost: pixels, with its square.",
-        settings: &[
+        values: &[
             ("512", |quality| quality.shadows.side = 512),
             ("1024", |quality| quality.shadows.side = 1024),
             ("2048", |quality| quality.shadows.side = 2048),
@@ -119,7 +119,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "filter of shadows",
         explanation: "Error: hard, blocky edges. Cost: samples of the map for each pixel and light, with its square.",
-        settings: &[
+        values: &[
             ("none", |quality| quality.shadows.filter = 0),
             ("1 texel", |quality| quality.shadows.filter = 1),
             ("2 texels", |quality| quality.shadows.filter = 2),
@@ -129,7 +129,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "bias of shadows",
         explanation: "Error: too small, and surfaces shadow themselves; too large, and shadows leave their objects. No cost.",
-        settings: &[
+        values: &[
             ("0.5", |quality| quality.shadows.bias = 0.5),
             ("1", |quality| quality.shadows.bias = 1.0),
             ("2", |quality| quality.shadows.bias = 2.0),
@@ -139,7 +139,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "frames between shadow maps",
         explanation: "Error: shadows that lag behind. Cost: a map is drawn in one frame of so many.",
-        settings: &[
+        values: &[
             ("every frame", |quality| quality.shadows.interval = 1),
             ("every 2nd", |quality| quality.shadows.interval = 2),
             ("every 4th", |quality| quality.shadows.interval = 4),
@@ -150,7 +150,7 @@ pub const KNOBS: &[Knob] = &[
         name: "edges in paraboloid maps",
         explanation: "Error: straight edges of large triangles bend in a paraboloid. Cost: triangles that are subdivided until their edges \
             are seen under this angle.",
-        settings: &[
+        values: &[
             ("2°", |quality| quality.shadows.widest_edge = 2.0),
             ("5°", |quality| quality.shadows.widest_edge = 5.0),
             ("10°", |quality| quality.shadows.widest_edge = 10.0),
@@ -160,7 +160,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "cut-off of lights",
         explanation: "Error: each light differs by at most 1.089 times this illuminance. Cost: the pixels within the lights' reach.",
-        settings: &[
+        values: &[
             ("none", |quality| quality.light_cut_off = 0.0),
             ("1/255", |quality| quality.light_cut_off = 1.0 / 255.0),
             ("4/255", |quality| quality.light_cut_off = 4.0 / 255.0),
@@ -169,7 +169,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "tone curve",
         explanation: "Error: the picture's contrast. Cost: some operations a pixel.",
-        settings: &[
+        values: &[
             ("filmic", |quality| quality.tone_curve = ToneCurve::Filmic),
             ("clipped", |quality| quality.tone_curve = ToneCurve::Clipped),
         ],
@@ -177,7 +177,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "transforms",
         explanation: "Error: pixels, the farther the camera is from the world's origin. Cost: some integer operations a vertex.",
-        settings: &[
+        values: &[
             ("relative to the camera", |quality| quality.transforms = TransformPrecision::CameraRelative),
             ("absolute", |quality| quality.transforms = TransformPrecision::Absolute),
         ],
@@ -240,7 +240,7 @@ mod tests {
                 let after = fields(&quality);
                 (0..before.len()).filter(|&field| before[field] != after[field]).collect::<Vec<_>>()
             };
-            let changed: HashSet<usize> = knob.settings.iter().flat_map(|(_, apply)| changed_by(apply)).collect();
+            let changed: HashSet<usize> = knob.values.iter().flat_map(|(_, apply)| changed_by(apply)).collect();
             assert_eq!(changed.len(), 1, "{}", knob.name);
             assert!(changed_fields.is_disjoint(&changed), "{}", knob.name);
             changed_fields.extend(changed);
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn values_are_valid_and_presets_are_among_them() {
         for knob in KNOBS {
-            for (name, apply) in knob.settings {
+            for (name, apply) in knob.values {
                 let mut quality = Quality::balanced();
                 apply(&mut quality);
                 assert_eq!(quality.check(), Ok(()), "{}: {name}", knob.name);

@@ -10,12 +10,14 @@ use egui::{Button, ComboBox, Grid, ProgressBar, RichText, Ui};
 
 use crate::colors::ACCENT;
 use knobs::{KNOBS, Knob};
-use price::{Measurement, PriceList, Setting};
+use price::{KnobValue, Measurement, PriceList};
 
 /// Shows and changes the quality, and measures what its settings cost.
 #[derive(Debug, Default)]
 pub struct QualityPanel {
     prices: PriceList,
+    /// The quality that the prices were measured against.
+    prices_of: Option<Quality>,
     measurement: Option<Measurement>,
     /// Why the latest change was refused.
     error: Option<String>,
@@ -27,6 +29,11 @@ impl QualityPanel {
         if let Some(measurement) = &mut self.measurement {
             measurement.add_frame(statistics);
         }
+    }
+
+    /// Whether a measurement runs.
+    pub fn is_measuring(&self) -> bool {
+        self.measurement.is_some()
     }
 
     /// Sets the quality that a running measurement needs for the next frame.
@@ -52,18 +59,33 @@ impl QualityPanel {
     /// Shows the panel.
     pub fn show<B: Backend>(&mut self, ui: &mut Ui, renderer: &mut Renderer<B>) {
         let current = self.measurement.as_ref().map_or(*renderer.quality(), Measurement::baseline);
-        let mut chosen = current;
+        if self.prices_of != Some(current) {
+            self.prices.clear();
+            self.prices_of = Some(current);
+        }
+        let (mut chosen, mut is_preset) = (current, false);
         ui.horizontal(|ui| {
             ui.add_enabled_ui(self.measurement.is_none(), |ui| {
                 for (name, preset) in
                     [("fast", Quality::fast()), ("balanced", Quality::balanced()), ("exact", Quality::exact())]
                 {
-                    ui.selectable_value(&mut chosen, preset, name);
+                    is_preset |= ui.selectable_value(&mut chosen, preset, name).clicked();
                 }
             });
-            self.show_measurement(ui, renderer, current);
+            if renderer.pipeline_has_quality() {
+                self.show_measurement(ui, renderer, current);
+            }
         });
-        ui.weak("A price is what a frame takes longer, or shorter, than with the setting that is chosen: measured in turns, medians.");
+        if !renderer.pipeline_has_quality() {
+            ui.label(
+                RichText::new("The pipeline has settings of its own. What is chosen here replaces all of them.")
+                    .color(ACCENT),
+            );
+        }
+        ui.weak(
+            "A price is what a frame takes longer, or shorter, than with the chosen value. With vertical synchronisation, the \
+             time between frames does not tell.",
+        );
         if let Some(error) = &self.error {
             ui.label(RichText::new(error).color(ACCENT));
         }
@@ -73,12 +95,12 @@ impl QualityPanel {
                 .for_each(|name| _ = ui.weak(name));
             ui.end_row();
             for (index, knob) in KNOBS.iter().enumerate() {
-                self.show_knob(ui, index, knob, current, &mut chosen);
+                let can_measure = self.measurement.is_none() && renderer.pipeline_has_quality();
+                self.show_knob(ui, index, knob, can_measure, &mut chosen);
                 ui.end_row();
             }
         });
-        if chosen != current && self.measurement.is_none() {
-            self.prices.clear();
+        if (chosen != current || is_preset) && self.measurement.is_none() {
             self.set(renderer, chosen);
         }
     }
@@ -95,19 +117,20 @@ impl QualityPanel {
         }
     }
 
-    fn show_knob(&mut self, ui: &mut Ui, index: usize, knob: &Knob, current: Quality, chosen: &mut Quality) {
+    fn show_knob(&mut self, ui: &mut Ui, index: usize, knob: &Knob, can_measure: bool, chosen: &mut Quality) {
+        let current = *chosen;
         ui.label(knob.name).on_hover_text(knob.explanation);
-        let selected = knob.chosen(&current).map_or("another value", |setting| knob.settings[setting].0);
+        let selected = knob.chosen(&current).map_or("another value", |value| knob.values[value].0);
         ui.add_enabled_ui(self.measurement.is_none(), |ui| {
             ComboBox::from_id_salt(knob.name).selected_text(selected).show_ui(ui, |ui| {
-                for (name, apply) in knob.settings {
-                    let mut with_setting = *chosen;
-                    apply(&mut with_setting);
-                    let check = with_setting.check();
-                    let is_chosen = with_setting == *chosen;
+                for (name, apply) in knob.values {
+                    let mut changed = *chosen;
+                    apply(&mut changed);
+                    let check = changed.check();
+                    let is_chosen = changed == *chosen;
                     let response = ui.add_enabled(check.is_ok(), Button::selectable(is_chosen, *name));
                     if response.clicked() {
-                        *chosen = with_setting;
+                        *chosen = changed;
                     }
                     if let Err(error) = check {
                         response.on_disabled_hover_text(error.to_string());
@@ -115,11 +138,11 @@ impl QualityPanel {
                 }
             });
         });
-        if ui.add_enabled(self.measurement.is_none(), Button::new("Measure").small()).clicked() {
+        if ui.add_enabled(can_measure, Button::new("Measure").small()).clicked() {
             self.measurement = Some(Measurement::new(current, alternatives(index, current)));
         }
         let prices = alternatives(index, current)
-            .filter_map(|setting| Some(format!("{} {}", knob.settings[setting.index].0, self.prices.get(setting)?)));
+            .filter_map(|value| Some(format!("{} {}", knob.values[value.value].0, self.prices.get(value)?)));
         ui.label(prices.collect::<Vec<_>>().join("; "));
     }
 
@@ -128,10 +151,10 @@ impl QualityPanel {
     }
 }
 
-/// The settings of a knob that are not chosen.
-fn alternatives(knob: usize, current: Quality) -> impl Iterator<Item = Setting> {
+/// The values of a knob that are not chosen.
+fn alternatives(knob: usize, current: Quality) -> impl Iterator<Item = KnobValue> {
     let chosen = KNOBS[knob].chosen(&current);
-    (0..KNOBS[knob].settings.len())
-        .filter(move |index| Some(*index) != chosen)
-        .map(move |index| Setting { knob, index })
+    (0..KNOBS[knob].values.len())
+        .filter(move |value| Some(*value) != chosen)
+        .map(move |value| KnobValue { knob, value })
 }

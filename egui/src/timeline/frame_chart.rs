@@ -12,9 +12,7 @@ pub fn show(ui: &mut Ui, history: &mut FrameHistory) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), HEIGHT), Sense::click());
     let area = response.rect;
     painter.rect_filled(area, 2.0, ui.visuals().extreme_bg_color);
-    // The latest frame has not ended.
-    let frames = || history.frames().rev().skip(1);
-    let longest = frames().map(|frame| frame.duration()).max().unwrap_or_default().as_secs_f32();
+    let longest = history.ended().map(|frame| frame.duration()).max().unwrap_or_default().as_secs_f32();
     if longest == 0.0 {
         return;
     }
@@ -26,7 +24,7 @@ pub fn show(ui: &mut Ui, history: &mut FrameHistory) {
     let shown = history.shown().map(|shown| shown.number);
     let pointer = response.hover_pos();
     let mut pointed = None;
-    for (index, frame) in frames().enumerate() {
+    for (index, frame) in history.ended().enumerate() {
         let column = column(index);
         let is_pointed = pointer.is_some_and(|pointer| (column.left()..column.right()).contains(&pointer.x));
         if is_pointed {

@@ -30,7 +30,7 @@ impl Lanes {
     /// Shows the lanes. The wheel zooms, a drag moves, a double click shows the whole frame.
     pub fn show(&mut self, ui: &mut Ui, record: &FrameRecord) {
         let tracks = tracks(record);
-        let rows: usize = tracks.iter().map(|track| track.depth).sum();
+        let rows: usize = tracks.iter().map(|track| track.rows).sum();
         let gaps = 2.0 * tracks.len() as f32;
         let size = vec2(ui.available_width(), AXIS_HEIGHT + rows as f32 * ROW_HEIGHT + gaps);
         let (response, painter) = ui.allocate_painter(size, Sense::click_and_drag());
@@ -44,7 +44,7 @@ impl Lanes {
         let mut top = area.top() + AXIS_HEIGHT;
         let mut pointed = None;
         for track in &tracks {
-            let lane = Rect::from_x_y_ranges(area.x_range(), top..=top + track.depth as f32 * ROW_HEIGHT);
+            let lane = Rect::from_x_y_ranges(area.x_range(), top..=top + track.rows as f32 * ROW_HEIGHT);
             top = lane.bottom() + 2.0;
             draw_name(ui, &painter, track, lane);
             painter.rect_filled(lane, 0.0, ui.visuals().extreme_bg_color);
@@ -53,12 +53,12 @@ impl Lanes {
                 let rect = axis.rect(interval, lane.top());
                 draw_interval(&clipped, interval, rect);
                 if response.hover_pos().is_some_and(|pointer| rect.contains(pointer) && lane.contains(pointer)) {
-                    pointed = Some(interval.explanation.as_str());
+                    pointed = Some(interval);
                 }
             }
         }
-        if let Some(explanation) = pointed {
-            response.on_hover_text_at_pointer(explanation);
+        if let Some(interval) = pointed {
+            response.on_hover_text_at_pointer(interval.explanation());
         }
     }
 
@@ -101,11 +101,11 @@ impl TimeAxis {
         self.area.left() + (fraction * f64::from(self.area.width())) as f32
     }
 
-    fn rect(&self, interval: &Interval, top: f32) -> Rect {
+    fn rect(&self, interval: &Interval<'_>, top: f32) -> Rect {
         // An idle worker may have slept since long before.
         let since = |time: Duration| time.as_secs_f64() - self.began.as_secs_f64();
         let (left, right) = (self.x(since(interval.began)), self.x(since(interval.ended)));
-        let top = top + interval.depth as f32 * ROW_HEIGHT;
+        let top = top + interval.row as f32 * ROW_HEIGHT;
         let [left, right] = [left, right].map(|x| x.clamp(self.area.left() - 1.0, self.area.right() + 1.0));
         Rect::from_min_max(pos2(left, top), pos2(right.max(left + 0.5), top + ROW_HEIGHT - 1.0))
     }
@@ -132,22 +132,26 @@ fn tick_step(shortest: f64) -> f64 {
 }
 
 fn time_text(seconds: f64, step: f64) -> String {
-    if step < 1e-3 { format!("{:.0} µs", seconds * 1e6) } else { format!("{:.0} ms", seconds * 1e3) }
+    match step {
+        ..1e-6 => format!("{:.0} ns", seconds * 1e9),
+        ..1e-3 => format!("{:.0} µs", seconds * 1e6),
+        _ => format!("{:.0} ms", seconds * 1e3),
+    }
 }
 
-fn draw_name(ui: &Ui, painter: &Painter, track: &Track, lane: Rect) {
+fn draw_name(ui: &Ui, painter: &Painter, track: &Track<'_>, lane: Rect) {
     let position = pos2(lane.left() - NAME_WIDTH, lane.top() + ROW_HEIGHT / 2.0);
     let names = Rect::from_x_y_ranges(position.x..=lane.left() - 4.0, lane.y_range());
     let clipped = painter.with_clip_rect(names.intersect(painter.clip_rect()));
-    clipped.text(position, Align2::LEFT_CENTER, &track.name, FontId::proportional(12.0), ui.visuals().text_color());
+    clipped.text(position, Align2::LEFT_CENTER, track.name, FontId::proportional(12.0), ui.visuals().text_color());
 }
 
-fn draw_interval(painter: &Painter, interval: &Interval, rect: Rect) {
-    painter.rect_filled(rect, 0.0, interval.color);
-    if !interval.text.is_empty() && rect.width() > 24.0 {
+fn draw_interval(painter: &Painter, interval: &Interval<'_>, rect: Rect) {
+    painter.rect_filled(rect, 0.0, interval.color());
+    if !interval.text().is_empty() && rect.width() > 24.0 {
         let clipped = painter.with_clip_rect(rect.intersect(painter.clip_rect()));
         let position = pos2(rect.left() + 3.0, rect.center().y);
-        clipped.text(position, Align2::LEFT_CENTER, &interval.text, FontId::proportional(11.0), ON_GROUP);
+        clipped.text(position, Align2::LEFT_CENTER, interval.text(), FontId::proportional(11.0), ON_GROUP);
     }
 }
 

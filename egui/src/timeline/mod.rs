@@ -5,6 +5,7 @@ mod lanes;
 mod tracks;
 
 use drawloom::report::{FrameReport, SchedulerCosts};
+use egui::containers::scroll_area::ScrollSource;
 use egui::{RichText, ScrollArea, Ui};
 
 use crate::frame_history::{FrameHistory, FrameRecord};
@@ -45,12 +46,15 @@ impl TimelinePanel {
             let text = self.explain(record);
             self.report = Some((number, text));
         }
-        self.lanes.show(ui, record);
-        if let Some((frame, text)) = &self.report {
-            ui.separator();
-            ui.weak(format!("Report on frame {frame}"));
-            ScrollArea::both().id_salt("report").auto_shrink(false).show(ui, |ui| ui.monospace(text));
-        }
+        // The wheel zooms.
+        ScrollArea::vertical().scroll_source(ScrollSource::SCROLL_BAR).auto_shrink(false).show(ui, |ui| {
+            self.lanes.show(ui, record);
+            if let Some((frame, text)) = &self.report {
+                ui.separator();
+                ui.weak(format!("Report on frame {frame}"));
+                ui.monospace(text);
+            }
+        });
         // The frame that is reported on stays.
         history.select(if explains || !follows { Some(history.selected().unwrap_or(number)) } else { None });
     }

@@ -48,7 +48,7 @@ pub struct Wave {
 #[derive(Clone, Copy, Component)]
 pub struct Friend;
 
-/// The same.
+/// Nothing that is drawn either.
 #[derive(Clone, Copy, Component)]
 pub struct Foe {
     #[expect(dead_code, reason = "what an engine keeps beside what is drawn")]

@@ -4,7 +4,7 @@
 //!
 //! Where one archetype holds all entities, Drawloom reads its columns in place. Where several do, what changed is gathered:
 //! see `scene_columns.rs`. Entities that the system moves to other rows, as when one is despawned, are found by their
-//! numbers. Prints what each costs, in a frame of median length.
+//! numbers. Prints medians of what each costs.
 
 mod bevy_world;
 mod components;
@@ -80,9 +80,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     println!(
         "µs in a frame: update, replace, gather (or lend), record, submit; bytes copied; objects reported as changed"
     );
-    for population in Population::ALL {
-        let population = population.with_entities(options.entities);
-        for (name, replaced) in [("", 0), (", replaced", options.replaced)] {
+    for population in Population::all(options.entities) {
+        for (name, replaced) in [("", 0), (", replaced", options.replaced.min(options.entities))] {
             println!("{}{name}", population.name);
             let hecs = measure(&mut graphics, &mut HecsWorld::new(population), population, replaced, options.frames)?;
             println!("  hecs      {hecs}");

@@ -39,33 +39,18 @@ pub struct Looks {
 }
 
 impl Population {
-    pub const ALL: [Self; 3] = [
-        Self { name: "one archetype, all move", entities: 0, kinds: &[Kind::Moving] },
-        Self {
-            name: "three archetypes, all move",
-            entities: 0,
-            kinds: &[Kind::Moving, Kind::MovingFriend, Kind::MovingFoe],
-        },
-        Self {
-            name: "three archetypes, a tenth moves",
-            entities: 0,
-            kinds: &[
-                Kind::Moving,
-                Kind::Friend,
-                Kind::Foe,
-                Kind::Friend,
-                Kind::Foe,
-                Kind::Friend,
-                Kind::Foe,
-                Kind::Friend,
-                Kind::Foe,
-                Kind::Friend,
-            ],
-        },
-    ];
-
-    pub fn with_entities(self, entities: u32) -> Self {
-        Self { entities, ..self }
+    /// All populations, of so many entities.
+    pub fn all(entities: u32) -> [Self; 3] {
+        use Kind::{Foe, Friend, Moving, MovingFoe, MovingFriend};
+        let population = |name, kinds| Self { name, entities, kinds };
+        [
+            population("one archetype, all move", &[Moving]),
+            population("three archetypes, all move", &[Moving, MovingFriend, MovingFoe]),
+            population(
+                "three archetypes, a tenth moves",
+                &[Moving, Friend, Foe, Friend, Foe, Friend, Foe, Friend, Foe, Friend],
+            ),
+        ]
     }
 
     /// What the entity of a number is.
@@ -88,7 +73,7 @@ impl Population {
             Number(number),
             position,
             orientation,
-            Scale(Vec3::splat(0.3)),
+            Scale(Vec3::splat(0.25 + 0.05 * (number % 4) as f32)),
             Extent(looks.bounds),
             Shape(looks.mesh),
             Surface(looks.materials[(number % 3) as usize]),

@@ -77,31 +77,33 @@ impl SceneColumns {
         // An archetype that was lent before, or is new, has no copy yet.
         let is_copied = !gathers || self.gathered.positions.len() > first;
         let before = self.numbers.get(first..).unwrap_or_default();
-        let replaced: Vec<_> = if is_copied {
-            let pairs = archetype.numbers.iter().enumerate();
-            runs(pairs.filter(|&(row, number)| before.get(row) != Some(number)).map(|(row, _)| row)).collect()
-        } else {
-            iter::once(0..rows).collect()
-        };
-        let moved: Vec<_> = match &archetype.moved {
-            Moved::None => Vec::new(),
-            Moved::All => iter::once(0..rows).collect(),
-            Moved::Rows(rows) => runs(rows.iter().map(|&row| row as usize)).collect(),
+        let is_replaced = |row: &usize| !is_copied || before.get(*row) != Some(&archetype.numbers[*row]);
+        let replaced: Vec<_> = (0..rows).filter(is_replaced).collect();
+        let changed: Vec<_> = match &archetype.moved {
+            Moved::All => iter::once(0..rows).filter(|rows| !rows.is_empty()).collect(),
+            Moved::None => runs(&replaced).collect(),
+            Moved::Rows(moved) => {
+                let mut changed: Vec<_> =
+                    moved.iter().map(|&row| row as usize).chain(replaced.iter().copied()).collect();
+                changed.sort_unstable();
+                changed.dedup();
+                runs(&changed).collect()
+            }
         };
         self.numbers.resize(self.numbers.len().max(first + rows), 0);
-        for rows in &replaced {
+        for rows in runs(&replaced) {
             let objects = first + rows.start..first + rows.end;
             self.numbers[objects.clone()].copy_from_slice(&archetype.numbers[rows.clone()]);
             self.bytes_copied += size_of_val(&archetype.numbers[rows.clone()]);
             if gathers {
-                self.bytes_copied += self.gathered.copy_fixed(archetype, rows.clone(), objects);
+                self.bytes_copied += self.gathered.copy_fixed(archetype, rows, objects);
             }
         }
-        for rows in replaced.iter().chain(&moved) {
+        for rows in changed {
             let objects = first + rows.start..first + rows.end;
             self.changed.push(objects.start as u32..objects.end as u32);
             if gathers {
-                self.bytes_copied += self.gathered.copy_moving(archetype, rows.clone(), objects);
+                self.bytes_copied += self.gathered.copy_moving(archetype, rows, objects);
             }
         }
     }
@@ -150,14 +152,6 @@ fn copy<T: Copy>(column: &mut Vec<T>, values: &[T], first: usize) -> usize {
 }
 
 /// Ascending indices as ranges.
-fn runs(indices: impl Iterator<Item = usize>) -> impl Iterator<Item = Range<usize>> {
-    let mut indices = indices.peekable();
-    iter::from_fn(move || {
-        let start = indices.next()?;
-        let mut end = start + 1;
-        while indices.next_if_eq(&end).is_some() {
-            end += 1;
-        }
-        Some(start..end)
-    })
+fn runs(indices: &[usize]) -> impl Iterator<Item = Range<usize>> {
+    indices.chunk_by(|before, after| before + 1 == *after).map(|run| run[0]..run[run.len() - 1] + 1)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use drawloom::scene::Material;
+use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom_testing::adapter;
 
 use crate::bevy_world::BevyWorld;
@@ -17,7 +17,7 @@ const ENTITIES: u32 = 150;
 const STEP: f64 = 0.1;
 
 /// What an object looks like, and where it is, in bits.
-type ObjectBits = ([u64; 3], [u32; 4], usize);
+type ObjectBits = ([u64; 3], [u32; 4], u32, usize);
 
 fn noop_graphics() -> Graphics {
     let (device, queue) = adapter::noop_device().unwrap();
@@ -25,23 +25,20 @@ fn noop_graphics() -> Graphics {
 }
 
 fn in_scene(graphics: &Graphics, scene: LentScene<'_>) -> BTreeSet<ObjectBits> {
-    let objects = scene.positions.iter().zip(scene.orientations).zip(scene.materials);
-    objects.map(|((position, orientation), material)| bits(graphics, position, orientation, *material)).collect()
+    let object = |object: usize| {
+        let material = graphics.looks.materials.iter().position(|material| *material == scene.materials[object]);
+        bits(scene.positions[object], scene.orientations[object], scene.scales[object], material.unwrap())
+    };
+    (0..scene.positions.len()).map(object).collect()
 }
 
-fn bits(
-    graphics: &Graphics,
-    position: &drawloom::glam::DVec3,
-    orientation: &drawloom::glam::Quat,
-    material: drawloom::handle::Handle<Material>,
-) -> ObjectBits {
-    let material = graphics.looks.materials.iter().position(|candidate| *candidate == material).unwrap();
-    (position.to_array().map(f64::to_bits), orientation.to_array().map(f32::to_bits), material)
+fn bits(position: DVec3, orientation: Quat, scale: Vec3, material: usize) -> ObjectBits {
+    (position.to_array().map(f64::to_bits), orientation.to_array().map(f32::to_bits), scale.x.to_bits(), material)
 }
 
 /// Where the entity of a number is in a frame, if so many are replaced in each. Entities that stand still are where they were when
 /// they were spawned: in the frame after whose update that was.
-fn expected(graphics: &Graphics, population: Population, frame: u64, replaced: u64) -> BTreeSet<ObjectBits> {
+fn expected(population: Population, frame: u64, replaced: u64) -> BTreeSet<ObjectBits> {
     let oldest = (frame + 1) * replaced;
     let numbers = oldest..oldest + u64::from(population.entities);
     let object = |number: u64| {
@@ -49,7 +46,7 @@ fn expected(graphics: &Graphics, population: Population, frame: u64, replaced: u
         let moves = matches!(population.kind(number), Kind::Moving | Kind::MovingFriend | Kind::MovingFoe);
         let frame = if moves { frame } else { spawned_in };
         let (Position(position), Orientation(orientation)) = population.wave(number).pose(frame as f64 * STEP);
-        bits(graphics, &position, &orientation, graphics.looks.materials[(number % 3) as usize])
+        bits(position, orientation, Vec3::splat(0.25 + 0.05 * (number % 4) as f32), (number % 3) as usize)
     };
     numbers.map(object).collect()
 }
@@ -65,7 +62,9 @@ fn check(graphics: &mut Graphics, mut world: impl EngineWorld, population: Popul
         let lent = world.lend();
         let archetypes = lent.archetypes();
         let scene = columns.update(&archetypes);
-        assert_eq!(in_scene(graphics, scene), expected(graphics, population, frame, u64::from(replaced)));
+        assert_eq!(in_scene(graphics, scene), expected(population, frame, u64::from(replaced)));
+        let changed: Vec<_> = scene.changed.iter().cloned().flatten().collect();
+        assert!(changed.is_sorted_by(|before, after| before < after), "{changed:?}");
         // With debug assertions, the renderer refuses a frame with an object that changed and was not reported.
         graphics.draw(scene, false).unwrap();
         drop(archetypes);
@@ -86,7 +85,7 @@ fn check(graphics: &mut Graphics, mut world: impl EngineWorld, population: Popul
 #[test]
 fn scenes_are_what_the_population_describes() {
     let mut graphics = noop_graphics();
-    for population in Population::ALL.map(|population| population.with_entities(ENTITIES)) {
+    for population in Population::all(ENTITIES) {
         for replaced in [0, 1, 7, 150] {
             check(&mut graphics, HecsWorld::new(population), population, replaced);
             check(&mut graphics, BevyWorld::new(population), population, replaced);
@@ -97,16 +96,21 @@ fn scenes_are_what_the_population_describes() {
 #[test]
 fn archetypes_may_become_one_and_several_again() {
     let mut graphics = noop_graphics();
-    let [one, several, _] = Population::ALL.map(|population| population.with_entities(ENTITIES));
+    let [one, several, _] = Population::all(ENTITIES);
     let [mut first, mut second] = [one, several].map(HecsWorld::new);
     let mut columns = SceneColumns::default();
     first.spawn(ENTITIES, graphics.looks, 0.0);
     second.spawn(ENTITIES, graphics.looks, 0.0);
     for frame in 0..8 {
-        let lent = if frame % 2 == 0 { first.lend() } else { second.lend() };
+        let world = if frame % 2 == 0 { &mut first } else { &mut second };
+        let time = (frame / 2) as f64 * STEP;
+        world.update(&graphics.scheduler, time).unwrap();
+        world.despawn_oldest(1);
+        world.spawn(1, graphics.looks, time);
+        let lent = world.lend();
         let archetypes = lent.archetypes();
         let scene = columns.update(&archetypes);
-        assert_eq!(in_scene(&graphics, scene), expected(&graphics, one, 0, 0));
+        assert_eq!(in_scene(&graphics, scene), expected(one, frame / 2, 1));
         graphics.draw(scene, false).unwrap();
     }
 }

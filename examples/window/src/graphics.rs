@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{Deferred, Format, ToneMapping};
+use drawloom::quality::Quality;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
 use winit::event_loop::OwnedDisplayHandle;
@@ -62,6 +63,8 @@ impl Graphics {
         let tone_mapping = ToneMapping { format: picture_format, ..ToneMapping::new(1.2) };
         let (renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue.clone())?)
             .deferred(Deferred::new().post(tone_mapping))
+            // So that the inspector knows the pipeline's settings.
+            .quality(Quality::balanced())
             .build(Arc::clone(&scheduler))?;
         Ok((Self { instance, adapter, device, queue, scheduler, renderer, submitter, format }, surface))
     }
