@@ -3,7 +3,7 @@
 use std::mem;
 
 use drawloom::wgpu;
-use egui::{Context, ViewportId};
+use egui::{Context, Order, Pos2, ViewportId};
 use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use egui_winit::State;
 use winit::event::WindowEvent;
@@ -13,6 +13,8 @@ use winit::window::Window;
 pub struct Overlay {
     state: State,
     renderer: Renderer,
+    /// In points.
+    pointer: Pos2,
     format: wgpu::TextureFormat,
 }
 
@@ -24,7 +26,7 @@ impl Overlay {
         let scale_factor = window.scale_factor() as f32;
         let state =
             State::new(Context::default(), ViewportId::ROOT, window, Some(scale_factor), window.theme(), Some(side));
-        Self { state, renderer: Renderer::new(device, format, RendererOptions::default()), format }
+        Self { state, renderer: Renderer::new(device, format, RendererOptions::default()), pointer: Pos2::ZERO, format }
     }
 
     /// The context, for its style or fonts.
@@ -34,7 +36,17 @@ impl Overlay {
 
     /// Passes an event of the window on. Returns whether egui uses it, so that the engine must not.
     pub fn handle(&mut self, window: &Window, event: &WindowEvent) -> bool {
-        self.state.on_window_event(window, event).consumed
+        let is_consumed = self.state.on_window_event(window, event).consumed;
+        match event {
+            WindowEvent::CursorMoved { position, .. } => {
+                let points = position.to_logical::<f32>(f64::from(self.context().pixels_per_point()));
+                self.pointer = Pos2::new(points.x, points.y);
+                is_consumed
+            }
+            // egui knows where the pointer was in the latest frame, and it may have moved since.
+            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => is_consumed || self.covers_pointer(),
+            _ => is_consumed,
+        }
     }
 
     /// Runs the user interface `run`, and draws it over a picture in the window's texture, which the queue draws before.
@@ -76,5 +88,9 @@ impl Overlay {
         commands.push(encoder.finish());
         queue.submit(commands);
         mem::take(&mut output.textures_delta.free).iter().for_each(|id| self.renderer.free_texture(id));
+    }
+
+    fn covers_pointer(&self) -> bool {
+        self.context().layer_id_at(self.pointer).is_some_and(|layer| layer.order != Order::Background)
     }
 }

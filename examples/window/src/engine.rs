@@ -14,14 +14,15 @@ use drawloom::{Recorded, SubmitError};
 use drawloom_egui::Inspector;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
-use winit::event::WindowEvent;
+use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
-use winit::keyboard::KeyCode;
+use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
 use crate::fly_camera::FlyCamera;
 use crate::frame_pacing::FramePacing;
 use crate::graphics::Graphics;
+use crate::key_presses::KeyPresses;
 use crate::options::Options;
 use crate::view_window::ViewWindow;
 use crate::window_surface::{SurfaceFrame, WindowSurface};
@@ -39,6 +40,7 @@ pub struct Engine {
     frames: u64,
     pacing: FramePacing,
     inspector: Inspector,
+    keys: KeyPresses,
     last_update: Option<Instant>,
     next_check: Instant,
     screenshot: Option<Picture>,
@@ -71,6 +73,7 @@ impl Engine {
             frames: 0,
             pacing: FramePacing::default(),
             inspector: Inspector::new(options.inspector),
+            keys: KeyPresses::default(),
             last_update: None,
             next_check: Instant::now(),
             screenshot: None,
@@ -285,10 +288,21 @@ impl ApplicationHandler for Engine {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
         let Some(index) = self.windows.iter().position(|window| window.id() == id) else { return };
-        let key = self.windows[index].handle(&event);
-        match (event, key) {
-            (WindowEvent::CloseRequested, _) => self.close(event_loop, index),
-            (_, Some(key)) => self.press(event_loop, index, key),
+        let is_used = self.windows[index].handle(&event);
+        match event {
+            WindowEvent::CloseRequested => self.close(event_loop, index),
+            WindowEvent::Focused(true) => self.keys.gain_focus(),
+            WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
+                let PhysicalKey::Code(key) = event.physical_key else { return };
+                match (event.state, is_synthetic) {
+                    (ElementState::Pressed, true) => self.keys.find_held(key),
+                    (ElementState::Pressed, false) if self.keys.press(key) && !is_used => {
+                        self.press(event_loop, index, key);
+                    }
+                    (ElementState::Released, false) => self.keys.release(key),
+                    _ => {}
+                }
+            }
             _ => {}
         }
     }

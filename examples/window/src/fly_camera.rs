@@ -41,13 +41,12 @@ impl FlyCamera {
         Quat::from_euler(EulerRot::YXZ, self.yaw, self.pitch, 0.0).normalize()
     }
 
-    /// A key went down or up. Returns whether it went down and was up before: keys that are held repeat.
-    pub fn set_key(&mut self, key: KeyCode, is_held: bool) -> bool {
+    /// A key went down or up.
+    pub fn set_key(&mut self, key: KeyCode, is_held: bool) {
         if is_held {
-            self.held.insert(key)
+            self.held.insert(key);
         } else {
             self.held.remove(&key);
-            false
         }
     }
 

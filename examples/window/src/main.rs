@@ -10,6 +10,7 @@ mod engine;
 mod fly_camera;
 mod frame_pacing;
 mod graphics;
+mod key_presses;
 mod options;
 mod view_window;
 mod window_surface;

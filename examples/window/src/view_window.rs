@@ -8,7 +8,7 @@ use drawloom::scene::Camera;
 use drawloom::wgpu;
 use drawloom_egui::Overlay;
 use winit::event::{ElementState, MouseButton, WindowEvent};
-use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::keyboard::PhysicalKey;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::fly_camera::FlyCamera;
@@ -118,19 +118,18 @@ impl ViewWindow {
         });
     }
 
-    /// What happens to the window and its camera. Returns the key that goes down, unless egui uses it.
-    pub fn handle(&mut self, event: &WindowEvent) -> Option<KeyCode> {
+    /// What happens to the window and its camera. Returns whether egui uses the event, so that nothing else does.
+    pub fn handle(&mut self, event: &WindowEvent) -> bool {
         let is_used = self.overlay.as_mut().is_some_and(|overlay| overlay.handle(&self.window, event));
         match event {
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.surface.mark_outdated(),
             WindowEvent::RedrawRequested => self.is_due = true,
             WindowEvent::Occluded(is_occluded) => self.is_occluded = *is_occluded,
             WindowEvent::Focused(false) => self.camera.release_all(),
-            WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
-                let PhysicalKey::Code(key) = event.physical_key else { return None };
-                let is_pressed = event.state.is_pressed() && !is_used;
-                // A window that gets the focus hears of the keys that are held as if they went down.
-                return Some(key).filter(|&key| self.camera.set_key(key, is_pressed) && !is_synthetic);
+            WindowEvent::KeyboardInput { event, .. } => {
+                if let PhysicalKey::Code(key) = event.physical_key {
+                    self.camera.set_key(key, event.state.is_pressed() && !is_used);
+                }
             }
             WindowEvent::MouseInput { button: MouseButton::Left | MouseButton::Right, state, .. } => {
                 self.camera.set_dragging(*state == ElementState::Pressed && !is_used);
@@ -141,6 +140,6 @@ impl ViewWindow {
             }
             _ => {}
         }
-        None
+        is_used
     }
 }
