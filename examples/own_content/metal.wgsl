@@ -25,7 +25,9 @@ fn vertex(in: VertexInput) -> Corner {
     let relative = relative_position(object, in.position);
     let turned = rotate(object.orientation, object.scale * in.tangent.xyz);
     let normal = world_normal(object, in.normal);
-    let tangent = vec4<f32>(turned, in.tangent.w);
+    // A mirror turns the third axis around.
+    let mirror = select(1.0, -1.0, object.scale.x * object.scale.y * object.scale.z < 0.0);
+    let tangent = vec4<f32>(turned, in.tangent.w * mirror);
     return Corner(clip_position(relative), relative, normal, tangent, in.uv, in.colour.rgb, object.material);
 }
 

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Assets, Camera, Changes, Light, Material, Mesh, SceneRef, Topology, Vertex};
+use drawloom::scene::{Assets, Camera, Changes, Light, Material, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
+use drawloom_testing::scenes::cube;
 
 use crate::population::{Looks, Population};
 use crate::scene_columns::LentScene;
@@ -41,7 +42,7 @@ impl Graphics {
             .deferred(Deferred::to_picture())
             .build(Arc::clone(&scheduler))?;
         let mut assets = Assets::default();
-        let mesh = cube()?;
+        let mesh = cube();
         let bounds = mesh.bounds();
         let mesh = assets.add(mesh)?;
         let mut material =
@@ -117,20 +118,4 @@ impl Graphics {
     pub fn picture(&self) -> Result<&Picture, Box<dyn Error>> {
         self.picture.as_ref().ok_or_else(|| "nothing was drawn".into())
     }
-}
-
-/// A cube of 2 m, with separate normals for each side.
-fn cube() -> Result<Mesh, drawloom::scene::SceneError> {
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-        let right = normal.any_orthonormal_vector();
-        let up = normal.cross(right);
-        let first = vertices.len() as u32;
-        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            let position = (normal + right * x + up * y).to_array();
-            vertices.push(Vertex { position, normal: normal.to_array(), uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] });
-        }
-        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
-    }
-    Mesh::new("cube", Topology::TriangleList, vertices, indices)
 }
