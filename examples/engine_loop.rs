@@ -18,9 +18,7 @@ use drawloom::handle::Handle;
 use drawloom::process::{
     CommandDraws, Declare, Deferred, Draws, Format, RawPass, RawPassResources, RenderProcess, ToneMapping,
 };
-use drawloom::scene::{
-    Assets, Blend, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
-};
+use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
 use parking_lot::Mutex;
@@ -97,7 +95,7 @@ struct World {
 impl World {
     fn new() -> Result<Self, SceneError> {
         let mut assets = Assets::default();
-        let cube = cube()?;
+        let cube = Mesh::cuboid("cube", Vec3::splat(2.0))?;
         let bounds = cube.bounds();
         let cube = assets.add(cube)?;
         let stone = assets.add(Material { name: "stone".into(), diffuse: Vec3::splat(0.6), ..Material::default() })?;
@@ -139,15 +137,12 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
-            layers: &[],
-            columns: &[],
-            // Every cube moves in every frame.
-            changes: Changes::Unknown,
-            assets: &self.assets,
             lights: &self.lights,
             cameras: std::slice::from_ref(&self.camera),
             ambient: Vec3::splat(0.05),
             background: Vec3::new(0.01, 0.012, 0.02),
+            // Every cube moves in every frame, so nothing is said of changes.
+            ..SceneRef::new(&self.assets)
         }
     }
 
@@ -291,20 +286,4 @@ fn open_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
         ..wgpu::DeviceDescriptor::default()
     };
     Ok(pollster::block_on(adapter.request_device(&descriptor))?)
-}
-
-/// A cube of 2 m, with separate normals for each side.
-fn cube() -> Result<Mesh, SceneError> {
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-        let right = normal.any_orthonormal_vector();
-        let up = normal.cross(right);
-        let first = vertices.len() as u32;
-        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            let position = (normal + right * x + up * y).to_array();
-            vertices.push(Vertex { position, normal: normal.to_array(), uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] });
-        }
-        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
-    }
-    Mesh::new("cube", Topology::TriangleList, vertices, indices)
 }

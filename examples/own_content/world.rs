@@ -3,7 +3,7 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
-    Assets, Bounds, Camera, Changes, ColumnValues, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
+    Assets, Bounds, Camera, ColumnValues, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex,
 };
 
 use crate::metal::{self, METAL, Metal};
@@ -129,14 +129,12 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
-            layers: &[],
             columns,
-            changes: Changes::Unknown,
-            assets: &self.assets,
             lights: &self.lights,
             cameras: std::slice::from_ref(&self.camera),
             ambient: Vec3::splat(0.08),
             background: Vec3::new(0.02, 0.03, 0.05),
+            ..SceneRef::new(&self.assets)
         }
     }
 }

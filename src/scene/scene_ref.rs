@@ -49,6 +49,38 @@ pub struct SceneRef<'a> {
     pub background: Vec3,
 }
 
+impl<'a> SceneRef<'a> {
+    /// A scene without objects, lights and cameras, dark and with a black background. Of its objects, any may have changed.
+    ///
+    /// An engine names what it has, and takes the rest from here:
+    ///
+    /// ```
+    /// use drawloom::scene::{Assets, Camera, SceneRef};
+    ///
+    /// fn lend<'a>(assets: &'a Assets, cameras: &'a [Camera]) -> SceneRef<'a> {
+    ///     SceneRef { cameras, ..SceneRef::new(assets) }
+    /// }
+    /// ```
+    pub fn new(assets: &'a Assets) -> Self {
+        Self {
+            positions: &[],
+            orientations: &[],
+            scales: &[],
+            bounds: &[],
+            meshes: &[],
+            materials: &[],
+            layers: &[],
+            columns: &[],
+            changes: Changes::Unknown,
+            assets,
+            lights: &[],
+            cameras: &[],
+            ambient: Vec3::ZERO,
+            background: Vec3::ZERO,
+        }
+    }
+}
+
 impl SceneRef<'_> {
     /// The number of objects.
     pub fn object_count(&self) -> usize {

@@ -89,14 +89,12 @@ impl Graphics {
             bounds: lent.bounds,
             meshes: lent.meshes,
             materials: lent.materials,
-            layers: &[],
-            columns: &[],
             changes: Changes::Ranges(lent.changed),
-            assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,
             ambient: Vec3::splat(0.1),
             background: Vec3::new(0.02, 0.03, 0.05),
+            ..SceneRef::new(&self.assets)
         };
         let began = Instant::now();
         let mut recorded = self.renderer.record(scene)?;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, SceneError, SceneRef, Topology, Vertex};
+use drawloom::scene::{Assets, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::{JobPanic, Scheduler};
 
 /// The engine's own storage: one array per property. Drawloom reads the arrays without copying them first.
@@ -33,7 +33,7 @@ impl World {
     /// If a mesh or a material is refused.
     pub fn new(cubes: usize) -> Result<Self, SceneError> {
         let mut assets = Assets::default();
-        let cube = cube()?;
+        let cube = Mesh::cuboid("cube", Vec3::splat(2.0))?;
         let bounds = cube.bounds();
         let cube = assets.add(cube)?;
         let colors = [Vec3::new(0.7, 0.25, 0.15), Vec3::new(0.75, 0.6, 0.35), Vec3::new(0.2, 0.45, 0.55)];
@@ -87,15 +87,12 @@ impl World {
             bounds: &self.bounds,
             meshes: &self.meshes,
             materials: &self.materials,
-            layers: &[],
-            columns: &[],
-            // All but one of the objects move in every frame.
-            changes: Changes::Unknown,
-            assets: &self.assets,
             lights: &self.lights,
             cameras,
             ambient: Vec3::splat(0.06),
             background: Vec3::new(0.02, 0.03, 0.05),
+            // All but one of the objects move in every frame, so nothing is said of changes.
+            ..SceneRef::new(&self.assets)
         }
     }
 
@@ -123,20 +120,4 @@ fn pose(cube: [usize; 2], side: usize, time: f64) -> (DVec3, Quat) {
     let [x, z] = cube.map(|index| index as f64 - (side - 1) as f64 / 2.0);
     let height = (x.hypot(z) * 0.6 - time * 2.0).sin();
     (DVec3::new(x * World::SPACING, height, z * World::SPACING), Quat::from_rotation_y((time + height) as f32))
-}
-
-/// A cube of 2 m, with separate normals for each side.
-fn cube() -> Result<Mesh, SceneError> {
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-        let right = normal.any_orthonormal_vector();
-        let up = normal.cross(right);
-        let first = vertices.len() as u32;
-        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            let position = (normal + right * x + up * y).to_array();
-            vertices.push(Vertex { position, normal: normal.to_array(), uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] });
-        }
-        indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
-    }
-    Mesh::new("cube", Topology::TriangleList, vertices, indices)
 }

@@ -101,22 +101,7 @@ mod tests {
 
     fn view_of(camera: &Camera) -> ShaderView<f64> {
         let assets = Assets::default();
-        let scene = SceneRef {
-            positions: &[],
-            orientations: &[],
-            scales: &[],
-            bounds: &[],
-            meshes: &[],
-            materials: &[],
-            layers: &[],
-            columns: &[],
-            changes: Changes::Unknown,
-            assets: &assets,
-            lights: &[],
-            cameras: &[],
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-        };
+        let scene = SceneRef::new(&assets);
         exact_view(&RenderView::new(camera), &scene)
     }
 
