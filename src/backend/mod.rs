@@ -17,8 +17,8 @@ mod wgpu;
 
 #[cfg(feature = "wgpu")]
 pub use self::wgpu::{
-    DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuPassStatistics,
-    WgpuReadBack, WgpuResources, WgpuSubmission,
+    DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, RecordingStrategy, SurfaceError, SurfaceFrame,
+    WgpuBackend, WgpuPassStatistics, WgpuReadBack, WgpuResources, WgpuSubmission, WindowDevice, WindowSurface,
 };
 pub use backend_trait::Backend;
 pub use error::BackendError;

@@ -6,7 +6,7 @@ use std::mem;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Picture, WgpuBackend};
+use drawloom::backend::{Picture, SurfaceFrame, WgpuBackend, WindowDevice};
 use drawloom::glam::DVec3;
 use drawloom::process::Format;
 use drawloom::task::{JobPanic, Scheduler};
@@ -25,7 +25,6 @@ use crate::graphics::Graphics;
 use crate::key_presses::KeyPresses;
 use crate::options::Options;
 use crate::view_window::ViewWindow;
-use crate::window_surface::{SurfaceFrame, WindowSurface};
 use crate::world::World;
 
 /// The engine: its windows, its world, and the loop of frames.
@@ -109,17 +108,20 @@ impl Engine {
         let attributes =
             Window::default_attributes().with_title("Drawloom").with_inner_size(LogicalSize::new(width, height));
         let window = Arc::new(event_loop.create_window(attributes)?);
-        let (graphics, surface) = match &mut self.graphics {
+        let (graphics, mut surface) = match &mut self.graphics {
             Some(graphics) => {
-                let surface = graphics.instance.create_surface(Arc::clone(&window))?;
+                let surface = graphics.device.surface(Arc::clone(&window))?;
+                let surface = surface.with_picture_format(graphics.picture_format)?;
                 (graphics, surface)
             }
             none => {
-                let (graphics, surface) = Graphics::new(event_loop.owned_display_handle(), &window)?;
+                let (graphics, surface) = Graphics::new(event_loop.owned_display_handle(), Arc::clone(&window))?;
                 (none.insert(graphics), surface)
             }
         };
-        let mut surface = WindowSurface::new(graphics, Arc::clone(&window), surface, self.options.convert)?;
+        if self.options.convert {
+            surface = surface.converting();
+        }
         surface.set_vsync(self.vsync);
         self.windows_opened += 1;
         let name = format!("window {}", self.windows_opened);
@@ -150,9 +152,9 @@ impl Engine {
         let (mut cameras, mut frames) = (Vec::new(), Vec::new());
         for window in self.windows.iter_mut().filter(|window| window.is_due()) {
             window.update(step);
-            if let Some(frame) = window.surface.acquire(graphics)? {
+            if let Some(frame) = window.acquire()? {
                 graphics.renderer.backend().import_target(window.name(), "picture", frame.target().clone());
-                cameras.push(window.camera());
+                cameras.push(window.camera(&frame));
                 frames.push((window, frame));
             }
         }
@@ -259,7 +261,7 @@ fn submit_and_update(
     inspector: &mut Inspector,
     update: impl FnOnce(&Scheduler) -> Result<(), JobPanic> + Send,
 ) -> Result<(), Box<dyn Error>> {
-    let Graphics { scheduler, submitter, renderer, device, queue, .. } = graphics;
+    let Graphics { scheduler, submitter, renderer, device: WindowDevice { device, queue, .. }, .. } = graphics;
     let mut updated = Ok(());
     let submitted = scheduler.scope(|scope| {
         scope.spawn(|_, _| {
@@ -332,7 +334,7 @@ impl ApplicationHandler for Engine {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // Surfaces go before the connection to the display does.
         drop(mem::take(&mut self.windows));
-        if let Some(report) = self.graphics.as_ref().and_then(|graphics| graphics.instance.generate_report()) {
+        if let Some(report) = self.graphics.as_ref().and_then(|graphics| graphics.device.instance.generate_report()) {
             self.resources = [&report.hub.textures, &report.hub.buffers].map(|registry| registry.num_kept_from_user);
         }
     }

@@ -13,7 +13,6 @@ mod graphics;
 mod key_presses;
 mod options;
 mod view_window;
-mod window_surface;
 mod world;
 
 use std::error::Error;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use drawloom::backend::{SurfaceError, SurfaceFrame};
 use drawloom::glam::{DVec2, DVec3};
 use drawloom::scene::Camera;
 use drawloom::wgpu;
@@ -12,15 +13,14 @@ use winit::keyboard::PhysicalKey;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::fly_camera::FlyCamera;
-use crate::graphics::Graphics;
-use crate::window_surface::{SurfaceFrame, WindowSurface};
+use crate::graphics::{Graphics, Surface};
 
 /// A window, and the view of the world in it.
 pub struct ViewWindow {
     /// Of the window and of its view.
     name: String,
     window: Arc<Window>,
-    pub surface: WindowSurface,
+    pub surface: Surface,
     camera: FlyCamera,
     /// egui, while it is shown in this window.
     overlay: Option<Overlay>,
@@ -31,7 +31,7 @@ pub struct ViewWindow {
 }
 
 impl ViewWindow {
-    pub fn new(name: String, window: Arc<Window>, surface: WindowSurface, camera: FlyCamera) -> Self {
+    pub fn new(name: String, window: Arc<Window>, surface: Surface, camera: FlyCamera) -> Self {
         Self { name, window, surface, camera, overlay: None, is_due: false, is_occluded: false, is_minimized: false }
     }
 
@@ -44,12 +44,20 @@ impl ViewWindow {
         self.window.id()
     }
 
-    /// The camera of its view, whose picture has the size of the surface.
-    pub fn camera(&self) -> Camera {
+    /// What the next picture is drawn into; `None` if there is nothing this time.
+    ///
+    /// # Errors
+    /// If the device refuses, or the surface stays lost.
+    pub fn acquire(&mut self) -> Result<Option<SurfaceFrame>, SurfaceError> {
+        self.surface.acquire(self.window.inner_size())
+    }
+
+    /// The camera of its view, whose picture is drawn into `frame`.
+    pub fn camera(&self, frame: &SurfaceFrame) -> Camera {
         Camera {
             position: self.camera.position,
             orientation: self.camera.orientation(),
-            size: self.surface.size(),
+            size: frame.size(),
             ..Camera::looking_at(self.name.clone(), DVec3::ZERO, DVec3::NEG_Z)
         }
     }
@@ -61,7 +69,9 @@ impl ViewWindow {
 
     /// Whether somebody can see it, as far as the system tells.
     pub fn is_visible(&self) -> bool {
-        !self.is_occluded && !self.is_minimized && self.surface.has_pixels()
+        // Not on every system does a minimised window have pixels.
+        let size = self.window.inner_size();
+        !self.is_occluded && !self.is_minimized && size.width > 0 && size.height > 0
     }
 
     /// Whether a picture is to be drawn for it now.
@@ -91,7 +101,7 @@ impl ViewWindow {
 
     /// Shows egui over the picture.
     pub fn show_overlay(&mut self, graphics: &Graphics) {
-        self.overlay = Some(Overlay::new(&self.window, &graphics.device, self.surface.overlay_format));
+        self.overlay = Some(Overlay::new(&self.window, &graphics.device.device, self.surface.overlay_format()));
     }
 
     pub fn hide_overlay(&mut self) {
@@ -111,10 +121,11 @@ impl ViewWindow {
         interface: impl FnMut(&mut egui::Ui),
     ) {
         let (window, overlay) = (&self.window, &mut self.overlay);
-        self.surface.present(device, queue, frame, |texture| {
+        self.surface.present(frame, |texture| {
             if let Some(overlay) = overlay {
                 overlay.draw(window, device, queue, texture, interface);
             }
+            window.pre_present_notify();
         });
     }
 
@@ -122,7 +133,6 @@ impl ViewWindow {
     pub fn handle(&mut self, event: &WindowEvent) -> bool {
         let is_used = self.overlay.as_mut().is_some_and(|overlay| overlay.handle(&self.window, event));
         match event {
-            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => self.surface.mark_outdated(),
             WindowEvent::RedrawRequested => self.is_due = true,
             WindowEvent::Occluded(is_occluded) => self.is_occluded = *is_occluded,
             WindowEvent::Focused(false) => self.camera.release_all(),

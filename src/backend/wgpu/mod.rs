@@ -31,6 +31,7 @@ mod strategy;
 mod submission;
 mod submit_frame;
 mod timing;
+mod window_surface;
 
 pub use backend::{WgpuBackend, WgpuResources};
 pub use frame::WgpuPassStatistics;
@@ -38,3 +39,4 @@ pub use read_back::WgpuReadBack;
 pub use strategy::{EncodingStrategy, RecordingStrategy};
 pub use submission::WgpuSubmission;
 pub use timing::{DeviceClock, DevicePassTime, DevicePassTimes};
+pub use window_surface::{SurfaceError, SurfaceFrame, WindowDevice, WindowSurface};
