@@ -71,6 +71,13 @@ impl Declare {
 
     /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on. The prelude's
     /// `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
+    ///
+    /// In WGSL it is a `texture_2d<f32>`; a `texture_depth_2d` if its format has depth; a `texture_2d<u32>` for [`Format::R32Uint`] and
+    /// [`Format::Stencil8`]. The targets of the deferred pipeline are listed at [`GeometryBuffer`](super::GeometryBuffer):
+    ///
+    /// ```wgsl
+    /// @group(2) @binding(1) var depth_target: texture_depth_2d;
+    /// ```
     pub fn samples(&mut self, target: &str) {
         self.access(target, Access::Sample);
     }

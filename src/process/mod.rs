@@ -18,6 +18,7 @@ mod deferred;
 mod draws;
 mod face_culling;
 mod format;
+mod parameters;
 mod plan;
 mod post;
 mod prelude;
@@ -48,6 +49,7 @@ pub use deferred::{
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;
 pub use format::Format;
+pub use parameters::Parameters;
 pub use plan::{
     AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
     ViewOrder,

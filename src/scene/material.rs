@@ -58,7 +58,7 @@ pub enum Blend {
     /// It covers what is behind it.
     #[default]
     None = 0,
-    /// It is blended over what is behind it by its opacity.
+    /// It is blended over what is behind it by its opacity: alpha, by which shaders have not multiplied the colour yet.
     Alpha = 1,
     /// It is added to what is behind it.
     Additive = 2,

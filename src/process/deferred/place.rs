@@ -1,7 +1,8 @@
 //! Places for an engine's processes in a frame of the deferred pipeline.
 
 /// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all of them,
-/// whatever the scene requires: see [`Declare::at`](crate::process::Declare::at).
+/// whatever the scene requires: see [`Declare::at`](crate::process::Declare::at). What its targets hold is listed at
+/// [`GeometryBuffer`](super::GeometryBuffer).
 ///
 /// ```text
 ///  geometry buffer │ lights │ transparency │ post-processing │

@@ -1,0 +1,85 @@
+//! Parameters of a shader that change between frames.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use bytemuck::NoUninit;
+use parking_lot::Mutex;
+
+/// Parameters of a shader that the engine changes between frames, while the renderer has the process that reads them.
+///
+/// Clones share their value: the engine keeps one, and the process has another. In WGSL they are the uniform at
+/// `@group(2) @binding(0)`, so `T` has the layout that WGSL gives the shader's type: `f32` is `f32`, `[f32; 4]` is `vec4<f32>`.
+///
+/// ```
+/// use drawloom::process::{Declare, Draws, FullScreen, Parameters, Place, RenderProcess};
+/// use drawloom::scene::Blend;
+///
+/// /// Fog over what was drawn, of a density per metre.
+/// struct Fog(Parameters<f32>);
+///
+/// impl RenderProcess for Fog {
+///     fn name(&self) -> &str {
+///         "fog"
+///     }
+///
+///     fn declare(&self, declare: &mut Declare) {
+///         declare.at(Place::AfterTransparency);
+///         declare.samples("depth");
+///         declare.draws_over("radiance");
+///     }
+///
+///     fn draws(&self) -> Draws<'_> {
+///         let shader = "
+///             @group(2) @binding(0) var<uniform> density: f32;
+///             @group(2) @binding(1) var depth_target: texture_depth_2d;
+///
+///             @fragment
+///             fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+///                 // Depth is reversed: 0 is infinitely far away.
+///                 let depth = max(textureLoad(depth_target, vec2<i32>(in.position.xy), 0), 1e-6);
+///                 let distance = length(position_from_depth(in.clip, depth));
+///                 return vec4<f32>(0.5, 0.6, 0.7, 1.0 - exp(-density * distance));
+///             }
+///         ";
+///         let parameters = self.0.bytes();
+///         Draws::FullScreen(FullScreen { shader, parameters, blend: Blend::Alpha, ..FullScreen::default() })
+///     }
+/// }
+///
+/// let density = Parameters::new(0.01_f32);
+/// let fog = Fog(density.clone());
+/// // Between frames:
+/// density.set(0.05);
+/// assert_eq!(fog.0.get(), 0.05);
+/// ```
+#[derive(Debug, Default)]
+pub struct Parameters<T>(Arc<Mutex<T>>);
+
+impl<T: NoUninit> Parameters<T> {
+    /// New parameters, which share their value with no others.
+    pub fn new(value: T) -> Self {
+        Self(Arc::new(Mutex::new(value)))
+    }
+
+    /// Changes them, for frames that are recorded from now on.
+    pub fn set(&self, value: T) {
+        *self.0.lock() = value;
+    }
+
+    /// The current value.
+    pub fn get(&self) -> T {
+        *self.0.lock()
+    }
+
+    /// The bytes of the current value, such as [`FullScreen::parameters`](super::FullScreen::parameters) has them.
+    pub fn bytes(&self) -> Cow<'static, [u8]> {
+        bytemuck::bytes_of(&self.get()).to_vec().into()
+    }
+}
+
+impl<T> Clone for Parameters<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
