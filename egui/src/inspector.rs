@@ -2,7 +2,7 @@
 
 use drawloom::backend::Backend;
 use drawloom::{Recorded, Renderer};
-use egui::{Context, ScrollArea, Ui, Window};
+use egui::{Context, ScrollArea, Ui, Vec2, Window};
 
 use crate::choices;
 use crate::frame_history::FrameHistory;
@@ -13,6 +13,9 @@ use crate::views;
 use crate::warnings::WarningList;
 
 /// A window that shows the frames of a [`Renderer`] as they are drawn, and changes its quality.
+///
+/// Prices of settings are measured where the renderer has a quality of its own, from
+/// [`RendererBuilder::quality`](drawloom::RendererBuilder::quality) or chosen in the inspector.
 ///
 /// While it is open, it records the scheduler's [timeline](drawloom::timeline), and takes out the
 /// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took. An inspector belongs to
@@ -48,6 +51,12 @@ impl Tab {
         (Self::Views, "Views"),
         (Self::Warnings, "Warnings"),
     ];
+}
+
+/// The size of the window when it is first shown: small enough to leave some of the picture visible.
+fn default_size(context: &Context) -> Vec2 {
+    let area = context.content_rect().size();
+    Vec2::new((area.x - 60.0).clamp(320.0, 760.0), (area.y * 0.5).clamp(240.0, 400.0))
 }
 
 /// An inspector that is open.
@@ -118,7 +127,7 @@ impl Inspector {
         // A window that is collapsed does not show what is in it, and a measurement goes on.
         self.update(context, renderer);
         let mut is_open = self.is_open;
-        let window = Window::new("Drawloom").open(&mut is_open).default_size([760.0, 400.0]);
+        let window = Window::new("Drawloom").open(&mut is_open).default_size(default_size(context));
         window.show(context, |ui| self.show_in(ui, renderer));
         if self.is_open && !is_open {
             self.close(renderer);

@@ -78,7 +78,8 @@ impl QualityPanel {
         });
         if !renderer.pipeline_has_quality() {
             ui.label(
-                RichText::new("The pipeline has settings of its own. What is chosen here replaces all of them.")
+                RichText::new("The pipeline has settings of its own, so nothing can be measured. Choose a quality here, which replaces \
+                     all of them, or give one to RendererBuilder::quality.")
                     .color(ACCENT),
             );
         }
