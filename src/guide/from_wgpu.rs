@@ -20,6 +20,7 @@
 //!
 //! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
 //! let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+//! // Handles of the engine's own device, or of the one that `WindowDevice::open` opens.
 //! let backend = WgpuBackend::new(device.clone(), queue.clone())?;
 //! let (mut renderer, submitter) =
 //!     Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
@@ -64,7 +65,7 @@
 //! # use drawloom::scene::{Assets, Material, Mesh, Topology, Vertex};
 //! # use drawloom::task::Scheduler;
 //! use drawloom::glam::{DVec3, Quat, Vec3};
-//! use drawloom::scene::{Camera, Changes, Light, SceneRef};
+//! use drawloom::scene::{Camera, Light, SceneRef};
 //!
 //! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
 //! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
@@ -89,14 +90,11 @@
 //!     bounds: &bounds,
 //!     meshes: &meshes,
 //!     materials: &materials,
-//!     layers: &[],
-//!     columns: &[],
-//!     changes: Changes::Unknown,
-//!     assets: &assets,
 //!     lights: &[sun],
 //!     cameras: &[camera],
 //!     ambient: Vec3::splat(0.1),
-//!     background: Vec3::ZERO,
+//!     // No layers, no columns of the engine's own, a black background, and nothing said of what changed.
+//!     ..SceneRef::new(&assets)
 //! })?;
 //! println!("{} objects are visible", recorded.statistics().views[0].visible);
 //! let submitted = submitter.submit(recorded)?;
@@ -104,41 +102,46 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! An engine that has no such arrays begins with [`Scene`], which owns them.
+//! An engine that has no such arrays begins with [`Scene`], which owns them. One that has some of them lends these, and takes the
+//! others from a scene: `SceneRef { positions: &positions, ..scene.as_scene_ref() }`.
 //!
 //! # 4. Draw into the window
 //!
-//! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own:
+//! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own. A [`WindowSurface`]
+//! chooses formats, follows the window's size, and makes a lost surface anew; [`WindowDevice::open`] opens the device too, and an
+//! engine that has one makes a [`WindowDevice`] of its handles.
 //!
 //! ```
 //! # use std::sync::Arc;
-//! # use drawloom::{Renderer, wgpu};
-//! # use drawloom::backend::WgpuBackend;
-//! # use drawloom::glam::DVec3;
-//! # use drawloom::process::Deferred;
-//! # use drawloom::scene::{Camera, Scene};
+//! # use drawloom::Renderer;
+//! # use drawloom::backend::{WgpuBackend, WindowSurface};
+//! # use drawloom::process::{Deferred, ToneMapping};
+//! # use drawloom::scene::Scene;
 //! # use drawloom::task::Scheduler;
-//! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
-//! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-//! # let backend = WgpuBackend::new(device.clone(), queue)?;
-//! # let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
-//! # let mut world = Scene::new();
-//! # world.cameras.push(Camera { size: [320, 200], ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) });
-//! # let surface_texture = device.create_texture(&wgpu::TextureDescriptor {
-//! #     label: None, size: wgpu::Extent3d { width: 320, height: 200, depth_or_array_layers: 1 }, mip_level_count: 1, sample_count: 1,
-//! #     dimension: wgpu::TextureDimension::D2, format: wgpu::TextureFormat::Rgba8UnormSrgb,
-//! #     usage: wgpu::TextureUsages::RENDER_ATTACHMENT, view_formats: &[],
-//! # });
-//! // The texture of `surface.get_current_texture()`, which has the size of the camera named "main".
-//! renderer.backend().import_target("main", "picture", surface_texture.clone());
-//! let recorded = renderer.record(world.as_scene_ref())?;
-//! submitter.submit(recorded)?;
-//! // Then `queue.present(surface_texture)`.
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! # use drawloom::wgpu;
+//! # fn run<W: Into<wgpu::SurfaceTarget<'static>> + Clone>(
+//! #     mut surface: WindowSurface<W>, backend: WgpuBackend, scheduler: Arc<Scheduler>, mut world: Scene, window_size: [u32; 2],
+//! # ) -> Result<(), Box<dyn std::error::Error>> {
+//! // The last step of post-processing decides the picture's format.
+//! let tone_mapping = ToneMapping { format: surface.picture_format(), ..ToneMapping::default() };
+//! let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::new().post(tone_mapping)).build(scheduler)?;
+//!
+//! // When the window asks to be drawn. There is no frame while it is minimised.
+//! if let Some(frame) = surface.acquire(window_size)? {
+//!     world.cameras[0].size = frame.size();
+//!     // "main" is the name of the camera, and "picture" the target that the last step draws.
+//!     renderer.backend().import_target("main", "picture", frame.target().clone());
+//!     let recorded = renderer.record(world.as_scene_ref())?;
+//!     submitter.submit(recorded)?;
+//!     surface.present(frame, |_texture| { /* egui draws over it here */ });
+//! }
+//! # Ok(())
+//! # }
 //! ```
 //!
-//! The last step of post-processing decides the picture's format: [`ToneMapping::format`]. `examples/window` has the whole of it:
-//! formats, resizes, several windows, lost surfaces.
+//! A window is drawn as often as the engine asks: a minimised one that asks for the next frame in each frame keeps a core busy.
+//! `examples/window` asks its windows whether they are visible, and has several on one device; `small_engine`, an example of
+//! `drawloom-egui`, has all of a small engine in one file.
 //!
 //! # 5. Bring the shaders
 //!
@@ -191,6 +194,8 @@
 //! ```
 //!
 //! `examples/own_content` has shaders that read data of objects, vertices and materials, move vertices, compute, and count.
+//!
+//! What the shader reads of the CPU's is its uniform: [`Parameters`] has an example, whose value changes between frames.
 //!
 //! # 6. Keep a pass of your own
 //!
@@ -312,6 +317,7 @@
 //! To see it rather than read it, add the inspector, `drawloom-egui`, or write a page with `report::write_page` (feature `report`).
 //!
 //! [`Mesh::from_buffers`]: crate::scene::Mesh::from_buffers
+//! [`Parameters`]: crate::process::Parameters
 //! [`RawPass`]: crate::process::RawPass
 //! [`RenderProcess`]: crate::process::RenderProcess
 //! [`Renderer::record`]: crate::Renderer::record
@@ -319,7 +325,9 @@
 //! [`SceneRef`]: crate::scene::SceneRef
 //! [`Scheduler`]: crate::task::Scheduler
 //! [`ShaderResource`]: crate::process::ShaderResource
-//! [`ToneMapping::format`]: crate::process::ToneMapping::format
 //! [`WgpuBackend`]: crate::backend::WgpuBackend
 //! [`WgpuBackend::REQUIRED_FEATURES`]: crate::backend::WgpuBackend::REQUIRED_FEATURES
 //! [`WgpuBackend::optional_features`]: crate::backend::WgpuBackend::optional_features
+//! [`WindowDevice`]: crate::backend::WindowDevice
+//! [`WindowDevice::open`]: crate::backend::WindowDevice::open
+//! [`WindowSurface`]: crate::backend::WindowSurface
