@@ -10,6 +10,9 @@
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 
 struct View {
+    // No shader reads it. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders that read
+    // them and branch on a member of the buffer: it compiles these anew for each pass, and never frees what it compiled.
+    unread: vec4<f32>,
     // From world axes relative to the camera to clip space; depth is reversed.
     clip_from_relative: mat4x4<f32>,
     // The origin that vertices are relative to, in fixed point like an object's: the camera's position, or for a

@@ -1,0 +1,66 @@
+//! Frames that are submitted leave no memory behind in the driver. This is the only case of its binary, so that it can measure the
+//! process.
+//!
+//! Without an adapter, or on a system that does not tell how much memory a process has, the case is ignored. With
+//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails it.
+
+use std::env;
+use std::error::Error;
+use std::fs;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use drawloom::backend::WgpuBackend;
+use drawloom::glam::DVec3;
+use drawloom::process::Deferred;
+use drawloom::scene::Camera;
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, demo};
+use drawloom_testing::adapter;
+use libtest_mimic::{Arguments, Failed, Trial};
+
+const WARM_UP_FRAMES: usize = 60;
+const MEASURED_FRAMES: usize = 40;
+/// A shader that the driver compiles and keeps is some 100 KiB. One for each frame exceeds this by far.
+const MAX_GROWTH_KIB: usize = 4 * 1024;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let required = env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let can_measure = resident_kib().is_some() && (required || adapter::device().is_ok());
+    let trial = Trial::test("submitted_frames_leave_no_memory_behind", || {
+        draw_and_measure().map_err(|error| Failed::from(error.to_string()))
+    });
+    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(!can_measure)]).exit_code()
+}
+
+/// Draws the project's scene, with all that it requires, from a camera that moves.
+fn draw_and_measure() -> Result<(), Box<dyn Error>> {
+    let (device, queue) = adapter::device()?;
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
+        .deferred(Deferred::to_picture().depth_pre_pass(true))
+        .build(scheduler)?;
+    let mut scene = demo::colonnade()?;
+    let mut before = 0;
+    for frame in 0..WARM_UP_FRAMES + MEASURED_FRAMES {
+        let position = DVec3::new(0.01 * frame as f64, 2.0, 8.0);
+        scene.cameras =
+            vec![Camera { size: [64, 36], ..Camera::looking_at("main", position, DVec3::new(0.0, 1.5, 0.0)) }];
+        submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
+        if frame + 1 == WARM_UP_FRAMES {
+            before = resident_kib().ok_or("the process's memory is unknown")?;
+        }
+    }
+    let growth = resident_kib().ok_or("the process's memory is unknown")?.saturating_sub(before);
+    if growth > MAX_GROWTH_KIB {
+        return Err(format!("{MEASURED_FRAMES} frames left {growth} KiB behind").into());
+    }
+    Ok(())
+}
+
+/// The memory of this process that is in RAM, in KiB; `None` where the system does not tell.
+fn resident_kib() -> Option<usize> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.split_whitespace().next()?.parse().ok()
+}
