@@ -17,6 +17,12 @@ pub fn device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Qu
     open(&adapter, missing, adapter.limits())
 }
 
+/// Opens a device on the machine's best adapter, without wgpu's check of indirect draws.
+pub fn device_without_indirect_validation() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    let adapter = best_adapter_without(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL)?;
+    open(&adapter, wgpu::Features::empty(), adapter.limits())
+}
+
 /// Opens two devices of one instance on the machine's best adapter.
 pub fn two_devices() -> Result<[(wgpu::Device, wgpu::Queue); 2], Box<dyn Error>> {
     let adapter = best_adapter()?;
@@ -31,6 +37,11 @@ pub fn device_with_limits(limits: wgpu::Limits) -> Result<(wgpu::Device, wgpu::Q
 
 /// Opens a device on wgpu's no-op backend.
 pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    noop_device_without(wgpu::Features::empty())
+}
+
+/// Opens a device on wgpu's no-op backend, as if it lacked some optional features.
+pub fn noop_device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::NOOP;
     // wgpu's check of indirect draws panics on this backend.
@@ -39,11 +50,17 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
     // The adapter claims limits that wgpu itself does not support.
-    open(&adapter, wgpu::Features::empty(), wgpu::Limits::default())
+    open(&adapter, missing, wgpu::Limits::default())
 }
 
 fn best_adapter() -> Result<wgpu::Adapter, Box<dyn Error>> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    best_adapter_without(wgpu::InstanceFlags::empty())
+}
+
+fn best_adapter_without(flags: wgpu::InstanceFlags) -> Result<wgpu::Adapter, Box<dyn Error>> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.flags.remove(flags);
+    let instance = wgpu::Instance::new(descriptor);
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::HighPerformance,
         ..wgpu::RequestAdapterOptions::default()

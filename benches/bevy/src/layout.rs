@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 pub const PICTURE: u32 = 256;
 /// Cube meshes. They are equal, but are assets of their own.
 pub const MESHES: usize = 4;
-/// The linear diffuse reflectance of each material.
-pub const MATERIALS: [[f32; 3]; 4] = [[0.8, 0.2, 0.1], [0.2, 0.7, 0.2], [0.1, 0.3, 0.8], [0.7, 0.7, 0.6]];
+/// The linear diffuse reflectance of each material. Each has a channel that is clearly the brightest, so that pictures tell them apart.
+pub const MATERIALS: [[f32; 3]; 4] = [[0.8, 0.2, 0.1], [0.2, 0.7, 0.2], [0.1, 0.3, 0.8], [0.7, 0.4, 0.1]];
 /// The direction of the light's rays, not normalized.
 pub const LIGHT: [f32; 3] = [-0.5, -1.0, -0.7];
 /// The vertical field of view, in radians.
@@ -17,9 +17,22 @@ pub const NEAR: f32 = 0.1;
 
 /// Between the centres of neighbouring cubes, in metres.
 const SPACING: f64 = 2.0;
-/// How far a cube moves per frame, in metres, and after how many frames it turns around.
+/// How far a cube moves per frame, in metres.
 const STEP: f64 = 1e-3;
+/// How far a camera turns per frame, in radians. The margin of the pictures is 3°.
+const ANGLE: f64 = 2e-4;
+/// After how many frames motion goes back.
 const TURN: u32 = 64;
+
+/// What moves in each frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    AllObjects,
+    /// Every hundredth object.
+    FewObjects,
+    /// The cameras turn, and no object moves.
+    Cameras,
+}
 
 /// A scene of unit cubes in a grid, every one of which each camera sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,26 +41,35 @@ pub struct Layout {
     pub name: &'static str,
     pub objects: usize,
     pub cameras: usize,
+    pub motion: Motion,
     /// Whether Drawloom's objects are entities of a `bevy_ecs` world, rather than arrays.
     pub has_entities: bool,
 }
 
 impl Layout {
+    /// All objects move, before one camera.
     pub const fn objects(objects: usize) -> Self {
-        Self { name: "objects", objects, cameras: 1, has_entities: false }
+        Self { name: "objects", objects, cameras: 1, motion: Motion::AllObjects, has_entities: false }
     }
 
+    /// One object of a hundred moves.
+    pub const fn few(objects: usize) -> Self {
+        Self { name: "few", motion: Motion::FewObjects, ..Self::objects(objects) }
+    }
+
+    /// The camera turns.
+    pub const fn turn(objects: usize) -> Self {
+        Self { name: "turn", motion: Motion::Cameras, ..Self::objects(objects) }
+    }
+
+    /// Four cameras.
     pub const fn record(objects: usize) -> Self {
-        Self { name: "record", objects, cameras: 4, has_entities: false }
+        Self { name: "record", cameras: 4, ..Self::objects(objects) }
     }
 
+    /// Entities for Drawloom too.
     pub const fn ecs(objects: usize) -> Self {
-        Self { name: "ecs", objects, cameras: 1, has_entities: true }
-    }
-
-    /// Objects drawn in a frame, over all cameras.
-    pub fn object_views(&self) -> usize {
-        self.objects * self.cameras
+        Self { name: "ecs", has_entities: true, ..Self::objects(objects) }
     }
 
     /// Cubes on each edge of the grid.
@@ -64,6 +86,15 @@ impl Layout {
             .map(move |object| [along(object % side), along(object / side % side), along(object / (side * side))])
     }
 
+    /// Whether an object moves.
+    pub fn moves(&self, object: usize) -> bool {
+        match self.motion {
+            Motion::AllObjects => true,
+            Motion::FewObjects => object.is_multiple_of(100),
+            Motion::Cameras => false,
+        }
+    }
+
     /// The mesh of an object.
     pub fn mesh(object: usize) -> usize {
         object % MESHES
@@ -74,7 +105,7 @@ impl Layout {
         object / MESHES % MATERIALS.len()
     }
 
-    /// The position of each camera. All look at the origin, upright.
+    /// The position of each camera. At frame 0 all look at the origin, upright.
     pub fn cameras(&self) -> impl Iterator<Item = [f64; 3]> + use<> {
         // The grid's nearest face fills the picture at 1 + 1 ÷ tan 30° times half its side.
         let distance = 3.0 * (self.side() as f64 * SPACING / 2.0 + 1.0);
@@ -86,9 +117,17 @@ impl Layout {
     }
 }
 
-/// By what every object moves in a frame, in metres: back and forth along a diagonal.
+/// By what a moving object moves in a frame, in metres: back and forth along a diagonal.
 pub fn step(frame: u32) -> [f64; 3] {
-    let forward = (frame / TURN).is_multiple_of(2);
-    let along = if forward { STEP } else { -STEP };
+    let along = STEP * direction(frame);
     [along, along / 2.0, 0.0]
+}
+
+/// By what a turning camera turns about the vertical axis in a frame, in radians.
+pub fn angle(frame: u32) -> f32 {
+    (ANGLE * direction(frame)) as f32
+}
+
+fn direction(frame: u32) -> f64 {
+    if (frame / TURN).is_multiple_of(2) { 1.0 } else { -1.0 }
 }

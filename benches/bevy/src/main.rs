@@ -5,10 +5,12 @@
 //!     cargo run --release --ignore-rust-version -- --quick
 //!     cargo run --release --ignore-rust-version -- --backend adapter --pictures pictures
 //!
-//! A scene is a grid of unit cubes that all move in every frame. Each camera sees every cube, and has a picture of its own. There is one
-//! directional light, without shadows. A frame is timed from the motion of the cubes until submit returns, and until the device has
-//! drawn it. The contenders are interleaved, in bursts of frames, on as many threads each. Before it is measured, each must draw every
-//! object; on the adapter the pictures must cover the same pixels.
+//! A scene is a grid of unit cubes. Each camera sees every cube, and has a picture of its own. There is one directional light, without
+//! shadows. A frame is timed from the motion of cubes or cameras until submit returns, and until the device has drawn it. Bevy's time is
+//! that of `App::update`: its engine's transforms, visibility and assets are in it, and Drawloom has no engine.
+//!
+//! The contenders are interleaved, in bursts of frames. Before they are measured, each must hand every object of every camera to the
+//! device; on the adapter the pictures of a frame must cover the same pixels with the same brightest channel, but for a few.
 
 mod bevy_side;
 mod contender;
@@ -41,9 +43,9 @@ struct Arguments {
     #[arg(long)]
     quick: bool,
     /// Measures this scene only.
-    #[arg(long, value_parser = ["objects", "record", "ecs"])]
+    #[arg(long, value_parser = ["objects", "few", "turn", "record", "ecs"])]
     scene: Option<String>,
-    /// The number of measured frames of each contender in each scene.
+    /// The number of measured frames of each contender in each scene, rounded up to whole bursts.
     #[arg(long)]
     frames: Option<usize>,
     /// The number of threads of each contender; by default, that of the machine's cores.
@@ -55,7 +57,7 @@ struct Arguments {
     /// Draws the results as a chart in SVG.
     #[arg(long)]
     chart: Option<PathBuf>,
-    /// Saves the pictures of all contenders into this folder, as PNG. For the adapter.
+    /// Saves the pictures of all contenders into this folder, as PNG. The no-op backend has none.
     #[arg(long)]
     pictures: Option<PathBuf>,
 }
@@ -66,10 +68,13 @@ const FULL: &[Layout] = &[
     Layout::objects(1_000),
     Layout::objects(10_000),
     Layout::objects(50_000),
+    Layout::few(50_000),
+    Layout::turn(50_000),
     Layout::record(10_000),
     Layout::ecs(20_000),
 ];
-const QUICK: &[Layout] = &[Layout::objects(100), Layout::record(1_000), Layout::ecs(1_000)];
+const QUICK: &[Layout] =
+    &[Layout::objects(100), Layout::few(1_000), Layout::turn(1_000), Layout::record(1_000), Layout::ecs(1_000)];
 
 fn main() -> Result<(), Failure> {
     let arguments = Arguments::parse();
@@ -79,6 +84,9 @@ fn main() -> Result<(), Failure> {
         None => thread::available_parallelism()?.get(),
     };
     if let Some(folder) = &arguments.pictures {
+        if backend == BackendName::Noop {
+            return Err("the no-op backend draws no pictures".into());
+        }
         fs::create_dir_all(folder)?;
     }
     let extent = Extent::new(backend, threads, arguments.quick, arguments.frames);

@@ -4,11 +4,10 @@ use std::path::Path;
 
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::{Harness, Rounds, WARM_UP};
-use drawloom_benches::statistics::median;
 use indicatif::ProgressBar;
 
 use crate::bevy_side::{Bevy, Mode};
-use crate::contender::{Contender, Failure, FrameTime};
+use crate::contender::{Contender, Failure};
 use crate::drawloom_side::Drawloom;
 use crate::layout::Layout;
 use crate::pictures;
@@ -26,11 +25,15 @@ pub struct Extent {
     pub frames: u32,
 }
 
+/// The modes of Bevy that are interleaved. A pipelined app has a thread that works for the task pool of all apps while it is idle, so it is
+/// measured when the others are gone.
+const GROUPS: [&[Mode]; 2] = [&[Mode::Default, Mode::SerialSchedules, Mode::DeviceCulling], &[Mode::Pipelined]];
+
 /// Frames before the first burst: Drawloom measures costs and orders its objects in them.
 const WARM_UP_FRAMES: usize = 60;
 
 impl Extent {
-    /// `frames` is the number of measured frames of each contender.
+    /// `frames` is the number of measured frames of each contender, and is rounded up to whole bursts.
     pub fn new(backend: BackendName, threads: usize, is_quick: bool, frames: Option<usize>) -> Self {
         let burst = backend.of([8, 2]);
         let default = if is_quick { 2 * burst } else { 31 * burst };
@@ -40,23 +43,39 @@ impl Extent {
 }
 
 /// # Errors
-/// Returns an error if a contender cannot draw a frame, or does not draw every object.
+/// Returns an error if a contender cannot draw a frame, does not draw every object, or draws another picture.
 pub fn measure(
     layout: &Layout,
     extent: &Extent,
     folder: Option<&Path>,
     progress: &ProgressBar,
 ) -> Result<Vec<Row>, Failure> {
-    let mut contenders = contenders(layout, extent)?;
+    let mut rows = Vec::new();
+    for modes in GROUPS {
+        let group = measure_group(modes, layout, extent, folder, progress)?;
+        // Drawloom is measured beside each group, and reported beside the first.
+        rows.extend(group.into_iter().skip(usize::from(!rows.is_empty())));
+    }
+    Ok(rows)
+}
+
+/// Measures Drawloom and Bevy in these modes.
+fn measure_group(
+    modes: &[Mode],
+    layout: &Layout,
+    extent: &Extent,
+    folder: Option<&Path>,
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Failure> {
+    let mut contenders = contenders(modes, layout, extent)?;
+    let warm_up = if extent.is_quick { 2 } else { extent.backend.of([WARM_UP_FRAMES, WARM_UP_FRAMES / 4]) };
     for contender in &mut contenders {
-        let warm_up = if extent.is_quick { 2 } else { extent.backend.of([WARM_UP_FRAMES, WARM_UP_FRAMES / 4]) };
         for _ in 0..warm_up {
             contender.frame()?;
             contender.wait()?;
         }
+        check(contender.as_mut(), layout)?;
     }
-    let drawn =
-        contenders.iter_mut().map(|contender| check(contender.as_mut(), layout)).collect::<Result<Vec<_>, _>>()?;
     if extent.backend == BackendName::Adapter {
         pictures::compare(&mut contenders, layout, folder)?;
     }
@@ -66,43 +85,36 @@ pub fn measure(
         contender.wait()?;
         contender.burst(extent.frames)
     })?;
-    let drawloom = samples.first().map_or(&[][..], |samples| &samples[..]);
-    let row = |((contender, samples), drawn_objects): ((&Box<dyn Contender>, &Vec<FrameTime>), usize)| {
-        let time = |time: fn(&FrameTime) -> f64| median(samples.iter().map(time)) * 1e6;
-        // The ratio of two bursts of the same round, so that a disturbance meets both.
-        let ratio = |time: fn(&FrameTime) -> f64| {
-            median(samples.iter().zip(drawloom).map(|(sample, drawloom)| time(sample) / time(drawloom)))
-        };
-        Row {
-            scene: layout.name,
-            objects: layout.objects,
-            cameras: layout.cameras,
-            contender: contender.name(),
-            drawn_objects,
-            submitted_us: time(|time| time.submitted),
-            submitted_ratio: ratio(|time| time.submitted),
-            drawn_us: time(|time| time.drawn),
-            drawn_ratio: ratio(|time| time.drawn),
-        }
-    };
-    Ok(contenders.iter().zip(&samples).zip(drawn).map(row).collect())
+    let samples: Vec<Vec<_>> = samples.into_iter().map(|bursts| bursts.concat()).collect();
+    let each = contenders.iter().zip(&samples);
+    let mut rows: Vec<_> = each.map(|(contender, samples)| Row::new(layout, contender.as_ref(), samples)).collect();
+    if let Some(drawloom) = rows.first().cloned() {
+        rows.iter_mut().for_each(|row| row.compare(&drawloom));
+    }
+    Ok(rows)
 }
 
 /// Drawloom comes first.
-fn contenders(layout: &Layout, extent: &Extent) -> Result<Vec<Box<dyn Contender>>, Failure> {
+fn contenders(modes: &[Mode], layout: &Layout, extent: &Extent) -> Result<Vec<Box<dyn Contender>>, Failure> {
     let &Extent { backend, threads, .. } = extent;
-    let mut all: Vec<Box<dyn Contender>> = vec![Box::new(Drawloom::new(backend, layout, threads)?)];
-    for mode in [Mode::Default, Mode::DeviceCulling, Mode::Pipelined] {
-        all.push(Box::new(Bevy::new(backend, layout, mode, threads)?));
+    let drawloom = Drawloom::new(backend, layout, threads)?;
+    let adapter = drawloom.adapter();
+    let mut all: Vec<Box<dyn Contender>> = vec![Box::new(drawloom)];
+    for &mode in modes {
+        let bevy = Bevy::new(backend, layout, mode, threads)?;
+        if bevy.adapter() != adapter {
+            return Err(format!("Bevy draws on {:?}, and Drawloom on {adapter:?}", bevy.adapter()).into());
+        }
+        all.push(Box::new(bevy));
     }
     Ok(all)
 }
 
-/// The number of objects that a contender draws.
-fn check(contender: &mut dyn Contender, layout: &Layout) -> Result<usize, Failure> {
-    let (drawn, all) = (contender.drawn_objects()?, layout.object_views());
+/// Checks that a contender draws every object for every camera.
+fn check(contender: &mut dyn Contender, layout: &Layout) -> Result<(), Failure> {
+    let (drawn, all) = (contender.counted_frame()?, vec![layout.objects; layout.cameras]);
     if drawn != all {
-        return Err(format!("{} draws {drawn} objects of {all}", contender.name()).into());
+        return Err(format!("{} draws {drawn:?} objects instead of {all:?}", contender.name()).into());
     }
-    Ok(drawn)
+    Ok(())
 }

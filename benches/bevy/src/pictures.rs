@@ -10,8 +10,11 @@ use crate::layout::{Layout, PICTURE};
 
 /// A pixel's channels are at most this where no object is.
 const BACKGROUND: u8 = 8;
-/// The share of pixels that only one of two renderers may cover. Both round the edges of cubes that are few pixels wide.
-const TOLERANCE: f64 = 0.01;
+/// The brightest channel of an object exceeds the others by this, out of 255.
+const MIXED: u8 = 12;
+/// Tolerances of [`Difference`]. Both renderers round the edges of cubes that are few pixels wide.
+const SILHOUETTE_TOLERANCE: f64 = 0.05;
+const COLOR_TOLERANCE: f64 = 0.05;
 
 /// Reads a texture of [`PICTURE`]² pixels of four bytes.
 ///
@@ -40,10 +43,10 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
     Ok(buffer.get_mapped_range(..)?.to_vec())
 }
 
-/// Compares which pixels the contenders cover, camera by camera, and saves the pictures into `folder`, if there is one.
+/// Compares the contenders' pictures of the same frame, camera by camera, and saves them into `folder`, if there is one.
 ///
 /// # Errors
-/// Returns an error if a contender draws nothing, or covers other pixels than the first one.
+/// Returns an error if a contender draws nothing, or covers other pixels or with other colours than the first one.
 pub fn compare(contenders: &mut [Box<dyn Contender>], layout: &Layout, folder: Option<&Path>) -> Result<(), Failure> {
     for camera in 0..layout.cameras {
         let mut first = Vec::new();
@@ -54,20 +57,66 @@ pub fn compare(contenders: &mut [Box<dyn Contender>], layout: &Layout, folder: O
                 let file = format!("{}-{}-{camera}-{name}.png", layout.name, layout.objects);
                 image::save_buffer(folder.join(file), &picture, PICTURE, PICTURE, image::ColorType::Rgba8)?;
             }
-            let covered: Vec<_> =
-                picture.chunks_exact(4).map(|pixel| pixel[..3].iter().any(|&channel| channel > BACKGROUND)).collect();
-            if !covered.contains(&true) {
-                return Err(format!("{name} draws nothing for camera {camera}").into());
-            }
+            let colors: Vec<_> = picture.chunks_exact(4).map(Color::of).collect();
             if first.is_empty() {
-                first = covered;
+                first = colors;
                 continue;
             }
-            let differ = first.iter().zip(&covered).filter(|(one, other)| one != other).count();
-            if differ as f64 > TOLERANCE * covered.len() as f64 {
-                return Err(format!("{name} draws another picture for camera {camera}: {differ} pixels differ").into());
+            let difference = Difference::new(&first, &colors);
+            if difference.is_large() {
+                return Err(format!("{name} draws another picture for camera {camera}: {difference:?}").into());
             }
         }
     }
     Ok(())
+}
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Color {
+    Background,
+    /// The brightest channel.
+    Channel(usize),
+    /// The edge of two objects, of which no channel is clearly the brightest.
+    Mixed,
+}
+
+impl Color {
+    fn of(pixel: &[u8]) -> Self {
+        let mut channels = [0, 1, 2].map(|channel| (pixel[channel], channel));
+        channels.sort_unstable();
+        let [_, (second, _), (brightest, channel)] = channels;
+        match brightest {
+            ..=BACKGROUND => Self::Background,
+            _ if brightest - second < MIXED => Self::Mixed,
+            _ => Self::Channel(channel),
+        }
+    }
+}
+
+/// How two pictures differ, as shares of the pixels that the first one covers.
+#[derive(Debug)]
+struct Difference {
+    /// Pixels that only one of them covers.
+    silhouette: f64,
+    /// Pixels that they cover with different colours.
+    color: f64,
+}
+
+impl Difference {
+    fn new(one: &[Color], other: &[Color]) -> Self {
+        let covered = one.iter().filter(|&&color| color != Color::Background).count();
+        let share = |differs: fn(Color, Color) -> bool| {
+            one.iter().zip(other).filter(|&(&one, &other)| differs(one, other)).count() as f64 / covered as f64
+        };
+        Self {
+            silhouette: share(|one, other| (one == Color::Background) != (other == Color::Background)),
+            color: share(|one, other| one != other && matches!((one, other), (Color::Channel(_), Color::Channel(_)))),
+        }
+    }
+
+    /// Without a covered pixel the shares are not finite.
+    fn is_large(&self) -> bool {
+        !(self.silhouette <= SILHOUETTE_TOLERANCE && self.color <= COLOR_TOLERANCE)
+    }
 }

@@ -4,28 +4,81 @@ use std::path::Path;
 
 use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::chart::{self, HorizontalBars, Lines, Panel};
+use drawloom_benches::statistics::{median, percentile};
 use drawloom_benches::table::Table;
-use serde::Serialize;
 
-use crate::contender::Failure;
+use crate::contender::{Contender, Failure, FrameTime, PARTS};
+use crate::layout::Layout;
 use crate::measure::Extent;
 
-/// A contender in a scene. Times are medians, in microseconds a frame; ratios are to Drawloom.
-#[derive(Serialize)]
+/// A contender in a scene. Times are medians over frames, in microseconds.
+#[derive(Clone)]
 pub struct Row {
-    pub scene: &'static str,
-    pub objects: usize,
-    pub cameras: usize,
-    pub contender: &'static str,
-    /// Objects drawn in a frame, over all cameras.
-    pub drawn_objects: usize,
-    /// Until submit returns.
-    pub submitted_us: f64,
-    pub submitted_ratio: f64,
-    /// Until the device is idle.
-    pub drawn_us: f64,
-    pub drawn_ratio: f64,
+    scene: &'static str,
+    objects: usize,
+    cameras: usize,
+    contender: &'static str,
+    color: usize,
+    /// [`FrameTime::submitted`], and its first and third quartile.
+    submitted_us: f64,
+    quartiles_us: [f64; 2],
+    /// [`FrameTime::parts`].
+    parts_us: Option<[f64; 3]>,
+    /// The median divided by Drawloom's.
+    submitted_ratio: f64,
+    /// [`FrameTime::drawn`].
+    drawn_us: f64,
+    /// `None` where frames overlap: then `drawn_us` is no latency.
+    drawn_ratio: Option<f64>,
 }
+
+impl Row {
+    pub fn new(layout: &Layout, contender: &dyn Contender, samples: &[FrameTime]) -> Self {
+        let submitted = || samples.iter().map(|sample| sample.submitted);
+        let parts: Vec<_> = samples.iter().filter_map(|sample| sample.parts).collect();
+        let part = |index: usize| median(parts.iter().map(|parts| parts[index])) * 1e6;
+        Self {
+            scene: layout.name,
+            objects: layout.objects,
+            cameras: layout.cameras,
+            contender: contender.name(),
+            color: contender.color(),
+            submitted_us: median(submitted()) * 1e6,
+            quartiles_us: [25, 75].map(|percent| percentile(percent, submitted()) * 1e6),
+            parts_us: (!parts.is_empty()).then(|| [0, 1, 2].map(part)),
+            submitted_ratio: 1.0,
+            drawn_us: median(samples.iter().map(|sample| sample.drawn)) * 1e6,
+            drawn_ratio: None,
+        }
+    }
+
+    /// Sets the ratios to Drawloom, which was measured beside this contender.
+    pub fn compare(&mut self, drawloom: &Self) {
+        self.submitted_ratio = self.submitted_us / drawloom.submitted_us;
+        self.drawn_ratio = self.parts_us.map(|_| self.drawn_us / drawloom.drawn_us);
+    }
+}
+
+/// The columns in CSV. Each row says on what it was measured.
+const COLUMNS: [&str; 17] = [
+    "backend",
+    "adapter",
+    "threads",
+    "is_quick",
+    "scene",
+    "objects",
+    "cameras",
+    "contender",
+    "submitted_us",
+    "first_quartile_us",
+    "third_quartile_us",
+    "first_part_us",
+    "second_part_us",
+    "third_part_us",
+    "submitted_ratio",
+    "drawn_us",
+    "drawn_ratio",
+];
 
 /// The results.
 pub struct Report {
@@ -41,29 +94,43 @@ impl Report {
     pub fn print(&self) {
         let Extent { backend, threads, is_quick, bursts, frames } = self.extent;
         let note = if is_quick { ", a quick run (meaningless figures)" } else { "" };
-        println!("{}{note}: medians of {bursts} bursts of {frames} frames, {threads} threads", self.backend_name());
-        println!("submitted: µs a frame, from the motion of the objects until submit returns");
-        println!("drawn: the same until the device is idle");
-        println!("÷: the median of the rounds' ratios to drawloom\n");
+        println!("{}{note}: medians of {bursts} × {frames} frames, {threads} threads", self.backend_name());
+        println!(
+            "submitted: µs a frame, from the motion until submit returns, and its quartiles; its parts: {PARTS:?}"
+        );
+        println!("bevy-pipelined: µs from one submit to the next, medians of {bursts} bursts");
+        if backend == BackendName::Adapter {
+            println!("drawn: µs until the device is idle; pipelined, the mean time of the frames of a burst");
+        }
+        println!("÷: the median divided by drawloom's\n");
+        let [first, second, third] = PARTS;
         let headings =
-            ["scene", "objects", "cameras", "contender", "drawn objects", "submitted", "÷", "drawn", "÷ drawn"];
-        let mut table = Table::new(&headings[..if backend == BackendName::Noop { 7 } else { 9 }]);
+            ["scene", "objects", "cameras", "contender", "submitted", "quartiles", first, second, third, "÷"];
+        let drawn = ["drawn", "÷ drawn"];
+        let columns = headings.len() + backend.of([0, drawn.len()]);
+        let mut table = Table::new(&[&headings[..], &drawn].concat()[..columns]);
         for row in &self.rows {
+            let [low, high] = row.quartiles_us.map(chart::grouped);
+            let parts = row.parts_us.map_or_else(Default::default, |parts| parts.map(chart::grouped));
+            let [first, second, third] = parts;
             let cells = [
                 row.scene.to_owned(),
                 chart::grouped(row.objects as f64),
                 row.cameras.to_string(),
                 row.contender.to_owned(),
-                chart::grouped(row.drawn_objects as f64),
                 chart::grouped(row.submitted_us),
+                format!("{low}–{high}"),
+                first,
+                second,
+                third,
                 format!("{:.2}", row.submitted_ratio),
             ];
             match backend {
                 BackendName::Noop => table.row(cells),
                 BackendName::Adapter => {
-                    let [scene, objects, cameras, contender, drawn, submitted, ratio] = cells;
-                    let (time, drawn_ratio) = (chart::grouped(row.drawn_us), format!("{:.2}", row.drawn_ratio));
-                    table.row([scene, objects, cameras, contender, drawn, submitted, ratio, time, drawn_ratio]);
+                    let [a, b, c, d, e, f, g, h, i, j] = cells;
+                    let ratio = row.drawn_ratio.map_or_else(String::new, |ratio| format!("{ratio:.2}"));
+                    table.row([a, b, c, d, e, f, g, h, i, j, chart::grouped(row.drawn_us), ratio]);
                 }
             }
         }
@@ -73,47 +140,59 @@ impl Report {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<(), Failure> {
-        let mut writer = csv::Writer::from_path(path)?;
-        self.rows.iter().try_for_each(|row| writer.serialize(row))?;
+        let Extent { backend, threads, is_quick, .. } = self.extent;
+        let mut writer = csv::WriterBuilder::new().has_headers(false).from_path(path)?;
+        writer.write_record(COLUMNS)?;
+        for row in &self.rows {
+            let run = (backend.name(), self.backend_name(), threads, is_quick);
+            let what = (row.scene, row.objects, row.cameras, row.contender);
+            let parts = row.parts_us.map_or([None; 3], |parts| parts.map(Some));
+            let submitted = (row.submitted_us, row.quartiles_us, parts, row.submitted_ratio);
+            writer.serialize((run, what, submitted, row.drawn_us, row.drawn_ratio))?;
+        }
         writer.flush()?;
         println!("{} written", path.display());
         Ok(())
     }
 
+    /// Draws the scenes of several sizes as lines, and the others as bars.
+    ///
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn draw(&self, path: &Path) -> Result<(), Failure> {
-        let mut panels = Vec::new();
-        let objects: Vec<_> = self.rows.iter().filter(|row| row.scene == "objects").collect();
-        if let Some(lines) = self.lines(&objects) {
-            panels.push(Panel::Lines(lines));
-        }
-        for scene in ["record", "ecs"] {
-            let rows: Vec<_> = self.rows.iter().filter(|row| row.scene == scene).collect();
-            let Some(&first) = rows.first() else { continue };
-            let (objects, cameras) = (chart::grouped(first.objects as f64), first.cameras);
-            let plural = if cameras == 1 { "" } else { "s" };
-            let title = format!("µs a frame, {scene}: {cameras} camera{plural} × {objects} objects");
-            let bars = rows.iter().map(|row| (row.contender.to_owned(), self.time(row), color(row.contender)));
-            panels.push(Panel::HorizontalBars(HorizontalBars { title, bars: bars.collect() }));
-        }
+        let panel = |rows: &[Row]| {
+            let has_sizes = rows.iter().any(|row| row.objects != rows[0].objects);
+            if has_sizes { Panel::Lines(self.lines(rows)) } else { Panel::HorizontalBars(self.bars(rows)) }
+        };
+        let panels: Vec<_> = self.rows.chunk_by(|one, other| one.scene == other.scene).map(panel).collect();
         chart::draw(path, &panels)
     }
 
-    /// A line per contender, if there are several numbers of objects.
-    fn lines(&self, rows: &[&Row]) -> Option<Lines> {
-        let mut names: Vec<_> = rows.iter().map(|row| row.contender).collect();
-        names.sort_by_key(|name| color(name));
-        names.dedup();
-        let points = |name: &str| {
-            let of = rows.iter().filter(|row| row.contender == name);
+    /// The contenders in a scene of one size.
+    fn bars(&self, rows: &[Row]) -> HorizontalBars {
+        let Row { scene, objects, cameras, .. } = rows[0];
+        let plural = if cameras == 1 { "" } else { "s" };
+        let title =
+            format!("µs a frame, {scene}: {cameras} camera{plural} × {} objects", chart::grouped(objects as f64));
+        let bars = rows.iter().map(|row| (row.contender.to_owned(), self.time(row), row.color));
+        HorizontalBars { title, bars: bars.collect() }
+    }
+
+    /// A line per contender.
+    fn lines(&self, rows: &[Row]) -> Lines {
+        let scene = rows[0].scene;
+        let mut contenders: Vec<_> = rows.iter().map(|row| (row.color, row.contender)).collect();
+        contenders.sort_unstable();
+        contenders.dedup();
+        let points = |&(color, name): &(usize, &str)| {
+            let of = rows.iter().filter(|row| row.color == color);
             (name.to_owned(), of.map(|row| (row.objects as f64, self.time(row))).collect::<Vec<_>>())
         };
-        let series: Vec<_> = names.into_iter().map(points).collect();
-        let ticks: Vec<_> = series.first()?.1.iter().map(|point| point.0).collect();
-        let title = format!("µs a frame, objects: one camera, {}", self.backend_name());
-        let (x_label, first_color) = ("objects".to_owned(), 1);
-        (ticks.len() > 1).then_some(Lines { title, x_label, series, first_color, ticks })
+        let series: Vec<_> = contenders.iter().map(points).collect();
+        let ticks = series[0].1.iter().map(|point| point.0).collect();
+        let title = format!("µs a frame, {scene}: one camera, {}", self.backend_name());
+        let (x_label, first_color) = ("objects".to_owned(), contenders[0].0);
+        Lines { title, x_label, series, first_color, ticks }
     }
 
     /// The time that the chart shows.
@@ -126,15 +205,5 @@ impl Report {
             BackendName::Noop => "wgpu's no-op backend".to_owned(),
             BackendName::Adapter => adapter_name().unwrap_or_else(|| "no adapter".to_owned()),
         }
-    }
-}
-
-/// The colour of a contender's bars, and the order of the lines, which have the same colours.
-fn color(contender: &str) -> usize {
-    match contender {
-        "bevy" => 1,
-        "bevy, device culling" => 2,
-        "bevy, pipelined" => 3,
-        _ => 4,
     }
 }

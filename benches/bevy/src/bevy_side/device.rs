@@ -16,7 +16,7 @@ pub fn open(backend: BackendName) -> Result<RenderResources, Failure> {
     match backend {
         BackendName::Noop => noop(),
         BackendName::Adapter => {
-            // As `RenderCreation::Automatic` does it.
+            // As `RenderCreation::Automatic` does it. wgpu does not check indirect draws then.
             let settings = WgpuSettings::default();
             let backends = settings.backends.unwrap_or(wgpu::Backends::all());
             Ok(block_on(initialize_renderer(backends, None, &settings)))
@@ -29,7 +29,7 @@ pub fn open(backend: BackendName) -> Result<RenderResources, Failure> {
 fn noop() -> Result<RenderResources, Failure> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::NOOP;
-    // Bevy removes it too.
+    // wgpu's check of indirect draws panics on this backend.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     descriptor.backend_options.noop = wgpu::NoopBackendOptions { enable: true, ..Default::default() };
     let instance = wgpu::Instance::new(descriptor);

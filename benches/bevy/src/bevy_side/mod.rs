@@ -1,53 +1,69 @@
 //! Bevy: its forward renderer with `StandardMaterial`, set up without plugins that the scene does not need.
 
 mod app;
-mod checks;
 mod device;
+mod probe;
 mod scene;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 use std::time::{Duration, Instant};
 
-use bevy_app::App;
+use bevy_app::{App, AppLabel, SubApps};
+use bevy_render::RenderApp;
 use bevy_render::renderer::{RenderDevice, RenderQueue};
 use drawloom::wgpu;
 use drawloom_benches::backends::BackendName;
 
-use crate::contender::{Contender, Failure, FrameTime, separate_frames};
+use crate::contender::{Contender, Failure, FrameTime, timed_frame};
 use crate::layout::Layout;
 use crate::pictures;
+use probe::Probe;
 
-/// Where a frame's objects are culled, and where it is rendered.
+/// How systems are scheduled, where objects are culled, and where a frame is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Bevy's default: the CPU culls, in `app.update()`, which renders too.
+    /// Bevy's default: systems run in parallel, the CPU culls, and `app.update()` renders.
     Default,
-    /// All objects have the component `NoCpuCulling`: the device alone culls.
+    /// The systems of each world run one after the other, but share their loops with the task pool.
+    SerialSchedules,
+    /// Serial schedules, and all objects have the component `NoCpuCulling`: the device alone culls.
     DeviceCulling,
-    /// As the default, but with `PipelinedRenderingPlugin`: a frame is rendered while the next one is simulated.
+    /// Serial schedules and `PipelinedRenderingPlugin`: a frame is rendered while the next one is simulated.
     Pipelined,
+}
+
+impl Mode {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Default => "bevy",
+            Self::SerialSchedules => "bevy-serial-schedules",
+            Self::DeviceCulling => "bevy-device-culling",
+            Self::Pipelined => "bevy-pipelined",
+        }
+    }
+
+    fn has_serial_schedules(self) -> bool {
+        self != Self::Default
+    }
+
+    fn is_pipelined(self) -> bool {
+        self == Self::Pipelined
+    }
 }
 
 /// A Bevy app.
 pub struct Bevy {
     app: App,
     mode: Mode,
-    layout: Layout,
     device: RenderDevice,
     queue: RenderQueue,
     targets: Vec<wgpu::Texture>,
-    /// The number of frames that the render world has submitted.
-    rendered: Arc<AtomicUsize>,
-    /// The number of frames that it will have submitted when it is idle.
-    requested: usize,
+    probe: Probe,
 }
 
-/// Updates in which pipelines are created, assets are prepared, and the render world becomes ready.
-const WARM_UP: usize = 8;
-/// The longest time in which a pipelined frame is rendered.
-const RENDER_TIMEOUT: Duration = Duration::from_secs(60);
+/// The longest time in which shaders are loaded, pipelines are created, and meshes are prepared. Nothing moves meanwhile.
+const WARM_UP: Duration = Duration::from_secs(60);
+/// Frames of a pipelined burst for each frame of another: it has one time only.
+const PIPELINED_FRAMES: u32 = 8;
 
 impl Bevy {
     /// # Errors
@@ -55,79 +71,95 @@ impl Bevy {
     pub fn new(backend: BackendName, layout: &Layout, mode: Mode, threads: usize) -> Result<Self, Failure> {
         let resources = device::open(backend)?;
         let (device, queue) = (resources.0.clone(), resources.1.clone());
-        let rendered = Arc::new(AtomicUsize::new(0));
-        let mut app = app::new(resources, mode, threads, Arc::clone(&rendered));
-        let targets = scene::spawn(app.world_mut(), layout, mode, &device);
-        app.finish();
-        app.cleanup();
-        for _ in 0..WARM_UP {
+        let probe = Probe::default();
+        let mut targets = Vec::new();
+        let mut app = app::new(resources, mode, threads, &probe, |world| {
+            targets = scene::spawn(world, layout, mode, &device);
+        });
+        let start = Instant::now();
+        loop {
+            probe.count();
             app.update();
-            // Nothing tells how many of the first updates the render world skips, so a pipelined one gets time to finish.
-            if mode == Mode::Pipelined {
-                thread::sleep(Duration::from_millis(200));
+            probe.wait()?;
+            let drawn = probe.drawn();
+            if drawn.as_ref().is_ok_and(|drawn| *drawn == vec![layout.objects; layout.cameras]) {
+                break;
+            }
+            if start.elapsed() > WARM_UP {
+                return Err(format!("Bevy does not draw every object: {drawn:?}").into());
             }
         }
-        let requested = rendered.load(Ordering::Acquire);
-        let mut bevy = Self { app, mode, layout: *layout, device, queue, targets, rendered, requested };
-        bevy.wait()?;
-        Ok(bevy)
+        scene::start(app.world_mut());
+        Ok(Self { app, mode, device, queue, targets, probe })
     }
 
-    /// Waits until the render world has submitted all frames.
-    fn wait_for_render_world(&self) -> Result<(), Failure> {
+    /// Frames of a pipelined app overlap. Their time is that from the first submit to the last one, so the burst's start and its end,
+    /// where only one world works, are not charged.
+    fn pipelined_burst(&mut self, frames: u32) -> Result<FrameTime, Failure> {
+        self.probe.start();
         let start = Instant::now();
-        while self.rendered.load(Ordering::Acquire) < self.requested {
-            if start.elapsed() > RENDER_TIMEOUT {
-                return Err("Bevy's render world does not finish its frame".into());
-            }
-            thread::yield_now();
+        for _ in 0..frames {
+            self.app.update();
         }
-        Ok(())
+        self.wait()?;
+        let drawn = start.elapsed().as_secs_f64() / f64::from(frames);
+        let submitted = self.probe.elapsed().as_secs_f64() / f64::from(frames - 1);
+        Ok(FrameTime { submitted, parts: None, drawn })
     }
 }
 
 impl Contender for Bevy {
     fn name(&self) -> &'static str {
-        match self.mode {
-            Mode::Default => "bevy",
-            Mode::DeviceCulling => "bevy, device culling",
-            Mode::Pipelined => "bevy, pipelined",
-        }
+        self.mode.name()
     }
 
-    fn frame(&mut self) -> Result<(), Failure> {
-        self.requested += 1;
-        self.app.update();
-        Ok(())
+    fn color(&self) -> usize {
+        1 + self.mode as usize
+    }
+
+    fn adapter(&self) -> wgpu::AdapterInfo {
+        self.device.wgpu_device().adapter_info()
+    }
+
+    fn frame(&mut self) -> Result<[f64; 3], Failure> {
+        let start = Instant::now();
+        if self.mode.is_pipelined() {
+            self.app.update();
+            return Ok([start.elapsed().as_secs_f64(), 0.0, 0.0]);
+        }
+        // As `App::update` does it.
+        let SubApps { main, sub_apps } = self.app.sub_apps_mut();
+        let render = sub_apps.get_mut(&RenderApp.intern()).ok_or("there is no render world")?;
+        main.run_default_schedule();
+        let main_end = Instant::now();
+        render.extract(main.world_mut());
+        let extract_end = Instant::now();
+        render.update();
+        main.world_mut().clear_trackers();
+        Ok([main_end - start, extract_end - main_end, extract_end.elapsed()].map(|part| part.as_secs_f64()))
     }
 
     fn wait(&mut self) -> Result<(), Failure> {
-        self.wait_for_render_world()?;
+        self.probe.wait()?;
         self.device.wgpu_device().poll(wgpu::PollType::wait_indefinitely())?;
         Ok(())
     }
 
-    fn drawn_objects(&mut self) -> Result<usize, Failure> {
+    fn counted_frame(&mut self) -> Result<Vec<usize>, Failure> {
+        self.probe.count();
+        self.frame()?;
         self.wait()?;
-        checks::check_render_world(&self.app, &self.layout)?;
-        Ok(checks::visible_objects(self.app.world_mut(), &self.layout, self.mode))
+        self.probe.drawn()
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        self.wait()?;
         pictures::read(self.device.wgpu_device(), &self.queue, &self.targets[camera])
     }
 
-    /// Pipelined frames overlap, so their burst is timed as a whole, until its last frame is submitted.
-    fn burst(&mut self, frames: u32) -> Result<FrameTime, Failure> {
-        if self.mode != Mode::Pipelined {
-            return separate_frames(self, frames);
+    fn burst(&mut self, frames: u32) -> Result<Vec<FrameTime>, Failure> {
+        if self.mode.is_pipelined() {
+            return Ok(vec![self.pipelined_burst(PIPELINED_FRAMES * frames)?]);
         }
-        let start = Instant::now();
-        (0..frames).try_for_each(|_| self.frame())?;
-        self.wait_for_render_world()?;
-        let submitted = start.elapsed();
-        self.wait()?;
-        Ok(FrameTime::mean(submitted, start.elapsed(), frames))
+        (0..frames).map(|_| timed_frame(self)).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! What all worlds of Drawloom have: assets, cameras and the light.
 
-use drawloom::glam::{DVec3, Vec3};
+use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, Projection, SceneError, SceneRef};
 use drawloom_benches::boxes::new_box;
@@ -44,6 +44,12 @@ impl Surroundings {
         };
         let cameras = layout.cameras().enumerate().map(camera).collect();
         Ok(Self { assets, meshes, materials, bounds, lights: vec![light], cameras })
+    }
+
+    /// Turns the cameras.
+    pub fn turn(&mut self, frame: u32) {
+        let turn = Quat::from_rotation_y(layout::angle(frame));
+        self.cameras.iter_mut().for_each(|camera| camera.orientation = turn * camera.orientation);
     }
 
     /// A scene without objects. All objects may have changed.

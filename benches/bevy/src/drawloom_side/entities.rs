@@ -15,7 +15,7 @@ use drawloom::task::{JobPanic, Scheduler};
 use super::assets::Surroundings;
 use super::{CHUNK, World};
 use crate::contender::Failure;
-use crate::layout::Layout;
+use crate::layout::{self, Layout};
 
 #[derive(Component, TransparentWrapper)]
 #[repr(transparent)]
@@ -72,7 +72,8 @@ impl Entities {
 }
 
 impl World for Entities {
-    fn advance(&mut self, step: DVec3, scheduler: &Scheduler) -> Result<(), JobPanic> {
+    fn advance(&mut self, frame: u32, scheduler: &Scheduler) -> Result<(), JobPanic> {
+        let step = DVec3::from_array(layout::step(frame));
         let Ok(tables) = self.moving.contiguous_iter_mut(&mut self.world) else { return Ok(()) };
         for mut positions in tables {
             let positions = Position::peel_slice_mut(&mut positions);

@@ -5,30 +5,29 @@ mod assets;
 mod entities;
 
 use std::sync::Arc;
+use std::time::Instant;
 
-use drawloom::backend::WgpuSubmission;
-use drawloom::glam::DVec3;
+use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::SceneRef;
 use drawloom::task::{JobPanic, Scheduler};
-use drawloom::{FrameStatistics, Renderer, Submitter};
+use drawloom::{FrameStatistics, Renderer, Submitter, wgpu};
 use drawloom_benches::backends::BackendName;
+use drawloom_testing::adapter;
 
 use crate::contender::{Contender, Failure};
-use crate::layout::{self, Layout};
+use crate::layout::Layout;
 use crate::pictures;
 use arrays::Arrays;
 use entities::Entities;
-
-type WgpuBackend = drawloom::backend::WgpuBackend;
 
 /// Positions that one job moves: some microseconds of work.
 const CHUNK: usize = 4096;
 
 /// An engine's world.
 trait World {
-    /// Moves each object by `step`, in metres.
-    fn advance(&mut self, step: DVec3, scheduler: &Scheduler) -> Result<(), JobPanic>;
+    /// Moves what moves in this frame.
+    fn advance(&mut self, frame: u32, scheduler: &Scheduler) -> Result<(), JobPanic>;
 
     /// Lends the world to `draw`.
     fn lend(&mut self, draw: &mut dyn FnMut(SceneRef<'_>) -> Result<(), Failure>) -> Result<(), Failure>;
@@ -54,7 +53,12 @@ impl Drawloom {
             false => Box::new(Arrays::new(layout)?),
         };
         let scheduler = Arc::new(Scheduler::new(threads)?);
-        let (renderer, submitter) = Renderer::builder(backend.open()?)
+        let (device, queue) = match backend {
+            // A graphics card with memory of its own: uploads are staged, as Bevy's always are.
+            BackendName::Noop => adapter::noop_device_without(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS)?,
+            BackendName::Adapter => adapter::device_without_indirect_validation()?,
+        };
+        let (renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
             .deferred(Deferred::to_picture().shadow_maps(None))
             .build(Arc::clone(&scheduler))?;
         let statistics = FrameStatistics::default();
@@ -67,24 +71,40 @@ impl Contender for Drawloom {
         "drawloom"
     }
 
-    fn frame(&mut self) -> Result<(), Failure> {
+    fn color(&self) -> usize {
+        5
+    }
+
+    fn adapter(&self) -> wgpu::AdapterInfo {
+        self.renderer.backend().device().adapter_info()
+    }
+
+    fn frame(&mut self) -> Result<[f64; 3], Failure> {
         let Self { world, scheduler, renderer, submitter, statistics, last, frame } = self;
-        world.advance(DVec3::from_array(layout::step(*frame)), scheduler)?;
+        let start = Instant::now();
+        world.advance(*frame, scheduler)?;
         *frame += 1;
+        let updated = Instant::now();
+        let mut recorded = updated;
         world.lend(&mut |scene| {
-            let submitted = submitter.submit(renderer.record(scene)?)?;
+            let frame = renderer.record(scene)?;
+            recorded = Instant::now();
+            let submitted = submitter.submit(frame)?;
             *statistics = submitted.statistics;
             *last = Some(submitted.submission);
             Ok(())
-        })
+        })?;
+        Ok([updated - start, recorded - updated, recorded.elapsed()].map(|part| part.as_secs_f64()))
     }
 
     fn wait(&mut self) -> Result<(), Failure> {
         Ok(self.last.as_ref().map_or(Ok(()), WgpuSubmission::wait)?)
     }
 
-    fn drawn_objects(&mut self) -> Result<usize, Failure> {
-        Ok(self.statistics.views.iter().map(|view| view.visible - view.occluded).sum())
+    fn counted_frame(&mut self) -> Result<Vec<usize>, Failure> {
+        self.frame()?;
+        self.wait()?;
+        Ok(self.statistics.views.iter().map(|view| view.visible - view.occluded).collect())
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
