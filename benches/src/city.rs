@@ -1,10 +1,8 @@
 //! A city of boxes.
 
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_testing::random::Random;
-
-use crate::boxes::new_box;
 
 /// In metres: the side of a lot. A street follows after [`LOTS`] lots along each axis.
 const LOT: f64 = 14.0;
@@ -21,7 +19,7 @@ const HOUSES: f64 = 0.7;
 pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();
-    let mesh = scene.add(new_box("box".to_owned(), Vec3::ONE)?)?;
+    let mesh = scene.add(Mesh::cuboid("box".to_owned(), Vec3::splat(2.0))?)?;
     let material = scene.add(Material::default())?;
     let houses = (boxes as f64 * HOUSES) as usize;
     let side = (houses as f64).sqrt().ceil() as usize;

@@ -3,10 +3,8 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Quat};
-use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_testing::random::Random;
-
-use crate::boxes::new_box;
 
 pub const MESHES: u32 = 64;
 /// A view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
@@ -72,7 +70,7 @@ fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<S
     let mut scene = Scene::new();
     let (mut meshes, mut materials) = (Vec::new(), Vec::new());
     for index in 0..MESHES {
-        meshes.push(scene.add(new_box(format!("box {index}"), random.vector(0.1, 0.6))?)?);
+        meshes.push(scene.add(Mesh::cuboid(format!("box {index}"), 2.0 * random.vector(0.1, 0.6))?)?);
     }
     for index in 0..MATERIALS {
         let (name, diffuse) = (format!("paint {index}"), random.vector(0.2, 0.9));

@@ -8,7 +8,6 @@
 pub mod arguments;
 #[cfg(feature = "wgpu")]
 pub mod backends;
-pub mod boxes;
 pub mod chart;
 pub mod city;
 pub mod clouds;

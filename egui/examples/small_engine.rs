@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release -p drawloom-egui --example small_engine
 //!
-//! `examples/window` adds what a larger one has: several windows, a camera that flies, full screen, frame pacing, tests.
+//! `examples/window` adds what a larger one has: several windows, hidden ones that draw nothing, a camera that flies, frame pacing.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -37,9 +37,10 @@ impl World {
         scene.cameras.push(Camera::looking_at("main", DVec3::new(0.0, 9.0, 22.0), DVec3::ZERO));
         let cube = scene.add(Mesh::cuboid("cube", Vec3::splat(0.5))?)?;
         let colors = [Vec3::new(0.7, 0.25, 0.15), Vec3::new(0.75, 0.6, 0.35), Vec3::new(0.2, 0.45, 0.55)];
+        let paints = colors.map(|diffuse| scene.add(Material { diffuse, ..Material::default() }));
+        let paints = paints.into_iter().collect::<Result<Vec<_>, _>>()?;
         for index in 0..cubes {
-            let paint = scene.add(Material { diffuse: colors[index % colors.len()], ..Material::default() })?;
-            scene.add_object(RenderObject::new(cube, paint, DVec3::ZERO))?;
+            scene.add_object(RenderObject::new(cube, paints[index % paints.len()], DVec3::ZERO))?;
         }
         Ok(Self { began: Instant::now(), positions: vec![DVec3::ZERO; cubes], scene })
     }
@@ -98,8 +99,9 @@ struct Engine {
     submitter: Submitter<WgpuBackend>,
     inspector: Inspector,
     overlay: Overlay,
-    surface: WindowSurface<Arc<Window>>,
+    surface: WindowSurface,
     graphics: WindowDevice,
+    window: Arc<Window>,
 }
 
 impl Engine {
@@ -115,12 +117,11 @@ impl Engine {
             .build(Arc::new(Scheduler::with_available_parallelism()?))?;
         let overlay = Overlay::new(&window, &graphics.device, surface.overlay_format());
         let (world, inspector) = (World::new(1_000)?, Inspector::default());
-        Ok(Self { world, fog, renderer, submitter, inspector, overlay, surface, graphics })
+        Ok(Self { world, fog, renderer, submitter, inspector, overlay, surface, graphics, window })
     }
 
     fn draw(&mut self) -> Result<(), Box<dyn Error>> {
-        let window = Arc::clone(self.surface.window());
-        let Some(frame) = self.surface.acquire(window.inner_size())? else { return Ok(()) };
+        let Some(frame) = self.surface.acquire(self.window.inner_size())? else { return Ok(()) };
         self.world.update();
         self.world.scene.cameras[0].size = frame.size();
         self.renderer.backend().import_target("main", "picture", frame.target().clone());
@@ -128,17 +129,16 @@ impl Engine {
         self.inspector.add_frame(&self.renderer, &recorded);
         self.submitter.submit(recorded)?;
         let WindowDevice { device, queue, .. } = &self.graphics;
-        self.surface.present(frame, |texture| {
-            self.overlay.draw(&window, device, queue, texture, |ui| {
+        frame.present(|texture| {
+            self.overlay.draw(&self.window, device, queue, texture, |ui| {
                 self.inspector.show(ui.ctx(), &mut self.renderer);
                 egui::Window::new("Fog").anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -12.0]).show(ui.ctx(), |ui| {
-                    let mut density = self.fog.get();
-                    ui.add(egui::Slider::new(&mut density, 0.0..=0.2).text("density"));
-                    self.fog.set(density);
+                    self.fog.update(|density| ui.add(egui::Slider::new(density, 0.0..=0.2).text("density")));
                 });
             });
-            window.pre_present_notify();
+            self.window.pre_present_notify();
         });
+        self.window.request_redraw();
         Ok(())
     }
 }
@@ -160,19 +160,21 @@ impl ApplicationHandler for App {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(engine) = &mut self.engine else { return };
-        engine.overlay.handle(engine.surface.window(), &event);
+        engine.overlay.handle(&engine.window, &event);
         match event {
             WindowEvent::CloseRequested => event_loop.exit(),
-            WindowEvent::RedrawRequested => match engine.draw() {
-                Ok(()) => engine.surface.window().request_redraw(),
-                Err(error) => (self.error, _) = (Some(error), event_loop.exit()),
-            },
-            _ => {}
+            WindowEvent::RedrawRequested => {
+                if let Err(error) = engine.draw() {
+                    (self.error, _) = (Some(error), event_loop.exit());
+                }
+            }
+            // A window that had nothing to draw into, as while it is minimised, may have it now.
+            _ => engine.window.request_redraw(),
         }
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // The surface goes before the connection to the display does.
+        // On Wayland, the surface must go before the connection to the display does.
         self.engine = None;
     }
 }

@@ -118,9 +118,8 @@
 //! # use drawloom::process::{Deferred, ToneMapping};
 //! # use drawloom::scene::Scene;
 //! # use drawloom::task::Scheduler;
-//! # use drawloom::wgpu;
-//! # fn run<W: Into<wgpu::SurfaceTarget<'static>> + Clone>(
-//! #     mut surface: WindowSurface<W>, backend: WgpuBackend, scheduler: Arc<Scheduler>, mut world: Scene, window_size: [u32; 2],
+//! # fn run(
+//! #     mut surface: WindowSurface, backend: WgpuBackend, scheduler: Arc<Scheduler>, mut world: Scene, window_size: [u32; 2],
 //! # ) -> Result<(), Box<dyn std::error::Error>> {
 //! // The last step of post-processing decides the picture's format.
 //! let tone_mapping = ToneMapping { format: surface.picture_format(), ..ToneMapping::default() };
@@ -133,7 +132,7 @@
 //!     renderer.backend().import_target("main", "picture", frame.target().clone());
 //!     let recorded = renderer.record(world.as_scene_ref())?;
 //!     submitter.submit(recorded)?;
-//!     surface.present(frame, |_texture| { /* egui draws over it here */ });
+//!     frame.present(|_texture| { /* egui draws over it here */ });
 //! }
 //! # Ok(())
 //! # }
@@ -195,7 +194,10 @@
 //!
 //! `examples/own_content` has shaders that read data of objects, vertices and materials, move vertices, compute, and count.
 //!
-//! What the shader reads of the CPU's is its uniform: [`Parameters`] has an example, whose value changes between frames.
+//! A shader that does not compile is an error of the first frame that needs it, with the process, the line and the column;
+//! [`Renderer::prepare_pipelines`] finds it before, while the world is loaded.
+//!
+//! A process passes values to its shader as a uniform. [`Parameters`] is one that changes between frames, with an example.
 //!
 //! # 6. Keep a pass of your own
 //!
@@ -291,7 +293,7 @@
 //!         changes: Changes::Ranges(&[0..100]),
 //!         // ... as in step 3.
 //! #         orientations: &orientations, scales: &scales, bounds: &bounds, meshes: &meshes, materials: &materials,
-//! #         layers: &[], columns: &[], assets: &assets, lights: &[], cameras: &cameras, ambient: Vec3::ONE, background: Vec3::ZERO,
+//! #         cameras: &cameras, ambient: Vec3::ONE, ..SceneRef::new(&assets)
 //!     })?;
 //!     let (mut updated, moving) = (Ok(()), &mut positions[..100]);
 //!     let submitted = scheduler.scope(|scope| {
@@ -320,6 +322,7 @@
 //! [`Parameters`]: crate::process::Parameters
 //! [`RawPass`]: crate::process::RawPass
 //! [`RenderProcess`]: crate::process::RenderProcess
+//! [`Renderer::prepare_pipelines`]: crate::Renderer::prepare_pipelines
 //! [`Renderer::record`]: crate::Renderer::record
 //! [`Scene`]: crate::scene::Scene
 //! [`SceneRef`]: crate::scene::SceneRef

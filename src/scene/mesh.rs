@@ -55,27 +55,6 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A box around the origin of object space, of this size in metres, with separate normals for each side, and the whole of a texture
-    /// on each.
-    ///
-    /// # Errors
-    /// If the size is not finite, or too large.
-    pub fn cuboid(name: impl Into<String>, size: Vec3) -> Result<Self, SceneError> {
-        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-        for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-            let right = normal.any_orthonormal_vector();
-            let up = normal.cross(right);
-            let first = vertices.len() as u32;
-            for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-                let position = (normal + right * x + up * y) * size * 0.5;
-                let uv = [x * 0.5 + 0.5, 0.5 - y * 0.5];
-                vertices.push(Vertex { position: position.to_array(), normal: normal.to_array(), uv });
-            }
-            indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
-        }
-        Self::new(name, Topology::TriangleList, vertices, indices)
-    }
-
     /// A mesh in the engine's own buffers. `bounding_box` is its minimum and maximum in object space, in metres: triangles outside of
     /// it may be missing.
     ///

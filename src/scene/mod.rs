@@ -6,6 +6,7 @@
 mod assets;
 mod camera;
 mod changes;
+mod cuboid;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
 mod error;

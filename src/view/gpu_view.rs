@@ -24,7 +24,7 @@ use crate::scene::{Projection, SceneRef, ViewKind};
 pub struct GpuView {
     /// 0, and read by no shader. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders that branch on
     /// a member of it: it compiles them anew for each pass, and never frees what it compiled. What no shader reads is not inlined.
-    pub unread: [f32; 4],
+    pub _unread: [f32; 4],
     /// From world axes relative to the origin below to clip space: see [`RenderView::clip_from_relative`].
     pub clip_from_relative: Mat4,
     /// The lower halves of the origin that vertices are relative to: the camera's position. The camera of a directional
@@ -62,7 +62,7 @@ impl GpuView {
         let [right, up, forward] = view.picture_axes();
         let [width, height] = view.camera.size.map(|pixels| pixels as f32);
         Some(Self {
-            unread: [0.0; 4],
+            _unread: [0.0; 4],
             clip_from_relative,
             position_low,
             light_count: light_count as u32,

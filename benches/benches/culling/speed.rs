@@ -6,9 +6,8 @@ use std::time::Instant;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::CullingVolume;
-use drawloom::scene::{Camera, Material, RenderObject, Scene, SceneError};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom::view::{BoundingSphere, Frustum, ObjectTable};
-use drawloom_benches::boxes::new_box;
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::statistics::median;
 use drawloom_testing::culling::lanes::SphereArrays;
@@ -161,7 +160,7 @@ fn cloud(objects: usize, size: f64) -> Result<Scene, SceneError> {
     let mut meshes = Vec::new();
     for index in 0..16 {
         let half = random.vector(0.02, 0.5) * size as f32;
-        meshes.push(scene.add(new_box(format!("box {index}"), half)?)?);
+        meshes.push(scene.add(Mesh::cuboid(format!("box {index}"), 2.0 * half)?)?);
     }
     let material = scene.add(Material::default())?;
     for _ in 0..objects {

@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
-use drawloom_benches::boxes::new_box;
+use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_testing::random::Random;
 
 use crate::Extent;
@@ -32,7 +31,7 @@ impl Field {
         let mut random = Random::new();
         let mut scene = Scene::new();
         (scene.ambient, scene.background) = (Vec3::splat(0.02), Vec3::new(0.01, 0.01, 0.02));
-        let cube = scene.add(new_box(String::from("cube"), Vec3::ONE)?)?;
+        let cube = scene.add(Mesh::cuboid(String::from("cube"), Vec3::splat(2.0))?)?;
         let mut paints = Vec::new();
         for index in 0..MATERIALS {
             let paint =

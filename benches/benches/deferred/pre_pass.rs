@@ -6,9 +6,8 @@ use std::rc::Rc;
 use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
+use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_benches::backends::BackendName;
-use drawloom_benches::boxes::new_box;
 use drawloom_benches::table::Table;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -78,7 +77,7 @@ enum Order {
 fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     const WALLS: usize = 30;
     let mut scene = Scene::new();
-    let wall = scene.add(new_box(String::from("wall"), Vec3::new(60.0, 40.0, 0.05))?)?;
+    let wall = scene.add(Mesh::cuboid(String::from("wall"), Vec3::new(120.0, 80.0, 0.1))?)?;
     for index in 0..WALLS {
         let behind = if order == Order::FrontToBack { index } else { WALLS - 1 - index };
         let diffuse = Vec3::new(0.2, 0.5, 0.9).lerp(Vec3::new(0.9, 0.5, 0.2), behind as f32 / WALLS as f32);

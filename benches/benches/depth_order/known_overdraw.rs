@@ -6,9 +6,8 @@ use std::thread::available_parallelism;
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::quality::DepthKey;
-use drawloom::scene::{Camera, Material, RenderObject, Scene};
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene};
 use drawloom::task::Scheduler;
-use drawloom_benches::boxes::new_box;
 
 use crate::across_meshes::AcrossMeshes;
 use crate::fragment_counter::{Counts, FragmentCounter};
@@ -55,7 +54,7 @@ fn walls(distances: [f64; 2], meshes: usize) -> Result<Scene, Box<dyn Error>> {
     let material = scene.add(Material::default())?;
     let mut handles = Vec::new();
     for index in 0..meshes {
-        handles.push(scene.add(new_box(format!("wall {index}"), Vec3::new(100.0, 100.0, 0.1))?)?);
+        handles.push(scene.add(Mesh::cuboid(format!("wall {index}"), Vec3::new(200.0, 200.0, 0.2))?)?);
     }
     for (index, distance) in distances.into_iter().enumerate() {
         scene.add_object(RenderObject::new(handles[index % meshes], material, DVec3::NEG_Z * distance))?;

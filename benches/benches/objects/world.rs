@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneError};
-use drawloom_benches::boxes::new_box;
+use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_benches::moving::{Motion, Moving};
 use drawloom_testing::random::Random;
 
@@ -26,7 +25,7 @@ pub fn new(objects: usize) -> Result<Moving, SceneError> {
     let mut scene = Scene::new();
     let mut originals = Vec::new();
     for index in 0..ORIGINALS {
-        let mesh = scene.add(new_box(format!("box {index}"), random.vector(0.3, 0.5))?)?;
+        let mesh = scene.add(Mesh::cuboid(format!("box {index}"), 2.0 * random.vector(0.3, 0.5))?)?;
         let (name, diffuse) = (format!("paint {index}"), random.vector(0.2, 0.9));
         let material = scene.add(Material { name, diffuse, ..Material::default() })?;
         let (sine, cosine) = (TAU * index as f64 / ORIGINALS as f64).sin_cos();

@@ -120,7 +120,7 @@ impl Engine {
             }
         };
         if self.options.convert {
-            surface = surface.converting();
+            surface = surface.always_converting()?;
         }
         surface.set_vsync(self.vsync);
         self.windows_opened += 1;
@@ -332,7 +332,7 @@ impl ApplicationHandler for Engine {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // Surfaces go before the connection to the display does.
+        // On Wayland, surfaces must go before the connection to the display does.
         drop(mem::take(&mut self.windows));
         if let Some(report) = self.graphics.as_ref().and_then(|graphics| graphics.device.instance.generate_report()) {
             self.resources = [&report.hub.textures, &report.hub.buffers].map(|registry| registry.num_kept_from_user);

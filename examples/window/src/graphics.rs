@@ -11,9 +11,6 @@ use drawloom::{Renderer, Submitter};
 use winit::event_loop::OwnedDisplayHandle;
 use winit::window::Window;
 
-/// The surface of a window of winit's.
-pub type Surface = WindowSurface<Arc<Window>>;
-
 /// The device that all windows share, and the renderer on it.
 pub struct Graphics {
     pub device: WindowDevice,
@@ -31,7 +28,7 @@ impl Graphics {
     ///
     /// # Errors
     /// If there is none.
-    pub fn new(display: OwnedDisplayHandle, window: Arc<Window>) -> Result<(Self, Surface), Box<dyn Error>> {
+    pub fn new(display: OwnedDisplayHandle, window: Arc<Window>) -> Result<(Self, WindowSurface), Box<dyn Error>> {
         let (device, surface) = WindowDevice::open(display, window)?;
         let WindowDevice { device: wgpu_device, queue, .. } = device.clone();
         // Without these, an error of the device ends the program with a panic.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::{SurfaceError, SurfaceFrame};
+use drawloom::backend::{SurfaceError, SurfaceFrame, WindowSurface};
 use drawloom::glam::{DVec2, DVec3};
 use drawloom::scene::Camera;
 use drawloom::wgpu;
@@ -13,14 +13,14 @@ use winit::keyboard::PhysicalKey;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::fly_camera::FlyCamera;
-use crate::graphics::{Graphics, Surface};
+use crate::graphics::Graphics;
 
 /// A window, and the view of the world in it.
 pub struct ViewWindow {
     /// Of the window and of its view.
     name: String,
     window: Arc<Window>,
-    pub surface: Surface,
+    pub surface: WindowSurface,
     camera: FlyCamera,
     /// egui, while it is shown in this window.
     overlay: Option<Overlay>,
@@ -31,7 +31,7 @@ pub struct ViewWindow {
 }
 
 impl ViewWindow {
-    pub fn new(name: String, window: Arc<Window>, surface: Surface, camera: FlyCamera) -> Self {
+    pub fn new(name: String, window: Arc<Window>, surface: WindowSurface, camera: FlyCamera) -> Self {
         Self { name, window, surface, camera, overlay: None, is_due: false, is_occluded: false, is_minimized: false }
     }
 
@@ -121,7 +121,7 @@ impl ViewWindow {
         interface: impl FnMut(&mut egui::Ui),
     ) {
         let (window, overlay) = (&self.window, &mut self.overlay);
-        self.surface.present(frame, |texture| {
+        frame.present(|texture| {
             if let Some(overlay) = overlay {
                 overlay.draw(window, device, queue, texture, interface);
             }

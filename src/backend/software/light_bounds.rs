@@ -94,7 +94,7 @@ mod tests {
 
     use super::*;
     use crate::backend::software::shader_inputs::{exact_view, light_as_uploaded};
-    use crate::scene::{Assets, Camera, Changes, Light, SceneRef};
+    use crate::scene::{Assets, Camera, Light, SceneRef};
     use crate::view::{GpuLight, RenderView};
 
     const SIZE: [u32; 2] = [160, 90];

@@ -30,6 +30,8 @@ mod resources;
 mod strategy;
 mod submission;
 mod submit_frame;
+mod surface_error;
+mod surface_formats;
 mod timing;
 mod window_surface;
 
@@ -38,5 +40,6 @@ pub use frame::WgpuPassStatistics;
 pub use read_back::WgpuReadBack;
 pub use strategy::{EncodingStrategy, RecordingStrategy};
 pub use submission::WgpuSubmission;
+pub use surface_error::SurfaceError;
 pub use timing::{DeviceClock, DevicePassTime, DevicePassTimes};
-pub use window_surface::{SurfaceError, SurfaceFrame, WindowDevice, WindowSurface};
+pub use window_surface::{SurfaceFrame, WindowDevice, WindowSurface};

@@ -4,6 +4,8 @@
 /// whatever the scene requires: see [`Declare::at`](crate::process::Declare::at). What its targets hold is listed at
 /// [`GeometryBuffer`](super::GeometryBuffer).
 ///
+/// A process needs a place where what it reads and writes leaves its order open, as that of all that change `radiance` does.
+///
 /// ```text
 ///  geometry buffer │ lights │ transparency │ post-processing │
 ///  ▲               ▲        ▲              ▲                 ▲

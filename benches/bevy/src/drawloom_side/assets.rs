@@ -3,7 +3,6 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, Projection, SceneError, SceneRef};
-use drawloom_benches::boxes::new_box;
 
 use crate::layout::{self, Layout};
 
@@ -21,7 +20,7 @@ pub struct Surroundings {
 impl Surroundings {
     pub fn new(layout: &Layout) -> Result<Self, SceneError> {
         let mut assets = Assets::default();
-        let cube = |index: usize| new_box(format!("cube {index}"), Vec3::splat(0.5));
+        let cube = |index: usize| Mesh::cuboid(format!("cube {index}"), Vec3::ONE);
         let bounds = cube(0)?.bounds();
         let meshes = (0..layout::MESHES).map(|index| assets.add(cube(index)?)).collect::<Result<_, _>>()?;
         let paint = |(index, &diffuse): (usize, &[f32; 3])| Material {

@@ -1,0 +1,35 @@
+//! What can go wrong with a window's surface.
+
+use crate::process::Format;
+
+/// Why a window has no device or no surface, or its surface no texture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// wgpu makes no surface for the window.
+    #[error("the window can have no surface: {0}")]
+    Create(#[from] wgpu::CreateSurfaceError),
+    /// No adapter presents in the window.
+    #[error(
+        "no graphics adapter presents in this window ({0}); on Debian, `apt install mesa-vulkan-drivers` provides one in software"
+    )]
+    NoAdapter(#[from] wgpu::RequestAdapterError),
+    /// The adapter opens no device.
+    #[error("the graphics adapter opens no device: {0}")]
+    NoDevice(#[from] wgpu::RequestDeviceError),
+    /// The device's adapter does not present in the window.
+    #[error("the device does not present in this window")]
+    CannotPresent,
+    /// Pictures in windows are [`Format::Rgba8Srgb`] or [`Format::Bgra8Srgb`].
+    #[error("pictures in windows are Rgba8Srgb or Bgra8Srgb, and not {0:?}")]
+    PictureFormat(Format),
+    /// The surface is lost again as soon as it is made.
+    #[error("the window's surface stays lost")]
+    StaysLost,
+    /// The device is lost, or refuses the surface's settings.
+    #[error("the device refuses the window's surface: {reason}")]
+    Refused {
+        /// What wgpu says.
+        reason: String,
+    },
+}
