@@ -1,4 +1,4 @@
-//! Bevy's renderer and Drawloom side by side, doing the same work.
+//! Bevy's renderer and Drawloom side by side, drawing the same scenes.
 //!
 //!     cd benches/bevy
 //!     cargo run --release --ignore-rust-version
