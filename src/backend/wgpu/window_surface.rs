@@ -6,6 +6,7 @@ use wgpu::util::TextureBlitter;
 use wgpu::wgt::WgpuHasDisplayHandle;
 
 use super::WgpuBackend;
+use super::error_scope::with_error_scope;
 use super::resources::texture_format;
 use super::surface_error::SurfaceError;
 use super::surface_formats::{SurfaceFormats, picture_format};
@@ -301,11 +302,9 @@ impl WindowSurface {
     /// # Errors
     /// If the device refuses the settings. Without the scope its error would go to a handler that the engine may not have.
     fn configure(&mut self) -> Result<(), SurfaceError> {
-        let scope = self.graphics.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        self.surface.configure(&self.graphics.device, &self.configuration);
-        if let Some(error) = pollster::block_on(scope.pop()) {
-            return Err(SurfaceError::Refused { reason: error.to_string() });
-        }
+        let device = &self.graphics.device;
+        with_error_scope(device, "the window's surface", || self.surface.configure(device, &self.configuration))
+            .map_err(|error| SurfaceError::Refused { reason: error.to_string() })?;
         self.is_outdated = false;
         Ok(())
     }
